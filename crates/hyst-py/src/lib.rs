@@ -1,0 +1,1 @@
+//! The Python wheel `hyst` grows here; it holds nothing yet.
