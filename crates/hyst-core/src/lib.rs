@@ -1,2 +1,83 @@
-//! x
+//! Hysteresis operators, the actuator chain that they live in, and their inverses.
+//!
+//! An actuator is a chain of named stages,
+//!
+//! ```text
+//! u [V] → delay → lag → HYSTERESIS → ×temperature → +creep → resonance(s) → +drift → +interference → y
+//! ```
+//!
+//! and every stage but the hysteresis is *identity plus a correction*: leave it out and the chain is
+//! still a chain. The same source runs in firmware, on the command line and in identification, with
+//! `f32` or `f64`, without heap, without `unsafe`, without a panic on any input, and with the same
+//! bits everywhere: every transcendental function is `libm`'s and every sum has one order.
+//!
+//! Three kinds of data are three kinds of types: **parameters** ([`LagParams`], …: what a person
+//! reads, in seconds, hertz, 1/K, always `f64`), **coefficients** ([`Lag`], …: per sample period,
+//! built once by a fallible [`Build::build`]) and **state** (the history, one per actuator).
+//!
+//! | idea | file | inverse |
+//! |---|---|---|
+//! | play and stop operators | `play.rs` | – |
+//! | Prandtl-Ishlinskii | `pi.rs` | closed form, the same type |
+//! | Preisach as an Everett map | `preisach/` | closed form cell by cell |
+//! | delay, lag, resonance | `delay.rs` `lag.rs` `resonance.rs` | band-limited with preview, `preview.rs` |
+//! | creep | `creep.rs` | recursive, exact |
+//! | temperature, drift, interference | `temperature.rs` `drift.rs` `interference.rs` | division; sensor effects are not driven against |
+//! | the whole chain | `chain.rs` | `compensator.rs` |
+//!
+//! ```
+//! use hyst_core::{Env, Invert, Pi, Stage};
+//! let pi = Pi::<f64, 2>::new(0.1, &[10.0, 20.0], &[0.02, 0.01])?;
+//! let inverse = pi.invert()?;
+//! let (mut forward, mut backward) = (pi.state(), inverse.state());
+//! let env = Env::default();
+//! for reference in [0.0, 1.0, 4.0, 2.5, 3.0] {
+//!     let drive = inverse.step(&mut backward, &env, reference);
+//!     let reached = pi.step(&mut forward, &env, drive);
+//!     assert!((reached - reference).abs() < 1e-12);
+//! }
+//! # Ok::<(), hyst_core::Error>(())
+//! ```
 #![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod chain;
+mod compensator;
+mod complex;
+mod creep;
+mod delay;
+mod drift;
+mod error;
+mod first_order;
+mod interference;
+mod lag;
+mod limits;
+mod pi;
+mod play;
+mod preisach;
+mod preview;
+mod real;
+mod resonance;
+mod stage;
+mod temperature;
+
+pub use chain::{Chain, ChainState, MAX_RESONANCES};
+pub use compensator::{Compensator, CompensatorOptions, CompensatorState};
+pub use complex::Complex;
+pub use creep::{Creep, CreepInverse, CreepParams, CreepState};
+pub use delay::{Delay, DelayParams, DelayState};
+pub use drift::{Drift, DriftParams};
+pub use error::Error;
+pub use interference::{Interference, InterferenceParams};
+pub use lag::{Lag, LagParams, LagState};
+pub use limits::{Limited, Limits};
+pub use pi::{Pi, PiState};
+pub use play::{play, stop};
+pub use preisach::{Cell, Everett, EverettInverse, Grid, PreisachState, Reversals};
+pub use preview::{Preview, PreviewState};
+pub use real::Real;
+pub use resonance::{Resonance, ResonanceParams, ResonanceState};
+pub use stage::{Build, Env, Invert, Meta, Params, Sampling, Stage};
+pub use temperature::{Temperature, TemperatureParams};

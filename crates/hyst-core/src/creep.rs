@@ -1,0 +1,210 @@
+//! Creep: a bank of first-order elements beside the identity.
+//!
+//! `y = v + Σᵢ cᵢ xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. With time constants spaced evenly on a logarithmic axis the
+//! step response rises with log t, as piezoceramics do (Janocha and Kuhnen 2000). An element's
+//! share cᵢ is 1–2 % per decade in ordinary ceramics.
+
+use crate::error::{finite, within};
+use crate::first_order::FirstOrder;
+use crate::{Build, Env, Error, Invert, Real, Sampling, Stage};
+
+/// Parameters of a creep bank, borrowed: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CreepParams<'a> {
+    /// Time constants τᵢ \[s\], positive.
+    pub seconds: &'a [f64],
+    /// Shares cᵢ of the fully settled element in the output \[ratio\].
+    pub shares: &'a [f64],
+}
+
+/// Coefficients of a bank of at most `N` elements; exact for an input that is linear between
+/// samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Creep<T, const N: usize> {
+    elements: [FirstOrder<T>; N],
+    shares: [T; N],
+    len: usize,
+}
+
+impl<T: Real, const N: usize> Build<Creep<T, N>> for CreepParams<'_> {
+    type Context = Sampling;
+    fn build(&self, cx: &Sampling) -> Result<Creep<T, N>, Error> {
+        let h = cx.checked()?;
+        if self.seconds.len() != self.shares.len() {
+            return Err(Error::Lengths("creep.seconds and creep.shares"));
+        }
+        if self.seconds.len() > N {
+            return Err(Error::Capacity { name: "creep elements", needed: self.seconds.len(), holds: N });
+        }
+        let mut creep = Creep {
+            elements: [FirstOrder { a: T::ZERO, b: T::ZERO }; N],
+            shares: [T::ZERO; N],
+            len: self.seconds.len(),
+        };
+        let slots = creep.elements.iter_mut().zip(&mut creep.shares);
+        for ((element, share), (tau, c)) in slots.zip(self.seconds.iter().zip(self.shares)) {
+            within("creep.seconds", *tau, *tau > 0.0, "positive")?;
+            *element = FirstOrder::new("creep.seconds", h, *tau)?;
+            *share = T::from_f64(finite("creep.shares", *c)?);
+        }
+        Ok(creep)
+    }
+}
+
+/// History of a creep bank: one state per element and the last input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepState<T, const N: usize> {
+    x: [T; N],
+    v: T,
+}
+
+impl<T: Real, const N: usize> CreepState<T, N> {
+    pub(crate) fn new() -> Self {
+        Self { x: [T::ZERO; N], v: T::ZERO }
+    }
+}
+
+impl<T: Real, const N: usize> Creep<T, N> {
+    fn rest(&self, s: &mut CreepState<T, N>, v: T) {
+        *s = CreepState { x: [v; N], v };
+    }
+
+    /// Σ cᵢ: how much of a step follows in the end, as a ratio of what follows at once.
+    fn total(&self) -> T {
+        self.shares.iter().take(self.len).fold(T::ZERO, |sum, c| sum + *c)
+    }
+}
+
+impl<T: Real, const N: usize> Stage<T> for Creep<T, N> {
+    type State = CreepState<T, N>;
+
+    fn state(&self) -> Self::State {
+        CreepState::new()
+    }
+
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        self.rest(s, u0);
+        u0 + self.total() * u0
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let mut y = u;
+        for ((x, e), c) in s.x.iter_mut().zip(&self.elements).zip(&self.shares).take(self.len) {
+            *x = e.step(*x, s.v, u);
+            y += *c * *x;
+        }
+        s.v = u;
+        y
+    }
+}
+
+/// The exact inverse of a creep bank: the recursion solved for its input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepInverse<T, const N: usize> {
+    forward: Creep<T, N>,
+    /// 1 / (1 + Σ cᵢ bᵢ): the bank's gain within one sample.
+    scale: T,
+    /// 1 / (1 + Σ cᵢ): its gain at rest.
+    at_rest: T,
+}
+
+impl<T: Real, const N: usize> Invert<T> for Creep<T, N> {
+    type Inverse = CreepInverse<T, N>;
+
+    /// Exact and, for shares ≥ 0, stable: the bank's zeros interlace with its poles on the stable
+    /// side. Negative shares are accepted while the total gain stays positive.
+    fn invert(&self) -> Result<Self::Inverse, Error> {
+        let mut at_once = T::ONE;
+        for (e, c) in self.elements.iter().zip(&self.shares).take(self.len) {
+            at_once += *c * e.b;
+        }
+        let settled = T::ONE + self.total();
+        if at_once > T::ZERO && settled > T::ZERO {
+            Ok(CreepInverse { forward: *self, scale: T::ONE / at_once, at_rest: T::ONE / settled })
+        } else {
+            Err(Error::NotInvertible("creep shares add up to -1 or less"))
+        }
+    }
+}
+
+impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
+    type State = CreepState<T, N>;
+
+    fn state(&self) -> Self::State {
+        self.forward.state()
+    }
+
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        let v = u0 * self.at_rest;
+        self.forward.rest(s, v);
+        v
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        // What the elements would be if the input stood still; the rest is proportional to v − s.v.
+        let mut held = T::ZERO;
+        let f = &self.forward;
+        for ((x, e), c) in s.x.iter_mut().zip(&f.elements).zip(&f.shares).take(f.len) {
+            *x = e.step(*x, s.v, s.v);
+            held += *c * *x;
+        }
+        // u = v + held + Σ c b (v − s.v), solved for v.
+        let v = s.v + (u - s.v - held) * self.scale;
+        for (x, e) in s.x.iter_mut().zip(&f.elements).take(f.len) {
+            *x += e.b * (v - s.v);
+        }
+        s.v = v;
+        v
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BANK: CreepParams<'static> = CreepParams { seconds: &[0.05, 0.5, 5.0, 50.0], shares: &[0.02, 0.015, 0.01, 0.02] };
+
+    #[test]
+    fn a_step_creeps_by_the_sum_of_exponentials() {
+        let h = 0.01;
+        let creep: Creep<f64, 4> = BANK.build(&Sampling { period: h }).unwrap();
+        let (mut s, e) = (creep.state(), Env::default());
+        creep.reset(&mut s, &e, 0.0);
+        // Between the samples at 0 and h the input rises linearly; a ramp is the step's integral.
+        creep.step(&mut s, &e, 1.0);
+        for k in 2..2000 {
+            let t = h * f64::from(k);
+            let y = creep.step(&mut s, &e, 1.0);
+            let mut expected = 1.0;
+            for (tau, c) in BANK.seconds.iter().zip(BANK.shares) {
+                let decayed = tau / h * (libm::exp(-(t - h) / tau) - libm::exp(-t / tau));
+                expected += c * (1.0 - decayed);
+            }
+            assert!((y - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn inverse_is_exact_also_with_other_time_scales() {
+        for h in [1e-5, 1e-2, 10.0] {
+            let creep: Creep<f64, 4> = BANK.build(&Sampling { period: h }).unwrap();
+            let inverse = creep.invert().unwrap();
+            let (mut s, mut i, e) = (creep.state(), inverse.state(), Env::default());
+            let first = inverse.reset(&mut i, &e, 0.7);
+            assert!((creep.reset(&mut s, &e, first) - 0.7).abs() < 1e-14);
+            for k in 0..5000 {
+                let reference = libm::sin(0.1 * f64::from(k)) + libm::sin(2.3 * f64::from(k));
+                let v = inverse.step(&mut i, &e, reference);
+                assert!((creep.step(&mut s, &e, v) - reference).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn unequal_lists_are_refused() {
+        let built: Result<Creep<f64, 4>, _> = CreepParams { seconds: &[1.0], shares: &[] }.build(&Sampling { period: 1.0 });
+        assert!(matches!(built, Err(Error::Lengths(_))));
+    }
+}

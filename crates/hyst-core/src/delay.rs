@@ -1,0 +1,121 @@
+//! Dead time: `y(t) = u(t − d)`.
+
+use crate::error::within;
+use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
+
+/// Parameters of a dead time `y(t) = u(t − d)`. Zero is no delay.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DelayParams {
+    /// Dead time d \[s\].
+    pub seconds: f64,
+}
+
+impl Params for DelayParams {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: 0.5 }, &mut self.seconds);
+    }
+}
+
+/// Coefficients of a dead time at one sample period, at most `N − 2` whole samples long.
+///
+/// A fraction of a sample interpolates linearly, which is exact for a drive that is linear between
+/// samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Delay<T, const N: usize> {
+    whole: usize,
+    fraction: T,
+}
+
+impl<T: Real, const N: usize> Build<Delay<T, N>> for DelayParams {
+    type Context = Sampling;
+    fn build(&self, cx: &Sampling) -> Result<Delay<T, N>, Error> {
+        let h = cx.checked()?;
+        let samples = within("delay.seconds", self.seconds, self.seconds >= 0.0, "zero or positive")? / h;
+        let whole = libm::floor(samples);
+        // Compared as f64: a huge delay must not wrap when it becomes an integer.
+        if whole + 2.0 > N as f64 {
+            return Err(Error::Capacity { name: "delay samples", needed: (whole as usize).saturating_add(2), holds: N });
+        }
+        Ok(Delay { whole: whole as usize, fraction: T::from_f64(samples - whole) })
+    }
+}
+
+/// History of a delay: the last `N` inputs in a ring.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DelayState<T, const N: usize> {
+    ring: [T; N],
+    newest: usize,
+}
+
+impl<T: Real, const N: usize> DelayState<T, N> {
+    pub(crate) fn new() -> Self {
+        Self { ring: [T::ZERO; N], newest: 0 }
+    }
+}
+
+impl<T: Real, const N: usize> Stage<T> for Delay<T, N> {
+    type State = DelayState<T, N>;
+
+    fn state(&self) -> Self::State {
+        DelayState::new()
+    }
+
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        s.ring = [u0; N];
+        u0
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
+        if let Some(slot) = s.ring.get_mut(s.newest) {
+            *slot = u;
+        }
+        let back = |k: usize| {
+            let at = if s.newest >= k { s.newest - k } else { s.newest + N - k };
+            s.ring.get(at).copied().unwrap_or(u)
+        };
+        let (near, far) = (back(self.whole), back(self.whole + 1));
+        near + self.fraction * (far - near)
+    }
+}
+
+impl<T: Real, const N: usize> Delay<T, N> {
+    /// Whole samples of the dead time.
+    pub fn whole_samples(&self) -> usize {
+        self.whole
+    }
+    /// Response at `z⁻¹` of the fraction alone, without the whole samples.
+    pub fn fraction_response(&self, z1: Complex) -> Complex {
+        let f = self.fraction.to_f64();
+        z1 * f + (1.0 - f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_arrives_late_by_exactly_the_dead_time() {
+        let h = 1e-3;
+        let delay: Delay<f64, 8> = DelayParams { seconds: 3.25e-3 }.build(&Sampling { period: h }).unwrap();
+        let mut s = delay.state();
+        let e = Env::default();
+        delay.reset(&mut s, &e, 0.0);
+        for k in 1..50 {
+            let t = h * f64::from(k);
+            let y = delay.step(&mut s, &e, t);
+            if k > 4 {
+                assert!((y - (t - 3.25e-3)).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn a_delay_longer_than_the_ring_says_so() {
+        let built: Result<Delay<f64, 8>, _> = DelayParams { seconds: 1e300 }.build(&Sampling { period: 1e-3 });
+        assert!(matches!(built, Err(Error::Capacity { holds: 8, .. })));
+    }
+}

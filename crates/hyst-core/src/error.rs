@@ -1,0 +1,58 @@
+//! What can be wrong with parameters.
+
+use core::fmt;
+
+/// Why coefficients or an inverse could not be built. Each variant names the parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Error {
+    /// The parameter is NaN or infinite.
+    NonFinite(&'static str),
+    /// The parameter is outside the range in which the stage is defined.
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// The range, in words.
+        must: &'static str,
+    },
+    /// More elements than the stage's type has room for.
+    Capacity {
+        /// What there are too many of.
+        name: &'static str,
+        /// How many would be needed.
+        needed: usize,
+        /// How many the type holds.
+        holds: usize,
+    },
+    /// Two lists that belong together differ in length.
+    Lengths(&'static str),
+    /// The operator has no inverse.
+    NotInvertible(&'static str),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NonFinite(name) => write!(f, "{name} is not a finite number"),
+            Self::OutOfRange { name, must } => write!(f, "{name} must be {must}"),
+            Self::Capacity { name, needed, holds } => {
+                write!(f, "{name}: {needed} needed, but this type holds {holds}")
+            }
+            Self::Lengths(name) => write!(f, "{name} differ in length"),
+            Self::NotInvertible(why) => write!(f, "no inverse: {why}"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+/// Refuses NaN and infinities, naming the parameter.
+pub(crate) fn finite(name: &'static str, x: f64) -> Result<f64, Error> {
+    if x.is_finite() { Ok(x) } else { Err(Error::NonFinite(name)) }
+}
+
+/// Refuses what is not finite or fails `ok`, naming parameter and range.
+pub(crate) fn within(name: &'static str, x: f64, ok: bool, must: &'static str) -> Result<f64, Error> {
+    finite(name, x)?;
+    if ok { Ok(x) } else { Err(Error::OutOfRange { name, must }) }
+}

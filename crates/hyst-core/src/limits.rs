@@ -1,0 +1,61 @@
+//! Limits of the drive: voltage and slew.
+
+use crate::error::{finite, within};
+use crate::{Error, Real, Sampling};
+
+/// Voltage and slew limits of an amplifier, per sample period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits<T> {
+    low: T,
+    high: T,
+    step: T,
+}
+
+/// A drive after limiting, and which limits acted on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limited<T> {
+    /// What may be applied \[V\].
+    pub drive: T,
+    /// The voltage limit acted.
+    pub voltage: bool,
+    /// The slew limit acted.
+    pub slew: bool,
+}
+
+impl<T: Real> Limits<T> {
+    /// Voltage from `low` to `high` \[V\]; at most `slew` \[V/s\], infinite for none.
+    ///
+    /// # Errors
+    /// If a bound is not finite, `low ≥ high` or the slew is not positive.
+    pub fn new(low: f64, high: f64, slew: f64, sampling: &Sampling) -> Result<Self, Error> {
+        finite("voltage minimum", low)?;
+        within("voltage maximum", high, high > low, "above the minimum")?;
+        if slew.is_nan() || slew <= 0.0 {
+            return Err(Error::OutOfRange { name: "slew", must: "positive" });
+        }
+        let step = slew * sampling.checked()?;
+        Ok(Self { low: T::from_f64(low), high: T::from_f64(high), step: T::from_f64(step) })
+    }
+
+    /// The allowed drive nearest to `wanted`, one period after `last`. NaN gives `last`.
+    #[inline]
+    pub fn apply(&self, last: T, wanted: T) -> Limited<T> {
+        let inside = wanted.at_least(self.low).at_most(self.high);
+        let drive = inside.at_least(last - self.step).at_most(last + self.step);
+        Limited { drive: if drive.is_finite() { drive } else { last }, voltage: inside != wanted, slew: drive != inside }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_limit_is_kept_and_reported() {
+        let l = Limits::<f64>::new(0.0, 120.0, 1000.0, &Sampling { period: 1e-3 }).unwrap();
+        assert_eq!(l.apply(50.0, 50.5), Limited { drive: 50.5, voltage: false, slew: false });
+        assert_eq!(l.apply(50.0, 60.0), Limited { drive: 51.0, voltage: false, slew: true });
+        assert_eq!(l.apply(119.5, 130.0), Limited { drive: 120.0, voltage: true, slew: false });
+        assert!(l.apply(10.0, f64::NAN).drive.is_finite());
+    }
+}

@@ -1,0 +1,159 @@
+//! The Prandtl-Ishlinskii operator and its closed-form inverse.
+//!
+//! `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)` (Brokate and Sprekels 1996; Kuhnen 2003). The inverse is an
+//! operator of the same type.
+
+use crate::error::{finite, within};
+use crate::{Env, Error, Invert, Real, Stage, play};
+
+/// Prandtl-Ishlinskii operator with at most `N` plays: `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pi<T, const N: usize> {
+    gain: T,
+    thresholds: [T; N],
+    weights: [T; N],
+    len: usize,
+}
+
+impl<T: Real, const N: usize> Pi<T, N> {
+    /// From the identity's gain p₀ \[output unit/V\], thresholds rᵢ \[V\] and weights wᵢ \[output
+    /// unit/V\].
+    ///
+    /// # Errors
+    /// If a number is not finite, the lists differ in length or are longer than `N`, or the
+    /// thresholds are not positive and strictly rising.
+    pub fn new(gain: f64, thresholds: &[f64], weights: &[f64]) -> Result<Self, Error> {
+        finite("pi.gain", gain)?;
+        if thresholds.len() != weights.len() {
+            return Err(Error::Lengths("pi.thresholds and pi.weights"));
+        }
+        if thresholds.len() > N {
+            return Err(Error::Capacity { name: "pi plays", needed: thresholds.len(), holds: N });
+        }
+        let mut pi = Self { gain: T::from_f64(gain), thresholds: [T::ZERO; N], weights: [T::ZERO; N], len: thresholds.len() };
+        let mut last = 0.0;
+        let slots = pi.thresholds.iter_mut().zip(&mut pi.weights);
+        for ((slot_r, slot_w), (r, w)) in slots.zip(thresholds.iter().zip(weights)) {
+            within("pi.thresholds", *r, *r > last, "positive and strictly rising")?;
+            *slot_r = T::from_f64(*r);
+            *slot_w = T::from_f64(finite("pi.weights", *w)?);
+            last = *r;
+        }
+        Ok(pi)
+    }
+
+    #[inline]
+    fn advance(&self, s: &mut PiState<T, N>, u: T) -> T {
+        let mut y = self.gain * u;
+        let plays = s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights).take(self.len);
+        for ((p, r), w) in plays {
+            *p = play(*p, u, *r);
+            y += *w * *p;
+        }
+        y
+    }
+}
+
+/// History of the operator: the output of each play \[V\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PiState<T, const N: usize> {
+    plays: [T; N],
+}
+
+impl<T: Real, const N: usize> Stage<T> for Pi<T, N> {
+    type State = PiState<T, N>;
+
+    fn state(&self) -> Self::State {
+        PiState { plays: [T::ZERO; N] }
+    }
+
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        s.plays = [T::ZERO; N];
+        self.advance(s, u0)
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        self.advance(s, u)
+    }
+}
+
+impl<T: Real, const N: usize> Invert<T> for Pi<T, N> {
+    type Inverse = Self;
+
+    /// With the slopes `Sⱼ = p₀ + Σ_{i≤j} wᵢ` of the initial curve behind threshold j, the inverse
+    /// has the gain 1/p₀, the thresholds `r'ⱼ = p₀ rⱼ + Σ_{i<j} wᵢ (rⱼ − rᵢ)` and the weights
+    /// `w'ⱼ = 1/Sⱼ − 1/Sⱼ₋₁` (Kuhnen 2003). Exists if every slope is positive.
+    fn invert(&self) -> Result<Self, Error> {
+        const WHY: &str = "p0 plus the first weights must stay positive for a rising initial curve";
+        let gain = self.gain.to_f64();
+        if gain.is_nan() || gain <= 0.0 {
+            return Err(Error::NotInvertible(WHY));
+        }
+        let mut inverse = Self { gain: T::from_f64(1.0 / gain), ..*self };
+        // In f64 whatever T is: thresholds of the inverse are sums of many products.
+        let (mut slope, mut height, mut last) = (gain, 0.0, 0.0);
+        let slots = inverse.thresholds.iter_mut().zip(&mut inverse.weights);
+        for ((slot_r, slot_w), (r, w)) in slots.zip(self.thresholds.iter().zip(&self.weights)).take(self.len) {
+            height += slope * (r.to_f64() - last);
+            last = r.to_f64();
+            let next = slope + w.to_f64();
+            if next.is_nan() || next <= 0.0 {
+                return Err(Error::NotInvertible(WHY));
+            }
+            *slot_r = T::from_f64(height);
+            // 1/next − 1/slope without the difference of two near numbers.
+            *slot_w = T::from_f64(-w.to_f64() / (next * slope));
+            slope = next;
+        }
+        Ok(inverse)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    proptest! {
+        #[test]
+        fn inverse_after_and_before_is_the_identity(
+            gain in 0.02..2.0f64,
+            steps in prop::collection::vec((0.01..5.0f64, 0.0..1.0f64), 1..16),
+            u in prop::collection::vec(-20.0..20.0f64, 50..200),
+        ) {
+            let mut at = 0.0;
+            let thresholds: Vec<f64> = steps.iter().map(|(d, _)| { at += d; at }).collect();
+            let weights: Vec<f64> = steps.iter().map(|(_, w)| *w).collect();
+            let pi = Pi::<f64, 16>::new(gain, &thresholds, &weights).unwrap();
+            let inverse = pi.invert().unwrap();
+            let e = Env::default();
+            let (mut a, mut b) = (pi.state(), inverse.state());
+            let (mut c, mut d) = (pi.state(), inverse.state());
+            let span = 20.0 * (gain + weights.iter().sum::<f64>());
+            for x in &u {
+                // M⁻¹ ∘ M
+                let y = pi.step(&mut a, &e, *x);
+                prop_assert!((inverse.step(&mut b, &e, y) - x).abs() <= 1e-12 * 20.0 * (span / gain / 20.0));
+                // M ∘ M⁻¹, references within the reach of ±20 V
+                let reference = x * gain;
+                let v = inverse.step(&mut d, &e, reference);
+                prop_assert!((pi.step(&mut c, &e, v) - reference).abs() <= 1e-12 * span);
+            }
+        }
+    }
+
+    #[test]
+    fn a_falling_branch_has_no_inverse() {
+        let pi = Pi::<f64, 2>::new(0.1, &[1.0, 2.0], &[-0.2, 0.5]).unwrap();
+        assert!(matches!(pi.invert(), Err(Error::NotInvertible(_))));
+        assert!(Pi::<f64, 2>::new(0.0, &[1.0], &[1.0]).unwrap().invert().is_err());
+    }
+
+    #[test]
+    fn unordered_thresholds_are_refused() {
+        assert!(Pi::<f64, 2>::new(0.1, &[2.0, 1.0], &[0.1, 0.1]).is_err());
+        assert!(Pi::<f64, 1>::new(0.1, &[1.0, 2.0], &[0.1, 0.1]).is_err());
+    }
+}

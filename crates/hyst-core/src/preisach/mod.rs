@@ -1,0 +1,13 @@
+//! The classical Preisach operator as an Everett map on a grid, with its inverse.
+//!
+//! The output is a sum over relays (α, β) with α ≥ β; the memory of all of them is the stack of
+//! dominating reversals (Mayergoyz 2003). `reversals.rs` is that stack, `everett.rs` the map,
+//! `operator.rs` the operator and its inverse.
+
+mod everett;
+mod operator;
+mod reversals;
+
+pub use everett::{Cell, Everett, Grid};
+pub use operator::{EverettInverse, PreisachState};
+pub use reversals::Reversals;

@@ -1,0 +1,304 @@
+//! The Preisach operator and its exact inverse.
+
+use super::{Everett, Reversals};
+use crate::{Env, Error, Invert, Real, Stage};
+
+/// Reversals that one operator keeps. Virgin memory in the middle of a grid needs two per cell.
+const DEPTH: usize = 128;
+
+/// History of a Preisach operator: the dominating reversals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreisachState<T> {
+    memory: Reversals<T, DEPTH>,
+    /// The output at rest is zero by definition; this is what the map says it is.
+    zero: T,
+}
+
+impl<T: Real> PreisachState<T> {
+    /// The reversal stack.
+    pub fn memory(&self) -> &Reversals<T, DEPTH> {
+        &self.memory
+    }
+}
+
+impl<T: Real, const N: usize> Everett<T, N> {
+    /// Output at `u` on the branch that the memory is on.
+    #[inline]
+    fn on_branch<const M: usize>(&self, memory: &Reversals<T, M>, u: T) -> T {
+        match (memory.branch(), memory.rising()) {
+            (None, _) => self.virgin(u),
+            (Some((from, y)), true) => y + self.value(u, from),
+            (Some((from, y)), false) => y - self.value(from, u),
+        }
+    }
+
+    /// Virgin memory at the rest input: relays with their centre below it are up. Seen from the low
+    /// end that is a spiral of reversals, one node further in each time.
+    fn virgin_memory(&self, s: &mut PreisachState<T>) {
+        s.memory = Reversals::new(self.low, T::ZERO);
+        s.zero = T::ZERO;
+        let mut reach = (self.at(self.cells) - self.rest).at_most(self.rest - self.low);
+        let middle = self.rest;
+        // `reach` falls by a cell each turn, so this ends after at most `cells` turns.
+        for _ in 0..self.cells {
+            if reach <= T::ZERO {
+                break;
+            }
+            s.memory.advance(middle + reach, |m, u| self.on_branch(m, u));
+            s.memory.advance(middle - reach, |m, u| self.on_branch(m, u));
+            reach = reach - self.width;
+        }
+        s.memory.advance(middle, |m, u| self.on_branch(m, u));
+        s.zero = s.memory.output();
+    }
+
+    /// Output that the operator would have at its lowest and highest grid input, given the memory.
+    fn reach(&self, s: &PreisachState<T>) -> (T, T) {
+        let (mut down, mut up) = (s.memory.clone(), s.memory.clone());
+        let low = down.advance(self.low, |m, u| self.on_branch(m, u));
+        let high = up.advance(self.at(self.cells), |m, u| self.on_branch(m, u));
+        (low - s.zero, high - s.zero)
+    }
+}
+
+impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
+    type State = PreisachState<T>;
+
+    fn state(&self) -> Self::State {
+        PreisachState { memory: Reversals::new(self.low, T::ZERO), zero: T::ZERO }
+    }
+
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        self.virgin_memory(s);
+        self.step(s, e, u0)
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        s.memory.advance(u, |m, u| self.on_branch(m, u)) - s.zero
+    }
+}
+
+/// The exact inverse of a Preisach operator.
+///
+/// The map rises strictly in the input on every branch, so the input that reaches an output is
+/// unique: loops whose closing output is passed are wiped out, then the branch is searched by
+/// bisection over its grid nodes and solved linearly inside one cell. Outputs that the grid cannot
+/// reach are sought on the linear continuation outside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EverettInverse<T, const N: usize> {
+    forward: Everett<T, N>,
+}
+
+impl<T: Real, const N: usize> Invert<T> for Everett<T, N> {
+    type Inverse = EverettInverse<T, N>;
+
+    /// Needs a positive reversible slope in every diagonal cell: then every branch rises strictly.
+    fn invert(&self) -> Result<Self::Inverse, Error> {
+        if (0..self.cells).all(|i| self.reversible(i) > T::ZERO) {
+            Ok(EverettInverse { forward: self.clone() })
+        } else {
+            Err(Error::NotInvertible("a diagonal cell of the Preisach triangle has no reversible slope"))
+        }
+    }
+}
+
+impl<T: Real, const N: usize> EverettInverse<T, N> {
+    /// Outputs at the lowest and the highest input of the grid, from the present memory
+    /// \[output unit\].
+    pub fn reach(&self, s: &PreisachState<T>) -> (T, T) {
+        self.forward.reach(s)
+    }
+
+    /// The input on the present branch at which the output is `y`.
+    fn solve(&self, memory: &Reversals<T, DEPTH>, y: T) -> T {
+        let f = &self.forward;
+        let up = memory.rising();
+        let at = |u: T| f.on_branch(memory, u);
+        let last = f.cells;
+        // Edges first: outside the grid the branch goes on with a constant slope.
+        let (lowest, highest) = (f.low, f.at(last));
+        if memory.now() > highest || up {
+            let top = at(highest);
+            if top <= y {
+                return highest + (y - top) / f.reversible(last - 1);
+            }
+        }
+        if memory.now() < lowest || !up {
+            let bottom = at(lowest);
+            if bottom >= y {
+                return lowest + (y - bottom) / f.reversible(0);
+            }
+        }
+        // Between where the branch is now and the edge, in whole cells.
+        let from = memory.now().at_least(lowest).at_most(highest);
+        let here = f.locate(from).index;
+        let (mut a, mut b) = if up { (here, last) } else { (0, here + 1) };
+        while b - a > 1 {
+            let middle = a + (b - a) / 2;
+            if at(f.at(middle)) <= y { a = middle } else { b = middle }
+        }
+        let (mut left, mut right) = (f.at(a), f.at(b));
+        // The cell in which the branch begins has a kink there: solve on its own side.
+        if let Some((start, _)) = memory.branch() {
+            if up { left = left.at_least(start.at_most(right)) } else { right = right.at_most(start.at_least(left)) }
+        }
+        let (y_left, y_right) = (at(left), at(right));
+        if y_right > y_left { left + (y - y_left) * ((right - left) / (y_right - y_left)) } else { left }
+    }
+}
+
+impl<T: Real, const N: usize> Stage<T> for EverettInverse<T, N> {
+    type State = PreisachState<T>;
+
+    fn state(&self) -> Self::State {
+        self.forward.state()
+    }
+
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        self.forward.virgin_memory(s);
+        self.step(s, e, u0)
+    }
+
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let y = u + s.zero;
+        let memory = &mut s.memory;
+        if y == memory.output() || !y.is_finite() {
+            return memory.now();
+        }
+        let up = y > memory.output();
+        memory.turn(up);
+        while let Some((_, closing)) = memory.target() {
+            if if up { y >= closing } else { y <= closing } {
+                memory.wipe();
+            } else {
+                break;
+            }
+        }
+        let input = self.solve(memory, y);
+        // The output is `y` by construction; storing it keeps rounding from piling up.
+        memory.set(input, y);
+        input
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Grid;
+    use super::*;
+    use proptest::prelude::*;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    type Map = Everett<f64, 13>;
+    const CELLS: usize = 12;
+
+    fn map(rest: f64, densities: &[f64]) -> Box<Map> {
+        let mut d = densities.iter().copied().cycle();
+        let mut next = move || d.next().unwrap();
+        let mut other = next.clone();
+        let low = if rest > 0.0 { 0.0 } else { rest };
+        let grid = Grid { low, high: low + 120.0, cells: CELLS };
+        Box::new(
+            Everett::new(grid, rest, |a, b| next() + if a == b { 0.3 } else { 0.0 }, |_| if rest > low { 0.0 } else { other() })
+                .unwrap(),
+        )
+    }
+
+    fn run(m: &Map, u: &[f64]) -> Vec<f64> {
+        let (mut s, e) = (m.state(), Env::default());
+        m.reset(&mut s, &e, m.rest);
+        u.iter().map(|u| m.step(&mut s, &e, *u)).collect()
+    }
+
+    fn densities() -> impl Strategy<Value = Vec<f64>> {
+        prop::collection::vec(0.0..1.0f64, 90)
+    }
+    fn inputs() -> impl Strategy<Value = Vec<f64>> {
+        prop::collection::vec(0.0..120.0f64, 20..120)
+    }
+
+    proptest! {
+        /// Wiping out: a loop inside a larger one leaves no trace once it is passed.
+        #[test]
+        fn inner_loops_leave_no_trace(d in densities(), inner in prop::collection::vec(40.0..80.0f64, 1..20), after in inputs(), bipolar: bool) {
+            let m = map(if bipolar { 60.0 } else { 0.0 }, &d);
+            let mut with: Vec<f64> = std::vec![100.0, 20.0];
+            with.extend(&inner);
+            with.push(100.0);
+            with.extend(&after);
+            let mut without: Vec<f64> = std::vec![100.0, 20.0, 100.0];
+            without.extend(&after);
+            let (a, b) = (run(&m, &with), run(&m, &without));
+            let tail = after.len() + 1;
+            for (x, y) in a[a.len() - tail..].iter().zip(&b[b.len() - tail..]) {
+                prop_assert!((x - y).abs() < 1e-10, "{x} {y}");
+            }
+        }
+
+        /// Congruency: minor loops between the same two inputs have the same shape, whatever the
+        /// history.
+        #[test]
+        fn minor_loops_are_congruent(d in densities(), history in inputs(), low in 5.0..60.0f64, swing in 1.0..55.0f64) {
+            let m = map(0.0, &d);
+            let high = low + swing;
+            let sweep: Vec<f64> = (0..=20).map(|k| low + swing * f64::from(k) / 20.0).collect();
+            let shape = |history: &[f64]| {
+                let mut u = history.to_vec();
+                // Arrive at `low` from a larger swing, so that the loop is inside it.
+                u.extend([119.0, 0.5, high, low]);
+                u.extend(&sweep);
+                let y = run(&m, &u);
+                let tail = &y[y.len() - sweep.len()..];
+                tail.iter().map(|v| v - tail[0]).collect::<Vec<_>>()
+            };
+            let (a, b) = (shape(&history), shape(&[119.0, 0.5, 118.0, 3.0, 117.0]));
+            for (x, y) in a.iter().zip(&b) {
+                prop_assert!((x - y).abs() < 1e-10);
+            }
+        }
+
+        #[test]
+        fn inverse_reaches_every_reference(d in densities(), u in inputs(), bipolar: bool) {
+            let m = map(if bipolar { 60.0 } else { 0.0 }, &d);
+            let inverse = m.invert().unwrap();
+            let e = Env::default();
+            let (mut f, mut s, mut i) = (m.state(), m.state(), inverse.state());
+            m.reset(&mut f, &e, m.rest);
+            m.reset(&mut s, &e, m.rest);
+            inverse.reset(&mut i, &e, 0.0);
+            let span = m.value(120.0, 0.0);
+            for u in &u {
+                // References within reach: what the operator itself gives for some input.
+                let reference = m.step(&mut s, &e, *u);
+                let drive = inverse.step(&mut i, &e, reference);
+                prop_assert!((m.step(&mut f, &e, drive) - reference).abs() < 1e-11 * span.max(1.0), "{reference}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_virgin_output_at_rest_is_zero() {
+        for rest in [0.0, 60.0] {
+            let m = map(rest, &[0.3, 0.1, 0.7]);
+            let mut s = m.state();
+            assert!(m.reset(&mut s, &Env::default(), rest).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_full_stack_forgets_the_smallest_loop_and_stays_bounded() {
+        let m = map(0.0, &[0.3, 0.1, 0.7]);
+        let u: Vec<f64> = (0..1000).map(|k| 60.0 + if k % 2 == 0 { 1.0 } else { -1.0 } * (59.0 - 0.05 * f64::from(k))).collect();
+        let y = run(&m, &u);
+        let top = m.virgin(120.0);
+        assert!(y.iter().all(|y| y.is_finite() && *y >= 0.0 && *y <= top));
+    }
+
+    #[test]
+    fn outside_the_grid_the_reversible_slope_goes_on() {
+        let m = map(0.0, &[0.3, 0.1, 0.7]);
+        let y = run(&m, &[130.0, 140.0, 130.0]);
+        assert!((y[0] - y[2]).abs() < 1e-9 && y[1] > y[0]);
+    }
+}
