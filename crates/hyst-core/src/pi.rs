@@ -60,15 +60,22 @@ pub struct PiState<T, const N: usize> {
     plays: [T; N],
 }
 
+impl<T: Real, const N: usize> PiState<T, N> {
+    /// Virgin memory: every play at 0.
+    pub fn virgin() -> Self {
+        Self { plays: [T::ZERO; N] }
+    }
+}
+
 impl<T: Real, const N: usize> Stage<T> for Pi<T, N> {
     type State = PiState<T, N>;
 
     fn state(&self) -> Self::State {
-        PiState { plays: [T::ZERO; N] }
+        PiState::virgin()
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        s.plays = [T::ZERO; N];
+        *s = PiState::virgin();
         self.advance(s, u0)
     }
 

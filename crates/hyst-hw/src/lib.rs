@@ -1,1 +1,31 @@
-//! x
+//! Data acquisition: one trait for everything that drives an actuator and measures it, a runner
+//! that is generic over the trait, and a simulated actuator that implements it.
+//!
+//! - [`Daq`]: start a sample clock, exchange drive for measurements, let the device rest, stop.
+//! - [`record`]: plays drive segments on any [`Daq`] and returns what was measured.
+//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file).
+//!
+//! ```
+//! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};
+//! use std::ops::ControlFlow;
+//!
+//! let config = PlantConfig::random_with(7, &["creep"])?;
+//! let top_v = config.actuator.max_v;
+//! let mut plant = Plant::new(config)?;
+//! let drive: Vec<f64> = (0..200).map(|k| top_v * f64::from(k) / 200.0).collect();
+//! let recording = record(&mut plant, &[drive], &RecordOptions::at(1000.0), |_| ControlFlow::Continue(()))?;
+//! assert_eq!(recording.segments[0].samples.len(), 200);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod daq;
+mod plant;
+mod runner;
+
+pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
+pub use plant::config::{
+    Actuator, Creep, Delay, Drift, Interference, Lag, Mode, PlantConfig, Sensor, Temperature, TemperatureShape,
+};
+pub use plant::error::{ConfigError, PlantError};
+pub use plant::{EFFECTS, Plant};
+pub use runner::{Cause, Failure, Phase, Progress, RecordOptions, Recording, SegmentRecord, record};

@@ -1,1 +1,26 @@
-//! x
+//! Records, fits, simulation, diagnosis and experiment design for actuators with hysteresis.
+//!
+//! The way of a record: [`record::Record`] (read and checked) → [`fit::fit`] (a base model) →
+//! [`diagnose::diagnose`] (what the model lacks, named and added) → [`compensate::compensate`] (the
+//! drive that makes the actuator follow a reference). [`simulate::simulate`] says what a model
+//! predicts, [`excite`] designs the drive of an identification experiment.
+//!
+//! Knows nothing of devices and terminals: progress is told to closures, results are returned.
+
+pub mod atomic_file;
+mod base;
+pub mod compensate;
+pub mod diagnose;
+pub mod excite;
+pub mod fit;
+mod lsq;
+pub mod metrics;
+pub mod model;
+mod nested;
+mod noise;
+pub mod record;
+mod samples;
+mod settle;
+pub mod simulate;
+
+pub use samples::Samples;

@@ -15,6 +15,11 @@ pub struct PreisachState<T> {
 }
 
 impl<T: Real> PreisachState<T> {
+    /// A memory that was never reset.
+    pub fn empty() -> Self {
+        Self { memory: Reversals::new(T::ZERO, T::ZERO), zero: T::ZERO }
+    }
+
     /// The reversal stack.
     pub fn memory(&self) -> &Reversals<T, DEPTH> {
         &self.memory
@@ -65,7 +70,7 @@ impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
     type State = PreisachState<T>;
 
     fn state(&self) -> Self::State {
-        PreisachState { memory: Reversals::new(self.low, T::ZERO), zero: T::ZERO }
+        PreisachState::empty()
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {

@@ -1,0 +1,173 @@
+//! The chain from drive to displacement, computed on a grid finer than the samples.
+
+use std::f64::consts::TAU;
+
+use super::config::PlantConfig;
+use super::creep::Creep;
+use super::input::InputPath;
+use super::relays::Hysteresis;
+use super::structure::Structure;
+use super::temperature::Climate;
+
+/// Fewest fine steps in a sample period.
+const MIN_STEPS: f64 = 8.0;
+/// Fine step times the fastest rate of the chain (`ω` of a mode, `1/τ` of a lag or creep element).
+const MAX_STEP_RATE: f64 = 0.05;
+
+/// Drive → delay → lag → hysteresis → × temperature → + creep → modes, with all their memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Chain {
+    /// Fine steps in a sample period.
+    steps: u32,
+    input: InputPath,
+    hysteresis: Hysteresis,
+    creep: Option<Creep>,
+    structure: Structure,
+    /// Outputs of the hysteresis with temperature, and with creep, at the end of the last fine step.
+    before_creep: f64,
+    after_creep: f64,
+}
+
+impl Chain {
+    /// The chain at rest, for samples at `rate_hz`.
+    pub(crate) fn new(config: &PlantConfig, hysteresis: Hysteresis, rate_hz: f64) -> Self {
+        Self::with_steps(config, hysteresis, rate_hz, fine_steps(config, rate_hz))
+    }
+
+    fn with_steps(config: &PlantConfig, hysteresis: Hysteresis, rate_hz: f64, steps: u32) -> Self {
+        let step_s = 1.0 / (rate_hz * f64::from(steps));
+        let mut chain = Self {
+            steps,
+            input: InputPath::new(
+                config.actuator.rest_v,
+                config.delay.as_ref().map_or(0.0, |delay| delay.seconds * rate_hz),
+                config.lag.as_ref().map(|lag| step_s / lag.seconds),
+            ),
+            hysteresis,
+            creep: config.creep.as_ref().map(|creep| Creep::new(creep, step_s)),
+            structure: Structure::new(&config.modes, step_s),
+            before_creep: 0.0,
+            after_creep: 0.0,
+        };
+        chain.reset();
+        chain
+    }
+
+    /// One sample period from lab time `from_s` to `to_s`, in which the drive goes in a straight
+    /// line to `drive_v`; returns the displacement at its end (µm).
+    pub(crate) fn advance(&mut self, drive_v: f64, climate: Option<&Climate>, from_s: f64, to_s: f64) -> f64 {
+        // The temperature is slow: a straight line within a sample period is true to it.
+        let factor = |t| climate.map_or(1.0, |climate| climate.factor(t));
+        let (factor_begin, factor_end) = (factor(from_s), factor(to_s));
+        self.input.push(drive_v);
+        let mut from = 0.0;
+        let mut position = 0.0;
+        for j in 1..=self.steps {
+            let to = f64::from(j) / f64::from(self.steps);
+            let volts = self.input.advance(from, to);
+            let scale = factor_begin + to * (factor_end - factor_begin);
+            let before_creep = self.hysteresis.move_to(volts) * scale;
+            let crept = self.creep.as_mut().map_or(0.0, |creep| creep.advance(self.before_creep, before_creep));
+            let after_creep = before_creep + crept;
+            position = self.structure.advance(self.after_creep, after_creep);
+            (self.before_creep, self.after_creep) = (before_creep, after_creep);
+            from = to;
+        }
+        position
+    }
+
+    /// Back to the virgin state at rest.
+    pub(crate) fn reset(&mut self) {
+        self.input.reset();
+        self.hysteresis.reset();
+        if let Some(creep) = &mut self.creep {
+            creep.reset();
+        }
+        self.structure.reset();
+        // Displacement is counted from the virgin rest.
+        (self.before_creep, self.after_creep) = (0.0, 0.0);
+    }
+}
+
+/// Fine steps in a sample period, so that the fastest motion is well resolved.
+fn fine_steps(config: &PlantConfig, rate_hz: f64) -> u32 {
+    let lag = config.lag.iter().map(|lag| 1.0 / lag.seconds);
+    let creep = config.creep.iter().map(|creep| 1.0 / creep.tau_min_s);
+    let modes = config.modes.iter().map(|mode| TAU * mode.hz);
+    let fastest = lag.chain(creep).chain(modes).fold(0.0, f64::max);
+    // The validated ranges keep this below 3e6 at 1 Hz.
+    (fastest / (rate_hz * MAX_STEP_RATE)).ceil().max(MIN_STEPS) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::config::tests::clean;
+    use super::super::config::{Lag, Mode};
+    use super::*;
+
+    #[test]
+    fn fine_grid_resolves_the_fastest_motion() {
+        let mut config = clean();
+        assert_eq!(fine_steps(&config, 1000.0), 8);
+        config.modes = vec![Mode { hz: 350.0, damping: 0.01, gain: 0.1 }];
+        assert_eq!(fine_steps(&config, 1000.0), 44);
+        assert_eq!(fine_steps(&config, 500.0), 88);
+        config.lag = Some(Lag { seconds: 1e-4 });
+        assert_eq!(fine_steps(&config, 1000.0), 200);
+    }
+
+    #[test]
+    fn a_chain_of_nothing_is_the_hysteresis_alone() {
+        let mut config = clean();
+        config.actuator.loop_share = 0.12;
+        let mut alone = Hysteresis::new(config.seed, &config.actuator).unwrap();
+        let mut chain = Chain::new(&config, alone.clone(), 1000.0);
+        for v in [0.0, 30.0, 90.0, 20.0, 60.0, 0.0, 100.0] {
+            assert_eq!(chain.advance(v, None, 0.0, 0.001), alone.move_to(v));
+        }
+    }
+
+    #[test]
+    fn a_finer_grid_gives_the_same_motion() {
+        for seed in 0..4 {
+            let config = PlantConfig::random_with(seed, &["delay", "lag", "creep", "resonance"]).unwrap();
+            let hysteresis = Hysteresis::new(config.seed, &config.actuator).unwrap();
+            let steps = fine_steps(&config, 1000.0);
+            let mut chain = Chain::new(&config, hysteresis.clone(), 1000.0);
+            let mut finer = Chain::with_steps(&config, hysteresis, 1000.0, 5 * steps);
+            let span = config.actuator.gain_um_per_v * config.actuator.max_v;
+            for k in 0..600 {
+                let v = config.actuator.max_v * (0.5 - 0.5 * (0.05 * f64::from(k)).cos());
+                let difference = chain.advance(v, None, 0.0, 0.0) - finer.advance(v, None, 0.0, 0.0);
+                // A tenth of the noise that such a plant has.
+                assert!(difference.abs() < 3e-5 * span, "{seed} {k}: {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn ring_down_seen_in_samples_has_the_declared_mode() {
+        let mut config = clean();
+        config.modes = vec![Mode { hz: 100.0, damping: 0.02, gain: 1.0 }];
+        let hysteresis = Hysteresis::new(1, &config.actuator).unwrap();
+        let mut chain = Chain::new(&config, hysteresis, 1000.0);
+        let y: Vec<f64> = (0..200).map(|_| chain.advance(50.0, None, 0.0, 0.0) - 5.0).collect();
+        // Free motion obeys y[n+2] = a y[n+1] - b y[n] exactly; two unknowns by least squares.
+        let (mut s11, mut s12, mut s22, mut r1, mut r2) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for w in y[1..].windows(3) {
+            s11 += w[1] * w[1];
+            s12 += w[1] * w[0];
+            s22 += w[0] * w[0];
+            r1 += w[2] * w[1];
+            r2 += w[2] * w[0];
+        }
+        let det = s11 * s22 - s12 * s12;
+        let (a, b) = ((r1 * s22 - r2 * s12) / det, -(r2 * s11 - r1 * s12) / det);
+        // Poles e^(-(ζω ± iω√(1-ζ²)) h).
+        let decay = -0.5 * b.ln() / 0.001;
+        let damped = (a / (2.0 * b.sqrt())).acos() / 0.001;
+        let natural = decay.hypot(damped);
+        assert!((natural / TAU / 100.0 - 1.0).abs() < 1e-4, "{}", natural / TAU);
+        assert!((decay / natural / 0.02 - 1.0).abs() < 1e-3, "{}", decay / natural);
+    }
+}

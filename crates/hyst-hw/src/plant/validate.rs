@@ -1,0 +1,202 @@
+//! Which descriptions of a plant make sense, and what to say of those that do not.
+
+use super::config::{Actuator, Creep, Mode, PlantConfig, Sensor, Temperature};
+use super::error::ConfigError;
+
+type Checked = Result<(), ConfigError>;
+
+/// Refuses `value` unless it is finite and `fits`.
+fn demand(field: &str, value: f64, fits: bool, advice: &str) -> Checked {
+    if value.is_finite() && fits { Ok(()) } else { Err(ConfigError::value(field, value, advice)) }
+}
+
+fn within(field: &str, value: f64, low: f64, high: f64, what: &str) -> Checked {
+    let fits = (low..=high).contains(&value);
+    demand(field, value, fits, &format!("give {what} from {low} to {high}"))
+}
+
+fn count_within(field: &str, value: usize, low: usize, high: usize, what: &str) -> Checked {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(ConfigError::value(field, value, format!("give {what} from {low} to {high}")))
+    }
+}
+
+/// First error of a whole description.
+pub(crate) fn check(config: &PlantConfig) -> Checked {
+    if i64::try_from(config.seed).is_err() {
+        return Err(ConfigError::value("seed", config.seed, format!("give an integer from 0 to {}", i64::MAX)));
+    }
+    actuator(&config.actuator)?;
+    sensor(&config.sensor)?;
+    if let Some(delay) = &config.delay {
+        let fits = delay.seconds > 0.0 && delay.seconds <= 1.0;
+        let advice = "give a dead time above 0 and up to 1 s, or remove the section [delay]";
+        demand("delay.seconds", delay.seconds, fits, advice)?;
+    }
+    if let Some(lag) = &config.lag {
+        let advice = "give a time constant from 1e-5 to 10 s, or remove the section [lag]";
+        demand("lag.seconds", lag.seconds, (1e-5..=10.0).contains(&lag.seconds), advice)?;
+    }
+    if let Some(section) = &config.temperature {
+        temperature(section)?;
+    }
+    if let Some(section) = &config.creep {
+        creep(section)?;
+    }
+    modes(&config.modes)?;
+    if let Some(drift) = &config.drift {
+        let advice = "give a rate in um/s that is not 0, or remove the section [drift]";
+        demand("drift.um_per_s", drift.um_per_s, drift.um_per_s != 0.0, advice)?;
+    }
+    if let Some(wave) = &config.interference {
+        let advice = "give an amplitude in um above 0, or remove the section [interference]";
+        demand("interference.amplitude_um", wave.amplitude_um, wave.amplitude_um > 0.0, advice)?;
+        demand("interference.hz", wave.hz, wave.hz > 0.0, "give a frequency in Hz above 0")?;
+        demand("interference.phase_rad", wave.phase_rad, true, "give a finite phase in rad")?;
+    }
+    Ok(())
+}
+
+fn actuator(a: &Actuator) -> Checked {
+    demand("actuator.min_v", a.min_v, true, "give a finite voltage")?;
+    demand("actuator.max_v", a.max_v, a.max_v > a.min_v, "give a finite voltage above actuator.min_v")?;
+    let rest_fits = (a.min_v..=a.max_v).contains(&a.rest_v);
+    demand("actuator.rest_v", a.rest_v, rest_fits, "give a voltage from actuator.min_v to actuator.max_v")?;
+    demand("actuator.gain_um_per_v", a.gain_um_per_v, a.gain_um_per_v > 0.0, "give a gain in um/V above 0")?;
+    within("actuator.loop_share", a.loop_share, 0.0, 0.3, "the loop's opening as a share of the span")?;
+    count_within("actuator.relays", a.relays, 1000, 500_000, "a number of relays")
+}
+
+fn sensor(s: &Sensor) -> Checked {
+    let [low, high] = s.range_um;
+    demand("sensor.range_um[0]", low, true, "give a finite displacement in um")?;
+    demand("sensor.range_um[1]", high, high > low, "give a finite displacement in um above range_um[0]")?;
+    count_within("sensor.bits", s.bits as usize, 4, 48, "a resolution in bit")?;
+    demand("sensor.noise_um", s.noise_um, s.noise_um >= 0.0, "give a standard deviation in um, 0 or more")?;
+    let shown = low < s.offset_um && s.offset_um < high;
+    demand("sensor.offset_um", s.offset_um, shown, "give a reading at rest within sensor.range_um")?;
+    within("sensor.max_rate_hz", s.max_rate_hz, 1.0, 1e6, "a sample rate in Hz")
+}
+
+fn temperature(t: &Temperature) -> Checked {
+    within("temperature.per_k", t.per_k, -0.1, 0.1, "a relative change per kelvin")?;
+    within("temperature.reference_degc", t.reference_degc, -273.15, 1000.0, "a temperature in degC")?;
+    within("temperature.mean_degc", t.mean_degc, -273.15, 1000.0, "a temperature in degC")?;
+    within("temperature.swing_k", t.swing_k, 0.0, 500.0, "a swing in K")?;
+    match t.period_s {
+        Some(period) => demand("temperature.period_s", period, period >= 0.1, "give a period of 0.1 s or more")?,
+        None if t.swing_k > 0.0 => {
+            let advice = "a temperature that swings needs temperature.period_s: give a period in s, or remove swing_k";
+            return Err(ConfigError::value("temperature.swing_k", t.swing_k, advice));
+        }
+        None => {}
+    }
+    demand("temperature.noise_k", t.noise_k, t.noise_k >= 0.0, "give a standard deviation in K, 0 or more")?;
+    if t.per_k == 0.0 && !t.recorded {
+        let advice =
+            "neither recorded nor of any influence: give temperature.per_k, or remove the section [temperature]";
+        return Err(ConfigError::value("temperature.recorded", false, advice));
+    }
+    Ok(())
+}
+
+fn creep(c: &Creep) -> Checked {
+    let fits = c.strength > 0.0 && c.strength <= 1.0;
+    demand("creep.strength", c.strength, fits, "give a share above 0 and up to 1, or remove the section [creep]")?;
+    within("creep.tau_min_s", c.tau_min_s, 1e-3, 1e5, "a time constant in s")?;
+    let above = c.tau_max_s > c.tau_min_s && c.tau_max_s <= 1e6;
+    demand("creep.tau_max_s", c.tau_max_s, above, "give a time constant in s above creep.tau_min_s, up to 1e6")?;
+    within("creep.exponent", c.exponent, -2.0, 2.0, "a power")?;
+    count_within("creep.elements", c.elements, 2, 1000, "a number of time constants")
+}
+
+fn modes(modes: &[Mode]) -> Checked {
+    for (index, mode) in modes.iter().enumerate() {
+        let name = |field: &str| format!("mode[{index}].{field}");
+        within(&name("hz"), mode.hz, 0.1, 20_000.0, "a natural frequency in Hz")?;
+        let damped = mode.damping > 0.0 && mode.damping < 1.0;
+        demand(&name("damping"), mode.damping, damped, "give a damping ratio between 0 and 1, both excluded")?;
+        let useful = mode.gain != 0.0 && mode.gain.abs() <= 10.0;
+        demand(&name("gain"), mode.gain, useful, "give a share that is not 0, or remove this [[mode]]")?;
+    }
+    let sum: f64 = modes.iter().map(|mode| mode.gain).sum();
+    // A hair above 1 is rounding of shares written in decimals.
+    demand("mode[].gain (sum)", sum, sum <= 1.0 + 1e-9, "let the gains of all [[mode]] sum to 1 or less")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::config::tests::clean;
+    use super::super::config::{Delay, Drift, Interference, Lag, TemperatureShape};
+    use super::*;
+
+    fn complains(field: &str, change: impl FnOnce(&mut PlantConfig)) {
+        let mut config = clean();
+        change(&mut config);
+        match config.validate() {
+            Err(ConfigError::Value { field: named, advice, .. }) => {
+                assert_eq!(named, field);
+                assert!(!advice.is_empty());
+            }
+            other => panic!("{field}: {other:?}"),
+        }
+        assert!(config.to_toml().is_err(), "{field}: written although not valid");
+    }
+
+    fn warm() -> Temperature {
+        Temperature {
+            per_k: 0.005,
+            reference_degc: 22.0,
+            mean_degc: 22.0,
+            swing_k: 0.0,
+            period_s: None,
+            shape: TemperatureShape::Sine,
+            recorded: true,
+            noise_k: 0.0,
+        }
+    }
+
+    #[test]
+    fn errors_name_the_field() {
+        clean().validate().unwrap();
+        complains("seed", |c| c.seed = u64::MAX);
+        complains("actuator.max_v", |c| c.actuator.max_v = c.actuator.min_v);
+        complains("actuator.rest_v", |c| c.actuator.rest_v = -1.0);
+        complains("actuator.gain_um_per_v", |c| {
+            c.actuator.gain_um_per_v = f64::NAN;
+        });
+        complains("actuator.loop_share", |c| c.actuator.loop_share = 0.9);
+        complains("actuator.relays", |c| c.actuator.relays = 3);
+        complains("sensor.range_um[1]", |c| c.sensor.range_um = [5.0, 5.0]);
+        complains("sensor.offset_um", |c| c.sensor.offset_um = 100.0);
+        complains("sensor.bits", |c| c.sensor.bits = 1);
+        complains("sensor.noise_um", |c| c.sensor.noise_um = -1.0);
+        complains("delay.seconds", |c| c.delay = Some(Delay { seconds: 0.0 }));
+        complains("lag.seconds", |c| {
+            c.lag = Some(Lag { seconds: f64::INFINITY });
+        });
+        complains("drift.um_per_s", |c| {
+            c.drift = Some(Drift { um_per_s: 0.0 });
+        });
+        complains("interference.hz", |c| {
+            c.interference = Some(Interference { amplitude_um: 1.0, hz: 0.0, phase_rad: 0.0 });
+        });
+        complains("temperature.swing_k", |c| {
+            c.temperature = Some(Temperature { swing_k: 3.0, ..warm() });
+        });
+        complains("temperature.recorded", |c| {
+            c.temperature = Some(Temperature { per_k: 0.0, recorded: false, ..warm() });
+        });
+        complains("creep.tau_max_s", |c| {
+            c.creep = Some(Creep { strength: 0.1, tau_min_s: 1.0, tau_max_s: 0.5, exponent: 0.0, elements: 60 });
+        });
+        complains("mode[1].damping", |c| {
+            c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.5 }, Mode { hz: 300.0, damping: 0.0, gain: 0.5 }];
+        });
+        complains("mode[].gain (sum)", |c| {
+            c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.7 }; 2];
+        });
+    }
+}

@@ -1,0 +1,134 @@
+//! Why a recording is not complete, and what there is of it.
+
+use super::Recording;
+
+/// Why a recording is not complete; `E` is the device's error.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Cause<E> {
+    /// No drive segment was given.
+    #[error("nothing to play: give at least one drive segment")]
+    NoSegment,
+    /// A drive segment has no sample.
+    #[error("drive segment {segment} is empty")]
+    EmptySegment {
+        /// Segment, from 0.
+        segment: usize,
+    },
+    /// A drive sample is not a finite number; nothing was played.
+    #[error("drive segment {segment}, sample {row}: {volts} is not a finite voltage; nothing was played")]
+    NonFinite {
+        /// Segment, from 0.
+        segment: usize,
+        /// Sample in the segment, from 0.
+        row: usize,
+        /// The value.
+        volts: f64,
+    },
+    /// A drive sample is outside the device's range; nothing was played.
+    #[error("drive segment {segment}, sample {row}: {volts} V is outside {min_v} to {max_v} V; nothing was played")]
+    OutOfRange {
+        /// Segment, from 0.
+        segment: usize,
+        /// Sample in the segment, from 0.
+        row: usize,
+        /// The value (V).
+        volts: f64,
+        /// Lowest voltage of the device (V).
+        min_v: f64,
+        /// Highest voltage of the device (V).
+        max_v: f64,
+    },
+    /// A value in [`RecordOptions`](super::RecordOptions) makes no sense; nothing was played.
+    #[error("{name} = {value}: {advice}")]
+    Option {
+        /// Field of [`RecordOptions`](super::RecordOptions).
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What to give instead.
+        advice: &'static str,
+    },
+    /// The device does not run at the rate that the drive is meant for; nothing was played.
+    #[error("asked for {asked_hz} Hz, the device runs at {actual_hz} Hz: resample the drive or choose another rate")]
+    Rate {
+        /// Rate asked for (Hz).
+        asked_hz: f64,
+        /// Rate of the device (Hz).
+        actual_hz: f64,
+    },
+    /// The device neither takes nor returns samples.
+    #[error("the device stalls: {outstanding} samples have not come back")]
+    Stalled {
+        /// Samples accepted but not measured.
+        outstanding: usize,
+    },
+    /// The device broke the contract of [`Daq::exchange`](crate::Daq::exchange): more samples than it was given.
+    #[error("the device returns samples for drive that it was not given")]
+    Surplus,
+    /// The progress callback asked to stop; the device was ramped to rest.
+    #[error("stopped on request")]
+    Cancelled,
+    /// All was played and measured, but the device could not be stopped.
+    #[error("the record is complete, but the device could not be stopped and may still be driven: {0}")]
+    Stop(E),
+    /// The device's own error.
+    #[error(transparent)]
+    Device(E),
+}
+
+/// An incomplete recording: why, and what was measured until then.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failure<E> {
+    /// Why the recording is not complete.
+    pub cause: Cause<E>,
+    /// What was measured until then; the last segment may be incomplete.
+    pub partial: Recording,
+    /// The device's error when, after the cause, it could not be stopped either: its drive may still be on.
+    pub not_stopped: Option<E>,
+}
+
+impl<E: std::error::Error> std::fmt::Display for Failure<E> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.cause.fmt(f)?;
+        match &self.not_stopped {
+            Some(error) => write!(f, "; the device could not be stopped and may still be driven: {error}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl<E: std::error::Error + 'static> std::error::Error for Failure<E> {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.cause.source()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error;
+
+    #[test]
+    fn failure_speaks_with_its_causes_voice() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("cable out")]
+        struct CableOut(#[source] std::fmt::Error);
+
+        let failure = Failure {
+            cause: Cause::Device(CableOut(std::fmt::Error)),
+            partial: Recording::default(),
+            not_stopped: None,
+        };
+        assert_eq!(failure.to_string(), "cable out");
+        assert!(failure.source().is_some_and(|source| source.is::<std::fmt::Error>()));
+        let segment = Failure {
+            cause: Cause::<CableOut>::EmptySegment { segment: 2 },
+            partial: Recording::default(),
+            not_stopped: None,
+        };
+        assert_eq!(segment.to_string(), "drive segment 2 is empty");
+        let driven = Failure { not_stopped: Some(CableOut(std::fmt::Error)), ..segment };
+        assert!(driven.to_string().ends_with("may still be driven: cable out"), "{driven}");
+    }
+}

@@ -1,0 +1,33 @@
+//! Hysteresis bases as columns: each is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
+
+mod pi;
+mod preisach;
+mod screening;
+
+pub(crate) use pi::PiBasis;
+pub(crate) use preisach::PreisachBasis;
+pub(crate) use screening::ScreeningBasis;
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use crate::lsq::Bounds;
+
+/// A family of rate-independent operators, linear in their weights.
+///
+/// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
+/// scale the motion and not an arbitrary zero.
+pub(crate) trait Basis: Sync {
+    /// Columns φᵢ over the rows of `drive`, memory reset at the start of each segment.
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>>;
+    /// Bounds of the weights.
+    fn bounds(&self) -> Vec<Bounds>;
+    /// What regularises the weights, as a matrix to be added to normal equations whose mean
+    /// diagonal (over the columns) is `level`; `None` if nothing has to.
+    fn penalty(&self, level: f64) -> Option<DMatrix<f64>>;
+    /// Number of columns.
+    fn len(&self) -> usize {
+        self.bounds().len()
+    }
+}

@@ -1,0 +1,182 @@
+//! The Preisach operator as columns: one per cell of the triangle, one per interval of the virgin
+//! strip.
+
+use std::ops::Range;
+
+use hyst_core::{Env, Everett, Grid, Stage};
+use nalgebra::DMatrix;
+
+use super::Basis;
+use crate::Samples;
+use crate::lsq::Bounds;
+use crate::model::{NODES, PreisachSpec, cell_index};
+
+/// Reversible slope of each diagonal cell is at least this share of the mean gain.
+const FLOOR: f64 = 0.05;
+/// Margin of the grid around the record's input, as a share of its swing.
+const MARGIN: f64 = 0.02;
+/// Weight of the differences between neighbouring cells against the record.
+const SMOOTHNESS: f64 = 3e-6;
+
+/// A grid over the record's input.
+#[derive(Clone, Debug)]
+pub(crate) struct PreisachBasis {
+    pub(crate) grid: Grid,
+    pub(crate) rest: f64,
+    floor: f64,
+}
+
+impl PreisachBasis {
+    /// A grid of `cells` cells over the record's input with a small margin; rest is 0 V, or the end
+    /// of the range next to it.
+    pub(crate) fn for_samples(samples: &Samples, cells: usize) -> Self {
+        let (low, high) = samples.input_range();
+        let margin = MARGIN * (high - low);
+        // A device that is only driven upwards from 0 V has its rest on the edge of the triangle.
+        let low = if (0.0..=high).contains(&low) && low < 0.2 * (high - low) { 0.0 } else { low - margin };
+        let high = if high <= 0.0 && -high < 0.2 * (high - low) { 0.0 } else { high + margin };
+        let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
+        let width = (high - low) / cells as f64;
+        Self { grid: Grid { low, high, cells }, rest: 0.0f64.clamp(low, high), floor: FLOOR * gain * width }
+    }
+
+    fn triangle(&self) -> usize {
+        self.grid.cells * (self.grid.cells + 1) / 2
+    }
+
+    /// Whether relays exist that the first rise from rest flips for good.
+    fn has_strip(&self) -> bool {
+        self.rest <= self.grid.low
+    }
+
+    /// The operator with these weights.
+    pub(crate) fn spec(&self, weights: &[f64]) -> PreisachSpec {
+        let (density, once) = weights.split_at(self.triangle());
+        let once = if self.has_strip() { once.to_vec() } else { vec![0.0; self.grid.cells] };
+        PreisachSpec { low: self.grid.low, high: self.grid.high, cells: self.grid.cells, rest: self.rest, density: density.to_vec(), once }
+    }
+
+    /// Adds `sign` times the share of every cell that lies between β and α.
+    fn add_between(&self, row: &mut [f64], alpha: f64, beta: f64, sign: f64) {
+        let width = (self.grid.high - self.grid.low) / self.grid.cells as f64;
+        let place = |u: f64| ((u - self.grid.low) / width).clamp(0.0, self.grid.cells as f64);
+        let (a, b) = (place(alpha), place(beta));
+        let last = self.grid.cells - 1;
+        let (top, bottom) = ((a as usize).min(last), (b as usize).min(last));
+        let below = |cell: usize| (a - cell as f64).clamp(0.0, 1.0);
+        let above = |cell: usize| (cell as f64 + 1.0 - b).clamp(0.0, 1.0);
+        for i in bottom..=top {
+            let rows = sign * below(i);
+            for j in bottom..i {
+                row[cell_index(i, j)] += rows * above(j);
+            }
+            row[cell_index(i, i)] += sign * (below(i) + above(i) - 1.0).max(0.0);
+        }
+    }
+
+    /// Adds the virgin curve at `u`.
+    fn add_virgin(&self, row: &mut [f64], u: f64) {
+        self.add_between(row, u, self.grid.low, 1.0);
+        if self.has_strip() {
+            let width = (self.grid.high - self.grid.low) / self.grid.cells as f64;
+            let a = (u - self.grid.low) / width;
+            for i in 0..self.grid.cells {
+                row[self.triangle() + i] += (a - i as f64).clamp(0.0, 1.0);
+            }
+        }
+    }
+}
+
+impl Basis for PreisachBasis {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let n = self.len();
+        let mut columns = vec![vec![0.0; drive.len()]; n];
+        // The operator itself keeps the memory, with an empty map: one rule of wiping out for all.
+        let Ok(map) = Everett::<f64, NODES>::new(self.grid, self.rest, |_, _| 0.0, |_| 0.0) else {
+            return columns;
+        };
+        let map = Box::new(map);
+        let env = Env::default();
+        let mut state = map.state();
+        for segment in segments {
+            // Rows at the reversals in force, each from the one before.
+            let mut levels: Vec<(f64, Vec<f64>)> = Vec::new();
+            let mut at_rest: Option<Vec<f64>> = None;
+            let mut row_now = |memory: &[f64], now: f64| -> Vec<f64> {
+                let same = levels.iter().zip(memory).take_while(|((u, _), m)| u == *m).count();
+                levels.truncate(same);
+                let branch = |levels: &[(f64, Vec<f64>)], to: f64| match levels.last() {
+                    None => {
+                        let mut row = vec![0.0; n];
+                        self.add_virgin(&mut row, to);
+                        row
+                    }
+                    Some((from, row)) => {
+                        let mut row = row.clone();
+                        if levels.len() % 2 == 1 {
+                            self.add_between(&mut row, *from, to, -1.0);
+                        } else {
+                            self.add_between(&mut row, to, *from, 1.0);
+                        }
+                        row
+                    }
+                };
+                for m in &memory[same..] {
+                    let row = branch(&levels, *m);
+                    levels.push((*m, row));
+                }
+                branch(&levels, now)
+            };
+            for k in segment.clone() {
+                if k == segment.start {
+                    map.reset(&mut state, &env, self.rest);
+                    at_rest = Some(row_now(state.memory().in_force(), self.rest));
+                }
+                map.step(&mut state, &env, drive[k]);
+                let row = row_now(state.memory().in_force(), drive[k]);
+                for (c, (x, zero)) in columns.iter_mut().zip(row.iter().zip(at_rest.as_deref().unwrap_or_default())) {
+                    c[k] = x - zero;
+                }
+            }
+        }
+        columns
+    }
+
+    fn bounds(&self) -> Vec<Bounds> {
+        let mut bounds = vec![Bounds::above(0.0); self.triangle() + if self.has_strip() { self.grid.cells } else { 0 }];
+        for i in 0..self.grid.cells {
+            bounds[cell_index(i, i)] = Bounds::above(self.floor);
+        }
+        bounds
+    }
+
+    /// Smoothness: neighbouring cells of the triangle's inside, of its diagonal and of the strip
+    /// differ little. What the record shows overrules it; cells it never visits follow their
+    /// neighbours.
+    fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
+        let n = self.len();
+        let weight = SMOOTHNESS * level;
+        let mut p = DMatrix::from_diagonal_element(n, n, 1e-3 * weight);
+        let mut tie = |i: usize, j: usize| {
+            p[(i, i)] += weight;
+            p[(j, j)] += weight;
+            p[(i, j)] -= weight;
+            p[(j, i)] -= weight;
+        };
+        for i in 1..self.grid.cells {
+            tie(cell_index(i, i), cell_index(i - 1, i - 1));
+            for j in 0..i {
+                if i - 1 > j {
+                    tie(cell_index(i, j), cell_index(i - 1, j));
+                }
+                if j > 0 {
+                    tie(cell_index(i, j), cell_index(i, j - 1));
+                }
+            }
+            if self.has_strip() {
+                tie(self.triangle() + i, self.triangle() + i - 1);
+            }
+        }
+        Some(p)
+    }
+}

@@ -1,0 +1,63 @@
+//! A rich rate-independent base for the search for effects.
+//!
+//! Every Preisach operator is `∫ ψ_r(play_r(u)) dr` with one curve ψ_r per threshold; a
+//! Prandtl-Ishlinskii operator is the case of straight lines. Here ψ_r is a polynomial of degree 3:
+//! enough that what is left of a fit is not the base's own shape, which would otherwise be taken for
+//! an effect.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::pi::plays;
+use super::{Basis, PiBasis};
+use crate::Samples;
+use crate::lsq::Bounds;
+
+/// Plays with quadratic and cubic curves.
+#[derive(Clone, Debug)]
+pub(crate) struct ScreeningBasis {
+    linear: PiBasis,
+    curved: Vec<f64>,
+    middle: f64,
+    half: f64,
+}
+
+impl ScreeningBasis {
+    /// For the input range of a record.
+    pub(crate) fn for_samples(samples: &Samples) -> Self {
+        let linear = PiBasis::for_samples(samples);
+        let (low, high) = samples.input_range();
+        // The identity (r = 0) and every second play.
+        let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();
+        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low) }
+    }
+}
+
+impl Basis for ScreeningBasis {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let mut columns = self.linear.columns(drive, segments);
+        let x0 = -self.middle / self.half;
+        let square = |x: f64| x * x;
+        let cubic = |x: f64| x * (x * x - 0.6);
+        for r in &self.curved {
+            let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r) };
+            let curve = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+                p.iter().map(|p| self.half * (f((p - self.middle) / self.half) - f(x0))).collect()
+            };
+            let (second, third) = (curve(&square), curve(&cubic));
+            columns.push(second);
+            columns.push(third);
+        }
+        columns
+    }
+
+    fn bounds(&self) -> Vec<Bounds> {
+        vec![Bounds::FREE; 1 + self.linear.thresholds.len() + 2 * self.curved.len()]
+    }
+
+    fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
+        let n = self.len();
+        Some(DMatrix::from_diagonal_element(n, n, 1e-8 * level))
+    }
+}

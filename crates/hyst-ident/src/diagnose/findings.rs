@@ -1,0 +1,256 @@
+//! `findings.json`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::search::{Named, Search};
+pub use crate::metrics::Errors;
+use crate::model::{Effect, Kind, Model};
+use crate::samples::Samples;
+use crate::simulate::{Simulation, Zero};
+
+/// Schema of the findings that this version writes.
+const SCHEMA: &str = "hyst.findings/1";
+
+/// The diagnosis in a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Effects were named.
+    Explained,
+    /// The model is at the noise floor.
+    NothingMissing,
+    /// A richer base would take what is left.
+    BaseTooCoarse,
+    /// Something is left that nothing on the list explains.
+    Unexplained,
+}
+
+/// What kind of residual is left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RemainderKind {
+    /// Noise.
+    None,
+    /// The base's own misfit.
+    BaseCapacity,
+    /// Unknown.
+    Unexplained,
+}
+
+/// What is left after everything that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Remainder {
+    /// What it is.
+    pub kind: RemainderKind,
+    /// Share of the output's variance.
+    pub variance_share: f64,
+    /// In words.
+    pub description: String,
+}
+
+/// A parameter that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Value.
+    pub value: f64,
+    /// Standard error; none if the parameter sits at a bound or is a convention.
+    pub std_error: Option<f64>,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Another effect in the place of a named one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alternative {
+    /// Its name.
+    pub name: Effect,
+    /// Cross-validated RMSE with it instead \[output unit\].
+    pub cv_rmse: f64,
+    /// Whether the record cannot tell the two apart.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub indistinguishable: bool,
+}
+
+/// A named effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Name.
+    pub name: Effect,
+    /// Parameters.
+    pub parameters: BTreeMap<String, Found>,
+    /// Why it was named, in sentences.
+    pub evidence: Vec<String>,
+    /// What else was tried in its place, best first.
+    pub alternatives: Vec<Alternative>,
+    /// Cross-validated RMSE without it \[output unit\].
+    pub cv_rmse_before: f64,
+    /// Cross-validated RMSE with it \[output unit\].
+    pub cv_rmse_after: f64,
+}
+
+/// Errors on the training and the test record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OnRecords {
+    /// Training record.
+    pub train: Option<Errors>,
+    /// Test record, where one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<Errors>,
+}
+
+/// What a diagnosis found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// `hyst.findings/1`
+    pub schema: String,
+    /// Base model.
+    pub base: Kind,
+    /// Unit of all errors: the ending of the output's column.
+    pub unit: String,
+    /// Standard deviation of the white noise in the record \[unit\].
+    pub noise_floor: f64,
+    /// What was done with the sensor's zero.
+    pub zero: Zero,
+    /// The diagnosis in a word.
+    pub verdict: Verdict,
+    /// Errors of the model as it was given.
+    pub before: OnRecords,
+    /// Effects, in the chain's order.
+    pub effects: Vec<Finding>,
+    /// What is left.
+    pub remainder: Remainder,
+    /// Errors of the extended model.
+    pub after: OnRecords,
+}
+
+pub(super) struct Material<'a> {
+    pub(super) model: &'a Model,
+    pub(super) extended: &'a Model,
+    pub(super) found: &'a Search,
+    pub(super) errors: &'a BTreeMap<String, f64>,
+    pub(super) before: &'a Simulation,
+    pub(super) after: &'a Simulation,
+    pub(super) tests: Option<&'a (Simulation, Simulation)>,
+    pub(super) remainder: Remainder,
+    pub(super) zero: Zero,
+    pub(super) samples: &'a Samples,
+}
+
+pub(super) fn collect(m: &Material<'_>) -> Findings {
+    let effects: Vec<Finding> = m.found.named.iter().map(|n| finding(m, n)).collect();
+    let verdict = match (effects.is_empty(), m.remainder.kind) {
+        (false, _) => Verdict::Explained,
+        (true, RemainderKind::None) => Verdict::NothingMissing,
+        (true, RemainderKind::BaseCapacity) => Verdict::BaseTooCoarse,
+        (true, RemainderKind::Unexplained) => Verdict::Unexplained,
+    };
+    let on = |train: &Simulation, test: Option<&Simulation>| OnRecords {
+        train: train.errors.clone(),
+        test: test.and_then(|t| t.errors.clone()),
+    };
+    Findings {
+        schema: SCHEMA.into(),
+        base: m.model.base.kind(),
+        unit: m.model.output.unit.clone(),
+        noise_floor: m.found.noise,
+        zero: m.zero,
+        verdict,
+        before: on(m.before, m.tests.map(|t| &t.0)),
+        effects,
+        remainder: m.remainder.clone(),
+        after: on(m.after, m.tests.map(|t| &t.1)),
+    }
+}
+
+fn finding(m: &Material<'_>, named: &Named) -> Finding {
+    let unit = &m.model.output.unit;
+    let after = m.found.best.cv_rmse();
+    let j = &named.judgement;
+    let mut evidence = vec![format!(
+        "cross-validated error {:.4} {unit} without it, {after:.4} {unit} with it; better in {:.1} % of {} bootstrap draws",
+        named.cv_without,
+        100.0 * j.confidence,
+        1000
+    )];
+    evidence.push(format!("explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors", 100.0 * j.share, j.over_noise));
+    evidence.extend(signature(m, named.effect));
+    Finding {
+        name: named.effect,
+        parameters: parameters(m, named.effect),
+        evidence,
+        alternatives: named
+            .instead
+            .iter()
+            .map(|(name, cv_rmse, tie)| Alternative { name: *name, cv_rmse: *cv_rmse, indistinguishable: *tie })
+            .collect(),
+        cv_rmse_before: named.cv_without,
+        cv_rmse_after: after,
+    }
+}
+
+/// The effect in words that a person can check against the device.
+fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
+    let e = &m.extended.effects;
+    Some(match effect {
+        Effect::Delay => format!("the output follows {:.3} ms late at every frequency", 1e3 * e.delay?.seconds),
+        Effect::Lag => {
+            let tau = e.lag?.seconds;
+            format!("the phase falls like a first-order lag with its corner at {:.1} Hz", 1.0 / (2.0 * std::f64::consts::PI * tau))
+        }
+        Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
+        Effect::Creep => format!("after a step the output goes on by {:.1} % of it", 100.0 * e.creep.as_ref()?.total()),
+        Effect::Resonance => {
+            let r = e.resonances.first()?;
+            format!("a mode rings at {:.1} Hz with damping ratio {:.4}", r.hz, r.damping)
+        }
+        Effect::Drift => {
+            let hours = m.samples.time.last()? - m.samples.time.first()?;
+            format!("the zero moves by {:+.4} {} over the record's {hours:.0} s", e.drift?.per_second * hours, m.model.output.unit)
+        }
+        Effect::Interference => {
+            let p = e.interference?;
+            format!("a tone of {:.4} {} at {:.3} Hz stands in the sensor, whatever the drive", p.amplitude, m.model.output.unit, p.hz)
+        }
+    })
+}
+
+fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
+    let (e, y) = (&m.extended.effects, &m.model.output.unit);
+    let mut list = BTreeMap::new();
+    let mut put = |stage: &str, name: &str, value: f64, unit: &str| {
+        let std_error = m.errors.get(&format!("{stage}.{name}")).copied();
+        let suffix = stage.strip_prefix("resonance").unwrap_or_default();
+        list.insert(format!("{name}{suffix}"), Found { value, std_error, unit: unit.into() });
+    };
+    match effect {
+        Effect::Delay => e.delay.iter().for_each(|p| put("delay", "seconds", p.seconds, "s")),
+        Effect::Lag => e.lag.iter().for_each(|p| put("lag", "seconds", p.seconds, "s")),
+        Effect::Temperature => e.temperature.iter().for_each(|p| {
+            put("temperature", "per_kelvin", p.per_kelvin, "1/K");
+            put("temperature", "reference_degc", p.reference_degc, "degC");
+        }),
+        Effect::Creep => e.creep.iter().for_each(|p| {
+            for (tau, share) in p.seconds.iter().zip(&p.shares) {
+                put("creep", &format!("share_{tau:.3}s"), *share, "1");
+            }
+            put("creep", "total", p.total(), "1");
+        }),
+        Effect::Resonance => {
+            for (i, p) in e.resonances.iter().enumerate() {
+                let stage = if i == 0 { "resonance" } else { "resonance_2" };
+                put(stage, "hz", p.hz, "Hz");
+                put(stage, "damping", p.damping, "1");
+                put(stage, "gain", p.gain, "1");
+            }
+        }
+        Effect::Drift => e.drift.iter().for_each(|p| put("drift", "per_second", p.per_second, &format!("{y}/s"))),
+        Effect::Interference => e.interference.iter().for_each(|p| {
+            put("interference", "hz", p.hz, "Hz");
+            put("interference", "amplitude", p.amplitude, y);
+            put("interference", "phase", p.phase, "rad");
+        }),
+    }
+    list
+}

@@ -1,0 +1,131 @@
+//! Closing the loop with measured data: find what a fitted model leaves over, name the effect that
+//! explains it, add it, and show the error before and after.
+//!
+//! 1. **Search** on a rich rate-independent base ([`ScreeningBasis`]), so that a coarse base model's
+//!    own misfit is not taken for an effect: forward with a small beam, then elimination, then swaps.
+//!    Every trial refits the whole nested model.
+//! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,
+//!    and it must matter against the noise floor and against what is left.
+//! 3. **Extend** the user's own model with the effects found, all weights refitted.
+
+mod findings;
+mod remainder;
+mod score;
+mod search;
+mod spectrum;
+mod starts;
+mod uncertainty;
+
+use std::collections::BTreeMap;
+
+pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
+
+use crate::base::ScreeningBasis;
+use crate::fit::{BLOCKS, FitError, basis_for, check, to_model};
+use crate::lsq::Blocks;
+use crate::model::{Effect, Model};
+use crate::nested::Problem;
+use crate::record::Record;
+use crate::samples::Samples;
+use crate::simulate::{Zero, simulate};
+
+/// What a diagnosis may be told.
+#[derive(Clone, Copy, Debug)]
+pub struct DiagnoseOptions {
+    /// What is done with the sensor's zero.
+    pub zero: Zero,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+impl Default for DiagnoseOptions {
+    fn default() -> Self {
+        Self { zero: Zero::None, seed: 1 }
+    }
+}
+
+/// A diagnosis: the extended model and how it was found.
+#[derive(Clone, Debug)]
+pub struct Diagnosis {
+    /// The user's model with every effect that was found; the same model if none was.
+    pub extended: Model,
+    /// What was found, with evidence.
+    pub findings: Findings,
+}
+
+/// Rows that the search uses at most.
+const SEARCH_ROWS: usize = 16_000;
+/// Rows that the final fit uses at most.
+const FINAL_ROWS: usize = 40_000;
+
+/// Diagnoses a model on the record that it was fitted to; `test` is only simulated, never fitted.
+/// `progress` is told what is being done.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn diagnose(
+    train: &Record,
+    test: Option<&Record>,
+    model: &Model,
+    options: &DiagnoseOptions,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosis, FitError> {
+    let before = simulate(model, train, options.zero)?;
+    let mut samples = Samples::from_record(train);
+    check(train, &samples)?;
+    samples.settling.clone_from(&before.settling);
+    let stage = |source| FitError::Stage { record: train.name(), source };
+    let per_record = options.zero == Zero::PerRecord;
+
+    let screening = ScreeningBasis::for_samples(&samples);
+    let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
+    let problem = Problem::new(&samples, &screening, &blocks, per_record);
+    let base = problem
+        .fit(&model.effects)
+        .map_err(stage)?
+        .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
+    let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+
+    progress("refitting the model with what was found");
+    let kind = model.base.kind();
+    let own = basis_for(kind, &samples);
+    let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
+    let final_problem = Problem::new(&samples, own.as_ref(), &final_blocks, per_record);
+    let mut extended = model.clone();
+    let mut errors = BTreeMap::new();
+    if found.best.fit.effects.names() != model.effects.names() {
+        let fit = final_problem.fit(&found.best.fit.effects).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
+        errors = uncertainty::standard_errors(&fit);
+        extended = to_model(train, &samples, kind, &fit, model.seed);
+        extended.std_errors.clone_from(&errors);
+    }
+
+    progress("judging what is left");
+    let after = simulate(&extended, train, options.zero)?;
+    let remainder = remainder::judge(&problem, &found, &after, &samples, per_record).map_err(stage)?;
+    let tests = test.map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?))).transpose()?;
+    let findings = findings::collect(&findings::Material {
+        model,
+        extended: &extended,
+        found: &found,
+        errors: &errors,
+        before: &before,
+        after: &after,
+        tests: tests.as_ref(),
+        remainder,
+        zero: options.zero,
+        samples: &samples,
+    });
+    Ok(Diagnosis { extended, findings })
+}
+
+/// Whether a record can show an effect at all.
+fn visible(effect: Effect, samples: &Samples) -> bool {
+    match effect {
+        Effect::Temperature => samples.temperature.as_ref().is_some_and(|t| {
+            let (low, high) = crate::samples::range(t.iter().copied());
+            high - low > 0.5
+        }),
+        _ => true,
+    }
+}

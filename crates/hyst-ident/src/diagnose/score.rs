@@ -1,0 +1,95 @@
+//! Whether an effect's gain is real and matters.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::search::Trial;
+use crate::Samples;
+use crate::model::Effect;
+
+/// Bootstrap draws.
+const DRAWS: usize = 1000;
+/// Share of draws in which the gain must be above zero.
+const CONFIDENCE: f64 = 0.99;
+/// RMSE must fall at least by this share.
+const LEAST_FALL: f64 = 0.05;
+/// What an effect adds must be at least this many noise floors (root mean square).
+const LEAST_OVER_NOISE: f64 = 0.5;
+/// Share of what stands above the noise floor that an effect must explain.
+const LEAST_SHARE: f64 = 0.15;
+/// Largest share of a motion that creep may add in the end.
+const MOST_CREEP: f64 = 0.6;
+
+/// How an effect was judged.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Judgement {
+    /// Share of bootstrap draws in which the cross-validated error falls.
+    pub(crate) confidence: f64,
+    /// RMSE after over before, cross-validated.
+    pub(crate) ratio: f64,
+    /// Share of the variance above the noise floor that the effect explains.
+    pub(crate) share: f64,
+    /// Root mean square of what it adds, in noise floors.
+    pub(crate) over_noise: f64,
+    /// Whether its parameters are physically sensible and away from their bounds.
+    pub(crate) sensible: bool,
+}
+
+impl Judgement {
+    pub(crate) fn accepted(&self) -> bool {
+        self.sensible
+            && self.confidence >= CONFIDENCE
+            && self.ratio <= 1.0 - LEAST_FALL
+            && self.over_noise >= LEAST_OVER_NOISE
+            && self.share >= LEAST_SHARE
+    }
+}
+
+pub(crate) fn judge(samples: &Samples, without: &Trial, with: &Trial, effect: Effect, noise: f64, seed: u64) -> Judgement {
+    let rows = with.fit.rows.max(1) as f64;
+    let (before, after) = (without.total(), with.total());
+    let gain = (before - after).max(0.0);
+    let above = (before - rows * noise * noise).max(f64::MIN_POSITIVE);
+    let differences: Vec<f64> = without.blocks.iter().zip(&with.blocks).map(|(a, b)| a - b).collect();
+    Judgement {
+        confidence: share_above_zero(&differences, seed),
+        ratio: (after / before.max(f64::MIN_POSITIVE)).sqrt(),
+        share: gain / above,
+        over_noise: (gain / rows).sqrt() / noise.max(f64::MIN_POSITIVE),
+        sensible: sensible(samples, with, effect),
+    }
+}
+
+/// Whether two trials' errors cannot be told apart.
+pub(crate) fn tie(a: &[f64], b: &[f64], seed: u64) -> bool {
+    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    share_above_zero(&differences, seed) < 0.95
+}
+
+/// Share of block-bootstrap draws whose sum is above zero.
+fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
+    let n = differences.len();
+    if n == 0 {
+        return 0.0;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let above = (0..DRAWS).filter(|_| (0..n).map(|_| differences[rng.random_range(0..n)]).sum::<f64>() > 0.0).count();
+    above as f64 / DRAWS as f64
+}
+
+fn sensible(samples: &Samples, trial: &Trial, effect: Effect) -> bool {
+    let e = &trial.fit.effects;
+    let longest = samples.longest_segment();
+    match effect {
+        Effect::Delay => e.delay.is_some_and(|p| p.seconds > 0.02 * samples.period && p.seconds < 0.09 * longest),
+        Effect::Lag => e.lag.is_some_and(|p| p.seconds > 0.02 * samples.period && p.seconds < 0.09 * longest),
+        Effect::Temperature => e.temperature.is_some_and(|p| p.per_kelvin.abs() < 0.049),
+        Effect::Creep => e.creep.as_ref().is_some_and(|p| p.total() > 0.0 && p.total() < MOST_CREEP),
+        Effect::Resonance => e.resonances.last().is_some_and(|p| {
+            let nyquist = 0.5 / samples.period;
+            p.gain > 1e-3 && p.damping < 0.69 && p.hz > 2.5 / longest && p.hz < 0.9 * nyquist
+        }),
+        Effect::Drift => true,
+        Effect::Interference => e.interference.is_some_and(|p| p.hz > 2.5 / longest),
+    }
+}

@@ -1,0 +1,219 @@
+//! Which effects: forward with a beam, then elimination, then swaps.
+
+use hyst_core::Error;
+use rayon::prelude::*;
+
+use super::score::{Judgement, judge};
+use super::{starts, visible};
+use crate::model::{Effect, Effects};
+use crate::nested::{Fitted, Problem, cross_validate, folds_by_segment, folds_interleaved};
+use crate::noise::noise_floor;
+
+/// Sets of effects carried from one round to the next.
+const BEAM: usize = 2;
+/// Effects that one record is searched for at most.
+const MOST: usize = 5;
+/// Folds of the interleaved cross-validation.
+const FOLDS: usize = 8;
+
+/// A fitted set of effects with its cross-validated errors.
+#[derive(Clone)]
+pub(crate) struct Trial {
+    pub(crate) fit: Fitted,
+    /// Σ residual² of each block, predicted from other blocks.
+    pub(crate) blocks: Vec<f64>,
+    /// The same, predicted from other segments.
+    pub(crate) segments: Vec<f64>,
+}
+
+impl Trial {
+    fn of(problem: &Problem<'_>, fit: Fitted) -> Option<Self> {
+        let blocks = cross_validate(&fit, &folds_interleaved(problem.blocks, FOLDS))?;
+        let segments = cross_validate(&fit, &folds_by_segment(problem.blocks, problem.samples))?;
+        Some(Self { fit, blocks, segments })
+    }
+
+    /// Σ residual² over all blocks, each predicted from others.
+    pub(crate) fn total(&self) -> f64 {
+        self.blocks.iter().sum()
+    }
+
+    /// Root mean square of the cross-validated residual \[output unit\].
+    pub(crate) fn cv_rmse(&self) -> f64 {
+        (self.total() / self.fit.rows.max(1) as f64).sqrt()
+    }
+}
+
+/// One named effect with how it was found.
+pub(crate) struct Named {
+    pub(crate) effect: Effect,
+    /// Cross-validated RMSE without it, everything else refitted.
+    pub(crate) cv_without: f64,
+    /// The best that each other candidate does in its place.
+    pub(crate) instead: Vec<(Effect, f64, bool)>,
+    pub(crate) judgement: Judgement,
+}
+
+/// What a search found.
+pub(crate) struct Search {
+    pub(crate) start: Trial,
+    pub(crate) best: Trial,
+    pub(crate) named: Vec<Named>,
+    /// Standard deviation of the white noise \[output unit\].
+    pub(crate) noise: f64,
+}
+
+/// Context that every judgement needs.
+struct Judge<'a> {
+    problem: &'a Problem<'a>,
+    noise: f64,
+    seed: u64,
+}
+
+impl Judge<'_> {
+    fn trials(&self, from: &Fitted, effect: Effect) -> Result<Option<Trial>, Error> {
+        let mut best: Option<Trial> = None;
+        for start in starts::starts(self.problem, from, effect)? {
+            let Some(trial) = self.problem.fit(&start)?.and_then(|f| Trial::of(self.problem, f)) else { continue };
+            if best.as_ref().is_none_or(|b| trial.total() < b.total()) {
+                best = Some(trial);
+            }
+        }
+        Ok(best)
+    }
+
+    fn refit(&self, effects: &Effects) -> Result<Option<Trial>, Error> {
+        Ok(self.problem.fit(effects)?.and_then(|f| Trial::of(self.problem, f)))
+    }
+
+    fn judge(&self, without: &Trial, with: &Trial, effect: Effect) -> Judgement {
+        judge(self.problem.samples, without, with, effect, self.noise, self.seed)
+    }
+}
+
+pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &(dyn Fn(&str) + Sync)) -> Result<Search, Error> {
+    let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments);
+    let judge = Judge { problem, noise, seed };
+    let already = base.effects.names();
+    let Some(start) = Trial::of(problem, base.clone()) else {
+        // Without cross-validation nothing can be named.
+        let nothing = Trial { blocks: vec![base.squares], segments: vec![base.squares], fit: base };
+        return Ok(Search { start: nothing.clone(), best: nothing, named: Vec::new(), noise });
+    };
+
+    let mut beam = vec![start.clone()];
+    let mut best = start.clone();
+    for round in 1..=MOST {
+        progress(&format!("searching for effects, round {round}"));
+        let jobs: Vec<(&Trial, Effect)> = beam
+            .iter()
+            .flat_map(|t| Effect::ALL.into_iter().map(move |e| (t, e)))
+            .filter(|(t, e)| t.fit.effects.has_room(*e) && visible(*e, problem.samples))
+            .collect();
+        // Each trial is computed alone and collected in order: threads change nothing.
+        let trials: Vec<Result<Option<Trial>, Error>> = jobs
+            .par_iter()
+            .map(|(parent, e)| Ok(judge.trials(&parent.fit, *e)?.filter(|t| judge.judge(parent, t, *e).accepted())))
+            .collect();
+        let mut next: Vec<Trial> = Vec::new();
+        for trial in trials {
+            let Some(trial) = trial? else { continue };
+            // Two ways to the same set of effects: keep the better.
+            let names = trial.fit.effects.names();
+            match next.iter_mut().find(|t| t.fit.effects.names() == names) {
+                Some(same) if same.total() > trial.total() => *same = trial,
+                Some(_) => {}
+                None => next.push(trial),
+            }
+        }
+        if next.is_empty() {
+            break;
+        }
+        next.sort_by(|a, b| a.total().total_cmp(&b.total()));
+        next.truncate(BEAM);
+        if next[0].total() < best.total() {
+            best = next[0].clone();
+        }
+        beam = next;
+    }
+
+    let mut named = Vec::new();
+    // Elimination and swaps until neither changes anything; both only ever lower the error or the
+    // number of effects, but a bound keeps a tie from turning in circles.
+    for _ in 0..2 * MOST {
+        progress("checking whether each effect is needed");
+        if let Some(less) = eliminate(&judge, &best, &already)? {
+            best = less;
+            continue;
+        }
+        progress("trying other effects in place of those found");
+        match swaps(&judge, &best, &already)? {
+            Swap::Better(other) => best = *other,
+            Swap::Final(list) => {
+                named = list;
+                break;
+            }
+        }
+    }
+    // The floor of the fit that explains most: an effect may sound like noise.
+    let noise = noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments));
+    Ok(Search { start, best, named, noise })
+}
+
+fn candidates_for_removal(best: &Trial, already: &[Effect]) -> Vec<Effect> {
+    let mut names = best.fit.effects.names();
+    for known in already {
+        if let Some(at) = names.iter().position(|n| n == known) {
+            names.remove(at);
+        }
+    }
+    names.dedup();
+    names
+}
+
+/// Drops the effect that is needed least, if there is one that is not needed.
+fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Option<Trial>, Error> {
+    let names = candidates_for_removal(best, already);
+    let reduced: Vec<Result<Option<Trial>, Error>> =
+        names.par_iter().map(|e| judge.refit(&best.fit.effects.without(*e))).collect();
+    let mut least: Option<Trial> = None;
+    for (effect, trial) in names.iter().zip(reduced) {
+        let Some(trial) = trial? else { continue };
+        if !judge.judge(&trial, best, *effect).accepted() && least.as_ref().is_none_or(|l| trial.total() < l.total()) {
+            least = Some(trial);
+        }
+    }
+    Ok(least)
+}
+
+enum Swap {
+    Better(Box<Trial>),
+    Final(Vec<Named>),
+}
+
+/// Tries every other effect in the place of each.
+fn swaps(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Swap, Error> {
+    let names = candidates_for_removal(best, already);
+    let mut named = Vec::new();
+    for effect in names {
+        let Some(without) = judge.refit(&best.fit.effects.without(effect))? else { continue };
+        let others: Vec<Effect> = Effect::ALL
+            .into_iter()
+            .filter(|e| *e != effect && without.fit.effects.has_room(*e) && visible(*e, judge.problem.samples))
+            .collect();
+        let trials: Vec<Result<Option<Trial>, Error>> = others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
+        let mut instead = Vec::new();
+        for (other, trial) in others.iter().zip(trials) {
+            let Some(trial) = trial? else { continue };
+            let accepted = judge.judge(&without, &trial, *other).accepted();
+            if accepted && trial.total() < 0.98 * best.total() {
+                return Ok(Swap::Better(Box::new(trial)));
+            }
+            let tie = accepted && super::score::tie(&trial.blocks, &best.blocks, judge.seed);
+            instead.push((*other, trial.cv_rmse(), tie));
+        }
+        instead.sort_by(|a, b| a.1.total_cmp(&b.1));
+        named.push(Named { effect, cv_without: without.cv_rmse(), judgement: judge.judge(&without, best, effect), instead });
+    }
+    Ok(Swap::Final(named))
+}

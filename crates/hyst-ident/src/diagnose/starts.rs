@@ -1,0 +1,102 @@
+//! Where the search for an effect's parameters begins.
+//!
+//! Most effects enter smoothly and can begin near nothing. A frequency cannot: it is looked for over
+//! the whole band first, by how much of the residual a first-order change would take.
+
+use hyst_core::{DelayParams, DriftParams, Error, InterferenceParams, LagParams, ResonanceParams, TemperatureParams};
+
+use super::spectrum::{peaks, tone};
+use crate::model::{CreepBank, Effect, Effects};
+use crate::nested::{Fitted, Problem};
+use crate::samples::Samples;
+
+/// Creep elements per decade of time.
+const PER_DECADE: f64 = 2.0;
+/// Modes that are followed up.
+const FOLLOWED: usize = 2;
+/// Frequencies of the coarse scan.
+const SCAN: usize = 48;
+
+/// Effects to begin at: those of `from`, and `effect`.
+pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, effect: Effect) -> Result<Vec<Effects>, Error> {
+    let samples = problem.samples;
+    let with = |change: &dyn Fn(&mut Effects)| {
+        let mut e = from.effects.clone();
+        change(&mut e);
+        e
+    };
+    Ok(match effect {
+        Effect::Delay => vec![with(&|e| e.delay = Some(DelayParams { seconds: samples.period }))],
+        Effect::Lag => vec![with(&|e| e.lag = Some(LagParams { seconds: samples.period }))],
+        Effect::Temperature => {
+            let reference_degc = starting_temperature(samples);
+            vec![with(&|e| e.temperature = Some(TemperatureParams { per_kelvin: 0.0, reference_degc }))]
+        }
+        Effect::Creep => vec![with(&|e| e.creep = Some(bank(samples)))],
+        Effect::Drift => vec![with(&|e| e.drift = Some(DriftParams { per_second: 0.0 }))],
+        Effect::Interference => {
+            let residual = problem.residual(from)?;
+            let found = tone(samples, &residual);
+            found.map(|hz| with(&|e| e.interference = Some(InterferenceParams { hz, ..Default::default() }))).into_iter().collect()
+        }
+        Effect::Resonance => {
+            let found = modes(problem, from)?;
+            found.into_iter().map(|mode| with(&|e| e.resonances.push(mode))).collect()
+        }
+    })
+}
+
+/// Temperature at which the gain counts as 1: where the record began, to a tenth of a degree.
+fn starting_temperature(samples: &Samples) -> f64 {
+    let Some(t) = &samples.temperature else { return 0.0 };
+    let rows = ((1.0 / samples.period) as usize).clamp(1, t.len());
+    let mean = t[..rows].iter().sum::<f64>() / rows as f64;
+    (10.0 * mean).round() / 10.0
+}
+
+/// Time constants from 30 samples (but not below a 400th of the longest segment) to three times the
+/// longest segment.
+fn bank(samples: &Samples) -> CreepBank {
+    let longest = samples.longest_segment();
+    let (first, last) = ((30.0 * samples.period).max(longest / 400.0), 3.0 * longest);
+    let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
+    let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
+    CreepBank { shares: vec![0.0; seconds.len()], seconds }
+}
+
+/// Modes whose first-order change takes most of the residual.
+fn modes(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<ResonanceParams>, Error> {
+    let samples = problem.samples;
+    let residual = problem.residual(from)?;
+    let (low, high) = (3.0 / samples.longest_segment(), 0.45 / samples.period);
+    let mut grid: Vec<f64> = (0..SCAN).map(|i| low * (high / low).powf(i as f64 / (SCAN - 1) as f64)).collect();
+    grid.extend(peaks(samples, &residual, 4).into_iter().filter(|hz| *hz > low && *hz < high));
+    let motion = problem.motion(&from.effects, &from.weights)?;
+    let projector = problem.projector(from)?;
+    let mut scored = Vec::new();
+    for hz in grid {
+        for damping in [0.02, 0.15] {
+            let mode = ResonanceParams { hz, damping, gain: 1.0 };
+            let mut moved = motion.clone();
+            let only = Effects { resonances: vec![mode], ..Effects::default() };
+            crate::nested::SignalPath::new(samples, &only)?.output_side(&mut moved);
+            moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);
+            let (gain, amplitude) = projector.gain(&moved, &residual);
+            if amplitude > 0.0 {
+                scored.push((gain, ResonanceParams { gain: amplitude.clamp(0.05, 1.1), ..mode }));
+            }
+        }
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<ResonanceParams> = Vec::new();
+    for (_, mode) in scored {
+        // A neighbour on the grid would lead to the same place.
+        if chosen.iter().all(|c| (c.hz / mode.hz).ln().abs() > 0.25) {
+            chosen.push(mode);
+        }
+        if chosen.len() == FOLLOWED {
+            break;
+        }
+    }
+    Ok(chosen)
+}

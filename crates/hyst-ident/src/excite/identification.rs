@@ -1,0 +1,109 @@
+//! The standard drive of an identification.
+
+use super::{
+    DecayingSine, Drive, ExciteError, Limits, Multisine, Phases, Shape, Sine, Stairs, Triangle, positive, require,
+};
+
+/// A drive that shows every effect that a diagnosis can name: nested loops (decaying sine), slow and fast full loops
+/// (lag, resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Identification {
+    /// Duration, rests included [s]; the drive comes within a few seconds of it.
+    pub duration_s: f64,
+    /// Rest between segments [s].
+    pub rest_s: f64,
+    /// Frequency of the slow loops [Hz].
+    pub slow_hz: f64,
+    /// Frequency of the fast loops [Hz].
+    pub fast_hz: f64,
+    /// Highest frequency of the multisine [Hz]; its lowest is `slow_hz`.
+    pub band_hz: f64,
+    /// How long the levels of the stairs are held [s].
+    pub hold_s: f64,
+    /// How long the ramps between them take [s].
+    pub ramp_s: f64,
+    /// Seed of levels and phases.
+    pub seed: u64,
+}
+
+impl Identification {
+    /// The usual drive: 36 s, 1 to 20 Hz and a band up to 50 Hz, less where `rate_hz` is low.
+    pub fn at_rate(rate_hz: f64, seed: u64) -> Self {
+        Self {
+            duration_s: 36.0,
+            rest_s: 1.0,
+            slow_hz: f64::min(1.0, rate_hz / 100.0),
+            fast_hz: f64::min(20.0, rate_hz / 10.0),
+            band_hz: f64::min(50.0, rate_hz / 8.0),
+            hold_s: 2.0,
+            ramp_s: f64::max(0.08, 4.0 / rate_hz),
+            seed,
+        }
+    }
+
+    /// The segments. Of the time without rests the stairs take two fifths and the decaying sine a fifth.
+    ///
+    /// # Errors
+    /// When a field is out of its range.
+    pub fn shapes(&self) -> Result<Vec<Shape>, ExciteError> {
+        require("rest_s", self.rest_s, (0.0..=1e6).contains(&self.rest_s), "between 0 and 1e6")?;
+        positive("slow_hz", self.slow_hz)?;
+        for (field, hz) in [("fast_hz", self.fast_hz), ("band_hz", self.band_hz)] {
+            require(field, hz, hz.is_finite() && hz > self.slow_hz, "above slow_hz")?;
+        }
+        require("hold_s", self.hold_s, self.hold_s.is_finite() && self.hold_s >= 0.0, "a number from 0 up")?;
+        positive("ramp_s", self.ramp_s)?;
+        let active = self.duration_s - 5.0 * self.rest_s;
+        // The decaying sine needs three of its periods, of which it takes two a slow one.
+        let least = f64::max(8.0 / self.slow_hz, 5.0 * (self.hold_s + self.ramp_s));
+        let must =
+            format!("finite and at least {} (5 rests and {least} s for the segments)", least + 5.0 * self.rest_s);
+        require("duration_s", self.duration_s, self.duration_s.is_finite() && active >= least, &must)?;
+        let cycles = |share: f64, frequency: f64| (share * active * frequency).round().clamp(1.0, 1e6) as u32;
+        let multisine_s = 0.15 * active;
+        let room = (self.band_hz - self.slow_hz) * multisine_s;
+        Ok(vec![
+            Shape::DecayingSine(DecayingSine { frequency_hz: 2.0 * self.slow_hz, duration_s: 0.2 * active }),
+            Shape::Sine(Sine { frequency_hz: self.slow_hz, cycles: cycles(0.1, self.slow_hz) }),
+            Shape::Sine(Sine { frequency_hz: self.fast_hz, cycles: cycles(0.05, self.fast_hz) }),
+            Shape::Triangle(Triangle { frequency_hz: self.slow_hz, cycles: cycles(0.1, self.slow_hz) }),
+            Shape::Stairs(Stairs {
+                levels: cycles(0.4, 1.0 / (self.hold_s + self.ramp_s)),
+                hold_s: self.hold_s,
+                ramp_s: self.ramp_s,
+                seed: self.seed,
+            }),
+            Shape::Multisine(Multisine {
+                low_hz: self.slow_hz,
+                high_hz: self.band_hz,
+                lines: room.floor().clamp(1.0, 40.0) as u32,
+                phases: Phases::Random(self.seed),
+                duration_s: multisine_s,
+                fade_s: 0.1 * multisine_s,
+            }),
+        ])
+    }
+
+    /// Makes the drive.
+    ///
+    /// # Errors
+    /// As [`Drive::new`]; messages name the fields of this specification.
+    pub fn drive(&self, limits: &Limits) -> Result<Drive, ExciteError> {
+        limits.check()?;
+        for (field, hz) in [("fast_hz", self.fast_hz), ("band_hz", self.band_hz)] {
+            require(field, hz, hz <= 0.25 * limits.rate_hz, "at most a quarter of rate_hz")?;
+        }
+        Drive::new(&self.shapes()?, limits, self.rest_s).map_err(|error| match error {
+            ExciteError::Slew { shape, needed, limit, .. } => {
+                let remedy = match shape {
+                    "sine" => "lower fast_hz (and slow_hz, if that is not enough)",
+                    "stairs" => "lengthen ramp_s",
+                    "multisine" => "lower band_hz",
+                    _ => "lower slow_hz",
+                };
+                ExciteError::Slew { shape, needed, limit, remedy }
+            }
+            other => other,
+        })
+    }
+}

@@ -1,0 +1,220 @@
+//! Drives with which to identify or test an actuator.
+//!
+//! A [`Drive`] is a sequence of segments, each made by a [`Shape`]. Every segment starts and ends with the device at
+//! rest at the lowest voltage, stays between the lowest and the highest, and keeps to the slew limit. What is random
+//! depends on its seed alone.
+
+mod identification;
+mod shapes;
+#[cfg(test)]
+mod tests;
+
+use std::io::Write;
+use std::ops::Range;
+
+pub use identification::Identification;
+pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
+
+use crate::record::{Extra, Record, RecordError, Samples, WriteError};
+
+/// No drive has more rows than this; a larger figure is a slip of the pen.
+const MOST_ROWS: f64 = 5e7;
+
+/// What the device and its amplifier stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Rows per second [Hz].
+    pub rate_hz: f64,
+    /// The lowest voltage [V], at which the device rests.
+    pub lo_v: f64,
+    /// The highest voltage [V].
+    pub hi_v: f64,
+    /// The steepest slope from one row to the next [V/s], if there is a limit.
+    pub slew_v_per_s: Option<f64>,
+}
+
+impl Limits {
+    fn span(&self) -> f64 {
+        self.hi_v - self.lo_v
+    }
+
+    fn check(&self) -> Result<(), ExciteError> {
+        positive("rate_hz", self.rate_hz)?;
+        require("lo_v", self.lo_v, self.lo_v.is_finite(), "a finite number")?;
+        require("hi_v", self.hi_v, self.hi_v.is_finite() && self.hi_v > self.lo_v, "above lo_v")?;
+        require("hi_v", self.hi_v, self.span().abs() < 1e9, "less than 1e9 V above lo_v")?;
+        self.slew_v_per_s.map_or(Ok(()), |slew| positive("slew_v_per_s", slew))
+    }
+}
+
+/// Why a drive cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExciteError {
+    /// A field of a specification is out of its range.
+    #[error("{field} = {value}: it has to be {must}")]
+    Field {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range, in words.
+        must: String,
+    },
+    /// A segment is steeper than the slew limit allows.
+    #[error("{shape}: {needed:.6} V/s are needed, but slew_v_per_s = {limit}; {remedy}, or narrow lo_v … hi_v")]
+    Slew {
+        /// The segment's shape.
+        shape: &'static str,
+        /// The steepest slope [V/s].
+        needed: f64,
+        /// The limit [V/s].
+        limit: f64,
+        /// Which field to change.
+        remedy: &'static str,
+    },
+    /// There is no shape to make a drive of.
+    #[error("a drive needs at least one segment")]
+    Nothing,
+}
+
+fn require(field: &'static str, value: f64, holds: bool, must: &str) -> Result<(), ExciteError> {
+    if holds { Ok(()) } else { Err(ExciteError::Field { field, value, must: must.to_owned() }) }
+}
+
+fn positive(field: &'static str, value: f64) -> Result<(), ExciteError> {
+    require(field, value, value.is_finite() && value > 0.0, "a positive number")
+}
+
+/// Voltages over the lab's clock, in segments between which the device rests.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    segments: Vec<Range<usize>>,
+    shapes: Vec<&'static str>,
+    time: Vec<f64>,
+    voltage: Vec<f64>,
+    decimals: usize,
+}
+
+impl Drive {
+    /// Makes one segment of each shape, with `rest_s` seconds of rest between them (1 is usual).
+    ///
+    /// Voltages are rounded to the four to six decimals with which [`write_csv`](Self::write_csv) prints them.
+    ///
+    /// # Errors
+    /// When a field of `limits` or of a shape is out of its range, or a segment is steeper than the slew limit. The
+    /// message names the field.
+    pub fn new(shapes: &[Shape], limits: &Limits, rest_s: f64) -> Result<Self, ExciteError> {
+        limits.check()?;
+        require("rest_s", rest_s, (0.0..=1e6).contains(&rest_s), "between 0 and 1e6")?;
+        if shapes.is_empty() {
+            return Err(ExciteError::Nothing);
+        }
+        let grid = VoltageGrid::new(limits)?;
+        let mut drive = Self {
+            segments: Vec::with_capacity(shapes.len()),
+            shapes: Vec::with_capacity(shapes.len()),
+            time: Vec::new(),
+            voltage: Vec::new(),
+            decimals: grid.decimals,
+        };
+        let mut start = 0.0;
+        for shape in shapes {
+            let first = drive.time.len();
+            drive.voltage.extend(shape.unit_samples(limits)?.into_iter().map(|s| grid.voltage(limits, s)));
+            grid.check_slew(limits, shape, &drive.voltage[first..])?;
+            let rows = first..drive.voltage.len();
+            drive.time.extend(rows.clone().map(|row| start + (row - first) as f64 / limits.rate_hz));
+            // Whole microseconds print exactly.
+            start = ((start + rows.len() as f64 / limits.rate_hz + rest_s) * 1e6).round() / 1e6;
+            drive.segments.push(rows);
+            drive.shapes.push(shape.name());
+        }
+        Ok(drive)
+    }
+
+    /// The rows of each segment, in order and without gaps.
+    pub fn segments(&self) -> &[Range<usize>] {
+        &self.segments
+    }
+
+    /// The name of each segment's shape, as `decaying-sine`.
+    pub fn shapes(&self) -> &[&'static str] {
+        &self.shapes
+    }
+
+    /// Time [s]; it goes on across segments.
+    pub fn time(&self) -> &[f64] {
+        &self.time
+    }
+
+    /// The drive [V].
+    pub fn voltage(&self) -> &[f64] {
+        &self.voltage
+    }
+
+    /// The drive as a record without an output; `name` stands for it in messages.
+    ///
+    /// # Errors
+    /// When the drive has fewer than two rows in every segment.
+    pub fn to_record(&self, name: &str) -> Result<Record, RecordError> {
+        let labels = (0..).zip(&self.segments).flat_map(|(label, rows)| std::iter::repeat_n(label, rows.len()));
+        Record::from_samples(Samples {
+            name: name.to_owned(),
+            segment: Some(labels.collect()),
+            time: self.time.clone(),
+            input: Some(self.voltage.clone()),
+            ..Samples::default()
+        })
+    }
+
+    /// Writes the columns `segment`, `time_s` and `voltage_v`.
+    ///
+    /// # Errors
+    /// When `out` refuses.
+    pub fn write_csv(&self, out: impl Write) -> Result<(), WriteError> {
+        let record = self.to_record("drive").map_err(std::io::Error::other)?;
+        record.write_with(out, &[Extra::rounded("voltage_v", &self.voltage, self.decimals)])
+    }
+}
+
+/// The voltages that can be printed, as whole numbers of the last decimal.
+struct VoltageGrid {
+    decimals: usize,
+    scale: f64,
+    lowest: f64,
+    highest: f64,
+}
+
+impl VoltageGrid {
+    fn new(limits: &Limits) -> Result<Self, ExciteError> {
+        // A millionth of the span, as far as four to six decimals go.
+        let decimals = (6.0 - limits.span().log10().floor()).clamp(4.0, 6.0) as usize;
+        let scale = 10_f64.powi(decimals as i32);
+        let mut lowest = (limits.lo_v * scale).ceil();
+        let mut highest = (limits.hi_v * scale).floor();
+        // The products above are rounded: step back to a value that is still inside, and never outside.
+        lowest -= f64::from((lowest - 1.0) / scale >= limits.lo_v);
+        lowest += f64::from(lowest / scale < limits.lo_v);
+        highest += f64::from((highest + 1.0) / scale <= limits.hi_v);
+        highest -= f64::from(highest / scale > limits.hi_v);
+        require("hi_v", limits.hi_v, highest - lowest >= 10.0, "at least 1e-5 V above lo_v")?;
+        Ok(Self { decimals, scale, lowest, highest })
+    }
+
+    /// The voltage for a share `s` of the span.
+    fn voltage(&self, limits: &Limits, s: f64) -> f64 {
+        let exact = limits.lo_v + s * limits.span();
+        (exact * self.scale).round().clamp(self.lowest, self.highest) / self.scale
+    }
+
+    fn check_slew(&self, limits: &Limits, shape: &Shape, voltage: &[f64]) -> Result<(), ExciteError> {
+        let Some(limit) = limits.slew_v_per_s else { return Ok(()) };
+        let step = voltage.windows(2).fold(0.0_f64, |most, w| most.max((w[1] - w[0]).abs()));
+        let needed = step * limits.rate_hz;
+        if needed <= limit * (1.0 + 1e-9) {
+            return Ok(());
+        }
+        Err(ExciteError::Slew { shape: shape.name(), needed, limit, remedy: shape.remedy() })
+    }
+}

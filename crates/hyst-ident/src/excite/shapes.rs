@@ -1,0 +1,356 @@
+//! The shapes of a drive's segments, as shares of the span: 0 is the lowest voltage, 1 the highest.
+
+use std::f64::consts::{PI, TAU};
+
+use rand::Rng;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::{ExciteError, Limits, MOST_ROWS, positive, require};
+
+/// A raised cosine over the whole span.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sine {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Whole cycles.
+    pub cycles: u32,
+}
+
+/// A sine around mid-span whose amplitude falls linearly from the whole span to nothing, with a smooth return to rest.
+///
+/// Its loops are nested and end where a demagnetisation would.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DecayingSine {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Duration, return included [s]; at least three periods.
+    pub duration_s: f64,
+}
+
+/// Ramps up and down over the whole span.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Whole cycles.
+    pub cycles: u32,
+}
+
+/// Random levels, spread over the whole span and held, with smooth ramps in between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stairs {
+    /// How many levels.
+    pub levels: u32,
+    /// How long each is held [s].
+    pub hold_s: f64,
+    /// How long each ramp takes [s]; 0.05 to 0.1 is usual.
+    pub ramp_s: f64,
+    /// Seed of the levels.
+    pub seed: u64,
+}
+
+/// How the lines of a [`Multisine`] are shifted against each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phases {
+    /// Schroeder's phases `−π k (k − 1) / lines`: a low crest factor.
+    Schroeder,
+    /// Random phases from this seed.
+    Random(u64),
+}
+
+/// A sum of sines of equal amplitude around mid-span, faded in from rest and out again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Multisine {
+    /// The lowest line [Hz].
+    pub low_hz: f64,
+    /// The highest line [Hz].
+    pub high_hz: f64,
+    /// How many lines, evenly spaced; each is moved to a whole number of cycles in `duration_s`.
+    pub lines: u32,
+    /// Their phases.
+    pub phases: Phases,
+    /// Duration, fades included [s].
+    pub duration_s: f64,
+    /// Duration of each fade [s]; at most half of `duration_s`.
+    pub fade_s: f64,
+}
+
+/// A raised cosine whose frequency grows by the same factor in equal times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// Frequency at the start [Hz].
+    pub low_hz: f64,
+    /// Frequency at the end [Hz].
+    pub high_hz: f64,
+    /// Duration [s], which is adjusted to whole cycles.
+    pub duration_s: f64,
+}
+
+/// The form of a peak of [`Forc`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Peak {
+    /// Straight flanks. They excite the modes of a structure.
+    Triangle,
+    /// Half a sine wave, smooth at the reversal.
+    HalfSine,
+}
+
+/// Peaks of growing height from rest, one per reversal voltage: the falling flanks are first-order reversal curves
+/// (first-order descent curves in Schirrer et al.).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forc {
+    /// How many peaks; the last reaches the highest voltage.
+    pub curves: u32,
+    /// Duration of a peak [s].
+    pub peak_s: f64,
+    /// Rest after each peak [s].
+    pub rest_s: f64,
+    /// The peaks' form.
+    pub peak: Peak,
+}
+
+/// The shape of one segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// See [`Sine`].
+    Sine(Sine),
+    /// See [`DecayingSine`].
+    DecayingSine(DecayingSine),
+    /// See [`Triangle`].
+    Triangle(Triangle),
+    /// See [`Stairs`].
+    Stairs(Stairs),
+    /// See [`Multisine`].
+    Multisine(Multisine),
+    /// See [`Sweep`].
+    Sweep(Sweep),
+    /// See [`Forc`].
+    Forc(Forc),
+}
+
+impl Shape {
+    /// The shape's name, as `decaying-sine`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Sine(_) => "sine",
+            Self::DecayingSine(_) => "decaying-sine",
+            Self::Triangle(_) => "triangle",
+            Self::Stairs(_) => "stairs",
+            Self::Multisine(_) => "multisine",
+            Self::Sweep(_) => "sweep",
+            Self::Forc(_) => "forc",
+        }
+    }
+
+    /// What to do about a slope that is too steep.
+    pub(super) fn remedy(&self) -> &'static str {
+        match self {
+            Self::Sine(_) | Self::DecayingSine(_) | Self::Triangle(_) => "lower frequency_hz",
+            Self::Stairs(_) => "lengthen ramp_s",
+            Self::Multisine(_) => "lower high_hz or lengthen fade_s",
+            Self::Sweep(_) => "lower high_hz",
+            Self::Forc(_) => "lengthen peak_s",
+        }
+    }
+
+    /// The segment's rows as shares of the span.
+    pub(super) fn unit_samples(&self, limits: &Limits) -> Result<Vec<f64>, ExciteError> {
+        let rate = limits.rate_hz;
+        match self {
+            Self::Sine(sine) => sine.samples(rate),
+            Self::DecayingSine(sine) => sine.samples(rate),
+            Self::Triangle(triangle) => triangle.samples(rate),
+            Self::Stairs(stairs) => stairs.samples(rate),
+            Self::Multisine(multisine) => multisine.samples(rate),
+            Self::Sweep(sweep) => sweep.samples(rate),
+            Self::Forc(forc) => forc.samples(rate),
+        }
+    }
+}
+
+/// Half a cosine wave from 0 to 1 while `x` goes from 0 to 1, and 0 or 1 beside.
+fn smooth(x: f64) -> f64 {
+    0.5 - 0.5 * (PI * x.clamp(0.0, 1.0)).cos()
+}
+
+/// The rows from 0 to `duration` [s], the last one not before `duration`; `share` sees no later time than that. The
+/// field named is the one to blame for a duration out of range.
+fn sampled(
+    (field, value): (&'static str, f64),
+    duration: f64,
+    rate: f64,
+    share: impl Fn(f64) -> f64,
+) -> Result<Vec<f64>, ExciteError> {
+    let steps = (duration * rate - 1e-9).ceil();
+    require(field, value, (1.0..MOST_ROWS).contains(&steps), "such that the segment has 2 to 5e7 rows")?;
+    Ok((0..=steps as usize).map(|k| share((k as f64 / rate).min(duration))).collect())
+}
+
+fn check_frequency(field: &'static str, frequency: f64, rate: f64) -> Result<(), ExciteError> {
+    positive(field, frequency)?;
+    require(field, frequency, frequency <= 0.25 * rate, "at most a quarter of rate_hz")
+}
+
+fn check_count(field: &'static str, count: u32) -> Result<(), ExciteError> {
+    require(field, f64::from(count), count > 0, "at least 1")
+}
+
+impl Sine {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_frequency("frequency_hz", self.frequency_hz, rate)?;
+        check_count("cycles", self.cycles)?;
+        let duration = f64::from(self.cycles) / self.frequency_hz;
+        sampled(("cycles", f64::from(self.cycles)), duration, rate, |t| 0.5 - 0.5 * (TAU * self.frequency_hz * t).cos())
+    }
+}
+
+impl DecayingSine {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_frequency("frequency_hz", self.frequency_hz, rate)?;
+        let period = 1.0 / self.frequency_hz;
+        let long = self.duration_s.is_finite() && self.duration_s >= 3.0 * period;
+        require("duration_s", self.duration_s, long, "at least three periods of frequency_hz")?;
+        let back = 0.5 * period;
+        let decay = self.duration_s - back;
+        // Linear, but for a first period in which the decay sets in, so that the start is smooth.
+        let slope = 1.0 / (decay - 0.5 * period);
+        let amplitude = |t: f64| {
+            let lost = if t < period { 0.5 * slope * t * t / period } else { slope * (t - 0.5 * period) };
+            (1.0 - lost).max(0.0)
+        };
+        sampled(("duration_s", self.duration_s), self.duration_s, rate, |t| {
+            let oscillation = 0.5 - 0.5 * amplitude(t.min(decay)) * (TAU * self.frequency_hz * t.min(decay)).cos();
+            oscillation * (1.0 - smooth((t - decay) / back))
+        })
+    }
+}
+
+impl Triangle {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_frequency("frequency_hz", self.frequency_hz, rate)?;
+        check_count("cycles", self.cycles)?;
+        let cycles = f64::from(self.cycles);
+        sampled(("cycles", cycles), cycles / self.frequency_hz, rate, |t| {
+            let phase = (self.frequency_hz * t).min(cycles);
+            1.0 - 2.0 * (phase - phase.floor() - 0.5).abs()
+        })
+    }
+}
+
+impl Stairs {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_count("levels", self.levels)?;
+        require("hold_s", self.hold_s, self.hold_s.is_finite() && self.hold_s >= 0.0, "a number from 0 up")?;
+        let ramped = self.ramp_s.is_finite() && self.ramp_s * rate >= 2.0;
+        require("ramp_s", self.ramp_s, ramped, "at least two rows long")?;
+        let step = self.ramp_s + self.hold_s;
+        let count = f64::from(self.levels);
+        let duration = count * step + self.ramp_s;
+        require("levels", count, duration * rate < MOST_ROWS, "so few that the drive has fewer than 5e7 rows")?;
+        // One level out of each equal part of the span, in random order.
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut levels: Vec<f64> =
+            (0..self.levels).map(|part| (f64::from(part) + random.random::<f64>()) / count).collect();
+        levels.shuffle(&mut random);
+        levels.push(0.0);
+        sampled(("hold_s", self.hold_s), duration, rate, |t| {
+            let at = ((t / step) as usize).min(levels.len() - 1);
+            let from = if at == 0 { 0.0 } else { levels[at - 1] };
+            let moved = smooth((t - at as f64 * step) / self.ramp_s);
+            from + (levels[at] - from) * moved
+        })
+    }
+}
+
+impl Multisine {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_frequency("low_hz", self.low_hz, rate)?;
+        check_frequency("high_hz", self.high_hz, rate)?;
+        require("high_hz", self.high_hz, self.high_hz >= self.low_hz, "at least low_hz")?;
+        positive("duration_s", self.duration_s)?;
+        let faded = self.fade_s > 0.0 && self.fade_s <= 0.5 * self.duration_s;
+        require("fade_s", self.fade_s, faded, "above 0 and at most half of duration_s")?;
+        let lines = self.lines()?;
+        let phases = self.phases();
+        let work = self.duration_s * rate * lines.len() as f64;
+        require("duration_s", self.duration_s, work < 100.0 * MOST_ROWS, "shorter for this many lines")?;
+        let sum = |t: f64| lines.iter().zip(&phases).map(|(f, phase)| (TAU * f * t + phase).sin()).sum::<f64>();
+        let raw = sampled(("duration_s", self.duration_s), self.duration_s, rate, sum)?;
+        let peak = raw.iter().fold(f64::MIN_POSITIVE, |most, s| most.max(s.abs()));
+        let faded = |(k, s): (usize, &f64)| {
+            let t = (k as f64 / rate).min(self.duration_s);
+            // Of both, the oscillation and the mid-span that it goes around: the sum is between 0 and 1 all the time.
+            let fade = smooth(t / self.fade_s) * smooth((self.duration_s - t) / self.fade_s);
+            fade * (0.5 + 0.5 * s / peak)
+        };
+        Ok(raw.iter().enumerate().map(faded).collect())
+    }
+
+    /// The lines [Hz], each with a whole number of cycles in the duration.
+    fn lines(&self) -> Result<Vec<f64>, ExciteError> {
+        check_count("lines", self.lines)?;
+        let count = f64::from(self.lines);
+        let low = (self.low_hz * self.duration_s).round().max(1.0);
+        let high = (self.high_hz * self.duration_s).round().max(1.0);
+        let room = format!("at most {}: lines are whole multiples of 1 / duration_s", high - low + 1.0);
+        require("lines", count, count <= high - low + 1.0, &room)?;
+        let spacing = if self.lines == 1 { 0.0 } else { (high - low) / (count - 1.0) };
+        let line = |k: u32| (low + f64::from(k) * spacing).round() / self.duration_s;
+        Ok((0..self.lines).map(line).collect())
+    }
+
+    fn phases(&self) -> Vec<f64> {
+        match self.phases {
+            Phases::Schroeder => {
+                let count = f64::from(self.lines);
+                let phase = |k: f64| -PI * k * (k - 1.0) / count;
+                (1..=self.lines).map(|k| phase(f64::from(k))).collect()
+            }
+            Phases::Random(seed) => {
+                let mut random = ChaCha8Rng::seed_from_u64(seed);
+                (0..self.lines).map(|_| TAU * random.random::<f64>()).collect()
+            }
+        }
+    }
+}
+
+impl Sweep {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_frequency("low_hz", self.low_hz, rate)?;
+        check_frequency("high_hz", self.high_hz, rate)?;
+        require("high_hz", self.high_hz, self.high_hz > self.low_hz, "above low_hz")?;
+        positive("duration_s", self.duration_s)?;
+        // Cycles up to the time t: low T / ln q · (q^(t/T) − 1), with q = high / low.
+        let growth = (self.high_hz / self.low_hz).ln();
+        let per_second = (self.high_hz - self.low_hz) / growth;
+        let cycles = (per_second * self.duration_s).round().max(1.0);
+        let duration = cycles / per_second;
+        let scale = self.low_hz * duration / growth;
+        sampled(("duration_s", self.duration_s), duration, rate, |t| {
+            let done = (scale * (growth * t / duration).exp_m1()).min(cycles);
+            0.5 - 0.5 * (TAU * done).cos()
+        })
+    }
+}
+
+impl Forc {
+    fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {
+        check_count("curves", self.curves)?;
+        positive("peak_s", self.peak_s)?;
+        require("peak_s", self.peak_s, self.peak_s * rate >= 4.0, "at least four rows long")?;
+        require("rest_s", self.rest_s, self.rest_s.is_finite() && self.rest_s >= 0.0, "a number from 0 up")?;
+        let step = self.peak_s + self.rest_s;
+        let count = f64::from(self.curves);
+        sampled(("curves", count), count * step, rate, |t| {
+            let at = (t / step).floor().min(count - 1.0);
+            let x = ((t - at * step) / self.peak_s).clamp(0.0, 1.0);
+            let share = match self.peak {
+                Peak::Triangle => 1.0 - (2.0 * x - 1.0).abs(),
+                Peak::HalfSine => (PI * x).sin().max(0.0),
+            };
+            share * (at + 1.0) / count
+        })
+    }
+}

@@ -1,0 +1,265 @@
+//! `fit`: a base model from a record.
+
+use std::collections::BTreeMap;
+
+use crate::base::{Basis, PiBasis, PreisachBasis};
+use crate::lsq::Blocks;
+use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError};
+use crate::nested::{Fitted, Problem};
+use crate::record::Record;
+use crate::samples::Samples;
+use crate::settle::{start_up_rows, windows};
+
+/// Cells along one edge of the Preisach triangle.
+const CELLS: usize = 24;
+/// Blocks of a record.
+pub(crate) const BLOCKS: usize = 64;
+/// Rows that one fit uses at most; longer records are thinned evenly after filtering.
+const ROWS: usize = 40_000;
+
+/// Why a fit is impossible.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// Not enough rows.
+    #[error("{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model")]
+    TooShort {
+        /// The record.
+        record: String,
+        /// Rows that it has.
+        rows: usize,
+        /// Unknowns of the model.
+        unknowns: usize,
+        /// Rows that would do.
+        needed: usize,
+    },
+    /// The input does not move.
+    #[error("{record}: column {column}: the input is constant ({value}), so the record shows no hysteresis; drive the actuator, e.g. with `hystctl excite identification`")]
+    ConstantInput {
+        /// The record.
+        record: String,
+        /// The input's column.
+        column: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The output does not move.
+    #[error("{record}: column {column}: the output is constant ({value}) while the input moves; check the sensor and `--map`")]
+    ConstantOutput {
+        /// The record.
+        record: String,
+        /// The output's column.
+        column: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The output falls where the input rises.
+    #[error("{record}: the output falls when the input rises; swap the sensor's sign (these models need a rising one)")]
+    Falling {
+        /// The record.
+        record: String,
+    },
+    /// A column is needed.
+    #[error("{record}: column {column} is missing; {advice}")]
+    Missing {
+        /// The record.
+        record: String,
+        /// The column.
+        column: String,
+        /// What to do.
+        advice: String,
+    },
+    /// The equations could not be solved.
+    #[error("{record}: the equations of the fit could not be solved; look for rows that are far off the others")]
+    Unsolvable {
+        /// The record.
+        record: String,
+    },
+    /// A stage cannot be built.
+    #[error("{record}: {source}")]
+    Stage {
+        /// The record.
+        record: String,
+        /// Why.
+        source: hyst_core::Error,
+    },
+    /// Prediction and measurement cannot be compared.
+    #[error("{record}: {source}")]
+    Compare {
+        /// The record.
+        record: String,
+        /// Why.
+        source: crate::metrics::MetricsError,
+    },
+    /// A model does not suit the record.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// What a fit may be told.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FitOptions {
+    /// Recorded with the model; the fits of this version draw nothing at random.
+    pub seed: u64,
+    /// One sensor zero for each file instead of one for all.
+    pub zero_per_record: bool,
+}
+
+/// Fits a base model: non-negative weights, the rows of a start-up transient left out.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, FitError> {
+    let mut samples = Samples::from_record(record);
+    check(record, &samples)?;
+    let basis = basis_for(kind, &samples);
+    let name = || record.name();
+    let needed = 3 * basis.len();
+    if samples.len() < needed {
+        return Err(FitError::TooShort { record: name(), rows: samples.len(), unknowns: basis.len(), needed });
+    }
+    let fitted = fit_settled(&mut samples, basis.as_ref(), options, &name)?;
+    let settled = samples.settling.iter().filter(|s| !**s).count();
+    if settled < needed {
+        return Err(FitError::TooShort { record: name(), rows: settled, unknowns: basis.len(), needed });
+    }
+    Ok(to_model(record, &samples, kind, &fitted, options.seed))
+}
+
+/// A base of a kind, with the grid or thresholds that the record calls for.
+pub(crate) enum BasisOf {
+    Pi(PiBasis),
+    Preisach(PreisachBasis),
+}
+
+impl BasisOf {
+    pub(crate) fn as_ref(&self) -> &dyn Basis {
+        match self {
+            Self::Pi(b) => b,
+            Self::Preisach(b) => b,
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.as_ref().len()
+    }
+
+    /// The operator with these weights. What the solver leaves below a billionth of the sum is zero.
+    pub(crate) fn operator(&self, weights: &[f64]) -> Base {
+        let smallest = 1e-9 * weights.iter().map(|w| w.abs()).sum::<f64>();
+        let clean: Vec<f64> = weights.iter().map(|w| if w.abs() < smallest { 0.0 } else { *w }).collect();
+        match self {
+            Self::Pi(b) => Base::Pi { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() },
+            Self::Preisach(b) => Base::Preisach(b.spec(&clean)),
+        }
+    }
+}
+
+pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> BasisOf {
+    match kind {
+        Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
+        Kind::Preisach => BasisOf::Preisach(PreisachBasis::for_samples(samples, CELLS)),
+    }
+}
+
+pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> {
+    let name = record.name();
+    let Some(unit) = record.output_unit() else {
+        return Err(FitError::Missing { record: name, column: "displacement_um".into(), advice: "a fit needs the measured output".into() });
+    };
+    if record.input().is_empty() {
+        return Err(FitError::Missing { record: name, column: "voltage_v".into(), advice: "a fit needs the drive".into() });
+    }
+    let (low, high) = samples.input_range();
+    if high - low <= 1e-9 * high.abs().max(low.abs()).max(f64::MIN_POSITIVE) {
+        return Err(FitError::ConstantInput { record: name, column: record.input_column().into(), value: low });
+    }
+    let (least, most) = crate::samples::range(samples.output.iter().copied());
+    if most - least <= 1e-12 * most.abs().max(least.abs()).max(f64::MIN_POSITIVE) {
+        return Err(FitError::ConstantOutput { record: name, column: unit.column().into(), value: least });
+    }
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let (u, y) = (mean(&samples.input), mean(&samples.output));
+    let together: f64 = samples.input.iter().zip(&samples.output).map(|(a, b)| (a - u) * (b - y)).sum();
+    if together <= 0.0 {
+        return Err(FitError::Falling { record: name });
+    }
+    Ok(())
+}
+
+/// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
+fn fit_settled(samples: &mut Samples, basis: &dyn Basis, options: &FitOptions, name: &dyn Fn() -> String) -> Result<Fitted, FitError> {
+    let run = |samples: &Samples| -> Result<(Fitted, Vec<f64>), FitError> {
+        let blocks = Blocks::new(samples, BLOCKS, ROWS);
+        let problem = Problem::new(samples, basis, &blocks, options.zero_per_record);
+        let stage = |source| FitError::Stage { record: name(), source };
+        let fitted = problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+        let residual = problem.residual(&fitted).map_err(stage)?;
+        Ok((fitted, residual))
+    };
+    let all = run(samples)?;
+    let windows = windows(samples);
+    let mut without = samples.clone();
+    for (s, w) in samples.segments.iter().zip(&windows) {
+        without.settling[s.start..s.start + w].fill(true);
+    }
+    let late = run(&without)?;
+    let rms_late = |r: &[f64]| {
+        let kept = r.iter().zip(&without.settling).filter(|(_, s)| !**s);
+        let (sum, n) = kept.fold((0.0, 0usize), |(sum, n), (r, _)| (sum + r * r, n + 1));
+        (sum / n.max(1) as f64).sqrt()
+    };
+    // If leaving the beginnings out improves the rest a lot, they disagree with the rest: judge them
+    // by a fit that has not seen them. If not, they belong to the record (and hold its virgin curve).
+    let residual = if rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
+    samples.settling = start_up_rows(samples, residual);
+    if samples.settling.iter().any(|s| *s) { Ok(run(samples)?.0) } else { Ok(all.0) }
+}
+
+/// Puts a fit into a model.
+pub(crate) fn to_model(record: &Record, samples: &Samples, kind: Kind, fitted: &Fitted, seed: u64) -> Model {
+    let basis = basis_for(kind, samples);
+    let unit = record.output_unit();
+    let (low, high) = samples.input_range();
+    let (least, most) = crate::samples::range(samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| *y));
+    Model {
+        input: Channel { column: record.input_column().into(), unit: unit_of(record.input_column()), low, high },
+        output: Channel {
+            column: unit.map_or("", |u| u.column()).into(),
+            unit: unit.map_or("", |u| u.suffix()).into(),
+            low: least,
+            high: most,
+        },
+        zero: fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64,
+        base: basis.operator(&fitted.weights),
+        effects: fitted.effects.clone(),
+        std_errors: BTreeMap::new(),
+        recorded_at_hz: 1.0 / samples.period,
+        fitted_on: fitted_on(record, samples),
+        seed,
+        version: env!("CARGO_PKG_VERSION").into(),
+    }
+}
+
+fn fitted_on(record: &Record, samples: &Samples) -> Vec<FittedOn> {
+    let of_file = |(source, rows): (&crate::record::Source, std::ops::Range<usize>)| {
+        let settling_rows = samples.settling[rows.clone()].iter().filter(|s| **s).count();
+        FittedOn {
+            file: std::path::Path::new(&source.name).file_name().map_or_else(|| source.name.clone(), |n| n.to_string_lossy().into_owned()),
+            sha256: source.sha256.clone().unwrap_or_default(),
+            rows: rows.len() - settling_rows,
+            settling_rows,
+        }
+    };
+    record.sources().iter().zip(record.rows_of_files()).map(of_file).collect()
+}
+
+/// The unit at the end of a column's name, as a person writes it.
+fn unit_of(column: &str) -> String {
+    match column.rsplit('_').next() {
+        Some("v") => "V".into(),
+        Some("n") => "N".into(),
+        Some(other) => other.into(),
+        None => String::new(),
+    }
+}

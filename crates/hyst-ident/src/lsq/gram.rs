@@ -1,0 +1,92 @@
+//! Normal equations per block.
+//!
+//! A block is a contiguous piece of one segment. With the matrices `XᵀX` of every block at hand, a
+//! fit to any union of blocks and its error on the others cost no further pass over the record: that
+//! is what makes cross-validation and block-wise standard errors cheap.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::Samples;
+
+/// How a record is cut into blocks.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks {
+    /// Rows of each block.
+    pub(crate) rows: Vec<Range<usize>>,
+    /// Every `stride`-th row counts.
+    pub(crate) stride: usize,
+}
+
+impl Blocks {
+    /// About `count` blocks of equal length, none across the border of two segments, using at most
+    /// about `budget` rows.
+    pub(crate) fn new(samples: &Samples, count: usize, budget: usize) -> Self {
+        let target = (samples.len() / count.max(1)).max(1);
+        let mut rows = Vec::new();
+        for segment in &samples.segments {
+            let pieces = (segment.len() as f64 / target as f64).round().max(1.0) as usize;
+            for i in 0..pieces {
+                let at = |i: usize| segment.start + segment.len() * i / pieces;
+                rows.push(at(i)..at(i + 1));
+            }
+        }
+        Self { rows, stride: samples.len().div_ceil(budget.max(1)).max(1) }
+    }
+
+    /// The rows of block `b` that count.
+    pub(crate) fn used<'a>(&'a self, b: usize, samples: &'a Samples) -> impl Iterator<Item = usize> + 'a {
+        self.rows[b].clone().step_by(self.stride).filter(|k| !samples.settling[*k])
+    }
+}
+
+/// `XᵀX` of one set of rows, the target being X's last column.
+#[derive(Clone, Debug)]
+pub(crate) struct Gram {
+    pub(crate) matrix: DMatrix<f64>,
+    pub(crate) rows: usize,
+}
+
+impl Gram {
+    pub(crate) fn zeros(columns: usize) -> Self {
+        Self { matrix: DMatrix::zeros(columns, columns), rows: 0 }
+    }
+
+    /// Of the given rows of a column-major table.
+    pub(crate) fn of(table: &[&[f64]], rows: impl Iterator<Item = usize>) -> Self {
+        let rows: Vec<usize> = rows.collect();
+        let x = DMatrix::from_fn(rows.len(), table.len(), |k, c| table[c][rows[k]]);
+        Self { matrix: x.tr_mul(&x), rows: rows.len() }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.matrix += &other.matrix;
+        self.rows += other.rows;
+    }
+
+    pub(crate) fn sum<'a>(columns: usize, parts: impl Iterator<Item = &'a Self>) -> Self {
+        let mut total = Self::zeros(columns);
+        parts.for_each(|p| total.add(p));
+        total
+    }
+
+    /// Unknowns: all columns but the target.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.matrix.ncols() - 1
+    }
+
+    /// Σ (y − X z)² over the rows.
+    pub(crate) fn error(&self, z: &DVector<f64>) -> f64 {
+        let n = self.unknowns();
+        let mut full = z.clone().insert_row(n, -1.0);
+        full.neg_mut();
+        (full.transpose() * &self.matrix * &full)[(0, 0)].max(0.0)
+    }
+
+    /// Xᵀ(y − X z): the gradient that these rows contribute.
+    pub(crate) fn score(&self, z: &DVector<f64>) -> DVector<f64> {
+        let n = self.unknowns();
+        self.matrix.view((0, n), (n, 1)).column(0) - self.matrix.view((0, 0), (n, n)) * z
+    }
+}

@@ -1,0 +1,207 @@
+//! How far a prediction is from the measurement.
+//!
+//! Every figure takes the measured and the predicted output, in the same unit, and a flag per row that is `true` while
+//! the model still settles (the start-up rows that `simulate` marks). Settling rows count only in
+//! [`Errors::rmse_all_rows`]. Errors are predicted − measured.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// Why no figure can be given.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MetricsError {
+    /// Columns of different length.
+    #[error("{column} has {found} values, but the measurement has {expected}")]
+    Lengths {
+        /// The column.
+        column: &'static str,
+        /// Its length.
+        found: usize,
+        /// The measurement's length.
+        expected: usize,
+    },
+    /// There is no row, or all of them are start-up rows.
+    #[error("no row is left to compare: all {rows} rows are start-up rows of the model")]
+    NoRows {
+        /// All rows.
+        rows: usize,
+    },
+    /// The measurement or the prediction is NaN or infinite.
+    #[error("row {row}: the error is not a finite number (measured {measured}, predicted {predicted})")]
+    NotFinite {
+        /// The row; the first is 0.
+        row: usize,
+        /// The measured value.
+        measured: f64,
+        /// The predicted value.
+        predicted: f64,
+    },
+}
+
+/// The errors of one prediction, as reports print them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Root of the mean squared error over the rows that do not settle, in the output's unit.
+    pub rmse: f64,
+    /// `rmse` in percent of the span (maximum − minimum) of the measured output over the same rows. For a constant
+    /// output it is 0 where `rmse` is, and else infinite, which JSON shows as `null`.
+    #[serde(deserialize_with = "null_as_infinity")]
+    pub nrmse_percent: f64,
+    /// The largest error by magnitude over the rows that do not settle, in the output's unit.
+    pub max_abs: f64,
+    /// Root of the mean squared error over all rows, in the output's unit.
+    pub rmse_all_rows: f64,
+}
+
+fn null_as_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+}
+
+impl Errors {
+    /// Compares `predicted` with `measured`; `settling` flags the model's start-up rows.
+    ///
+    /// # Errors
+    /// When the lengths differ, no row is left, or a value is not finite.
+    pub fn of(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Self, MetricsError> {
+        check(measured, predicted, settling)?;
+        let rmse = root_mean_square(settled(measured, predicted, settling).map(|(y, p)| p - y));
+        let (low, high) = settled(measured, predicted, settling)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (y, _)| (low.min(y), high.max(y)));
+        Ok(Self {
+            rmse,
+            nrmse_percent: if rmse == 0.0 { 0.0 } else { 100.0 * rmse / (high - low) },
+            max_abs: settled(measured, predicted, settling).fold(0.0, |most, (y, p)| f64::max(most, (p - y).abs())),
+            rmse_all_rows: root_mean_square(measured.iter().zip(predicted).map(|(y, p)| p - y)),
+        })
+    }
+}
+
+/// Mean absolute error relative to the measurement, `mean |p − y| / |y|`, as a ratio (1 = 100 %).
+///
+/// Rows in which the measured output is zero have no such ratio and are left out; near zero the figure says more about
+/// noise than about the model. `None` when no row has a ratio.
+///
+/// # Errors
+/// As [`Errors::of`].
+pub fn mape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Option<f64>, MetricsError> {
+    check(measured, predicted, settling)?;
+    let ratios = settled(measured, predicted, settling).filter(|(y, _)| *y != 0.0).map(|(y, p)| ((p - y) / y).abs());
+    let (sum, count) = ratios.fold((0.0, 0_usize), |(sum, count), ratio| (sum + ratio, count + 1));
+    Ok((count > 0).then(|| sum / count as f64))
+}
+
+/// Symmetric mean absolute error, `mean |p − y| / ((|p| + |y|) / 2)`, as a ratio between 0 and 2.
+///
+/// A row in which both are zero counts as no error.
+///
+/// # Errors
+/// As [`Errors::of`].
+pub fn smape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<f64, MetricsError> {
+    check(measured, predicted, settling)?;
+    let ratio = |(y, p): (f64, f64)| if y == p { 0.0 } else { (p - y).abs() / (0.5 * p.abs() + 0.5 * y.abs()) };
+    let (sum, count) = settled(measured, predicted, settling)
+        .map(ratio)
+        .fold((0.0, 0_usize), |(sum, count), ratio| (sum + ratio, count + 1));
+    Ok(sum / count as f64)
+}
+
+/// Peak to valley: the largest error minus the smallest, signs included, in the output's unit.
+///
+/// # Errors
+/// As [`Errors::of`].
+pub fn peak_to_valley(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<f64, MetricsError> {
+    check(measured, predicted, settling)?;
+    let (low, high) = settled(measured, predicted, settling)
+        .map(|(y, p)| p - y)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| (low.min(e), high.max(e)));
+    Ok(high - low)
+}
+
+fn check(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<(), MetricsError> {
+    let expected = measured.len();
+    for (column, found) in [("the prediction", predicted.len()), ("the start-up flag", settling.len())] {
+        if found != expected {
+            return Err(MetricsError::Lengths { column, found, expected });
+        }
+    }
+    if let Some(row) = (0..expected).find(|row| !(predicted[*row] - measured[*row]).is_finite()) {
+        return Err(MetricsError::NotFinite { row, measured: measured[row], predicted: predicted[row] });
+    }
+    if settling.iter().all(|settling| *settling) {
+        return Err(MetricsError::NoRows { rows: expected });
+    }
+    Ok(())
+}
+
+/// Pairs of measured and predicted values in the rows that do not settle.
+fn settled<'a>(
+    measured: &'a [f64],
+    predicted: &'a [f64],
+    settling: &'a [bool],
+) -> impl Iterator<Item = (f64, f64)> + 'a {
+    measured.iter().zip(predicted).zip(settling).filter(|(_, settling)| !**settling).map(|((y, p), _)| (*y, *p))
+}
+
+fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = errors.fold((0.0, 0_usize), |(sum, count), e| (sum + e * e, count + 1));
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const Y: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
+    const P: [f64; 4] = [9.0, 1.0, 5.0, 0.0];
+    const SETTLING: [bool; 4] = [true, false, false, false];
+
+    #[test]
+    fn figures_by_hand() {
+        let errors = Errors::of(&Y, &P, &SETTLING).unwrap();
+        // Errors 0, 3, −4 over a span of 3, and 9 in the start-up row.
+        let rmse = (25.0_f64 / 3.0).sqrt();
+        assert_eq!(errors.rmse, rmse);
+        assert_eq!(errors.nrmse_percent, 100.0 * rmse / 3.0);
+        assert_eq!(errors.max_abs, 4.0);
+        assert_eq!(errors.rmse_all_rows, (106.0_f64 / 4.0).sqrt());
+        assert_eq!(peak_to_valley(&Y, &P, &SETTLING), Ok(7.0));
+        assert_eq!(mape(&Y, &P, &SETTLING), Ok(Some((0.0 + 1.5 + 1.0) / 3.0)));
+        assert_eq!(smape(&Y, &P, &SETTLING), Ok((0.0 + 3.0 / 3.5 + 2.0) / 3.0));
+    }
+
+    #[test]
+    fn json_has_the_keys_of_the_report() {
+        let json = serde_json::to_string(&Errors::of(&Y, &Y, &SETTLING).unwrap()).unwrap();
+        assert_eq!(json, r#"{"rmse":0.0,"nrmse_percent":0.0,"max_abs":0.0,"rmse_all_rows":0.0}"#);
+    }
+
+    #[test]
+    fn a_constant_output_has_no_span() {
+        let constant = Errors::of(&[1.0; 3], &[1.0; 3], &[false; 3]).unwrap();
+        assert_eq!(constant.nrmse_percent, 0.0);
+        let off = Errors::of(&[1.0; 3], &[2.0; 3], &[false; 3]).unwrap();
+        assert_eq!(off.nrmse_percent, f64::INFINITY);
+        let json = serde_json::to_string(&off).unwrap();
+        assert!(json.contains(r#""nrmse_percent":null"#));
+        assert_eq!(serde_json::from_str::<Errors>(&json).unwrap(), off);
+    }
+
+    #[test]
+    fn zeros_have_no_ratio() {
+        assert_eq!(mape(&[0.0], &[1.0], &[false]), Ok(None));
+        assert_eq!(smape(&[0.0], &[0.0], &[false]), Ok(0.0));
+        assert_eq!(smape(&[0.0], &[1.0], &[false]), Ok(2.0));
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_an_error() {
+        assert_eq!(Errors::of(&[], &[], &[]), Err(MetricsError::NoRows { rows: 0 }));
+        assert_eq!(Errors::of(&[1.0], &[1.0], &[true]), Err(MetricsError::NoRows { rows: 1 }));
+        assert!(matches!(Errors::of(&Y, &P[..3], &SETTLING), Err(MetricsError::Lengths { found: 3, expected: 4, .. })));
+        assert!(matches!(smape(&Y, &P, &[]), Err(MetricsError::Lengths { column: "the start-up flag", .. })));
+        // A start-up row counts in `rmse_all_rows`, so it has to be finite too.
+        let diverged = [f64::NAN, 1.0, 2.0, 4.0];
+        assert!(matches!(Errors::of(&Y, &diverged, &SETTLING), Err(MetricsError::NotFinite { row: 0, .. })));
+        assert!(matches!(mape(&diverged, &Y, &SETTLING), Err(MetricsError::NotFinite { row: 0, .. })));
+    }
+}

@@ -1,0 +1,201 @@
+//! The optional stages around the hysteresis, as parameters.
+
+use std::fmt;
+use std::str::FromStr;
+
+use hyst_core::{
+    DelayParams, DriftParams, InterferenceParams, LagParams, MAX_RESONANCES, Params, ResonanceParams, TemperatureParams,
+};
+use serde::{Deserialize, Serialize};
+
+/// An effect that an actuator may show besides hysteresis. In the chain's order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effect {
+    /// Dead time of the drive.
+    Delay,
+    /// First-order lag of the amplifier.
+    Lag,
+    /// Gain that follows temperature.
+    Temperature,
+    /// Slow relaxation after the drive has stopped.
+    Creep,
+    /// A structural mode.
+    Resonance,
+    /// Drift of the sensor.
+    Drift,
+    /// A tone in the sensor.
+    Interference,
+}
+
+impl Effect {
+    /// All effects that this version can add, in the chain's order.
+    pub const ALL: [Self; 7] =
+        [Self::Delay, Self::Lag, Self::Temperature, Self::Creep, Self::Resonance, Self::Drift, Self::Interference];
+
+    /// The name that commands and files use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Delay => "delay",
+            Self::Lag => "lag",
+            Self::Temperature => "temperature",
+            Self::Creep => "creep",
+            Self::Resonance => "resonance",
+            Self::Drift => "drift",
+            Self::Interference => "interference",
+        }
+    }
+
+    /// Whether the effect moves the actuator, or only what the sensor shows.
+    pub fn acts_on_the_motion(self) -> bool {
+        !matches!(self, Self::Drift | Self::Interference)
+    }
+}
+
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Effect {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|e| e.name() == s).ok_or_else(|| format!("no effect is called {s:?}"))
+    }
+}
+
+/// A bank of creep elements: element i adds `shares[i]` of a first-order response with
+/// `seconds[i]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CreepBank {
+    /// Time constants \[s\].
+    pub seconds: Vec<f64>,
+    /// Settled shares \[ratio\].
+    pub shares: Vec<f64>,
+}
+
+impl CreepBank {
+    /// What all elements add in the end, as a ratio of the motion at once.
+    pub fn total(&self) -> f64 {
+        self.shares.iter().sum()
+    }
+}
+
+/// Which effects a chain has, and their parameters.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Effects {
+    /// Dead time.
+    pub delay: Option<DelayParams>,
+    /// Lag.
+    pub lag: Option<LagParams>,
+    /// Gain over temperature.
+    pub temperature: Option<TemperatureParams>,
+    /// Creep bank.
+    pub creep: Option<CreepBank>,
+    /// Structural modes, at most [`MAX_RESONANCES`].
+    pub resonances: Vec<ResonanceParams>,
+    /// Drift.
+    pub drift: Option<DriftParams>,
+    /// Tone.
+    pub interference: Option<InterferenceParams>,
+}
+
+/// A parameter as it is searched, with what moves it.
+pub(crate) struct Parameter<'a> {
+    pub(crate) effect: Effect,
+    pub(crate) name: String,
+    pub(crate) unit: &'static str,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) value: &'a mut f64,
+}
+
+impl Effects {
+    /// Effects that are present, in the chain's order; a second mode counts once more.
+    pub fn names(&self) -> Vec<Effect> {
+        let mut names = Vec::new();
+        let mut push = |present: bool, e: Effect| {
+            if present {
+                names.push(e);
+            }
+        };
+        push(self.delay.is_some(), Effect::Delay);
+        push(self.lag.is_some(), Effect::Lag);
+        push(self.temperature.is_some(), Effect::Temperature);
+        push(self.creep.is_some(), Effect::Creep);
+        for _ in &self.resonances {
+            push(true, Effect::Resonance);
+        }
+        push(self.drift.is_some(), Effect::Drift);
+        push(self.interference.is_some(), Effect::Interference);
+        names
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.names().is_empty()
+    }
+
+    /// Whether the chain has room for (another) one.
+    pub(crate) fn has_room(&self, effect: Effect) -> bool {
+        let count = self.names().iter().filter(|e| **e == effect).count();
+        count < if effect == Effect::Resonance { MAX_RESONANCES } else { 1 }
+    }
+
+    /// The same effects without `effect` (the last one, if there are two).
+    pub(crate) fn without(&self, effect: Effect) -> Self {
+        let mut less = self.clone();
+        match effect {
+            Effect::Delay => less.delay = None,
+            Effect::Lag => less.lag = None,
+            Effect::Temperature => less.temperature = None,
+            Effect::Creep => less.creep = None,
+            Effect::Resonance => {
+                less.resonances.pop();
+            }
+            Effect::Drift => less.drift = None,
+            Effect::Interference => less.interference = None,
+        }
+        less
+    }
+
+    /// Whether any stage acts before the hysteresis.
+    pub(crate) fn on_input_side(&self) -> bool {
+        self.delay.is_some() || self.lag.is_some()
+    }
+
+    /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
+    /// Drift and the amplitude and phase of a tone enter linearly and are not among them.
+    pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
+        fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
+            params.visit(&mut |meta, value| {
+                f(Parameter { effect, name: format!("{}{suffix}", meta.name), unit: meta.unit, lower: meta.lower, upper: meta.upper, value });
+            });
+        }
+        if let Some(p) = &mut self.delay {
+            pass(Effect::Delay, "", p, f);
+        }
+        if let Some(p) = &mut self.lag {
+            pass(Effect::Lag, "", p, f);
+        }
+        if let Some(p) = &mut self.temperature {
+            pass(Effect::Temperature, "", p, f);
+        }
+        if let Some(bank) = &mut self.creep {
+            for (tau, share) in bank.seconds.iter().zip(&mut bank.shares) {
+                f(Parameter { effect: Effect::Creep, name: format!("share_{tau:.3}s"), unit: "", lower: 0.0, upper: 0.3, value: share });
+            }
+        }
+        for (i, p) in self.resonances.iter_mut().enumerate() {
+            pass(Effect::Resonance, if i == 0 { "" } else { "_2" }, p, f);
+        }
+        if let Some(p) = &mut self.interference {
+            pass(Effect::Interference, "", p, &mut |parameter| {
+                if parameter.name == "hz" {
+                    f(parameter);
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Cross-validation inside the training record, from the blocks' normal equations.
+
+use super::Fitted;
+use crate::Samples;
+use crate::lsq::{Blocks, Gram, solve};
+
+/// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
+pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
+    let n = blocks.rows.len();
+    (0..count.min(n)).map(|f| (f..n).step_by(count).collect()).collect()
+}
+
+/// One fold for each segment; a lone segment is cut into quarters.
+pub(crate) fn folds_by_segment(blocks: &Blocks, samples: &Samples) -> Vec<Vec<usize>> {
+    if samples.segments.len() == 1 {
+        let n = blocks.rows.len();
+        return (0..4).map(|q| (n * q / 4..n * (q + 1) / 4).collect()).filter(|f: &Vec<usize>| !f.is_empty()).collect();
+    }
+    let inside = |b: &usize, s: &std::ops::Range<usize>| s.contains(&blocks.rows[*b].start);
+    samples.segments.iter().map(|s| (0..blocks.rows.len()).filter(|b| inside(b, s)).collect()).collect()
+}
+
+/// Σ residual² of each block, predicted by a fit to the blocks of all other folds.
+///
+/// The fit to the others is one Gauss-Newton step away from the fit to all, taken with every weight
+/// and parameter free: exact for what is linear, and close for the rest, since one fold moves the
+/// solution little.
+pub(crate) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>]) -> Option<Vec<f64>> {
+    let columns = fit.grams.first()?.matrix.ncols();
+    let total = Gram::sum(columns, fit.grams.iter());
+    let nonlinear_from = columns - 1 - count_nonlinear(fit);
+    let mut penalty = fit.penalty.clone();
+    for i in nonlinear_from..columns - 1 {
+        penalty[(i, i)] += 1e-6 * total.matrix[(i, i)];
+    }
+    let mut squares = vec![0.0; fit.grams.len()];
+    for fold in folds {
+        let mut others = total.clone();
+        for b in fold {
+            others.matrix -= &fit.grams[*b].matrix;
+            others.rows -= fit.grams[*b].rows;
+        }
+        let z = solve(&others, Some(&penalty), &fit.bounds)?;
+        for b in fold {
+            squares[*b] = fit.grams[*b].error(&z);
+        }
+    }
+    Some(squares)
+}
+
+fn count_nonlinear(fit: &Fitted) -> usize {
+    let mut n = 0;
+    fit.effects.clone().visit_nonlinear(&mut |_| n += 1);
+    n
+}

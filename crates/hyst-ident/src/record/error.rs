@@ -1,0 +1,320 @@
+//! What can be wrong with a record. Every message says where, and what to do.
+
+use std::fmt;
+
+/// A row of a record, as its reader would look for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of a file; the first line is 1, so that the header usually is line 1.
+    Line(u64),
+    /// A row of a record that was made in memory; the first is 0.
+    Row(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Row(row) => write!(f, "row {row}"),
+        }
+    }
+}
+
+/// Why a record could not be read, made or joined.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The file could not be opened or read.
+    #[error("{file}: cannot be read: {source}")]
+    Io {
+        /// The file.
+        file: String,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The file has no header line.
+    #[error(
+        "{file}, line 1: the file is empty; a record starts with a header line such as \"time_s,voltage_v,displacement_um\""
+    )]
+    Empty {
+        /// The file.
+        file: String,
+    },
+    /// There is a header but no row below it.
+    #[error("{file}: the record has a header but no rows; rows of numbers have to follow it from line 2 on")]
+    NoRows {
+        /// The file.
+        file: String,
+    },
+    /// The bytes are not UTF-8.
+    #[error("{file}, line {line}, byte {byte} of the line: {problem}; save the file as UTF-8 text")]
+    Encoding {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The byte within the line; the first is 1.
+        byte: usize,
+        /// What was found.
+        problem: &'static str,
+    },
+    /// The columns seem to be separated by something other than a comma.
+    #[error(
+        "{file}, line 1: the columns seem to be separated by {found}; a record needs ',' between columns and '.' as the decimal point"
+    )]
+    Delimiter {
+        /// The file.
+        file: String,
+        /// The separator found.
+        found: &'static str,
+    },
+    /// A column that the command needs is missing.
+    #[error(
+        "{file}, line 1: there is no column for {role}; name it {accepted}, or say which column it is with --map {example}=COLUMN (columns found: {found})"
+    )]
+    MissingColumn {
+        /// The file.
+        file: String,
+        /// What the column is for, as `the input`.
+        role: &'static str,
+        /// The names that it may have.
+        accepted: String,
+        /// A name to show the use of `--map` with.
+        example: &'static str,
+        /// The header's names.
+        found: String,
+    },
+    /// A column's name suggests a role, but not in a unit that the record format knows.
+    #[error(
+        "{file}, line 1, column \"{column}\": this is not a name for {role}; accepted is {accepted}. Convert the values and rename the column; if only the name differs, use --map {example}={column}"
+    )]
+    WrongUnit {
+        /// The file.
+        file: String,
+        /// The column's name in the file.
+        column: String,
+        /// What it seems to be for.
+        role: &'static str,
+        /// The names that it may have.
+        accepted: String,
+        /// The name to give it with `--map`.
+        example: &'static str,
+    },
+    /// Two columns have the same name.
+    #[error("{file}, line 1, column \"{column}\": columns {first} and {second} have the same name; rename or drop one")]
+    DuplicateColumn {
+        /// The file.
+        file: String,
+        /// The name.
+        column: String,
+        /// The first column's number; the leftmost is 1.
+        first: usize,
+        /// The second column's number.
+        second: usize,
+    },
+    /// Two columns could play the same role.
+    #[error(
+        "{file}, line 1, columns \"{first}\" and \"{second}\": both could be {role}; choose one with --map {first}={first}, or drop the other from the file"
+    )]
+    AmbiguousColumn {
+        /// The file.
+        file: String,
+        /// What both could be.
+        role: &'static str,
+        /// The first candidate.
+        first: String,
+        /// The second candidate.
+        second: String,
+    },
+    /// `--map` names a column that the file does not have.
+    #[error(
+        "{file}, line 1: --map {canonical}={column} names a column that is not in the file (columns found: {found})"
+    )]
+    MappedColumnMissing {
+        /// The file.
+        file: String,
+        /// The left side of the mapping.
+        canonical: String,
+        /// The right side of the mapping.
+        column: String,
+        /// The header's names.
+        found: String,
+    },
+    /// A row has more or fewer fields than the header.
+    #[error(
+        "{file}, line {line}: {found} fields, but the header has {expected} columns (the last is \"{column}\"); complete or remove the row{hint}"
+    )]
+    RaggedRow {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// Fields in this row.
+        found: usize,
+        /// Columns of the header.
+        expected: usize,
+        /// The header's last column.
+        column: String,
+        /// A further remark, or nothing.
+        hint: &'static str,
+    },
+    /// A field is not a number.
+    #[error("{file}, {place}, column \"{column}\": \"{text}\" is not a number; write it as 1.25 or 1.25e-3")]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// What stands there, shortened.
+        text: String,
+    },
+    /// A value is NaN or infinite.
+    #[error(
+        "{file}, {place}, column \"{column}\": the value is {value}, not a finite number; repair the value, or give the rows before and after it different integers in \"segment\" and remove it"
+    )]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The value.
+        value: String,
+    },
+    /// A segment label is not an integer.
+    #[error("{file}, {place}, column \"{column}\": \"{text}\" is not an integer; number the segments 0, 1, 2 …")]
+    SegmentNotInteger {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// What stands there, shortened.
+        text: String,
+    },
+    /// A segment label comes back after another one.
+    #[error(
+        "{file}, {place}, column \"{column}\": segment {label} returns after segment {previous}; the rows of a segment have to follow one another: sort them or give the later part a new label"
+    )]
+    SegmentReturns {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The label that comes back.
+        label: i64,
+        /// The label just before.
+        previous: i64,
+    },
+    /// Time stands still or goes back.
+    #[error(
+        "{file}, {place}, column \"{column}\": time has to increase from row to row and across segments, but {found} s follows {previous} s; sort the rows, or print the time with more decimals"
+    )]
+    TimeNotIncreasing {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The time of the row before [s].
+        previous: String,
+        /// The time of this row [s].
+        found: String,
+    },
+    /// The rows of a segment are not evenly spaced in time.
+    #[error(
+        "{file}, {place}, column \"{column}\": uneven time: expected {expected} s, found {found} s; resample to even steps, or, where the device rested in between, give the two parts different integers in a column \"segment\""
+    )]
+    UnevenTime {
+        /// The file.
+        file: String,
+        /// The first row off the grid.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The time that the even grid has there [s].
+        expected: String,
+        /// The time found [s].
+        found: String,
+    },
+    /// Two segments are sampled at different rates.
+    #[error(
+        "{file}, {place}, column \"{column}\": segment {label} has a sample period of {period} s, but segment {other_label} one of {other_period} s; resample one of them, or keep them in separate records"
+    )]
+    MixedPeriods {
+        /// The file.
+        file: String,
+        /// The second of the two segments' first row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The second of the two segments.
+        label: i64,
+        /// Its sample period [s].
+        period: String,
+        /// The first of the two segments.
+        other_label: i64,
+        /// Its sample period [s].
+        other_period: String,
+    },
+    /// No segment has two rows, so that there is no sample period.
+    #[error(
+        "{file}, {place}, column \"{column}\": no segment has two rows, so there is no sample period; a record needs at least two rows in a segment"
+    )]
+    TooShort {
+        /// The file.
+        file: String,
+        /// The last row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+    },
+    /// Columns given in memory differ in length.
+    #[error(
+        "{name}, column \"{column}\": {found} values, but \"time_s\" has {expected}; give every column the same length"
+    )]
+    Lengths {
+        /// The record.
+        name: String,
+        /// The column.
+        column: String,
+        /// Its length.
+        found: usize,
+        /// The length of the time column.
+        expected: usize,
+    },
+    /// The command needs a column that this record does not have.
+    #[error("{file}: the column \"{column}\" is needed here ({why}); add it, or name it with --map {column}=COLUMN")]
+    Needed {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// What for.
+        why: String,
+    },
+    /// Records to be joined do not fit each other.
+    #[error("{file}, line 1: {what} is {found}, but {other_file} has {expected}; join only records of the same kind")]
+    Unlike {
+        /// The file that differs.
+        file: String,
+        /// The first file.
+        other_file: String,
+        /// What differs, as `the output column`.
+        what: &'static str,
+        /// In the file that differs.
+        found: String,
+        /// In the first file.
+        expected: String,
+    },
+    /// Nothing was given to join.
+    #[error("no record was given")]
+    Nothing,
+}

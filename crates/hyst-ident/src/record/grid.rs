@@ -1,0 +1,354 @@
+//! The even time grid behind printed times.
+//!
+//! A 750 Hz record written with six decimals reads 0.000000, 0.001333, 0.002667: its steps differ, yet it is even to
+//! the last printed digit. Here `t_k` are the printed times of a segment, `r` the printed resolution, and the record
+//! is even when one period `h` fits every row, `|t_k − t_0 − k·h| ≤ r`. Each row bounds `h` from both sides, so the
+//! periods that fit are an interval; the period is the simplest one in it.
+
+use std::ops::Range;
+
+/// How finely times are printed, in decimals of a second.
+///
+/// Both figures are needed: fixed decimals (`10.920000`) are limited by `decimals`, a fixed number of digits
+/// (`10.9213`, `1.09213e1`) by `digits`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Printed {
+    /// The most digits after the decimal point of any row.
+    pub(crate) decimals: i32,
+    /// The most digits of any row, leading zeros not counted.
+    pub(crate) digits: i32,
+}
+
+impl Printed {
+    /// Times that come from memory with all their bits.
+    pub(crate) const EXACT: Self = Self { decimals: 30, digits: 30 };
+
+    /// Takes the figures of one more number into account.
+    pub(crate) fn take(&mut self, text: &[u8]) {
+        let (mut digits, mut decimals) = (0, 0);
+        let (mut leading, mut after_point) = (true, false);
+        let mut exponent = 0;
+        for (at, byte) in text.iter().enumerate() {
+            match byte {
+                b'0'..=b'9' => {
+                    leading &= *byte == b'0';
+                    digits += i32::from(!leading);
+                    decimals += i32::from(after_point);
+                }
+                b'.' => after_point = true,
+                b'e' | b'E' => {
+                    exponent = std::str::from_utf8(&text[at + 1..]).ok().and_then(|e| e.parse().ok()).unwrap_or(0);
+                    break;
+                }
+                _ => {}
+            }
+        }
+        self.digits = self.digits.max(digits);
+        self.decimals = self.decimals.max(decimals.saturating_sub(exponent).clamp(-300, 300));
+    }
+
+    /// One unit of the last printed digit of the time `t` [s].
+    fn resolution(self, t: f64) -> f64 {
+        let fixed = 10_f64.powi(-self.decimals);
+        if t.abs() < 10_f64.powi(self.digits.saturating_sub(self.decimals)) {
+            return fixed;
+        }
+        // 1e-3 decades of slack keep 10 from counting as 9.99…
+        let leading = (t.abs().log10() + 1e-3).floor();
+        if leading.is_finite() { fixed.max(10_f64.powf(leading + 1.0 - f64::from(self.digits))) } else { fixed }
+    }
+}
+
+/// The sample period of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Period {
+    /// The period [s].
+    pub(crate) value: f64,
+    /// The shortest and the longest period that fit every row [s].
+    pub(crate) fits: (f64, f64),
+}
+
+/// Why no period fits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Fault {
+    /// A row off its segment's grid.
+    Uneven { row: usize, expected: f64 },
+    /// Two segments (by number) with their own periods.
+    Mixed { first: usize, second: usize, periods: (f64, f64) },
+    /// No segment has two rows.
+    TooShort,
+}
+
+/// The interval of periods that fit the rows seen so far.
+#[derive(Clone, Copy)]
+struct Fits {
+    low: f64,
+    high: f64,
+}
+
+impl Fits {
+    const ALL: Self = Self { low: 0.0, high: f64::INFINITY };
+
+    fn narrow(&mut self, step: f64, tolerance: f64, k: f64) {
+        self.low = self.low.max((step - tolerance) / k);
+        self.high = self.high.min((step + tolerance) / k);
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
+    }
+
+    fn has(self, h: f64) -> bool {
+        self.low <= h && h <= self.high
+    }
+
+    fn is_empty(self) -> bool {
+        self.low.is_nan() || self.high.is_nan() || self.low > self.high
+    }
+}
+
+/// Finds the period of increasing times [s], or the first place where they are not even.
+pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Period, Fault> {
+    let Some(longest) = segments.iter().filter(|rows| rows.len() >= 2).max_by_key(|rows| rows.len()) else {
+        return Err(Fault::TooShort);
+    };
+    let guess = mean_step(&time[longest.clone()]);
+    let largest = time.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
+    let rounding = 4.0 * f64::EPSILON * largest;
+    // Times summed up step by step drift off the grid by more than a rounding: a millionth of a period is no matter.
+    let slack = rounding + 1e-6 * guess;
+
+    let mut strict = Fits::ALL;
+    let mut loose = Vec::with_capacity(segments.len());
+    for rows in segments {
+        let t = &time[rows.clone()];
+        let mut own = Fits::ALL;
+        for (k, tk) in t.iter().enumerate().skip(1) {
+            let r = printed.resolution(*tk).max(printed.resolution(t[0]));
+            own.narrow(tk - t[0], r + slack, k as f64);
+            strict.narrow(tk - t[0], r + rounding, k as f64);
+        }
+        if own.is_empty() {
+            return Err(uneven(t, printed, slack, rows.start));
+        }
+        loose.push(own);
+    }
+    let all = loose.iter().fold(Fits::ALL, |all, own| all.and(*own));
+    if all.is_empty() {
+        return Err(mixed(time, segments, &loose));
+    }
+    let grid = Grid { time, segments, printed, rounding, strict };
+    let value = grid.simplest(guess).clamp(all.low, all.high);
+    if !(value > 0.0 && value.is_finite()) {
+        return Err(Fault::TooShort);
+    }
+    Ok(Period { value, fits: (all.low, all.high) })
+}
+
+fn mean_step(t: &[f64]) -> f64 {
+    (t[t.len() - 1] - t[0]) / (t.len() - 1) as f64
+}
+
+struct Grid<'a> {
+    time: &'a [f64],
+    segments: &'a [Range<usize>],
+    printed: Printed,
+    rounding: f64,
+    strict: Fits,
+}
+
+impl Grid<'_> {
+    /// A period that the printed digits spell out, or else a whole rate, or else the guess.
+    fn simplest(&self, guess: f64) -> f64 {
+        let spelled = || self.spelled_out(guess);
+        let whole = || whole_rate(guess, self.strict);
+        // Times with all their bits spell out anything: then a whole rate goes first.
+        let coarse = 10_f64.powi(-self.printed.decimals) > 1e-9 * guess;
+        let found = if coarse { spelled().or_else(whole) } else { whole().or_else(spelled) };
+        found
+            .or_else(|| whole_rate(guess, Fits { low: guess * (1.0 - 1e-9), high: guess * (1.0 + 1e-9) }))
+            .unwrap_or(guess)
+    }
+
+    /// The period with as many decimals as the times have, if it gives every printed time exactly.
+    fn spelled_out(&self, guess: f64) -> Option<f64> {
+        let decimals = self.printed.decimals.clamp(0, 12);
+        let scale = 10_f64.powi(decimals);
+        let h = (guess * scale).round() / scale;
+        let on_grid = |rows: &Range<usize>| {
+            let t = &self.time[rows.clone()];
+            t.iter().enumerate().all(|(k, tk)| (tk - t[0] - k as f64 * h).abs() <= self.rounding)
+        };
+        (h > 0.0 && self.segments.iter().all(on_grid)).then_some(h)
+    }
+}
+
+/// The roundest whole rate [Hz] near `1 / guess` whose period fits.
+fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
+    let rate = 1.0 / guess;
+    if !(0.5..1e15).contains(&rate) {
+        return None;
+    }
+    (0..=rate.log10().ceil() as i32).rev().map(|zeros| 10_f64.powi(zeros)).find_map(|unit| {
+        let whole = (rate / unit).round() * unit;
+        (whole > 0.0 && fits.has(1.0 / whole)).then(|| 1.0 / whole)
+    })
+}
+
+/// Names the first row off the grid of a segment that has no common period.
+fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    // Of two steps the shorter: a row is sooner missing than added.
+    let middle = (steps.len() - 1) / 2;
+    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let tolerance = |tk: f64| printed.resolution(tk) + slack;
+    // A step that is missing, added or moved stands out against the usual step.
+    let jump = t.windows(2).position(|w| !((w[1] - w[0] - usual).abs() <= 2.0 * tolerance(w[1])));
+    if let Some(k) = jump {
+        return Fault::Uneven { row: first_row + k + 1, expected: t[k] + usual };
+    }
+    // Else the rate creeps: the row that is farthest from the mean grid.
+    let h = mean_step(t);
+    let off = |k: usize| (t[k] - t[0] - k as f64 * h).abs();
+    let k = (1..t.len()).max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0);
+    Fault::Uneven { row: first_row + k, expected: t[0] + k as f64 * h }
+}
+
+/// Names two segments whose periods exclude each other.
+fn mixed(time: &[f64], segments: &[Range<usize>], fits: &[Fits]) -> Fault {
+    let by = |key: fn(&Fits) -> f64| move |a: &usize, b: &usize| key(&fits[*a]).total_cmp(&key(&fits[*b]));
+    let slow = (0..fits.len()).max_by(by(|f| f.low)).unwrap_or(0);
+    let fast = (0..fits.len()).min_by(by(|f| f.high)).unwrap_or(0);
+    let (first, second) = (slow.min(fast), slow.max(fast));
+    let step = |s: usize| mean_step(&time[segments[s].clone()]);
+    Fault::Mixed { first, second, periods: (step(first), step(second)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn printed(texts: &[String]) -> (Vec<f64>, Printed) {
+        let mut figures = Printed::default();
+        texts.iter().for_each(|text| figures.take(text.as_bytes()));
+        (texts.iter().map(|text| text.parse().unwrap()).collect(), figures)
+    }
+
+    fn period_of(texts: &[String]) -> Result<Period, Fault> {
+        let (time, figures) = printed(texts);
+        fit(&time, &[0..time.len()], figures)
+    }
+
+    fn fixed(rate: f64, rows: usize, decimals: usize) -> Vec<String> {
+        (0..rows).map(|k| format!("{:.decimals$}", k as f64 / rate)).collect()
+    }
+
+    #[test]
+    fn figures_of_printed_numbers() {
+        let of = |text: &str| {
+            let mut p = Printed::default();
+            p.take(text.as_bytes());
+            (p.decimals, p.digits)
+        };
+        assert_eq!(of("10.9200"), (4, 6));
+        assert_eq!(of("0.001333"), (6, 4));
+        assert_eq!(of("-1.25e-3"), (5, 3));
+        assert_eq!(of("4.000e+01"), (2, 4));
+        assert_eq!(of("12"), (0, 2));
+        assert_eq!(of("1e999999999999"), (0, 1));
+    }
+
+    #[test]
+    fn whole_rates_are_found_behind_rounded_times() {
+        for (rate, decimals) in [
+            (750.0, 6),
+            (750.0, 4),
+            (750.0, 3),
+            (1000.0, 3),
+            (200.0, 6),
+            (44_100.0, 7),
+            (51_200.0, 6),
+            (30.0, 2),
+            (3.0, 1),
+        ] {
+            let period = period_of(&fixed(rate, 2000, decimals)).unwrap();
+            assert_eq!(period.value, 1.0 / rate, "{rate} Hz with {decimals} decimals");
+        }
+    }
+
+    #[test]
+    fn a_period_that_is_spelled_out_is_taken_as_it_stands() {
+        for (h, decimals) in [(0.0012, 4), (0.0012, 17), (0.0015, 4), (2.5, 1), (60.0, 0)] {
+            let texts: Vec<_> = (0..3).map(|k| format!("{:.decimals$}", k as f64 * h)).collect();
+            assert_eq!(period_of(&texts).unwrap().value, h, "{h} with {decimals} decimals");
+        }
+    }
+
+    #[test]
+    fn a_fixed_number_of_digits_is_even_too() {
+        // As "%g" and "%.5e" print: the resolution falls as time goes on.
+        let g = |k: usize| {
+            let t = k as f64 / 750.0;
+            let decimals = if k == 0 { 0 } else { (5 - t.log10().floor() as i32) as usize };
+            format!("{t:.decimals$}")
+        };
+        assert_eq!(period_of(&(0..9000).map(g).collect::<Vec<_>>()).unwrap().value, 1.0 / 750.0);
+        let e: Vec<_> = (0..9000).map(|k| format!("{:.5e}", k as f64 / 750.0)).collect();
+        assert_eq!(period_of(&e).unwrap().value, 1.0 / 750.0);
+    }
+
+    #[test]
+    fn summed_up_times_are_even() {
+        let mut t = 0.0;
+        let texts: Vec<_> = (0..100_000)
+            .map(|_| {
+                t += 0.001;
+                format!("{t:?}")
+            })
+            .collect();
+        assert_eq!(period_of(&texts).unwrap().value, 0.001);
+    }
+
+    #[test]
+    fn a_missing_row_is_found_where_it_is_missing() {
+        let mut texts = fixed(1000.0, 100, 6);
+        texts.remove(12);
+        let fault = period_of(&texts).unwrap_err();
+        let Fault::Uneven { row, expected } = fault else { panic!("{fault:?}") };
+        assert_eq!(row, 12);
+        assert!((expected - 0.012).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_deviation_of_two_units_is_uneven_and_of_one_is_not() {
+        let mut texts = fixed(1000.0, 100, 6);
+        texts[50] = "0.050001".to_owned();
+        assert_eq!(period_of(&texts).unwrap().value, 0.001);
+        texts[50] = "0.050002".to_owned();
+        assert!(matches!(period_of(&texts), Err(Fault::Uneven { row: 50, .. })));
+    }
+
+    #[test]
+    fn a_creeping_rate_is_uneven() {
+        let texts: Vec<_> = (0..1000).map(|k| format!("{:.6}", k as f64 * 1e-3 + (k * k) as f64 * 1e-9)).collect();
+        assert!(matches!(period_of(&texts), Err(Fault::Uneven { .. })));
+    }
+
+    #[test]
+    fn segments_of_two_rates_are_told_apart() {
+        let (mut time, figures) = printed(&fixed(1000.0, 100, 6));
+        time.extend((0..100).map(|k| 1.0 + k as f64 * 2e-3));
+        let fault = fit(&time, &[0..100, 100..200], figures).unwrap_err();
+        let Fault::Mixed { first: 0, second: 1, periods } = fault else { panic!("{fault:?}") };
+        assert!((periods.0 - 1e-3).abs() < 1e-12 && (periods.1 - 2e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn extreme_times_give_an_answer() {
+        for time in [[-1.7e308, 0.0, 1.7e308], [0.0, 5e-324, 1e-323], [1e15, 2e15, 3e15]] {
+            let _ = fit(&time, &[0..3], Printed::EXACT);
+            let _ = fit(&time, &[0..3], Printed::default());
+        }
+        assert_eq!(fit(&[1.0], &[0..1], Printed::EXACT), Err(Fault::TooShort));
+    }
+}

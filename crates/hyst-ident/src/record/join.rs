@@ -1,0 +1,80 @@
+//! Joining the records of several files into one.
+
+use super::{OutputUnit, Record, RecordError};
+
+impl Record {
+    /// Joins records in the order given. Segments keep to their files ([`Record::file_of_segment`]), and each file
+    /// keeps its own clock. Columns that play no role are left behind.
+    ///
+    /// # Errors
+    /// When there is no record, or two of them differ in the input's or output's column, in whether temperature or
+    /// load was measured, or in the sample period.
+    pub fn join(records: Vec<Self>) -> Result<Self, RecordError> {
+        let mut records = records.into_iter();
+        let Some(mut all) = records.next() else {
+            return Err(RecordError::Nothing);
+        };
+        for next in records {
+            all.check_like(&next)?;
+            all.append(next);
+        }
+        Ok(all)
+    }
+
+    fn check_like(&self, next: &Self) -> Result<(), RecordError> {
+        let unlike = |what, found: String, expected: String| {
+            Err(RecordError::Unlike { file: next.name(), other_file: self.name(), what, found, expected })
+        };
+        let input = |r: &Self| {
+            if r.input.is_some() { format!("\"{}\"", r.input_column) } else { "none".to_owned() }
+        };
+        let output =
+            |r: &Self| r.output_unit().map_or("none".to_owned(), |unit: OutputUnit| format!("\"{}\"", unit.column()));
+        let present = |there: bool| if there { "measured" } else { "not measured" }.to_owned();
+        let pairs = [
+            ("the input column", input(next), input(self)),
+            ("the output column", output(next), output(self)),
+            ("\"temperature_degc\"", present(next.temperature.is_some()), present(self.temperature.is_some())),
+            ("\"load_n\"", present(next.load.is_some()), present(self.load.is_some())),
+        ];
+        for (what, found, expected) in pairs {
+            if found != expected {
+                return unlike(what, found, expected);
+            }
+        }
+        let (a, b) = (self.period.fits, next.period.fits);
+        if a.0.max(b.0) > a.1.min(b.1) {
+            let period = |r: &Self| format!("{:.9} s", r.period.value);
+            return unlike("the sample period (column \"time_s\")", period(next), period(self));
+        }
+        Ok(())
+    }
+
+    fn append(&mut self, next: Self) {
+        // The longer record knows the period better.
+        let (long, short) =
+            if next.rows() > self.rows() { (next.period, self.period) } else { (self.period, next.period) };
+        self.period.fits = (long.fits.0.max(short.fits.0), long.fits.1.min(short.fits.1));
+        self.period.value = long.value;
+
+        let (rows, files) = (self.rows(), self.sources.len());
+        self.sources.extend(next.sources);
+        self.labelled |= next.labelled;
+        self.labels.extend(next.labels);
+        self.segments.extend(next.segments.into_iter().map(|s| s.start + rows..s.end + rows));
+        self.file_of_segment.extend(next.file_of_segment.into_iter().map(|file| file + files));
+        self.time.extend(next.time);
+        let extend = |all: &mut Option<Vec<f64>>, more: Option<Vec<f64>>| {
+            if let (Some(all), Some(more)) = (all, more) {
+                all.extend(more);
+            }
+        };
+        extend(&mut self.input, next.input);
+        extend(&mut self.temperature, next.temperature);
+        extend(&mut self.load, next.load);
+        if let (Some((_, all)), Some((_, more))) = (&mut self.output, next.output) {
+            all.extend(more);
+        }
+        self.text = None;
+    }
+}

@@ -1,0 +1,331 @@
+//! Records: what an actuator was told, what it did, and the surroundings, over the lab's clock.
+//!
+//! A record is a CSV file with one header line whose column names end in their unit: `segment` (integer, optional;
+//! the device rests and its state resets between segments), `time_s|time_ms|time_us`, the input `voltage_v` (or
+//! another, as `force_in_n`), one output of `displacement_um|_nm|_mm` and `force_n`, and optionally
+//! `temperature_degc` and `load_n`. Further columns are carried through. Time goes on across segments; within a
+//! segment it is even to the last printed digit, and all segments share one sample period.
+//!
+//! Reading checks all of that, so that a [`Record`] in hand is sound: finite values, increasing time, at least one
+//! row, columns of one length.
+
+mod columns;
+mod error;
+mod grid;
+mod join;
+mod read;
+#[cfg(test)]
+mod tests;
+mod unit;
+mod write;
+
+use std::collections::HashSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+pub use columns::{ColumnMap, MapError, Need};
+pub use error::{Place, RecordError};
+pub use unit::{OutputUnit, Quantity};
+pub use write::{Extra, WriteError};
+
+use grid::{Fault, Printed};
+
+/// Where rows come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// The file's path as it was given, or the name of a record made in memory.
+    pub name: String,
+    /// SHA-256 of the file's bytes in lower-case hexadecimal digits; `None` for a record made in memory.
+    pub sha256: Option<String>,
+}
+
+/// Columns in memory from which [`Record::from_samples`] makes a record. All have the length of `time`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// What to call the record in messages and in the models fitted to it.
+    pub name: String,
+    /// A label per row; without it the record is one segment.
+    pub segment: Option<Vec<i64>>,
+    /// Time [s] of the lab's clock.
+    pub time: Vec<f64>,
+    /// The input's column name, with its unit; empty stands for `voltage_v`.
+    pub input_column: String,
+    /// The input, in the unit of its column.
+    pub input: Option<Vec<f64>>,
+    /// The output and its unit.
+    pub output: Option<(OutputUnit, Vec<f64>)>,
+    /// Temperature [°C].
+    pub temperature: Option<Vec<f64>>,
+    /// External load [N].
+    pub load: Option<Vec<f64>>,
+}
+
+/// A sound record of one or more files; see the [module](self).
+#[derive(Clone, Debug)]
+pub struct Record {
+    sources: Vec<Source>,
+    labelled: bool,
+    labels: Vec<i64>,
+    segments: Vec<Range<usize>>,
+    file_of_segment: Vec<usize>,
+    period: grid::Period,
+    time: Vec<f64>,
+    input_column: String,
+    input: Option<Vec<f64>>,
+    output: Option<(OutputUnit, Vec<f64>)>,
+    temperature: Option<Vec<f64>>,
+    load: Option<Vec<f64>>,
+    /// The file's text without a byte-order mark, for writing its columns again as they stand.
+    text: Option<Arc<[u8]>>,
+}
+
+impl Record {
+    /// Makes a record of columns in memory.
+    ///
+    /// # Errors
+    /// As for a file: columns of unequal length, values that are not finite, uneven or unsorted time, a segment label
+    /// that returns. Messages name the row.
+    pub fn from_samples(samples: Samples) -> Result<Self, RecordError> {
+        let rows = samples.time.len();
+        let (input, output) = (samples.input.as_deref(), samples.output.as_ref());
+        let input_column = if samples.input_column.is_empty() { "voltage_v" } else { &samples.input_column };
+        let columns = [
+            ("time_s", Some(samples.time.as_slice())),
+            (input_column, input),
+            (output.map_or("", |(unit, _)| unit.column()), output.map(|(_, y)| y.as_slice())),
+            ("temperature_degc", samples.temperature.as_deref()),
+            ("load_n", samples.load.as_deref()),
+        ];
+        let lengths = columns.iter().map(|(column, values)| (*column, values.map(<[f64]>::len)));
+        let labels = std::iter::once(("segment", samples.segment.as_ref().map(Vec::len)));
+        for (column, found) in lengths.chain(labels) {
+            if let Some(found) = found.filter(|found| *found != rows) {
+                let (name, column) = (samples.name, column.to_owned());
+                return Err(RecordError::Lengths { name, column, found, expected: rows });
+            }
+        }
+        for (column, values) in columns {
+            if let Some(row) = values.and_then(|values| values.iter().position(|v| !v.is_finite())) {
+                return Err(RecordError::NotFinite {
+                    file: samples.name.clone(),
+                    place: Place::Row(row),
+                    column: column.to_owned(),
+                    value: values.map_or(f64::NAN, |values| values[row]).to_string(),
+                });
+            }
+        }
+        let origin = Origin { time_column: "time_s", segment_column: "segment", place: &Place::Row };
+        Self::assemble(samples, Printed::EXACT, &origin)
+    }
+
+    /// Puts together finite columns of equal length.
+    fn assemble(samples: Samples, printed: Printed, origin: &Origin<'_>) -> Result<Self, RecordError> {
+        let Samples { name, segment, mut time, mut input_column, input, output, temperature, load } = samples;
+        if time.is_empty() {
+            return Err(RecordError::NoRows { file: name });
+        }
+        let (labels, segments) = match &segment {
+            Some(labels) => split(labels).map_err(|row| RecordError::SegmentReturns {
+                file: name.clone(),
+                place: (origin.place)(row),
+                column: origin.segment_column.to_owned(),
+                label: labels[row],
+                previous: labels[row - 1],
+            })?,
+            None => (vec![0], std::iter::once(0..time.len()).collect()),
+        };
+        let decimals = usize::try_from(printed.decimals).unwrap_or(0).min(12);
+        let seconds = |t: f64| format!("{t:.decimals$}");
+        let place = origin.place;
+        let (file, column) = (|| name.clone(), || origin.time_column.to_owned());
+        if let Some(row) = (1..time.len()).find(|row| time[*row] <= time[row - 1]) {
+            return Err(RecordError::TimeNotIncreasing {
+                file: file(),
+                place: place(row),
+                column: column(),
+                previous: seconds(time[row - 1]),
+                found: seconds(time[row]),
+            });
+        }
+        let period = grid::fit(&time, &segments, printed).map_err(|fault| match fault {
+            Fault::Uneven { row, expected } => RecordError::UnevenTime {
+                file: file(),
+                place: place(row),
+                column: column(),
+                expected: seconds(expected),
+                found: seconds(time[row]),
+            },
+            Fault::Mixed { first, second, periods } => RecordError::MixedPeriods {
+                file: file(),
+                place: place(segments[second].start),
+                column: column(),
+                label: labels[second],
+                period: format!("{:.9}", periods.1),
+                other_label: labels[first],
+                other_period: format!("{:.9}", periods.0),
+            },
+            Fault::TooShort => RecordError::TooShort { file: file(), place: place(time.len() - 1), column: column() },
+        })?;
+        for rows in &segments {
+            let start = time[rows.start];
+            for (k, t) in time[rows.clone()].iter_mut().enumerate() {
+                *t = start + k as f64 * period.value;
+            }
+        }
+        if input_column.is_empty() {
+            input_column.push_str("voltage_v");
+        }
+        Ok(Self {
+            sources: vec![Source { name, sha256: None }],
+            labelled: segment.is_some(),
+            file_of_segment: vec![0; segments.len()],
+            labels,
+            segments,
+            period,
+            time,
+            input_column,
+            input,
+            output,
+            temperature,
+            load,
+            text: None,
+        })
+    }
+
+    /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
+    pub fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    /// The names of all sources, as messages use them.
+    pub fn name(&self) -> String {
+        self.sources.iter().map(|source| source.name.as_str()).collect::<Vec<_>>().join(" + ")
+    }
+
+    /// How many rows there are, over all segments; at least two.
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The rows of each segment, in order and without gaps. The device is at rest at the start of each.
+    pub fn segments(&self) -> &[Range<usize>] {
+        &self.segments
+    }
+
+    /// The label of each segment in its file; 0 where the file has no column `segment`.
+    pub fn labels(&self) -> &[i64] {
+        &self.labels
+    }
+
+    /// For each segment the index of its file in [`sources`](Self::sources).
+    pub fn file_of_segment(&self) -> &[usize] {
+        &self.file_of_segment
+    }
+
+    /// The rows of each file, in the order of [`sources`](Self::sources).
+    pub fn rows_of_files(&self) -> Vec<Range<usize>> {
+        let mut files: Vec<Range<usize>> = Vec::with_capacity(self.sources.len());
+        for (rows, file) in self.segments.iter().zip(&self.file_of_segment) {
+            match files.get_mut(*file) {
+                Some(known) => known.end = rows.end,
+                None => files.push(rows.clone()),
+            }
+        }
+        files
+    }
+
+    /// The time between two rows of a segment [s], as exactly as the printed digits tell.
+    pub fn sample_period(&self) -> f64 {
+        self.period.value
+    }
+
+    /// Time of the lab's clock [s]. In each segment the first value is as printed and the others lie on the even grid
+    /// behind it, without the jitter of rounding. In a joined record each file has its own clock.
+    pub fn time(&self) -> &[f64] {
+        &self.time
+    }
+
+    /// The input's name with its unit, as `voltage_v` or `force_in_n`.
+    pub fn input_column(&self) -> &str {
+        &self.input_column
+    }
+
+    /// The input in the unit of [`input_column`](Self::input_column); empty in a record read as a reference.
+    pub fn input(&self) -> &[f64] {
+        self.input.as_deref().unwrap_or_default()
+    }
+
+    /// The measured output (or the reference), in [`output_unit`](Self::output_unit).
+    pub fn output(&self) -> Option<&[f64]> {
+        self.output.as_ref().map(|(_, values)| values.as_slice())
+    }
+
+    /// The unit of the output, if there is one.
+    pub fn output_unit(&self) -> Option<OutputUnit> {
+        self.output.as_ref().map(|(unit, _)| *unit)
+    }
+
+    /// Temperature [°C], if it was measured.
+    pub fn temperature(&self) -> Option<&[f64]> {
+        self.temperature.as_deref()
+    }
+
+    /// External load [N], if it was measured.
+    pub fn load(&self) -> Option<&[f64]> {
+        self.load.as_deref()
+    }
+
+    /// The temperature [°C] for somebody who cannot do without; `why` completes "is needed here (…)".
+    ///
+    /// # Errors
+    /// When the record has none.
+    pub fn need_temperature(&self, why: &str) -> Result<&[f64], RecordError> {
+        self.temperature().ok_or_else(|| self.lacks("temperature_degc", why))
+    }
+
+    /// The load [N] for somebody who cannot do without; `why` completes "is needed here (…)".
+    ///
+    /// # Errors
+    /// When the record has none.
+    pub fn need_load(&self, why: &str) -> Result<&[f64], RecordError> {
+        self.load().ok_or_else(|| self.lacks("load_n", why))
+    }
+
+    /// The output in `unit` for somebody who cannot do without; `why` completes "is needed here (…)".
+    ///
+    /// # Errors
+    /// When the record has no output, or one in another unit.
+    pub fn need_output(&self, unit: OutputUnit, why: &str) -> Result<&[f64], RecordError> {
+        match &self.output {
+            Some((found, values)) if *found == unit => Ok(values),
+            _ => Err(self.lacks(unit.column(), why)),
+        }
+    }
+
+    fn lacks(&self, column: &str, why: &str) -> RecordError {
+        RecordError::Needed { file: self.name(), column: column.to_owned(), why: why.to_owned() }
+    }
+}
+
+/// How rows and columns are called in messages.
+struct Origin<'a> {
+    time_column: &'a str,
+    segment_column: &'a str,
+    place: &'a dyn Fn(usize) -> Place,
+}
+
+/// Splits rows by their labels, or gives the row at which a label returns.
+fn split(labels: &[i64]) -> Result<(Vec<i64>, Vec<Range<usize>>), usize> {
+    let mut seen = HashSet::new();
+    let (mut of_segment, mut segments) = (Vec::new(), Vec::new());
+    let mut row = 0;
+    for run in labels.chunk_by(|a, b| a == b) {
+        if !seen.insert(run[0]) {
+            return Err(row);
+        }
+        of_segment.push(run[0]);
+        segments.push(row..row + run.len());
+        row += run.len();
+    }
+    Ok((of_segment, segments))
+}

@@ -1,0 +1,234 @@
+//! Writing records as CSV.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::io::Write;
+
+use csv::ByteRecord;
+
+use super::Record;
+use super::grid::{self, Printed};
+use super::read::rows_of;
+
+/// Why a record could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The writer refused.
+    #[error("the record cannot be written: {0}")]
+    Io(#[from] std::io::Error),
+    /// A column to add has another length than the record.
+    #[error("column \"{column}\" has {found} values, but the record has {expected} rows")]
+    Lengths {
+        /// The column.
+        column: String,
+        /// Its length.
+        found: usize,
+        /// The record's rows.
+        expected: usize,
+    },
+    /// A value to write is NaN or infinite, which no reader of the format would take.
+    #[error("column \"{column}\", row {row}: {value} is not a finite number and is not written")]
+    NotFinite {
+        /// The column.
+        column: String,
+        /// The row; the first is 0.
+        row: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The record was joined from several files, whose clocks need not go on from one to the next.
+    #[error("{name}: records joined from several files are not written as one; write each by itself")]
+    Joined {
+        /// The files.
+        name: String,
+    },
+}
+
+/// A column to write after a record's own. It replaces a column of the same name.
+#[derive(Clone, Copy, Debug)]
+pub struct Extra<'a> {
+    name: &'a str,
+    cells: Cells<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Cells<'a> {
+    Numbers(&'a [f64], Option<usize>),
+    Flags(&'a [bool]),
+}
+
+impl<'a> Extra<'a> {
+    /// Numbers, written with as many digits as it takes to read the same values again.
+    pub fn numbers(name: &'a str, values: &'a [f64]) -> Self {
+        Self { name, cells: Cells::Numbers(values, None) }
+    }
+
+    /// Numbers, rounded to `decimals` digits after the point.
+    pub fn rounded(name: &'a str, values: &'a [f64], decimals: usize) -> Self {
+        Self { name, cells: Cells::Numbers(values, Some(decimals)) }
+    }
+
+    /// Flags, written as 1 and 0.
+    pub fn flags(name: &'a str, values: &'a [bool]) -> Self {
+        Self { name, cells: Cells::Flags(values) }
+    }
+
+    fn check(&self, rows: usize) -> Result<(), WriteError> {
+        let found = match self.cells {
+            Cells::Numbers(values, _) => values.len(),
+            Cells::Flags(values) => values.len(),
+        };
+        let column = || self.name.to_owned();
+        if found != rows {
+            return Err(WriteError::Lengths { column: column(), found, expected: rows });
+        }
+        if let Cells::Numbers(values, _) = self.cells
+            && let Some(row) = values.iter().position(|value| !value.is_finite())
+        {
+            return Err(WriteError::NotFinite { column: column(), row, value: values[row] });
+        }
+        Ok(())
+    }
+
+    fn print(&self, row: usize, cell: &mut String) {
+        cell.clear();
+        // Writing to a String does not fail.
+        let _ = match self.cells {
+            Cells::Numbers(values, None) => write!(cell, "{}", values[row]),
+            Cells::Numbers(values, Some(decimals)) => write!(cell, "{:.decimals$}", values[row]),
+            Cells::Flags(values) => write!(cell, "{}", u8::from(values[row])),
+        };
+    }
+}
+
+impl Record {
+    /// Writes the columns that play a role, in the record format: times in seconds with the decimals that keep them
+    /// even to the last printed digit, other values with as many digits as it takes to read the same values again.
+    ///
+    /// # Errors
+    /// When `out` refuses, or the record was joined.
+    pub fn write_csv(&self, mut out: impl Write) -> Result<(), WriteError> {
+        if self.sources.len() != 1 {
+            return Err(WriteError::Joined { name: self.name() });
+        }
+        let columns: Vec<(&str, &[f64])> = [
+            (self.input_column.as_str(), self.input.as_deref()),
+            (self.output_unit().map_or("", |unit| unit.column()), self.output()),
+            ("temperature_degc", self.temperature()),
+            ("load_n", self.load()),
+        ]
+        .into_iter()
+        .filter_map(|(name, values)| values.map(|values| (name, values)))
+        .collect();
+
+        let mut text = String::from(if self.labelled { "segment,time_s" } else { "time_s" });
+        columns.iter().for_each(|(name, _)| text.extend([",", name]));
+        text.push('\n');
+        let decimals = self.time_decimals();
+        for (rows, label) in self.segments.iter().zip(&self.labels) {
+            for row in rows.clone() {
+                // Writing to a String does not fail.
+                if self.labelled {
+                    let _ = write!(text, "{label},");
+                }
+                let _ = write!(text, "{:.decimals$}", self.time[row]);
+                for (_, values) in &columns {
+                    let _ = write!(text, ",{}", values[row]);
+                }
+                text.push('\n');
+            }
+            out.write_all(text.as_bytes())?;
+            text.clear();
+        }
+        out.flush()?;
+        Ok(())
+    }
+
+    /// Writes the file's own columns, digit for digit and with those that play no role, and `extra` after them. A
+    /// record made in memory is written as by [`write_csv`](Self::write_csv).
+    ///
+    /// # Errors
+    /// When `out` refuses, an extra column has another length than the record or values that are not finite, or the
+    /// record was joined.
+    pub fn write_with(&self, out: impl Write, extra: &[Extra<'_>]) -> Result<(), WriteError> {
+        extra.iter().try_for_each(|column| column.check(self.rows()))?;
+        let text = match &self.text {
+            Some(text) => Cow::Borrowed(&text[..]),
+            None => {
+                let mut text = Vec::new();
+                self.write_csv(&mut text)?;
+                Cow::Owned(text)
+            }
+        };
+        let refused = |error: csv::Error| WriteError::Io(error.into());
+        let mut reader = rows_of(&text);
+        let mut writer = csv::Writer::from_writer(out);
+        let mut fields = ByteRecord::new();
+        let mut kept: Vec<bool> = Vec::new();
+        let mut cell = String::new();
+        let mut row = None;
+        while reader.read_byte_record(&mut fields).map_err(refused)? {
+            if row.is_none() {
+                let replaced = |field: &[u8]| extra.iter().any(|column| column.name.as_bytes() == field.trim_ascii());
+                kept = fields.iter().map(|field| !replaced(field)).collect();
+            }
+            for (field, _) in fields.iter().zip(&kept).filter(|(_, kept)| **kept) {
+                writer.write_field(field).map_err(refused)?;
+            }
+            for column in extra {
+                match row {
+                    None => column.name.clone_into(&mut cell),
+                    Some(row) => column.print(row, &mut cell),
+                }
+                writer.write_field(&cell).map_err(refused)?;
+            }
+            writer.write_record(None::<&[u8]>).map_err(refused)?;
+            row = Some(row.map_or(0, |row| row + 1));
+        }
+        writer.flush()?;
+        Ok(())
+    }
+
+    /// The fewest decimals with which the printed times lead back to this record's grid, but enough to show a
+    /// thousandth of a period where the period itself is not a short number.
+    fn time_decimals(&self) -> usize {
+        const MOST: usize = 17;
+        let h = self.sample_period();
+        let fine = (3.0 - h.log10()).ceil().clamp(3.0, MOST as f64) as usize;
+        let starts = self.segments.iter().map(|rows| decimals_of(self.time[rows.start]));
+        let least = starts.max().unwrap_or(0).max(decimals_of(h).min(fine)).clamp(3, MOST);
+        let mut near = None;
+        for decimals in least..=MOST {
+            let found = self.period_printed_with(decimals);
+            if found == Some(h) {
+                return decimals;
+            }
+            // A period that is no short number at all comes back to its last bits only.
+            if near.is_none() && found.is_some_and(|found| (found - h).abs() <= 1e-12 * h) {
+                near = Some(decimals);
+            }
+        }
+        near.unwrap_or(MOST)
+    }
+
+    /// The period that a reader of the times would find.
+    fn period_printed_with(&self, decimals: usize) -> Option<f64> {
+        let mut printed = Printed::default();
+        let mut text = String::new();
+        let mut reprint = |t: &f64| {
+            text.clear();
+            // Writing to a String does not fail.
+            let _ = write!(text, "{t:.decimals$}");
+            printed.take(text.as_bytes());
+            text.parse().unwrap_or(*t)
+        };
+        let times: Vec<f64> = self.time.iter().map(&mut reprint).collect();
+        grid::fit(&times, &self.segments, printed).ok().map(|period| period.value)
+    }
+}
+
+/// The decimals of the shortest text that reads as `t` again.
+fn decimals_of(t: f64) -> usize {
+    t.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len())
+}

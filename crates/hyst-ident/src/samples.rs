@@ -1,0 +1,90 @@
+//! What a fit sees of a record: columns of numbers, segments, and which rows count.
+
+use std::ops::Range;
+
+use hyst_core::Env;
+
+use crate::record::Record;
+
+/// Columns of one or more records with the same units and sample period.
+#[derive(Clone, Debug)]
+pub struct Samples {
+    /// Sample period \[s\].
+    pub period: f64,
+    /// Lab clock \[s\].
+    pub time: Vec<f64>,
+    /// Input \[V\].
+    pub input: Vec<f64>,
+    /// Measured output \[output unit\]; empty if there is none.
+    pub output: Vec<f64>,
+    /// Temperature \[°C\], where it was recorded.
+    pub temperature: Option<Vec<f64>>,
+    /// Load \[N\], where it was recorded.
+    pub load: Option<Vec<f64>>,
+    /// Stretches between which the device rests.
+    pub segments: Vec<Range<usize>>,
+    /// File that each segment came from.
+    pub file_of_segment: Vec<usize>,
+    /// Rows that are a start-up transient: left out of fits and of the settled error.
+    pub settling: Vec<bool>,
+}
+
+impl Samples {
+    /// The columns of a record; no row is settling yet.
+    pub fn from_record(record: &Record) -> Self {
+        Self {
+            period: record.sample_period(),
+            time: record.time().to_vec(),
+            input: record.input().to_vec(),
+            output: record.output().unwrap_or_default().to_vec(),
+            temperature: record.temperature().map(<[f64]>::to_vec),
+            load: record.load().map(<[f64]>::to_vec),
+            segments: record.segments().to_vec(),
+            file_of_segment: record.file_of_segment().to_vec(),
+            settling: vec![false; record.rows()],
+        }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// Surroundings at row `k`.
+    pub fn env(&self, k: usize) -> Env<f64> {
+        let at = |column: &Option<Vec<f64>>| column.as_ref().and_then(|c| c.get(k)).copied().unwrap_or(0.0);
+        Env { time: self.time[k], temperature: at(&self.temperature), load: at(&self.load) }
+    }
+
+    /// Lowest and highest input.
+    pub fn input_range(&self) -> (f64, f64) {
+        range(self.input.iter().copied())
+    }
+
+    /// Highest minus lowest output over the settled rows \[output unit\].
+    pub fn output_span(&self) -> f64 {
+        let settled = self.output.iter().zip(&self.settling).filter(|(_, s)| !**s).map(|(y, _)| *y);
+        let (low, high) = range(settled);
+        (high - low).max(0.0)
+    }
+
+    /// Number of files that the rows came from.
+    pub fn files(&self) -> usize {
+        self.file_of_segment.iter().max().map_or(0, |m| m + 1)
+    }
+
+    /// Length of the longest segment \[s\].
+    pub fn longest_segment(&self) -> f64 {
+        self.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0) as f64 * self.period
+    }
+}
+
+/// Smallest and largest value; (∞, −∞) of nothing.
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+}

@@ -1,0 +1,71 @@
+//! Start-up rows: a transient left from before the record.
+//!
+//! A model starts each segment at rest with virgin memory. A real record may start otherwise: still
+//! ringing, or with an unknown memory. What was left decays, or is wiped out once the input has swept
+//! its range; until then a misfit says nothing about the model.
+
+use crate::Samples;
+use crate::samples::range;
+
+/// Share of a segment's swing after which its memory no longer depends on the past.
+const SWEPT: f64 = 0.9;
+/// A start-up must exceed the largest residual of the rest this many times to be called one.
+const CLEARLY: f64 = 3.0;
+
+/// Rows of each segment in which a start-up transient can lie: until the input has swept its range,
+/// once more as long, and at most half of the segment.
+pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
+    let window = |s: &std::ops::Range<usize>| {
+        let u = &samples.input[s.clone()];
+        let (low, high) = range(u.iter().copied());
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let swept = u.iter().position(|u| {
+            (least, most) = (least.min(*u), most.max(*u));
+            most - least >= SWEPT * (high - low)
+        });
+        (2 * swept.unwrap_or(0)).min(u.len() / 2)
+    };
+    samples.segments.iter().map(window).collect()
+}
+
+/// Marks the start-up rows, given measured minus predicted output.
+pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    let windows = windows(samples);
+    let centred = centre(samples, residual, &windows);
+    let outside = || {
+        samples.segments.iter().zip(&windows).flat_map(|(s, w)| centred[s.start + w..s.end].iter())
+    };
+    let n = outside().count().max(1) as f64;
+    let rms = (outside().map(|r| r * r).sum::<f64>() / n).sqrt();
+    let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
+    let mut settling = vec![false; samples.len()];
+    for (s, window) in samples.segments.iter().zip(&windows) {
+        let rows = &centred[s.start..s.start + window];
+        if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
+            continue;
+        }
+        let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
+        // What decays into the residual's level goes on below it for about half as long again.
+        let end = (last + last / 2 + 1).min(rows.len());
+        settling[s.start..s.start + end].fill(true);
+    }
+    settling
+}
+
+/// Residual minus each file's mean outside the windows: another sensor zero is no transient.
+fn centre(samples: &Samples, residual: &[f64], windows: &[usize]) -> Vec<f64> {
+    let mut centred = residual.to_vec();
+    for file in 0..samples.files() {
+        let own = || samples.segments.iter().zip(windows).zip(&samples.file_of_segment).filter(move |(_, f)| **f == file);
+        let (mut sum, mut n) = (0.0, 0usize);
+        for ((s, w), _) in own() {
+            sum += residual[s.start + w..s.end].iter().sum::<f64>();
+            n += s.len() - w;
+        }
+        let mean = sum / n.max(1) as f64;
+        for ((s, _), _) in own() {
+            centred[s.clone()].iter_mut().for_each(|r| *r -= mean);
+        }
+    }
+    centred
+}

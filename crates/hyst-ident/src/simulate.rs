@@ -1,0 +1,84 @@
+//! `simulate`: what a model says about a record.
+
+use hyst_core::Stage;
+use serde::{Deserialize, Serialize};
+
+use crate::fit::FitError;
+use crate::metrics::Errors;
+use crate::model::Model;
+use crate::record::Record;
+use crate::samples::Samples;
+use crate::settle::start_up_rows;
+
+/// What is done with the sensor's zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Zero {
+    /// The model's zero holds.
+    #[default]
+    None,
+    /// One constant per file is taken from its measured output.
+    PerRecord,
+}
+
+/// What a model says about a record.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    /// Output \[output unit\], per row.
+    pub predicted: Vec<f64>,
+    /// Start-up rows.
+    pub settling: Vec<bool>,
+    /// Constant that was added per file; empty with [`Zero::None`].
+    pub zeros: Vec<f64>,
+    /// Errors against the measured output, where there is one.
+    pub errors: Option<Errors>,
+}
+
+/// Runs a model over a record. Memory starts virgin in each segment.
+///
+/// # Errors
+/// If the record lacks a column that the model uses, or its units are not the model's.
+pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation, FitError> {
+    check_units(model, record)?;
+    let mut samples = Samples::from_record(record);
+    let chain = model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
+    let chain = Box::new(chain);
+    let mut state = Box::new(chain.state());
+    let mut predicted = Vec::with_capacity(samples.len());
+    for segment in &samples.segments {
+        for k in segment.clone() {
+            let (env, u) = (samples.env(k), samples.input[k]);
+            predicted.push(if k == segment.start { chain.reset(&mut state, &env, u) } else { chain.step(&mut state, &env, u) });
+        }
+    }
+    let mut zeros = Vec::new();
+    let mut errors = None;
+    if record.output().is_some() {
+        let residual: Vec<f64> = samples.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
+        samples.settling = start_up_rows(&samples, &residual);
+        if zero == Zero::PerRecord {
+            for rows in record.rows_of_files() {
+                let settled = || rows.clone().filter(|k| !samples.settling[*k]);
+                let mean = settled().map(|k| residual[k]).sum::<f64>() / settled().count().max(1) as f64;
+                predicted[rows.clone()].iter_mut().for_each(|p| *p += mean);
+                zeros.push(mean);
+            }
+        }
+        errors = Some(Errors::of(&samples.output, &predicted, &samples.settling).map_err(|source| FitError::Compare { record: record.name(), source })?);
+    }
+    Ok(Simulation { predicted, settling: samples.settling, zeros, errors })
+}
+
+fn check_units(model: &Model, record: &Record) -> Result<(), FitError> {
+    let missing = |column: &str, advice: String| Err(FitError::Missing { record: record.name(), column: column.into(), advice });
+    if record.input().is_empty() || record.input_column() != model.input.column {
+        return missing(&model.input.column, "the model was fitted with it; use --map if it has another name".into());
+    }
+    if let Some(unit) = record.output_unit().filter(|u| u.column() != model.output.column) {
+        return missing(&model.output.column, format!("the record's output is {}, the model's is not", unit.column()));
+    }
+    if model.needs_temperature() && record.temperature().is_none() {
+        return missing("temperature_degc", "the model's gain depends on it".into());
+    }
+    Ok(())
+}
