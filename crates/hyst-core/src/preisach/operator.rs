@@ -51,7 +51,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
             }
             s.memory.advance(middle + reach, |m, u| self.on_branch(m, u));
             s.memory.advance(middle - reach, |m, u| self.on_branch(m, u));
-            reach = reach - self.width;
+            reach -= self.width;
         }
         s.memory.advance(middle, |m, u| self.on_branch(m, u));
         s.zero = s.memory.output();

@@ -37,17 +37,15 @@ impl ScreeningBasis {
 impl Basis for ScreeningBasis {
     fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
         let mut columns = self.linear.columns(drive, segments);
-        let x0 = -self.middle / self.half;
-        let square = |x: f64| x * x;
+        let scale = 1.0 / self.half;
+        let x0 = -self.middle * scale;
         let cubic = |x: f64| x * (x * x - 0.6);
+        let (square0, cubic0) = (x0 * x0, cubic(x0));
         for r in &self.curved {
             let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r) };
-            let curve = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
-                p.iter().map(|p| self.half * (f((p - self.middle) / self.half) - f(x0))).collect()
-            };
-            let (second, third) = (curve(&square), curve(&cubic));
-            columns.push(second);
-            columns.push(third);
+            let x = |p: &f64| (p - self.middle) * scale;
+            columns.push(p.iter().map(|p| self.half * (x(p) * x(p) - square0)).collect());
+            columns.push(p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect());
         }
         columns
     }

@@ -14,7 +14,7 @@ const CONFIDENCE: f64 = 0.99;
 /// RMSE must fall at least by this share.
 const LEAST_FALL: f64 = 0.05;
 /// What an effect adds must be at least this many noise floors (root mean square).
-const LEAST_OVER_NOISE: f64 = 0.5;
+pub(super) const LEAST_OVER_NOISE: f64 = 0.5;
 /// Share of what stands above the noise floor that an effect must explain.
 const LEAST_SHARE: f64 = 0.15;
 /// Largest share of a motion that creep may add in the end.

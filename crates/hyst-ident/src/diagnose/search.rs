@@ -3,7 +3,7 @@
 use hyst_core::Error;
 use rayon::prelude::*;
 
-use super::score::{Judgement, judge};
+use super::score::{Judgement, LEAST_OVER_NOISE, judge};
 use super::{starts, visible};
 use crate::model::{Effect, Effects};
 use crate::nested::{Fitted, Problem, cross_validate, folds_by_segment, folds_interleaved};
@@ -86,6 +86,12 @@ impl Judge<'_> {
         Ok(self.problem.fit(effects)?.and_then(|f| Trial::of(self.problem, f)))
     }
 
+    /// Whether even a perfect model would add less than an effect has to.
+    fn nothing_to_gain(&self, best: &Trial) -> bool {
+        let above = best.total() / best.fit.rows.max(1) as f64 - self.noise * self.noise;
+        above < (LEAST_OVER_NOISE * self.noise).powi(2)
+    }
+
     fn judge(&self, without: &Trial, with: &Trial, effect: Effect) -> Judgement {
         judge(self.problem.samples, without, with, effect, self.noise, self.seed)
     }
@@ -93,7 +99,7 @@ impl Judge<'_> {
 
 pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &(dyn Fn(&str) + Sync)) -> Result<Search, Error> {
     let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments);
-    let judge = Judge { problem, noise, seed };
+    let mut judge = Judge { problem, noise, seed };
     let already = base.effects.names();
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
@@ -104,6 +110,9 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
     let mut beam = vec![start.clone()];
     let mut best = start.clone();
     for round in 1..=MOST {
+        if judge.nothing_to_gain(&best) {
+            break;
+        }
         progress(&format!("searching for effects, round {round}"));
         let jobs: Vec<(&Trial, Effect)> = beam
             .iter()
@@ -113,7 +122,11 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
         // Each trial is computed alone and collected in order: threads change nothing.
         let trials: Vec<Result<Option<Trial>, Error>> = jobs
             .par_iter()
-            .map(|(parent, e)| Ok(judge.trials(&parent.fit, *e)?.filter(|t| judge.judge(parent, t, *e).accepted())))
+            .map(|(parent, e)| {
+                // A set that is worse than a smaller one found before leads nowhere.
+                let promising = |t: &Trial| t.total() < best.total() && judge.judge(parent, t, *e).accepted();
+                Ok(judge.trials(&parent.fit, *e)?.filter(promising))
+            })
             .collect();
         let mut next: Vec<Trial> = Vec::new();
         for trial in trials {
@@ -131,9 +144,9 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
         }
         next.sort_by(|a, b| a.total().total_cmp(&b.total()));
         next.truncate(BEAM);
-        if next[0].total() < best.total() {
-            best = next[0].clone();
-        }
+        best = next[0].clone();
+        // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
+        judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments));
         beam = next;
     }
 
@@ -155,9 +168,7 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
             }
         }
     }
-    // The floor of the fit that explains most: an effect may sound like noise.
-    let noise = noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments));
-    Ok(Search { start, best, named, noise })
+    Ok(Search { start, best, named, noise: judge.noise })
 }
 
 fn candidates_for_removal(best: &Trial, already: &[Effect]) -> Vec<Effect> {

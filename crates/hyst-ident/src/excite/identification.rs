@@ -8,19 +8,19 @@ use super::{
 /// (lag, resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Identification {
-    /// Duration, rests included [s]; the drive comes within a few seconds of it.
+    /// Duration, rests included \[s\]; the drive comes within a few seconds of it.
     pub duration_s: f64,
-    /// Rest between segments [s].
+    /// Rest between segments \[s\].
     pub rest_s: f64,
-    /// Frequency of the slow loops [Hz].
+    /// Frequency of the slow loops \[Hz\].
     pub slow_hz: f64,
-    /// Frequency of the fast loops [Hz].
+    /// Frequency of the fast loops \[Hz\].
     pub fast_hz: f64,
-    /// Highest frequency of the multisine [Hz]; its lowest is `slow_hz`.
+    /// Highest frequency of the multisine \[Hz\]; its lowest is `slow_hz`.
     pub band_hz: f64,
-    /// How long the levels of the stairs are held [s].
+    /// How long the levels of the stairs are held \[s\].
     pub hold_s: f64,
-    /// How long the ramps between them take [s].
+    /// How long the ramps between them take \[s\].
     pub ramp_s: f64,
     /// Seed of levels and phases.
     pub seed: u64,

@@ -15,7 +15,7 @@ use std::ops::Range;
 pub use identification::Identification;
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
 
-use crate::record::{Extra, Record, RecordError, Samples, WriteError};
+use crate::record::{Columns, Extra, Record, RecordError, WriteError};
 
 /// No drive has more rows than this; a larger figure is a slip of the pen.
 const MOST_ROWS: f64 = 5e7;
@@ -23,13 +23,13 @@ const MOST_ROWS: f64 = 5e7;
 /// What the device and its amplifier stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Rows per second [Hz].
+    /// Rows per second \[Hz\].
     pub rate_hz: f64,
-    /// The lowest voltage [V], at which the device rests.
+    /// The lowest voltage \[V\], at which the device rests.
     pub lo_v: f64,
-    /// The highest voltage [V].
+    /// The highest voltage \[V\].
     pub hi_v: f64,
-    /// The steepest slope from one row to the next [V/s], if there is a limit.
+    /// The steepest slope from one row to the next \[V/s\], if there is a limit.
     pub slew_v_per_s: Option<f64>,
 }
 
@@ -66,9 +66,9 @@ pub enum ExciteError {
     Slew {
         /// The segment's shape.
         shape: &'static str,
-        /// The steepest slope [V/s].
+        /// The steepest slope \[V/s\].
         needed: f64,
-        /// The limit [V/s].
+        /// The limit \[V/s\].
         limit: f64,
         /// Which field to change.
         remedy: &'static str,
@@ -143,12 +143,12 @@ impl Drive {
         &self.shapes
     }
 
-    /// Time [s]; it goes on across segments.
+    /// Time \[s\]; it goes on across segments.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
 
-    /// The drive [V].
+    /// The drive \[V\].
     pub fn voltage(&self) -> &[f64] {
         &self.voltage
     }
@@ -159,12 +159,12 @@ impl Drive {
     /// When the drive has fewer than two rows in every segment.
     pub fn to_record(&self, name: &str) -> Result<Record, RecordError> {
         let labels = (0..).zip(&self.segments).flat_map(|(label, rows)| std::iter::repeat_n(label, rows.len()));
-        Record::from_samples(Samples {
+        Record::from_samples(Columns {
             name: name.to_owned(),
             segment: Some(labels.collect()),
             time: self.time.clone(),
             input: Some(self.voltage.clone()),
-            ..Samples::default()
+            ..Columns::default()
         })
     }
 

@@ -12,7 +12,7 @@ use super::{ExciteError, Limits, MOST_ROWS, positive, require};
 /// A raised cosine over the whole span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sine {
-    /// Frequency [Hz].
+    /// Frequency \[Hz\].
     pub frequency_hz: f64,
     /// Whole cycles.
     pub cycles: u32,
@@ -23,16 +23,16 @@ pub struct Sine {
 /// Its loops are nested and end where a demagnetisation would.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecayingSine {
-    /// Frequency [Hz].
+    /// Frequency \[Hz\].
     pub frequency_hz: f64,
-    /// Duration, return included [s]; at least three periods.
+    /// Duration, return included \[s\]; at least three periods.
     pub duration_s: f64,
 }
 
 /// Ramps up and down over the whole span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
-    /// Frequency [Hz].
+    /// Frequency \[Hz\].
     pub frequency_hz: f64,
     /// Whole cycles.
     pub cycles: u32,
@@ -43,9 +43,9 @@ pub struct Triangle {
 pub struct Stairs {
     /// How many levels.
     pub levels: u32,
-    /// How long each is held [s].
+    /// How long each is held \[s\].
     pub hold_s: f64,
-    /// How long each ramp takes [s]; 0.05 to 0.1 is usual.
+    /// How long each ramp takes \[s\]; 0.05 to 0.1 is usual.
     pub ramp_s: f64,
     /// Seed of the levels.
     pub seed: u64,
@@ -63,28 +63,28 @@ pub enum Phases {
 /// A sum of sines of equal amplitude around mid-span, faded in from rest and out again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multisine {
-    /// The lowest line [Hz].
+    /// The lowest line \[Hz\].
     pub low_hz: f64,
-    /// The highest line [Hz].
+    /// The highest line \[Hz\].
     pub high_hz: f64,
     /// How many lines, evenly spaced; each is moved to a whole number of cycles in `duration_s`.
     pub lines: u32,
     /// Their phases.
     pub phases: Phases,
-    /// Duration, fades included [s].
+    /// Duration, fades included \[s\].
     pub duration_s: f64,
-    /// Duration of each fade [s]; at most half of `duration_s`.
+    /// Duration of each fade \[s\]; at most half of `duration_s`.
     pub fade_s: f64,
 }
 
 /// A raised cosine whose frequency grows by the same factor in equal times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// Frequency at the start [Hz].
+    /// Frequency at the start \[Hz\].
     pub low_hz: f64,
-    /// Frequency at the end [Hz].
+    /// Frequency at the end \[Hz\].
     pub high_hz: f64,
-    /// Duration [s], which is adjusted to whole cycles.
+    /// Duration \[s\], which is adjusted to whole cycles.
     pub duration_s: f64,
 }
 
@@ -103,9 +103,9 @@ pub enum Peak {
 pub struct Forc {
     /// How many peaks; the last reaches the highest voltage.
     pub curves: u32,
-    /// Duration of a peak [s].
+    /// Duration of a peak \[s\].
     pub peak_s: f64,
-    /// Rest after each peak [s].
+    /// Rest after each peak \[s\].
     pub rest_s: f64,
     /// The peaks' form.
     pub peak: Peak,
@@ -175,7 +175,7 @@ fn smooth(x: f64) -> f64 {
     0.5 - 0.5 * (PI * x.clamp(0.0, 1.0)).cos()
 }
 
-/// The rows from 0 to `duration` [s], the last one not before `duration`; `share` sees no later time than that. The
+/// The rows from 0 to `duration` \[s\], the last one not before `duration`; `share` sees no later time than that. The
 /// field named is the one to blame for a duration out of range.
 fn sampled(
     (field, value): (&'static str, f64),
@@ -288,7 +288,7 @@ impl Multisine {
         Ok(raw.iter().enumerate().map(faded).collect())
     }
 
-    /// The lines [Hz], each with a whole number of cycles in the duration.
+    /// The lines \[Hz\], each with a whole number of cycles in the duration.
     fn lines(&self) -> Result<Vec<f64>, ExciteError> {
         check_count("lines", self.lines)?;
         let count = f64::from(self.lines);

@@ -223,14 +223,14 @@ pub enum RecordError {
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// The time of the row before [s].
+        /// The time of the row before \[s\].
         previous: String,
-        /// The time of this row [s].
+        /// The time of this row \[s\].
         found: String,
     },
     /// The rows of a segment are not evenly spaced in time.
     #[error(
-        "{file}, {place}, column \"{column}\": uneven time: expected {expected} s, found {found} s; resample to even steps, or, where the device rested in between, give the two parts different integers in a column \"segment\""
+        "{file}, {place}, column \"{column}\": uneven time: expected {expected} s, found {found} s; resample to even steps (or print more decimals, if it is only rounding), or, where the device rested in between, give the two parts different integers in a column \"segment\""
     )]
     UnevenTime {
         /// The file.
@@ -239,14 +239,14 @@ pub enum RecordError {
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// The time that the even grid has there [s].
+        /// The time that the even grid has there \[s\].
         expected: String,
-        /// The time found [s].
+        /// The time found \[s\].
         found: String,
     },
     /// Two segments are sampled at different rates.
     #[error(
-        "{file}, {place}, column \"{column}\": segment {label} has a sample period of {period} s, but segment {other_label} one of {other_period} s; resample one of them, or keep them in separate records"
+        "{file}, {place}, column \"{column}\": segment {label} has a sample period of {period:.9} s, but segment {other_label} one of {other_period:.9} s; resample one of them, or keep them in separate records"
     )]
     MixedPeriods {
         /// The file.
@@ -257,12 +257,12 @@ pub enum RecordError {
         column: String,
         /// The second of the two segments.
         label: i64,
-        /// Its sample period [s].
-        period: String,
+        /// Its sample period \[s\].
+        period: f64,
         /// The first of the two segments.
         other_label: i64,
-        /// Its sample period [s].
-        other_period: String,
+        /// Its sample period \[s\].
+        other_period: f64,
     },
     /// No segment has two rows, so that there is no sample period.
     #[error(

@@ -47,7 +47,7 @@ impl Printed {
         self.decimals = self.decimals.max(decimals.saturating_sub(exponent).clamp(-300, 300));
     }
 
-    /// One unit of the last printed digit of the time `t` [s].
+    /// One unit of the last printed digit of the time `t` \[s\].
     fn resolution(self, t: f64) -> f64 {
         let fixed = 10_f64.powi(-self.decimals);
         if t.abs() < 10_f64.powi(self.digits.saturating_sub(self.decimals)) {
@@ -62,9 +62,9 @@ impl Printed {
 /// The sample period of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Period {
-    /// The period [s].
+    /// The period \[s\].
     pub(crate) value: f64,
-    /// The shortest and the longest period that fit every row [s].
+    /// The shortest and the longest period that fit every row \[s\].
     pub(crate) fits: (f64, f64),
 }
 
@@ -107,7 +107,7 @@ impl Fits {
     }
 }
 
-/// Finds the period of increasing times [s], or the first place where they are not even.
+/// Finds the period of increasing times \[s\], or the first place where they are not even.
 pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Period, Fault> {
     let Some(longest) = segments.iter().filter(|rows| rows.len() >= 2).max_by_key(|rows| rows.len()) else {
         return Err(Fault::TooShort);
@@ -117,6 +117,9 @@ pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> 
     let rounding = 4.0 * f64::EPSILON * largest;
     // Times summed up step by step drift off the grid by more than a rounding: a millionth of a period is no matter.
     let slack = rounding + 1e-6 * guess;
+    if let Some(fault) = gap(time, segments, printed, guess) {
+        return Err(fault);
+    }
 
     let mut strict = Fits::ALL;
     let mut loose = Vec::with_capacity(segments.len());
@@ -183,7 +186,7 @@ impl Grid<'_> {
     }
 }
 
-/// The roundest whole rate [Hz] near `1 / guess` whose period fits.
+/// The roundest whole rate \[Hz\] near `1 / guess` whose period fits.
 fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
     let rate = 1.0 / guess;
     if !(0.5..1e15).contains(&rate) {
@@ -195,6 +198,26 @@ fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
     })
 }
 
+/// Finds a missing row where the period is so few printed units that rounding could account for it.
+///
+/// At 1 kHz with three decimals a missing row reads 0.003, 0.005: one unit off, as if the rate were a little below
+/// 1 kHz. Rounding makes such longer steps again and again; those that come once or twice, or less than every
+/// twentieth time, are gaps. Where a period is more than three units, the tolerance of one unit shows any gap.
+fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) -> Option<Fault> {
+    let is_coarse = |row: &usize| guess <= 3.0 * printed.resolution(time[*row]);
+    let steps = || segments.iter().flat_map(|rows| rows.clone().skip(1)).filter(is_coarse);
+    let mut lengths: Vec<f64> = steps().map(|row| time[row] - time[row - 1]).collect();
+    if lengths.is_empty() {
+        return None;
+    }
+    let count = lengths.len();
+    let usual = *lengths.select_nth_unstable_by((count - 1) / 2, f64::total_cmp).1;
+    let is_odd = |row: &usize| (time[*row] - time[*row - 1] - usual).abs() > 0.5 * printed.resolution(time[*row]);
+    let odd = steps().filter(is_odd).count();
+    let row = steps().find(is_odd)?;
+    (odd < 3 || 20 * odd < count).then(|| Fault::Uneven { row, expected: time[row - 1] + usual })
+}
+
 /// Names the first row off the grid of a segment that has no common period.
 fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
@@ -203,7 +226,7 @@ fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
     let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let tolerance = |tk: f64| printed.resolution(tk) + slack;
     // A step that is missing, added or moved stands out against the usual step.
-    let jump = t.windows(2).position(|w| !((w[1] - w[0] - usual).abs() <= 2.0 * tolerance(w[1])));
+    let jump = t.windows(2).position(|w| (w[1] - w[0] - usual).abs() > 2.0 * tolerance(w[1]));
     if let Some(k) = jump {
         return Fault::Uneven { row: first_row + k + 1, expected: t[k] + usual };
     }
@@ -234,9 +257,13 @@ mod tests {
         (texts.iter().map(|text| text.parse().unwrap()).collect(), figures)
     }
 
+    fn one(rows: usize) -> Vec<Range<usize>> {
+        std::iter::once(0..rows).collect()
+    }
+
     fn period_of(texts: &[String]) -> Result<Period, Fault> {
         let (time, figures) = printed(texts);
-        fit(&time, &[0..time.len()], figures)
+        fit(&time, &one(time.len()), figures)
     }
 
     fn fixed(rate: f64, rows: usize, decimals: usize) -> Vec<String> {
@@ -320,6 +347,19 @@ mod tests {
     }
 
     #[test]
+    fn a_missing_row_is_found_though_the_period_is_one_printed_unit() {
+        for (rate, decimals, missing) in [(1000.0, 3, 400), (1000.0, 3, 1), (1000.0, 3, 998), (500.0, 3, 400)] {
+            let mut texts = fixed(rate, 1000, decimals);
+            assert_eq!(period_of(&texts).unwrap().value, 1.0 / rate);
+            texts.remove(missing);
+            let fault = period_of(&texts).unwrap_err();
+            assert!(matches!(fault, Fault::Uneven { row, .. } if row == missing), "{missing} at {rate} Hz: {fault:?}");
+        }
+        let few: Vec<_> = ["0.0", "0.1", "0.3"].map(str::to_owned).into();
+        assert_eq!(period_of(&few), Err(Fault::Uneven { row: 2, expected: 0.2 }));
+    }
+
+    #[test]
     fn a_deviation_of_two_units_is_uneven_and_of_one_is_not() {
         let mut texts = fixed(1000.0, 100, 6);
         texts[50] = "0.050001".to_owned();
@@ -346,9 +386,9 @@ mod tests {
     #[test]
     fn extreme_times_give_an_answer() {
         for time in [[-1.7e308, 0.0, 1.7e308], [0.0, 5e-324, 1e-323], [1e15, 2e15, 3e15]] {
-            let _ = fit(&time, &[0..3], Printed::EXACT);
-            let _ = fit(&time, &[0..3], Printed::default());
+            let _ = fit(&time, &one(3), Printed::EXACT);
+            let _ = fit(&time, &one(3), Printed::default());
         }
-        assert_eq!(fit(&[1.0], &[0..1], Printed::EXACT), Err(Fault::TooShort));
+        assert_eq!(fit(&[1.0], &one(1), Printed::EXACT), Err(Fault::TooShort));
     }
 }

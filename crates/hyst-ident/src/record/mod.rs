@@ -41,12 +41,12 @@ pub struct Source {
 
 /// Columns in memory from which [`Record::from_samples`] makes a record. All have the length of `time`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Samples {
+pub struct Columns {
     /// What to call the record in messages and in the models fitted to it.
     pub name: String,
     /// A label per row; without it the record is one segment.
     pub segment: Option<Vec<i64>>,
-    /// Time [s] of the lab's clock.
+    /// Time \[s\] of the lab's clock.
     pub time: Vec<f64>,
     /// The input's column name, with its unit; empty stands for `voltage_v`.
     pub input_column: String,
@@ -54,9 +54,9 @@ pub struct Samples {
     pub input: Option<Vec<f64>>,
     /// The output and its unit.
     pub output: Option<(OutputUnit, Vec<f64>)>,
-    /// Temperature [°C].
+    /// Temperature \[°C\].
     pub temperature: Option<Vec<f64>>,
-    /// External load [N].
+    /// External load \[N\].
     pub load: Option<Vec<f64>>,
 }
 
@@ -85,7 +85,7 @@ impl Record {
     /// # Errors
     /// As for a file: columns of unequal length, values that are not finite, uneven or unsorted time, a segment label
     /// that returns. Messages name the row.
-    pub fn from_samples(samples: Samples) -> Result<Self, RecordError> {
+    pub fn from_samples(samples: Columns) -> Result<Self, RecordError> {
         let rows = samples.time.len();
         let (input, output) = (samples.input.as_deref(), samples.output.as_ref());
         let input_column = if samples.input_column.is_empty() { "voltage_v" } else { &samples.input_column };
@@ -119,8 +119,8 @@ impl Record {
     }
 
     /// Puts together finite columns of equal length.
-    fn assemble(samples: Samples, printed: Printed, origin: &Origin<'_>) -> Result<Self, RecordError> {
-        let Samples { name, segment, mut time, mut input_column, input, output, temperature, load } = samples;
+    fn assemble(samples: Columns, printed: Printed, origin: &Origin<'_>) -> Result<Self, RecordError> {
+        let Columns { name, segment, mut time, mut input_column, input, output, temperature, load } = samples;
         if time.is_empty() {
             return Err(RecordError::NoRows { file: name });
         }
@@ -160,9 +160,9 @@ impl Record {
                 place: place(segments[second].start),
                 column: column(),
                 label: labels[second],
-                period: format!("{:.9}", periods.1),
+                period: periods.1,
                 other_label: labels[first],
-                other_period: format!("{:.9}", periods.0),
+                other_period: periods.0,
             },
             Fault::TooShort => RecordError::TooShort { file: file(), place: place(time.len() - 1), column: column() },
         })?;
@@ -234,12 +234,12 @@ impl Record {
         files
     }
 
-    /// The time between two rows of a segment [s], as exactly as the printed digits tell.
+    /// The time between two rows of a segment \[s\], as exactly as the printed digits tell.
     pub fn sample_period(&self) -> f64 {
         self.period.value
     }
 
-    /// Time of the lab's clock [s]. In each segment the first value is as printed and the others lie on the even grid
+    /// Time of the lab's clock \[s\]. In each segment the first value is as printed and the others lie on the even grid
     /// behind it, without the jitter of rounding. In a joined record each file has its own clock.
     pub fn time(&self) -> &[f64] {
         &self.time
@@ -265,17 +265,17 @@ impl Record {
         self.output.as_ref().map(|(unit, _)| *unit)
     }
 
-    /// Temperature [°C], if it was measured.
+    /// Temperature \[°C\], if it was measured.
     pub fn temperature(&self) -> Option<&[f64]> {
         self.temperature.as_deref()
     }
 
-    /// External load [N], if it was measured.
+    /// External load \[N\], if it was measured.
     pub fn load(&self) -> Option<&[f64]> {
         self.load.as_deref()
     }
 
-    /// The temperature [°C] for somebody who cannot do without; `why` completes "is needed here (…)".
+    /// The temperature \[°C\] for somebody who cannot do without; `why` completes "is needed here (…)".
     ///
     /// # Errors
     /// When the record has none.
@@ -283,7 +283,7 @@ impl Record {
         self.temperature().ok_or_else(|| self.lacks("temperature_degc", why))
     }
 
-    /// The load [N] for somebody who cannot do without; `why` completes "is needed here (…)".
+    /// The load \[N\] for somebody who cannot do without; `why` completes "is needed here (…)".
     ///
     /// # Errors
     /// When the record has none.

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::columns::{ColumnMap, Layout, Need};
 use super::error::{Place, RecordError};
 use super::grid::Printed;
-use super::{Origin, Record, Samples};
+use super::{Columns, Origin, Record};
 
 impl Record {
     /// Reads and checks the file at `path`.
@@ -65,7 +65,7 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    fn rows(&self, reader: &mut csv::Reader<&[u8]>, layout: &Layout) -> Result<(Samples, Printed), RecordError> {
+    fn rows(&self, reader: &mut csv::Reader<&[u8]>, layout: &Layout) -> Result<(Columns, Printed), RecordError> {
         let (time_at, time_unit) = layout.time;
         // A row has two bytes or more per column.
         let room = self.text.len() / (8 * self.names.len());
@@ -95,7 +95,7 @@ impl Table<'_> {
         printed.decimals += time_unit.per_second().log10() as i32;
 
         let values = |column: Option<(usize, Vec<f64>)>| column.map(|(_, values)| values);
-        let samples = Samples {
+        let samples = Columns {
             name: self.name.to_owned(),
             segment: segment.map(|(_, labels)| labels),
             time,

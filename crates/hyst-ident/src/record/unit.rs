@@ -14,16 +14,16 @@ pub enum Quantity {
 /// The unit of an output column. Values keep the unit of their file: nothing is converted on reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum OutputUnit {
-    /// `displacement_um` [µm]
+    /// `displacement_um` \[µm\]
     #[serde(rename = "um")]
     Micrometre,
-    /// `displacement_nm` [nm]
+    /// `displacement_nm` \[nm\]
     #[serde(rename = "nm")]
     Nanometre,
-    /// `displacement_mm` [mm]
+    /// `displacement_mm` \[mm\]
     #[serde(rename = "mm")]
     Millimetre,
-    /// `force_n` [N]
+    /// `force_n` \[N\]
     #[serde(rename = "n")]
     Newton,
 }
