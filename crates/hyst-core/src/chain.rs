@@ -1,9 +1,9 @@
 //! The actuator: a hysteresis operator and the optional stages around it, in physical order.
 
 use crate::{
-    Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift, DriftParams, Env, Error, Interference,
-    InterferenceParams, Lag, LagParams, LagState, Real, Resonance, ResonanceParams, ResonanceState, Sampling, Stage,
-    Temperature, TemperatureParams,
+    Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift, DriftParams, Env, Error,
+    Interference, InterferenceParams, Lag, LagParams, LagState, Real, Resonance, ResonanceParams, ResonanceState,
+    Sampling, Stage, Temperature, TemperatureParams,
 };
 
 /// Structural modes that one chain can hold.
@@ -105,7 +105,9 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         let built = p.build(cx)?;
         match self.resonances.iter_mut().find(|r| r.is_none()) {
             Some(slot) => *slot = Some(built),
-            None => return Err(Error::Capacity { name: "resonances", needed: MAX_RESONANCES + 1, holds: MAX_RESONANCES }),
+            None => {
+                return Err(Error::Capacity { name: "resonances", needed: MAX_RESONANCES + 1, holds: MAX_RESONANCES });
+            }
         }
         Ok(self)
     }

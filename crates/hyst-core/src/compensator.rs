@@ -2,7 +2,8 @@
 
 use crate::preview::{Preview, PreviewState};
 use crate::{
-    Chain, Complex, CreepInverse, CreepState, DelayState, Delay, DelayParams, Env, Error, Invert, Real, Sampling, Stage, Build, Temperature,
+    Build, Chain, Complex, CreepInverse, CreepState, Delay, DelayParams, DelayState, Env, Error, Invert, Real,
+    Sampling, Stage, Temperature,
 };
 
 /// How the dynamic stages are inverted.

@@ -164,7 +164,8 @@ impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
 mod tests {
     use super::*;
 
-    const BANK: CreepParams<'static> = CreepParams { seconds: &[0.05, 0.5, 5.0, 50.0], shares: &[0.02, 0.015, 0.01, 0.02] };
+    const BANK: CreepParams<'static> =
+        CreepParams { seconds: &[0.05, 0.5, 5.0, 50.0], shares: &[0.02, 0.015, 0.01, 0.02] };
 
     #[test]
     fn a_step_creeps_by_the_sum_of_exponentials() {
@@ -204,7 +205,8 @@ mod tests {
 
     #[test]
     fn unequal_lists_are_refused() {
-        let built: Result<Creep<f64, 4>, _> = CreepParams { seconds: &[1.0], shares: &[] }.build(&Sampling { period: 1.0 });
+        let built: Result<Creep<f64, 4>, _> =
+            CreepParams { seconds: &[1.0], shares: &[] }.build(&Sampling { period: 1.0 });
         assert!(matches!(built, Err(Error::Lengths(_))));
     }
 }

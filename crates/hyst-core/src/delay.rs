@@ -35,7 +35,11 @@ impl<T: Real, const N: usize> Build<Delay<T, N>> for DelayParams {
         let whole = libm::floor(samples);
         // Compared as f64: a huge delay must not wrap when it becomes an integer.
         if whole + 2.0 > N as f64 {
-            return Err(Error::Capacity { name: "delay samples", needed: (whole as usize).saturating_add(2), holds: N });
+            return Err(Error::Capacity {
+                name: "delay samples",
+                needed: (whole as usize).saturating_add(2),
+                holds: N,
+            });
         }
         Ok(Delay { whole: whole as usize, fraction: T::from_f64(samples - whole) })
     }

@@ -13,7 +13,10 @@ pub struct DriftParams {
 
 impl Params for DriftParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        f(&Meta { name: "per_second", unit: "y/s", lower: f64::NEG_INFINITY, upper: f64::INFINITY }, &mut self.per_second);
+        f(
+            &Meta { name: "per_second", unit: "y/s", lower: f64::NEG_INFINITY, upper: f64::INFINITY },
+            &mut self.per_second,
+        );
     }
 }
 

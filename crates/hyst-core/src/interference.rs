@@ -19,7 +19,10 @@ impl Params for InterferenceParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         f(&Meta { name: "hz", unit: "Hz", lower: 0.0, upper: f64::INFINITY }, &mut self.hz);
         f(&Meta { name: "amplitude", unit: "y", lower: 0.0, upper: f64::INFINITY }, &mut self.amplitude);
-        f(&Meta { name: "phase", unit: "rad", lower: -core::f64::consts::PI, upper: core::f64::consts::PI }, &mut self.phase);
+        f(
+            &Meta { name: "phase", unit: "rad", lower: -core::f64::consts::PI, upper: core::f64::consts::PI },
+            &mut self.phase,
+        );
     }
 }
 

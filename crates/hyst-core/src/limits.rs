@@ -42,7 +42,11 @@ impl<T: Real> Limits<T> {
     pub fn apply(&self, last: T, wanted: T) -> Limited<T> {
         let inside = wanted.at_least(self.low).at_most(self.high);
         let drive = inside.at_least(last - self.step).at_most(last + self.step);
-        Limited { drive: if drive.is_finite() { drive } else { last }, voltage: inside != wanted, slew: drive != inside }
+        Limited {
+            drive: if drive.is_finite() { drive } else { last },
+            voltage: inside != wanted,
+            slew: drive != inside,
+        }
     }
 }
 

@@ -30,7 +30,8 @@ impl<T: Real, const N: usize> Pi<T, N> {
         if thresholds.len() > N {
             return Err(Error::Capacity { name: "pi plays", needed: thresholds.len(), holds: N });
         }
-        let mut pi = Self { gain: T::from_f64(gain), thresholds: [T::ZERO; N], weights: [T::ZERO; N], len: thresholds.len() };
+        let mut pi =
+            Self { gain: T::from_f64(gain), thresholds: [T::ZERO; N], weights: [T::ZERO; N], len: thresholds.len() };
         let mut last = 0.0;
         let slots = pi.thresholds.iter_mut().zip(&mut pi.weights);
         for ((slot_r, slot_w), (r, w)) in slots.zip(thresholds.iter().zip(weights)) {

@@ -21,7 +21,7 @@ pub struct ResonanceParams {
 impl Params for ResonanceParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         f(&Meta { name: "hz", unit: "Hz", lower: 0.0, upper: f64::INFINITY }, &mut self.hz);
-        f(&Meta { name: "damping", unit: "", lower: 1e-4, upper: 0.7 }, &mut self.damping);
+        f(&Meta { name: "damping", unit: "", lower: 1e-4, upper: 0.5 }, &mut self.damping);
         f(&Meta { name: "gain", unit: "", lower: 0.0, upper: 1.2 }, &mut self.gain);
     }
 }
@@ -160,7 +160,8 @@ mod tests {
     #[test]
     fn measured_response_is_the_stated_one() {
         let (h, hz) = (1e-3, 60.0);
-        let m: Resonance<f64> = ResonanceParams { hz: 90.0, damping: 0.05, gain: 0.8 }.build(&Sampling { period: h }).unwrap();
+        let m: Resonance<f64> =
+            ResonanceParams { hz: 90.0, damping: 0.05, gain: 0.8 }.build(&Sampling { period: h }).unwrap();
         let (mut s, e) = (m.state(), Env::default());
         let (mut re, mut im) = (0.0, 0.0);
         for k in 0..2_000 {

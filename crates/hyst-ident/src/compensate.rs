@@ -45,7 +45,9 @@ pub struct Drive {
 #[non_exhaustive]
 pub enum CompensateError {
     /// Beyond the stroke.
-    #[error("{record}: row {row} (time {time} s): {value} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference")]
+    #[error(
+        "{record}: row {row} (time {time} s): {value} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference"
+    )]
     OutOfReach {
         /// The reference.
         record: String,
@@ -87,7 +89,8 @@ const MARGIN: f64 = 0.01;
 pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Drive, CompensateError> {
     let samples = Samples::from_record(reference);
     check(model, reference, &samples)?;
-    let compensator = Box::new(model.compensator(samples.period, &CompensatorOptions { bandwidth_hz: options.bandwidth_hz })?);
+    let compensator =
+        Box::new(model.compensator(samples.period, &CompensatorOptions { bandwidth_hz: options.bandwidth_hz })?);
     let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
     let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
     let lead = compensator.lead();
@@ -130,9 +133,14 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
 }
 
 fn check(model: &Model, reference: &Record, samples: &Samples) -> Result<(), CompensateError> {
-    let missing = |column: &str, advice: &str| Err(CompensateError::Missing { record: reference.name(), column: column.into(), advice: advice.into() });
+    let missing = |column: &str, advice: &str| {
+        Err(CompensateError::Missing { record: reference.name(), column: column.into(), advice: advice.into() })
+    };
     if reference.output_unit().is_none_or(|u| u.column() != model.output.column) {
-        return missing(&model.output.column, "the reference must be in the output that the model was fitted to; use --map if it has another name");
+        return missing(
+            &model.output.column,
+            "the reference must be in the output that the model was fitted to; use --map if it has another name",
+        );
     }
     if model.needs_temperature() && reference.temperature().is_none() {
         return missing("temperature_degc", "the model's gain depends on it");

@@ -22,7 +22,9 @@ const ROWS: usize = 40_000;
 #[non_exhaustive]
 pub enum FitError {
     /// Not enough rows.
-    #[error("{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model")]
+    #[error(
+        "{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model"
+    )]
     TooShort {
         /// The record.
         record: String,
@@ -34,7 +36,9 @@ pub enum FitError {
         needed: usize,
     },
     /// The input does not move.
-    #[error("{record}: column {column}: the input is constant ({value}), so the record shows no hysteresis; drive the actuator, e.g. with `hystctl excite identification`")]
+    #[error(
+        "{record}: column {column}: the input is constant ({value}), so the record shows no hysteresis; drive the actuator, e.g. with `hystctl excite identification`"
+    )]
     ConstantInput {
         /// The record.
         record: String,
@@ -44,7 +48,9 @@ pub enum FitError {
         value: f64,
     },
     /// The output does not move.
-    #[error("{record}: column {column}: the output is constant ({value}) while the input moves; check the sensor and `--map`")]
+    #[error(
+        "{record}: column {column}: the output is constant ({value}) while the input moves; check the sensor and `--map`"
+    )]
     ConstantOutput {
         /// The record.
         record: String,
@@ -165,10 +171,18 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> BasisOf {
 pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> {
     let name = record.name();
     let Some(unit) = record.output_unit() else {
-        return Err(FitError::Missing { record: name, column: "displacement_um".into(), advice: "a fit needs the measured output".into() });
+        return Err(FitError::Missing {
+            record: name,
+            column: "displacement_um".into(),
+            advice: "a fit needs the measured output".into(),
+        });
     };
     if record.input().is_empty() {
-        return Err(FitError::Missing { record: name, column: "voltage_v".into(), advice: "a fit needs the drive".into() });
+        return Err(FitError::Missing {
+            record: name,
+            column: "voltage_v".into(),
+            advice: "a fit needs the drive".into(),
+        });
     }
     let (low, high) = samples.input_range();
     if high - low <= 1e-9 * high.abs().max(low.abs()).max(f64::MIN_POSITIVE) {
@@ -188,12 +202,18 @@ pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> 
 }
 
 /// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
-fn fit_settled(samples: &mut Samples, basis: &dyn Basis, options: &FitOptions, name: &dyn Fn() -> String) -> Result<Fitted, FitError> {
+fn fit_settled(
+    samples: &mut Samples,
+    basis: &dyn Basis,
+    options: &FitOptions,
+    name: &dyn Fn() -> String,
+) -> Result<Fitted, FitError> {
     let run = |samples: &Samples| -> Result<(Fitted, Vec<f64>), FitError> {
         let blocks = Blocks::new(samples, BLOCKS, ROWS);
         let problem = Problem::new(samples, basis, &blocks, options.zero_per_record);
         let stage = |source| FitError::Stage { record: name(), source };
-        let fitted = problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+        let fitted =
+            problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
         let residual = problem.residual(&fitted).map_err(stage)?;
         Ok((fitted, residual))
     };
@@ -210,8 +230,11 @@ fn fit_settled(samples: &mut Samples, basis: &dyn Basis, options: &FitOptions, n
         (sum / n.max(1) as f64).sqrt()
     };
     // If leaving the beginnings out improves the rest a lot, they disagree with the rest: judge them
-    // by a fit that has not seen them. If not, they belong to the record (and hold its virgin curve).
-    let residual = if rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
+    // by a fit that has not seen them. So too where a record begins away from 0 V: its memory there is
+    // nobody's guess. If neither, they belong to the record (and hold its virgin curve).
+    let (low, high) = samples.input_range();
+    let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > 0.1 * low.abs().max(high.abs()));
+    let residual = if away || rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
     samples.settling = start_up_rows(samples, residual);
     if samples.settling.iter().any(|s| *s) { Ok(run(samples)?.0) } else { Ok(all.0) }
 }
@@ -221,7 +244,8 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, kind: Kind, fitted: &
     let basis = basis_for(kind, samples);
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
-    let (least, most) = crate::samples::range(samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| *y));
+    let (least, most) =
+        crate::samples::range(samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| *y));
     Model {
         input: Channel { column: record.input_column().into(), unit: unit_of(record.input_column()), low, high },
         output: Channel {
@@ -245,7 +269,9 @@ fn fitted_on(record: &Record, samples: &Samples) -> Vec<FittedOn> {
     let of_file = |(source, rows): (&crate::record::Source, std::ops::Range<usize>)| {
         let settling_rows = samples.settling[rows.clone()].iter().filter(|s| **s).count();
         FittedOn {
-            file: std::path::Path::new(&source.name).file_name().map_or_else(|| source.name.clone(), |n| n.to_string_lossy().into_owned()),
+            file: std::path::Path::new(&source.name)
+                .file_name()
+                .map_or_else(|| source.name.clone(), |n| n.to_string_lossy().into_owned()),
             sha256: source.sha256.clone().unwrap_or_default(),
             rows: rows.len() - settling_rows,
             settling_rows,

@@ -32,9 +32,7 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let windows = windows(samples);
     let centred = centre(samples, residual, &windows);
-    let outside = || {
-        samples.segments.iter().zip(&windows).flat_map(|(s, w)| centred[s.start + w..s.end].iter())
-    };
+    let outside = || samples.segments.iter().zip(&windows).flat_map(|(s, w)| centred[s.start + w..s.end].iter());
     let n = outside().count().max(1) as f64;
     let rms = (outside().map(|r| r * r).sum::<f64>() / n).sqrt();
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
@@ -56,7 +54,8 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
 fn centre(samples: &Samples, residual: &[f64], windows: &[usize]) -> Vec<f64> {
     let mut centred = residual.to_vec();
     for file in 0..samples.files() {
-        let own = || samples.segments.iter().zip(windows).zip(&samples.file_of_segment).filter(move |(_, f)| **f == file);
+        let own =
+            || samples.segments.iter().zip(windows).zip(&samples.file_of_segment).filter(move |(_, f)| **f == file);
         let (mut sum, mut n) = (0.0, 0usize);
         for ((s, w), _) in own() {
             sum += residual[s.start + w..s.end].iter().sum::<f64>();

@@ -48,7 +48,11 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
     for segment in &samples.segments {
         for k in segment.clone() {
             let (env, u) = (samples.env(k), samples.input[k]);
-            predicted.push(if k == segment.start { chain.reset(&mut state, &env, u) } else { chain.step(&mut state, &env, u) });
+            predicted.push(if k == segment.start {
+                chain.reset(&mut state, &env, u)
+            } else {
+                chain.step(&mut state, &env, u)
+            });
         }
     }
     let mut zeros = Vec::new();
@@ -64,13 +68,17 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
                 zeros.push(mean);
             }
         }
-        errors = Some(Errors::of(&samples.output, &predicted, &samples.settling).map_err(|source| FitError::Compare { record: record.name(), source })?);
+        errors = Some(
+            Errors::of(&samples.output, &predicted, &samples.settling)
+                .map_err(|source| FitError::Compare { record: record.name(), source })?,
+        );
     }
     Ok(Simulation { predicted, settling: samples.settling, zeros, errors })
 }
 
 fn check_units(model: &Model, record: &Record) -> Result<(), FitError> {
-    let missing = |column: &str, advice: String| Err(FitError::Missing { record: record.name(), column: column.into(), advice });
+    let missing =
+        |column: &str, advice: String| Err(FitError::Missing { record: record.name(), column: column.into(), advice });
     if record.input().is_empty() || record.input_column() != model.input.column {
         return missing(&model.input.column, "the model was fitted with it; use --map if it has another name".into());
     }

@@ -205,8 +205,13 @@ mod tests {
         let low = if rest > 0.0 { 0.0 } else { rest };
         let grid = Grid { low, high: low + 120.0, cells: CELLS };
         Box::new(
-            Everett::new(grid, rest, |a, b| next() + if a == b { 0.3 } else { 0.0 }, |_| if rest > low { 0.0 } else { other() })
-                .unwrap(),
+            Everett::new(
+                grid,
+                rest,
+                |a, b| next() + if a == b { 0.3 } else { 0.0 },
+                |_| if rest > low { 0.0 } else { other() },
+            )
+            .unwrap(),
         )
     }
 
@@ -294,7 +299,8 @@ mod tests {
     #[test]
     fn a_full_stack_forgets_the_smallest_loop_and_stays_bounded() {
         let m = map(0.0, &[0.3, 0.1, 0.7]);
-        let u: Vec<f64> = (0..1000).map(|k| 60.0 + if k % 2 == 0 { 1.0 } else { -1.0 } * (59.0 - 0.05 * f64::from(k))).collect();
+        let u: Vec<f64> =
+            (0..1000).map(|k| 60.0 + if k % 2 == 0 { 1.0 } else { -1.0 } * (59.0 - 0.05 * f64::from(k))).collect();
         let y = run(&m, &u);
         let top = m.virgin(120.0);
         assert!(y.iter().all(|y| y.is_finite() && *y >= 0.0 && *y <= top));

@@ -53,7 +53,14 @@ impl PreisachBasis {
     pub(crate) fn spec(&self, weights: &[f64]) -> PreisachSpec {
         let (density, once) = weights.split_at(self.triangle());
         let once = if self.has_strip() { once.to_vec() } else { vec![0.0; self.grid.cells] };
-        PreisachSpec { low: self.grid.low, high: self.grid.high, cells: self.grid.cells, rest: self.rest, density: density.to_vec(), once }
+        PreisachSpec {
+            low: self.grid.low,
+            high: self.grid.high,
+            cells: self.grid.cells,
+            rest: self.rest,
+            density: density.to_vec(),
+            once,
+        }
     }
 
     /// Adds `sign` times the share of every cell that lies between β and α.

@@ -174,7 +174,11 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
         100.0 * j.confidence,
         1000
     )];
-    evidence.push(format!("explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors", 100.0 * j.share, j.over_noise));
+    evidence.push(format!(
+        "explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors",
+        100.0 * j.share,
+        j.over_noise
+    ));
     evidence.extend(signature(m, named.effect));
     Finding {
         name: named.effect,
@@ -197,7 +201,10 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         Effect::Delay => format!("the output follows {:.3} ms late at every frequency", 1e3 * e.delay?.seconds),
         Effect::Lag => {
             let tau = e.lag?.seconds;
-            format!("the phase falls like a first-order lag with its corner at {:.1} Hz", 1.0 / (2.0 * std::f64::consts::PI * tau))
+            format!(
+                "the phase falls like a first-order lag with its corner at {:.1} Hz",
+                1.0 / (2.0 * std::f64::consts::PI * tau)
+            )
         }
         Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
         Effect::Creep => format!("after a step the output goes on by {:.1} % of it", 100.0 * e.creep.as_ref()?.total()),
@@ -207,11 +214,18 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         }
         Effect::Drift => {
             let hours = m.samples.time.last()? - m.samples.time.first()?;
-            format!("the zero moves by {:+.4} {} over the record's {hours:.0} s", e.drift?.per_second * hours, m.model.output.unit)
+            format!(
+                "the zero moves by {:+.4} {} over the record's {hours:.0} s",
+                e.drift?.per_second * hours,
+                m.model.output.unit
+            )
         }
         Effect::Interference => {
             let p = e.interference?;
-            format!("a tone of {:.4} {} at {:.3} Hz stands in the sensor, whatever the drive", p.amplitude, m.model.output.unit, p.hz)
+            format!(
+                "a tone of {:.4} {} at {:.3} Hz stands in the sensor, whatever the drive",
+                p.amplitude, m.model.output.unit, p.hz
+            )
         }
     })
 }

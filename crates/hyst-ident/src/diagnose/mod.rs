@@ -16,14 +16,12 @@ mod spectrum;
 mod starts;
 mod uncertainty;
 
-use std::collections::BTreeMap;
-
 pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
 
 use crate::base::ScreeningBasis;
 use crate::fit::{BLOCKS, FitError, basis_for, check, to_model};
 use crate::lsq::Blocks;
-use crate::model::{Effect, Model};
+use crate::model::{Effect, Effects, Model};
 use crate::nested::Problem;
 use crate::record::Record;
 use crate::samples::Samples;
@@ -80,30 +78,38 @@ pub fn diagnose(
     let screening = ScreeningBasis::for_samples(&samples);
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
-    let base = problem
-        .fit(&model.effects)
-        .map_err(stage)?
-        .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
+    let base =
+        problem.fit(&model.effects).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
     let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
 
     progress("refitting the model with what was found");
     let kind = model.base.kind();
-    let own = basis_for(kind, &samples);
-    let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
-    let final_problem = Problem::new(&samples, own.as_ref(), &final_blocks, per_record);
+    let effects = &found.best.fit.effects;
+    let errors = uncertainty::standard_errors(&found.best.fit);
     let mut extended = model.clone();
-    let mut errors = BTreeMap::new();
-    if found.best.fit.effects.names() != model.effects.names() {
-        let fit = final_problem.fit(&found.best.fit.effects).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
-        errors = uncertainty::standard_errors(&fit);
+    if effects.names() != model.effects.names() {
+        // The effects keep the parameters that the rich base gave them: refitted on a coarser base
+        // they would take up its misfit. Only the base's weights and the zero are solved again.
+        let own = basis_for(kind, &samples);
+        let motion_only = without_sensor_effects(&samples, effects);
+        let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
+        let final_problem = Problem::new(&motion_only, own.as_ref(), &final_blocks, per_record);
+        let moving = Effects { drift: None, interference: None, ..effects.clone() };
+        let fit = final_problem
+            .fit_linear(&moving)
+            .map_err(stage)?
+            .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
         extended = to_model(train, &samples, kind, &fit, model.seed);
+        extended.effects.clone_from(effects);
         extended.std_errors.clone_from(&errors);
     }
 
     progress("judging what is left");
     let after = simulate(&extended, train, options.zero)?;
     let remainder = remainder::judge(&problem, &found, &after, &samples, per_record).map_err(stage)?;
-    let tests = test.map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?))).transpose()?;
+    let tests = test
+        .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
+        .transpose()?;
     let findings = findings::collect(&findings::Material {
         model,
         extended: &extended,
@@ -117,6 +123,21 @@ pub fn diagnose(
         samples: &samples,
     });
     Ok(Diagnosis { extended, findings })
+}
+
+/// The record with drift and tone taken from its output.
+fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Samples {
+    let mut motion = samples.clone();
+    for (k, y) in motion.output.iter_mut().enumerate() {
+        let t = samples.time[k];
+        if let Some(drift) = effects.drift {
+            *y -= drift.per_second * t;
+        }
+        if let Some(tone) = effects.interference {
+            *y -= tone.amplitude * (2.0 * std::f64::consts::PI * (tone.hz * t).fract() + tone.phase).sin();
+        }
+    }
+    motion
 }
 
 /// Whether a record can show an effect at all.

@@ -20,7 +20,13 @@ const CELLS: usize = 24;
 const ROWS: usize = 8_000;
 
 /// Whether the rest is noise, lack of capacity of the base, or unexplained.
-pub(super) fn judge(problem: &Problem<'_>, found: &Search, after: &Simulation, samples: &Samples, per_record: bool) -> Result<Remainder, Error> {
+pub(super) fn judge(
+    problem: &Problem<'_>,
+    found: &Search,
+    after: &Simulation,
+    samples: &Samples,
+    per_record: bool,
+) -> Result<Remainder, Error> {
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
@@ -32,7 +38,10 @@ pub(super) fn judge(problem: &Problem<'_>, found: &Search, after: &Simulation, s
     let left = |kind, description: String| Remainder { kind, variance_share: share, description };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     if rmse <= AT_FLOOR * found.noise {
-        return Ok(left(RemainderKind::None, format!("what is left is noise: {rmse:.3e} against a floor of {:.3e}", found.noise)));
+        return Ok(left(
+            RemainderKind::None,
+            format!("what is left is noise: {rmse:.3e} against a floor of {:.3e}", found.noise),
+        ));
     }
     // The search ran on a richer, rate-independent base: what that one takes is the base's.
     let richest = {
@@ -64,7 +73,11 @@ pub(super) fn judge(problem: &Problem<'_>, found: &Search, after: &Simulation, s
     } else {
         left(
             RemainderKind::Unexplained,
-            format!("{:.2} % of span stands above the noise floor of {:.2} %, and no effect of the list explains it", percent(rmse), percent(found.noise)),
+            format!(
+                "{:.2} % of span stands above the noise floor of {:.2} %, and no effect of the list explains it",
+                percent(rmse),
+                percent(found.noise)
+            ),
         )
     })
 }

@@ -5,20 +5,22 @@ use rand_chacha::ChaCha8Rng;
 
 use super::search::Trial;
 use crate::Samples;
-use crate::model::Effect;
 
 /// Bootstrap draws.
 const DRAWS: usize = 1000;
 /// Share of draws in which the gain must be above zero.
 const CONFIDENCE: f64 = 0.99;
 /// RMSE must fall at least by this share.
-const LEAST_FALL: f64 = 0.05;
+const LEAST_FALL: f64 = 0.1;
 /// What an effect adds must be at least this many noise floors (root mean square).
 pub(super) const LEAST_OVER_NOISE: f64 = 0.5;
 /// Share of what stands above the noise floor that an effect must explain.
-const LEAST_SHARE: f64 = 0.15;
+const LEAST_SHARE: f64 = 0.3;
 /// Largest share of a motion that creep may add in the end.
-const MOST_CREEP: f64 = 0.6;
+const MOST_CREEP: f64 = 0.3;
+
+/// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
+const MOST_DAMPING: f64 = 0.35;
 
 /// How an effect was judged.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +47,7 @@ impl Judgement {
     }
 }
 
-pub(crate) fn judge(samples: &Samples, without: &Trial, with: &Trial, effect: Effect, noise: f64, seed: u64) -> Judgement {
+pub(crate) fn judge(samples: &Samples, without: &Trial, with: &Trial, noise: f64, seed: u64) -> Judgement {
     let rows = with.fit.rows.max(1) as f64;
     let (before, after) = (without.total(), with.total());
     let gain = (before - after).max(0.0);
@@ -56,12 +58,12 @@ pub(crate) fn judge(samples: &Samples, without: &Trial, with: &Trial, effect: Ef
         ratio: (after / before.max(f64::MIN_POSITIVE)).sqrt(),
         share: gain / above,
         over_noise: (gain / rows).sqrt() / noise.max(f64::MIN_POSITIVE),
-        sensible: sensible(samples, with, effect),
+        sensible: sensible(samples, with),
     }
 }
 
-/// Whether two trials' errors cannot be told apart.
-pub(crate) fn tie(a: &[f64], b: &[f64], seed: u64) -> bool {
+/// Whether the first errors may well be no larger than the second.
+pub(super) fn open(a: &[f64], b: &[f64], seed: u64) -> bool {
     let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
     share_above_zero(&differences, seed) < 0.95
 }
@@ -77,19 +79,17 @@ fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
     above as f64 / DRAWS as f64
 }
 
-fn sensible(samples: &Samples, trial: &Trial, effect: Effect) -> bool {
+/// Whether every effect's parameters are physically sensible and away from the bounds of the search.
+pub(super) fn sensible(samples: &Samples, trial: &Trial) -> bool {
     let e = &trial.fit.effects;
-    let longest = samples.longest_segment();
-    match effect {
-        Effect::Delay => e.delay.is_some_and(|p| p.seconds > 0.02 * samples.period && p.seconds < 0.09 * longest),
-        Effect::Lag => e.lag.is_some_and(|p| p.seconds > 0.02 * samples.period && p.seconds < 0.09 * longest),
-        Effect::Temperature => e.temperature.is_some_and(|p| p.per_kelvin.abs() < 0.049),
-        Effect::Creep => e.creep.as_ref().is_some_and(|p| p.total() > 0.0 && p.total() < MOST_CREEP),
-        Effect::Resonance => e.resonances.last().is_some_and(|p| {
-            let nyquist = 0.5 / samples.period;
-            p.gain > 1e-3 && p.damping < 0.69 && p.hz > 2.5 / longest && p.hz < 0.9 * nyquist
-        }),
-        Effect::Drift => true,
-        Effect::Interference => e.interference.is_some_and(|p| p.hz > 2.5 / longest),
-    }
+    let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
+    let time = |seconds: f64| seconds > 0.02 * samples.period && seconds < 0.09 * longest;
+    e.delay.is_none_or(|p| time(p.seconds))
+        && e.lag.is_none_or(|p| time(p.seconds))
+        && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
+        && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
+        && e.resonances
+            .iter()
+            .all(|p| p.gain > 1e-3 && p.damping < MOST_DAMPING && p.hz > 2.5 / longest && p.hz < 0.9 * nyquist)
+        && e.interference.is_none_or(|p| p.hz > 2.5 / longest)
 }

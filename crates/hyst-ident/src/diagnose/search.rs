@@ -3,10 +3,10 @@
 use hyst_core::Error;
 use rayon::prelude::*;
 
-use super::score::{Judgement, LEAST_OVER_NOISE, judge};
+use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::{starts, visible};
 use crate::model::{Effect, Effects};
-use crate::nested::{Fitted, Problem, cross_validate, folds_by_segment, folds_interleaved};
+use crate::nested::{Fitted, Problem, cross_validate, folds_interleaved};
 use crate::noise::noise_floor;
 
 /// Sets of effects carried from one round to the next.
@@ -22,15 +22,12 @@ pub(crate) struct Trial {
     pub(crate) fit: Fitted,
     /// Σ residual² of each block, predicted from other blocks.
     pub(crate) blocks: Vec<f64>,
-    /// The same, predicted from other segments.
-    pub(crate) segments: Vec<f64>,
 }
 
 impl Trial {
     fn of(problem: &Problem<'_>, fit: Fitted) -> Option<Self> {
         let blocks = cross_validate(&fit, &folds_interleaved(problem.blocks, FOLDS))?;
-        let segments = cross_validate(&fit, &folds_by_segment(problem.blocks, problem.samples))?;
-        Some(Self { fit, blocks, segments })
+        Some(Self { fit, blocks })
     }
 
     /// Σ residual² over all blocks, each predicted from others.
@@ -56,7 +53,6 @@ pub(crate) struct Named {
 
 /// What a search found.
 pub(crate) struct Search {
-    pub(crate) start: Trial,
     pub(crate) best: Trial,
     pub(crate) named: Vec<Named>,
     /// Standard deviation of the white noise \[output unit\].
@@ -92,23 +88,28 @@ impl Judge<'_> {
         above < (LEAST_OVER_NOISE * self.noise).powi(2)
     }
 
-    fn judge(&self, without: &Trial, with: &Trial, effect: Effect) -> Judgement {
-        judge(self.problem.samples, without, with, effect, self.noise, self.seed)
+    fn judge(&self, without: &Trial, with: &Trial) -> Judgement {
+        judge(self.problem.samples, without, with, self.noise, self.seed)
     }
 }
 
-pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &(dyn Fn(&str) + Sync)) -> Result<Search, Error> {
+pub(crate) fn search(
+    problem: &Problem<'_>,
+    base: Fitted,
+    seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Search, Error> {
     let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments);
     let mut judge = Judge { problem, noise, seed };
     let already = base.effects.names();
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
-        let nothing = Trial { blocks: vec![base.squares], segments: vec![base.squares], fit: base };
-        return Ok(Search { start: nothing.clone(), best: nothing, named: Vec::new(), noise });
+        let nothing = Trial { blocks: vec![base.squares], fit: base };
+        return Ok(Search { best: nothing, named: Vec::new(), noise });
     };
 
     let mut beam = vec![start.clone()];
-    let mut best = start.clone();
+    let mut best = start;
     for round in 1..=MOST {
         if judge.nothing_to_gain(&best) {
             break;
@@ -124,7 +125,7 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
             .par_iter()
             .map(|(parent, e)| {
                 // A set that is worse than a smaller one found before leads nowhere.
-                let promising = |t: &Trial| t.total() < best.total() && judge.judge(parent, t, *e).accepted();
+                let promising = |t: &Trial| t.total() < best.total() && judge.judge(parent, t).accepted();
                 Ok(judge.trials(&parent.fit, *e)?.filter(promising))
             })
             .collect();
@@ -150,25 +151,29 @@ pub(crate) fn search(problem: &Problem<'_>, base: Fitted, seed: u64, progress: &
         beam = next;
     }
 
-    let mut named = Vec::new();
-    // Elimination and swaps until neither changes anything; both only ever lower the error or the
-    // number of effects, but a bound keeps a tie from turning in circles.
-    for _ in 0..2 * MOST {
+    // Elimination and swaps until neither changes anything. A set that was left is never entered again,
+    // so this ends.
+    let mut left: Vec<Vec<Effect>> = Vec::new();
+    let named = loop {
         progress("checking whether each effect is needed");
-        if let Some(less) = eliminate(&judge, &best, &already)? {
-            best = less;
-            continue;
-        }
-        progress("trying other effects in place of those found");
-        match swaps(&judge, &best, &already)? {
-            Swap::Better(other) => best = *other,
-            Swap::Final(list) => {
-                named = list;
-                break;
+        let needed = eliminate(&judge, &best, &already)?;
+        let change = match needed {
+            Some(less) => Some(less),
+            None => {
+                progress("trying other effects in place of those found");
+                let (better, list) = swaps(&judge, &best, &already, &left)?;
+                match better {
+                    Some(better) => Some(better),
+                    None => break list,
+                }
             }
+        };
+        if let Some(other) = change {
+            left.push(best.fit.effects.names());
+            best = other;
         }
-    }
-    Ok(Search { start, best, named, noise: judge.noise })
+    };
+    Ok(Search { best, named, noise: judge.noise })
 }
 
 fn candidates_for_removal(best: &Trial, already: &[Effect]) -> Vec<Effect> {
@@ -188,43 +193,57 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Opti
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.refit(&best.fit.effects.without(*e))).collect();
     let mut least: Option<Trial> = None;
-    for (effect, trial) in names.iter().zip(reduced) {
-        let Some(trial) = trial? else { continue };
-        if !judge.judge(&trial, best, *effect).accepted() && least.as_ref().is_none_or(|l| trial.total() < l.total()) {
+    for trial in reduced {
+        // Without one effect another may be driven to nonsense: then the first one is needed.
+        let Some(trial) = trial?.filter(|t| score::sensible(judge.problem.samples, t)) else { continue };
+        if !judge.judge(&trial, best).accepted() && least.as_ref().is_none_or(|l| trial.total() < l.total()) {
             least = Some(trial);
         }
     }
     Ok(least)
 }
 
-enum Swap {
-    Better(Box<Trial>),
-    Final(Vec<Named>),
-}
-
-/// Tries every other effect in the place of each.
-fn swaps(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Swap, Error> {
-    let names = candidates_for_removal(best, already);
+/// Tries every other effect in the place of each: a better set that was not left before, if there is
+/// one, and how each effect stands against the others.
+fn swaps(
+    judge: &Judge<'_>,
+    best: &Trial,
+    already: &[Effect],
+    left: &[Vec<Effect>],
+) -> Result<(Option<Trial>, Vec<Named>), Error> {
     let mut named = Vec::new();
-    for effect in names {
+    let mut better: Option<Trial> = None;
+    for effect in candidates_for_removal(best, already) {
         let Some(without) = judge.refit(&best.fit.effects.without(effect))? else { continue };
         let others: Vec<Effect> = Effect::ALL
             .into_iter()
             .filter(|e| *e != effect && without.fit.effects.has_room(*e) && visible(*e, judge.problem.samples))
             .collect();
-        let trials: Vec<Result<Option<Trial>, Error>> = others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
+        let trials: Vec<Result<Option<Trial>, Error>> =
+            others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
         let mut instead = Vec::new();
         for (other, trial) in others.iter().zip(trials) {
             let Some(trial) = trial? else { continue };
-            let accepted = judge.judge(&without, &trial, *other).accepted();
-            if accepted && trial.total() < 0.98 * best.total() {
-                return Ok(Swap::Better(Box::new(trial)));
-            }
-            let tie = accepted && super::score::tie(&trial.blocks, &best.blocks, judge.seed);
+            let accepted = judge.judge(&without, &trial).accepted();
+            let tie = score::sensible(judge.problem.samples, &trial) && tie(judge, best, &trial);
             instead.push((*other, trial.cv_rmse(), tie));
+            let simpler = tie && other.complexity() < effect.complexity();
+            let clearly = accepted && !tie && trial.total() < best.total();
+            let fresh = !left.contains(&trial.fit.effects.names());
+            if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
+                better = Some(trial);
+            }
         }
         instead.sort_by(|a, b| a.1.total_cmp(&b.1));
-        named.push(Named { effect, cv_without: without.cv_rmse(), judgement: judge.judge(&without, best, effect), instead });
+        named.push(Named { effect, cv_without: without.cv_rmse(), judgement: judge.judge(&without, best), instead });
     }
-    Ok(Swap::Final(named))
+    Ok((better, named))
+}
+
+/// Whether the record cannot tell two sets apart: neither is better in nearly every bootstrap draw, or
+/// what separates them is small against the noise.
+fn tie(judge: &Judge<'_>, a: &Trial, b: &Trial) -> bool {
+    let per_row = (a.total() - b.total()).abs() / a.fit.rows.max(1) as f64;
+    let drowned = per_row < (LEAST_OVER_NOISE * judge.noise).powi(2) && (a.total() / b.total()).ln().abs() < 0.1;
+    drowned || (score::open(&a.blocks, &b.blocks, judge.seed) && score::open(&b.blocks, &a.blocks, judge.seed))
 }

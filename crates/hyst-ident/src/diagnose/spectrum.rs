@@ -125,7 +125,8 @@ mod tests {
             samples.time.extend((0..3000).map(|k| t0 + h * f64::from(k)));
             samples.segments.push(first..first + 3000);
         }
-        let r: Vec<f64> = samples.time.iter().map(|t| (2.0 * std::f64::consts::PI * hz * t + 0.4).sin() + (0.7 * t).sin()).collect();
+        let r: Vec<f64> =
+            samples.time.iter().map(|t| (2.0 * std::f64::consts::PI * hz * t + 0.4).sin() + (0.7 * t).sin()).collect();
         let found = tone(&samples, &r).unwrap();
         assert!((found - hz).abs() < 0.01, "{found}");
     }

@@ -32,12 +32,16 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, effect: Effect) -> Re
             let reference_degc = starting_temperature(samples);
             vec![with(&|e| e.temperature = Some(TemperatureParams { per_kelvin: 0.0, reference_degc }))]
         }
-        Effect::Creep => vec![with(&|e| e.creep = Some(bank(samples)))],
+        // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
+        Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
         Effect::Drift => vec![with(&|e| e.drift = Some(DriftParams { per_second: 0.0 }))],
         Effect::Interference => {
             let residual = problem.residual(from)?;
             let found = tone(samples, &residual);
-            found.map(|hz| with(&|e| e.interference = Some(InterferenceParams { hz, ..Default::default() }))).into_iter().collect()
+            found
+                .map(|hz| with(&|e| e.interference = Some(InterferenceParams { hz, ..Default::default() })))
+                .into_iter()
+                .collect()
         }
         Effect::Resonance => {
             let found = modes(problem, from)?;
@@ -56,12 +60,12 @@ fn starting_temperature(samples: &Samples) -> f64 {
 
 /// Time constants from 30 samples (but not below a 400th of the longest segment) to three times the
 /// longest segment.
-fn bank(samples: &Samples) -> CreepBank {
+fn bank(samples: &Samples, share: f64) -> CreepBank {
     let longest = samples.longest_segment();
     let (first, last) = ((30.0 * samples.period).max(longest / 400.0), 3.0 * longest);
     let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
     let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
-    CreepBank { shares: vec![0.0; seconds.len()], seconds }
+    CreepBank { shares: vec![share; seconds.len()], seconds }
 }
 
 /// Modes whose first-order change takes most of the residual.

@@ -53,13 +53,6 @@ impl Gram {
         Self { matrix: DMatrix::zeros(columns, columns), rows: 0 }
     }
 
-    /// Of the given rows of a column-major table.
-    pub(crate) fn of(table: &[&[f64]], rows: impl Iterator<Item = usize>) -> Self {
-        let rows: Vec<usize> = rows.collect();
-        let x = DMatrix::from_fn(rows.len(), table.len(), |k, c| table[c][rows[k]]);
-        Self { matrix: x.tr_mul(&x), rows: rows.len() }
-    }
-
     pub(crate) fn add(&mut self, other: &Self) {
         self.matrix += &other.matrix;
         self.rows += other.rows;

@@ -85,14 +85,13 @@ fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVec
     let m = limit.len();
     let a = CscMatrix::new_from_triplets(m, n, rows, columns, values);
     let q: Vec<f64> = g.iter().map(|x| -x).collect();
-    let settings = DefaultSettingsBuilder::default()
-        .verbose(false)
-        .max_iter(100)
-        .build()
-        .ok()?;
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(100).build().ok()?;
     let mut solver = DefaultSolver::new(&p, &q, &a, &limit, &[SupportedConeT::NonnegativeConeT(m)], settings).ok()?;
     solver.solve();
-    if !matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress) {
+    if !matches!(
+        solver.solution.status,
+        SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
+    ) {
         return None;
     }
     // An interior point ends just inside or, within its tolerance, outside.
@@ -193,7 +192,8 @@ mod tests {
         let a: Vec<f64> = (0..40).map(|k| f64::from(k % 2)).collect();
         let b: Vec<f64> = (0..40).map(|k| f64::from((k + 1) % 2)).collect();
         let y: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - b).collect();
-        let gram = Gram::of(&[&a, &b, &y], 0..40);
+        let x = DMatrix::from_fn(40, 3, |k, c| [&a, &b, &y][c][k]);
+        let gram = Gram { matrix: x.tr_mul(&x), rows: 40 };
         let free = solve(&gram, None, &[Bounds::FREE; 2]).unwrap();
         assert!((free[1] + 1.0).abs() < 1e-8);
         let z = solve(&gram, None, &[Bounds::FREE, Bounds::above(0.0)]).unwrap();

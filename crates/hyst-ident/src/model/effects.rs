@@ -46,6 +46,16 @@ impl Effect {
         }
     }
 
+    /// Parameters that it brings: between two effects that a record cannot tell apart, the one with
+    /// fewer is the simpler explanation.
+    pub(crate) fn complexity(self) -> usize {
+        match self {
+            Self::Delay | Self::Lag | Self::Temperature | Self::Drift => 1,
+            Self::Resonance | Self::Interference => 3,
+            Self::Creep => 4,
+        }
+    }
+
     /// Whether the effect moves the actuator, or only what the sensor shows.
     pub fn acts_on_the_motion(self) -> bool {
         !matches!(self, Self::Drift | Self::Interference)
@@ -74,6 +84,10 @@ pub struct CreepBank {
     /// Settled shares \[ratio\].
     pub shares: Vec<f64>,
 }
+
+/// Largest share of one creep element. Ceramics creep by 1–2 % per decade of time; with two elements
+/// per decade this allows ten times that, beyond which the bank would stand in for hysteresis.
+const MOST_SHARE: f64 = 0.08;
 
 impl CreepBank {
     /// What all elements add in the end, as a ratio of the motion at once.
@@ -105,7 +119,6 @@ pub struct Effects {
 pub(crate) struct Parameter<'a> {
     pub(crate) effect: Effect,
     pub(crate) name: String,
-    pub(crate) unit: &'static str,
     pub(crate) lower: f64,
     pub(crate) upper: f64,
     pub(crate) value: &'a mut f64,
@@ -170,7 +183,13 @@ impl Effects {
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
             params.visit(&mut |meta, value| {
-                f(Parameter { effect, name: format!("{}{suffix}", meta.name), unit: meta.unit, lower: meta.lower, upper: meta.upper, value });
+                f(Parameter {
+                    effect,
+                    name: format!("{}{suffix}", meta.name),
+                    lower: meta.lower,
+                    upper: meta.upper,
+                    value,
+                });
             });
         }
         if let Some(p) = &mut self.delay {
@@ -184,7 +203,13 @@ impl Effects {
         }
         if let Some(bank) = &mut self.creep {
             for (tau, share) in bank.seconds.iter().zip(&mut bank.shares) {
-                f(Parameter { effect: Effect::Creep, name: format!("share_{tau:.3}s"), unit: "", lower: 0.0, upper: 0.3, value: share });
+                f(Parameter {
+                    effect: Effect::Creep,
+                    name: format!("share_{tau:.3}s"),
+                    lower: 0.0,
+                    upper: MOST_SHARE,
+                    value: share,
+                });
             }
         }
         for (i, p) in self.resonances.iter_mut().enumerate() {

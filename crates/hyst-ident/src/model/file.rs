@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use hyst_core::{
-    CompensatorOptions, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, ResonanceParams, Sampling,
-    TemperatureParams,
+    CompensatorOptions, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, ResonanceParams,
+    Sampling, TemperatureParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -257,14 +257,22 @@ impl Model {
             }
         }
         if let Some(p) = e.temperature {
-            push(effect(EffectSpec::Temperature(p)), "temperature", &[("per_kelvin", "1/K".into()), ("reference_degc", "degC".into())]);
+            push(
+                effect(EffectSpec::Temperature(p)),
+                "temperature",
+                &[("per_kelvin", "1/K".into()), ("reference_degc", "degC".into())],
+            );
         }
         if let Some(p) = &e.creep {
             push(effect(EffectSpec::Creep(p.clone())), "creep", &[("seconds", "s".into()), ("shares", "1".into())]);
         }
         for (i, p) in e.resonances.iter().enumerate() {
             let name = if i == 0 { "resonance" } else { "resonance_2" };
-            push(effect(EffectSpec::Resonance(*p)), name, &[("hz", "Hz".into()), ("damping", "1".into()), ("gain", "1".into())]);
+            push(
+                effect(EffectSpec::Resonance(*p)),
+                name,
+                &[("hz", "Hz".into()), ("damping", "1".into()), ("gain", "1".into())],
+            );
         }
         if let Some(p) = e.drift {
             push(effect(EffectSpec::Drift(p)), "drift", &[("per_second", format!("{y}/s"))]);
@@ -296,7 +304,12 @@ impl Model {
             schema: Option<String>,
         }
         let path = path.to_owned();
-        let syntax = |e: serde_json::Error| ModelError::Syntax { path: path.clone(), line: e.line(), column: e.column(), message: e.to_string() };
+        let syntax = |e: serde_json::Error| ModelError::Syntax {
+            path: path.clone(),
+            line: e.line(),
+            column: e.column(),
+            message: e.to_string(),
+        };
         let head: Head = serde_json::from_str(text).map_err(syntax)?;
         let found = head.schema.unwrap_or_default();
         if found != SCHEMA {

@@ -54,7 +54,10 @@ impl fmt::Display for Kind {
 impl FromStr for Kind {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|k| k.name() == s).ok_or_else(|| format!("no model is called {s:?}; there are pi and preisach"))
+        Self::ALL
+            .into_iter()
+            .find(|k| k.name() == s)
+            .ok_or_else(|| format!("no model is called {s:?}; there are pi and preisach"))
     }
 }
 
@@ -116,10 +119,17 @@ impl Base {
             Self::Preisach(p) => {
                 let needed = p.cells.saturating_mul(p.cells.saturating_add(1)) / 2;
                 if p.density.len() != needed || p.once.len() != p.cells {
-                    return Err(Error::Lengths("preisach.density and preisach.once, and what preisach.cells asks for,"));
+                    return Err(Error::Lengths(
+                        "preisach.density and preisach.once, and what preisach.cells asks for,",
+                    ));
                 }
                 let grid = Grid { low: p.low, high: p.high, cells: p.cells };
-                Operator::Preisach(Box::new(Everett::new(grid, p.rest, |a, b| p.density[cell_index(a, b)], |a| p.once[a])?))
+                Operator::Preisach(Box::new(Everett::new(
+                    grid,
+                    p.rest,
+                    |a, b| p.density[cell_index(a, b)],
+                    |a| p.once[a],
+                )?))
             }
         })
     }

@@ -1,23 +1,12 @@
 //! Cross-validation inside the training record, from the blocks' normal equations.
 
 use super::Fitted;
-use crate::Samples;
 use crate::lsq::{Blocks, Gram, solve};
 
 /// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
 pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
     let n = blocks.rows.len();
     (0..count.min(n)).map(|f| (f..n).step_by(count).collect()).collect()
-}
-
-/// One fold for each segment; a lone segment is cut into quarters.
-pub(crate) fn folds_by_segment(blocks: &Blocks, samples: &Samples) -> Vec<Vec<usize>> {
-    if samples.segments.len() == 1 {
-        let n = blocks.rows.len();
-        return (0..4).map(|q| (n * q / 4..n * (q + 1) / 4).collect()).filter(|f: &Vec<usize>| !f.is_empty()).collect();
-    }
-    let inside = |b: &usize, s: &std::ops::Range<usize>| s.contains(&blocks.rows[*b].start);
-    samples.segments.iter().map(|s| (0..blocks.rows.len()).filter(|b| inside(b, s)).collect()).collect()
 }
 
 /// Σ residual² of each block, predicted by a fit to the blocks of all other folds.

@@ -9,6 +9,6 @@ mod cross_validation;
 mod path;
 mod problem;
 
-pub(crate) use cross_validation::{cross_validate, folds_by_segment, folds_interleaved};
+pub(crate) use cross_validation::{cross_validate, folds_interleaved};
 pub(crate) use path::SignalPath;
 pub(crate) use problem::{Fitted, Problem};

@@ -40,12 +40,6 @@ pub(crate) struct Fitted {
     pub(crate) penalty: DMatrix<f64>,
 }
 
-impl Fitted {
-    pub(crate) fn rmse(&self) -> f64 {
-        (self.squares / self.rows.max(1) as f64).sqrt()
-    }
-}
-
 /// Columns at one set of effects.
 struct Assembly {
     /// Rows of each block: weights, linear extras, measured output.
@@ -64,7 +58,8 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
         let raw = basis.columns(&samples.input, &samples.segments);
         let rows = |b: usize| blocks.used(b, samples);
-        let squares: f64 = raw.iter().map(|c| (0..blocks.rows.len()).flat_map(rows).map(|k| c[k] * c[k]).sum::<f64>()).sum();
+        let squares: f64 =
+            raw.iter().map(|c| (0..blocks.rows.len()).flat_map(rows).map(|k| c[k] * c[k]).sum::<f64>()).sum();
         let penalty = basis.penalty(squares / raw.len().max(1) as f64);
         Self { samples, basis, blocks, zero_per_file, raw, penalty }
     }
@@ -94,7 +89,8 @@ impl<'a> Problem<'a> {
 
     fn bounds(&self, effects: &Effects) -> Vec<Bounds> {
         let mut bounds = self.basis.bounds();
-        let extras = self.zeros() + usize::from(effects.drift.is_some()) + 2 * usize::from(effects.interference.is_some());
+        let extras =
+            self.zeros() + usize::from(effects.drift.is_some()) + 2 * usize::from(effects.interference.is_some());
         bounds.extend(vec![Bounds::FREE; extras]);
         bounds
     }
@@ -119,7 +115,8 @@ impl<'a> Problem<'a> {
         };
         let extras = self.extras(effects);
         let width = base.len() + extras.len() + 1;
-        let rows: Vec<Vec<usize>> = (0..self.blocks.rows.len()).map(|b| self.blocks.used(b, self.samples).collect()).collect();
+        let rows: Vec<Vec<usize>> =
+            (0..self.blocks.rows.len()).map(|b| self.blocks.used(b, self.samples).collect()).collect();
         let mut blocks: Vec<DMatrix<f64>> = rows.iter().map(|r| DMatrix::zeros(r.len(), width)).collect();
         let mut put = |c: usize, column: &[f64]| {
             for (block, rows) in blocks.iter_mut().zip(&rows) {
@@ -175,7 +172,9 @@ impl<'a> Problem<'a> {
                 let tone = effects.interference.unwrap_or_default();
                 let slope = |t: &f64| {
                     let angle = 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
-                    2.0 * std::f64::consts::PI * (t - self.samples.time[0]) * (sine * angle.cos() - cosine * angle.sin())
+                    2.0 * std::f64::consts::PI
+                        * (t - self.samples.time[0])
+                        * (sine * angle.cos() - cosine * angle.sin())
                 };
                 self.samples.time.iter().map(slope).collect()
             } else {
@@ -199,7 +198,15 @@ impl<'a> Problem<'a> {
             let (cross, own) = (x.tr_mul(&j), j.tr_mul(&j));
             let g = &assembly.grams[b].matrix;
             // Old columns keep their place, the target moves behind the new ones.
-            let old = |i: usize| if i < n - 1 { Some(i) } else if i == n - 1 + q { Some(n - 1) } else { None };
+            let old = |i: usize| {
+                if i < n - 1 {
+                    Some(i)
+                } else if i == n - 1 + q {
+                    Some(n - 1)
+                } else {
+                    None
+                }
+            };
             let matrix = DMatrix::from_fn(n + q, n + q, |r, c| match (old(r), old(c)) {
                 (Some(r), Some(c)) => g[(r, c)],
                 (Some(r), None) => cross[(r, c - (n - 1))],
@@ -239,7 +246,13 @@ impl<'a> Problem<'a> {
     }
 
     /// One damped step that lowers the objective, or `None` if none does.
-    fn step(&self, effects: &Effects, here: &Assembly, total: &Gram, damping: &mut f64) -> Result<Option<(Effects, Assembly)>, Error> {
+    fn step(
+        &self,
+        effects: &Effects,
+        here: &Assembly,
+        total: &Gram,
+        damping: &mut f64,
+    ) -> Result<Option<(Effects, Assembly)>, Error> {
         let values = nonlinear(effects);
         let (q, n) = (values.len(), here.solution.len());
         let mut bounds = self.bounds(effects);
@@ -382,7 +395,9 @@ fn box_of(p: &crate::model::Parameter<'_>, samples: &Samples) -> Bounds {
     match (p.effect, p.name.starts_with("hz")) {
         (Effect::Resonance, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist },
         (Effect::Interference, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist },
-        (Effect::Delay | Effect::Lag, _) => Bounds { lower: 0.0, upper: p.upper.min(0.1 * samples.longest_segment()).min(4000.0 * samples.period) },
+        (Effect::Delay | Effect::Lag, _) => {
+            Bounds { lower: 0.0, upper: p.upper.min(0.1 * samples.longest_segment()).min(4000.0 * samples.period) }
+        }
         _ => Bounds { lower: p.lower, upper: p.upper },
     }
 }
