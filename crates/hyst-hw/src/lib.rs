@@ -28,4 +28,6 @@ pub use plant::config::{
 };
 pub use plant::error::{ConfigError, PlantError};
 pub use plant::{EFFECTS, Plant};
-pub use runner::{Cause, Failure, Phase, Progress, RecordOptions, Recording, SegmentRecord, record};
+pub use runner::{
+    Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,
+};

@@ -1,8 +1,11 @@
-//! `compensate`: the drive that makes the actuator follow a reference.
+//! `compensate`: the drive that makes the actuator follow a reference, at once for a whole reference or
+//! sample by sample while the actuator runs.
 
-use hyst_core::{CompensatorOptions, Limits, Sampling, Stage};
+use std::ops::Range;
 
-use crate::model::Model;
+use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Sampling, Stage};
+
+use crate::model::{CREEP, Compensator, Model, OperatorState, TAPS};
 use crate::record::Record;
 use crate::samples::Samples;
 
@@ -15,11 +18,13 @@ pub struct CompensateOptions {
     pub slew: f64,
     /// Band in which lag, delay and resonances are inverted \[Hz\]; chosen if not given.
     pub bandwidth_hz: Option<f64>,
+    /// Temperature \[°C\] where the reference has no column of it.
+    pub temperature: Option<f64>,
 }
 
 impl Default for CompensateOptions {
     fn default() -> Self {
-        Self { voltage: None, slew: f64::INFINITY, bandwidth_hz: None }
+        Self { voltage: None, slew: f64::INFINITY, bandwidth_hz: None, temperature: None }
     }
 }
 
@@ -87,40 +92,12 @@ const MARGIN: f64 = 0.01;
 /// # Errors
 /// See [`CompensateError`].
 pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Drive, CompensateError> {
-    let samples = Samples::from_record(reference);
-    check(model, reference, &samples)?;
-    let compensator =
-        Box::new(model.compensator(samples.period, &CompensatorOptions { bandwidth_hz: options.bandwidth_hz })?);
-    let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
-    let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
-    let lead = compensator.lead();
-    let mut drive = Drive {
-        voltage: vec![0.0; samples.len()],
-        lead,
-        bandwidth_hz: compensator.bandwidth_hz(),
-        band_error: compensator.error(),
-        voltage_limited: Vec::new(),
-        slew_limited: Vec::new(),
-    };
-    let mut state = Box::new(compensator.state());
-    for segment in &samples.segments {
-        let last = segment.end - 1;
-        let first = compensator.reset(&mut state, &samples.env(segment.start), samples.output[segment.start]);
-        if lead == 0 {
-            drive.voltage[segment.start] = first;
-        }
-        for ahead in segment.start + 1..segment.end + lead {
-            let row = ahead.min(last);
-            let wanted = compensator.step(&mut state, &samples.env(row), samples.output[row]);
-            if ahead >= segment.start + lead {
-                drive.voltage[ahead - lead] = wanted;
-            }
-        }
-        let mut before = drive.voltage[segment.start];
-        for row in segment.clone() {
-            let limited = limits.apply(before, drive.voltage[row]);
-            before = limited.drive;
-            drive.voltage[row] = limited.drive;
+    let mut follower = Follower::new(model, reference, options)?;
+    let mut drive = follower.stated();
+    for segment in follower.segments().to_vec() {
+        for row in segment {
+            let limited = follower.next(None);
+            drive.voltage.push(limited.drive);
             if limited.voltage {
                 drive.voltage_limited.push(row);
             }
@@ -132,7 +109,101 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
     Ok(drive)
 }
 
-fn check(model: &Model, reference: &Record, samples: &Samples) -> Result<(), CompensateError> {
+/// Compensation sample by sample: for a device whose temperature is only known when it runs.
+#[derive(Debug)]
+pub struct Follower {
+    compensator: Box<Compensator>,
+    state: Box<State>,
+    limits: Limits<f64>,
+    samples: Samples,
+    temperature: Option<f64>,
+    row: usize,
+    segment: usize,
+    before: f64,
+}
+
+type State = CompensatorState<f64, OperatorState, CREEP, TAPS>;
+
+impl Follower {
+    /// Prepares to follow a reference from its first row.
+    ///
+    /// # Errors
+    /// See [`CompensateError`].
+    pub fn new(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Self, CompensateError> {
+        let samples = Samples::from_record(reference);
+        check(model, reference, &samples, options)?;
+        let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
+        let compensator = Box::new(model.compensator(samples.period, &own)?);
+        let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
+        let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
+        let state = Box::new(compensator.state());
+        let temperature = options.temperature;
+        Ok(Self { compensator, state, limits, samples, temperature, row: 0, segment: 0, before: 0.0 })
+    }
+
+    /// Segments of the reference.
+    pub fn segments(&self) -> &[Range<usize>] {
+        &self.samples.segments
+    }
+
+    /// Preview, band and stated error, with no drive yet.
+    pub fn stated(&self) -> Drive {
+        Drive {
+            voltage: Vec::with_capacity(self.samples.len()),
+            lead: self.compensator.lead(),
+            bandwidth_hz: self.compensator.bandwidth_hz(),
+            band_error: self.compensator.error(),
+            voltage_limited: Vec::new(),
+            slew_limited: Vec::new(),
+        }
+    }
+
+    /// Surroundings at a row, unless a newer temperature is known.
+    fn env(&self, row: usize, temperature: Option<f64>) -> Env<f64> {
+        let mut env = self.samples.env(row);
+        if let Some(t) = temperature {
+            env.temperature = t;
+        } else if self.samples.temperature.is_none() {
+            env.temperature = self.temperature.unwrap_or_default();
+        }
+        env
+    }
+
+    /// The drive of the next row \[V\], within the limits. `temperature` \[°C\] is the newest that was
+    /// measured, if any; it changes little over the preview. After the last row the last drive is held.
+    pub fn next(&mut self, temperature: Option<f64>) -> Limited<f64> {
+        let Some(segment) = self.samples.segments.get(self.segment).cloned() else {
+            return Limited { drive: self.before, voltage: false, slew: false };
+        };
+        let last = segment.end - 1;
+        let lead = self.compensator.lead();
+        let feed = |this: &mut Self, row: usize| {
+            let row = row.min(last);
+            let env = this.env(row, temperature);
+            this.compensator.step(&mut this.state, &env, this.samples.output[row])
+        };
+        let starts = self.row == segment.start;
+        let wanted = if starts {
+            let env = self.env(self.row, temperature);
+            let mut wanted = self.compensator.reset(&mut self.state, &env, self.samples.output[self.row]);
+            for ahead in 1..=lead {
+                wanted = feed(self, segment.start + ahead);
+            }
+            wanted
+        } else {
+            feed(self, self.row + lead)
+        };
+        let limited = self.limits.apply(if starts { wanted } else { self.before }, wanted);
+        self.before = limited.drive;
+        self.row += 1;
+        if self.row == segment.end {
+            self.segment += 1;
+        }
+        limited
+    }
+}
+
+fn check(model: &Model, reference: &Record, samples: &Samples, options: &CompensateOptions) -> Result<(), CompensateError> {
     let missing = |column: &str, advice: &str| {
         Err(CompensateError::Missing { record: reference.name(), column: column.into(), advice: advice.into() })
     };
@@ -142,7 +213,7 @@ fn check(model: &Model, reference: &Record, samples: &Samples) -> Result<(), Com
             "the reference must be in the output that the model was fitted to; use --map if it has another name",
         );
     }
-    if model.needs_temperature() && reference.temperature().is_none() {
+    if model.needs_temperature() && reference.temperature().is_none() && options.temperature.is_none() {
         return missing("temperature_degc", "the model's gain depends on it");
     }
     let (low, high) = (model.output.low, model.output.high);

@@ -3,11 +3,11 @@
 mod failure;
 mod plan;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use crate::daq::{Daq, Sample};
 pub use failure::{Cause, Failure};
-use plan::Plan;
+use plan::{Place, Plan};
 
 /// How to play segments.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +82,39 @@ pub struct Recording {
     pub segments: Vec<SegmentRecord>,
 }
 
+/// A piece of drive about to be sent, with what is known by now.
+#[derive(Debug)]
+pub struct Revision<'a> {
+    /// Running segment, from 0.
+    pub segment: usize,
+    /// Rows of the segment's drive that the piece covers; each row comes exactly once, in order.
+    pub rows: Range<usize>,
+    /// The drive of those rows (V), to be changed at will.
+    pub drive_v: &'a mut [f64],
+    /// The newest sample measured, approach included.
+    pub latest: Option<&'a Sample>,
+}
+
 /// Plays drive segments (V) on a device and returns what was measured.
+///
+/// As [`record_with`], the drive being played as it stands.
+///
+/// # Errors
+/// As [`record_with`].
+pub fn record<D: Daq + ?Sized>(
+    daq: &mut D,
+    segments: &[impl AsRef<[f64]>],
+    options: &RecordOptions,
+    progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Recording, Failure<D::Error>> {
+    record_with(daq, segments, options, |_| {}, progress)
+}
+
+/// Plays drive segments (V) on a device, each block revised just before it is sent, and returns what was
+/// measured.
+///
+/// `revise` may change what was planned, by what has been measured since (temperature, …). What it
+/// gives is not checked again here: the device refuses what is outside its range.
 ///
 /// All drives are checked against the device's range before anything moves. Then the sample clock
 /// starts, and every segment is played: a ramp of the stated slew from the present voltage to the drive's
@@ -96,17 +128,18 @@ pub struct Recording {
 /// # Errors
 /// A [`Failure`] with the cause and what was measured until then. The device is stopped in any
 /// case, also after an error of its own; only a request that was refused before anything moved leaves it alone.
-pub fn record<D: Daq + ?Sized>(
+pub fn record_with<D: Daq + ?Sized>(
     daq: &mut D,
     segments: &[impl AsRef<[f64]>],
     options: &RecordOptions,
+    revise: impl FnMut(&mut Revision<'_>),
     progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Recording, Failure<D::Error>> {
     let mut recording = Recording::default();
     if let Err(cause) = plan::check(segments, daq.capabilities().voltage, options) {
         return Err(Failure { cause, partial: recording, not_stopped: None });
     }
-    let played = start_and_play(daq, segments, options, progress, &mut recording);
+    let played = start_and_play(daq, segments, options, revise, progress, &mut recording);
     match (played, daq.stop()) {
         (Ok(()), Ok(())) => Ok(recording),
         (Ok(()), Err(error)) => Err(Failure { cause: Cause::Stop(error), partial: recording, not_stopped: None }),
@@ -119,6 +152,7 @@ fn start_and_play<D: Daq + ?Sized>(
     daq: &mut D,
     segments: &[impl AsRef<[f64]>],
     options: &RecordOptions,
+    revise: impl FnMut(&mut Revision<'_>),
     progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
     recording: &mut Recording,
 ) -> Result<(), Cause<D::Error>> {
@@ -130,22 +164,29 @@ fn start_and_play<D: Daq + ?Sized>(
     }
     recording.rate_hz = actual_hz;
     let total = segments.iter().map(|drive| drive.as_ref().len()).sum();
-    let mut run = Run { daq, options, progress, recording, segments: segments.len(), done: 0, total };
+    let mut run = Run { daq, options, revise, progress, recording, segments: segments.len(), done: 0, total, latest: None };
     segments.iter().enumerate().try_for_each(|(k, drive)| run.segment(k, drive.as_ref()))
 }
 
 /// A recording under way.
-struct Run<'a, D: ?Sized, F> {
+struct Run<'a, D: ?Sized, R, F> {
     daq: &'a mut D,
     options: &'a RecordOptions,
+    revise: R,
     progress: F,
     recording: &'a mut Recording,
     segments: usize,
     done: usize,
     total: usize,
+    latest: Option<Sample>,
 }
 
-impl<D: Daq + ?Sized, F: FnMut(&Progress<'_>) -> ControlFlow<()>> Run<'_, D, F> {
+impl<D, R, F> Run<'_, D, R, F>
+where
+    D: Daq + ?Sized,
+    R: FnMut(&mut Revision<'_>),
+    F: FnMut(&Progress<'_>) -> ControlFlow<()>,
+{
     fn segment(&mut self, segment: usize, drive: &[f64]) -> Result<(), Cause<D::Error>> {
         if segment > 0 {
             self.daq.rest(self.options.rest_s).map_err(Cause::Device)?;
@@ -157,6 +198,10 @@ impl<D: Daq + ?Sized, F: FnMut(&Progress<'_>) -> ControlFlow<()>> Run<'_, D, F> 
         let (mut sent, mut received, mut cancelled) = (0, 0, false);
         let mut fresh = Vec::with_capacity(block);
         while received < plan.drive_v.len() {
+            if !cancelled {
+                let segment = Place { segment, latest: self.latest.as_ref() };
+                plan.revise(sent + block, segment, rest_v, self.options, &mut self.revise);
+            }
             let end = plan.drive_v.len().min(sent + block);
             let offered = &plan.drive_v[sent..end];
             let outcome = self.daq.exchange(offered, &mut fresh);
@@ -165,6 +210,7 @@ impl<D: Daq + ?Sized, F: FnMut(&Progress<'_>) -> ControlFlow<()>> Run<'_, D, F> 
                 return Err(Cause::Surplus);
             }
             sent += accepted;
+            self.latest = fresh.last().copied().or(self.latest);
             let wish = self.deliver(segment, &plan, received, &fresh);
             received += fresh.len();
             let idle = accepted == 0 && fresh.is_empty();

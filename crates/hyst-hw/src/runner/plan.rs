@@ -2,7 +2,8 @@
 
 use crate::daq::VoltageRange;
 
-use super::{Cause, Phase, RecordOptions};
+use super::{Cause, Phase, RecordOptions, Revision};
+use crate::daq::Sample;
 
 /// Ramps and settling are laid out in memory; longer ones are a slip of the unit.
 const LONGEST_RAMP_S: f64 = 600.0;
@@ -16,6 +17,15 @@ pub(super) struct Plan {
     record: usize,
     /// Where the retreat begins.
     retreat: usize,
+    /// Up to where the record has been revised.
+    revised: usize,
+}
+
+/// Where a revision takes place, and what is known by then.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) segment: usize,
+    pub(super) latest: Option<&'a Sample>,
 }
 
 impl Plan {
@@ -31,9 +41,33 @@ impl Plan {
         let record = drive_v.len();
         drive_v.extend_from_slice(drive);
         let retreat = drive_v.len();
-        let mut plan = Self { drive_v, record, retreat };
+        let mut plan = Self { drive_v, record, retreat, revised: record };
         plan.come_to_rest(rest_v, step_v);
         plan
+    }
+
+    /// Lets `revise` change the record up to sample `end` of the plan, each of its samples once. When the
+    /// last one is through, the retreat is laid out anew from where the drive now ends.
+    pub(super) fn revise(
+        &mut self,
+        end: usize,
+        place: Place<'_>,
+        rest_v: f64,
+        options: &RecordOptions,
+        revise: &mut impl FnMut(&mut Revision<'_>),
+    ) {
+        let end = end.min(self.retreat);
+        if self.revised >= end {
+            return;
+        }
+        let Place { segment, latest } = place;
+        let rows = self.revised - self.record..end - self.record;
+        revise(&mut Revision { segment, rows, drive_v: &mut self.drive_v[self.revised..end], latest });
+        self.revised = end;
+        if end == self.retreat {
+            self.drive_v.truncate(self.retreat);
+            self.come_to_rest(rest_v, options.slew_v_per_s / options.rate_hz);
+        }
     }
 
     /// Gives up all but the first `sent` samples and retreats from there.

@@ -265,3 +265,22 @@ fn error_of_the_plant_comes_through() {
     let failure = record(&mut plant, &drives()[1..], &RecordOptions::at(1e6), on).unwrap_err();
     assert!(matches!(failure.cause, Cause::Device(PlantError::Rate { .. })), "{failure}");
 }
+
+#[test]
+fn each_row_is_revised_once_with_the_newest_sample_and_the_retreat_follows() {
+    let mut daq = Queued::new(3);
+    let (mut rows, mut known) = (Vec::new(), false);
+    let revise = |r: &mut Revision<'_>| {
+        rows.extend(r.rows.clone());
+        known |= r.latest.is_some();
+        r.drive_v.iter_mut().for_each(|v| *v *= 2.0);
+    };
+    let drive: Vec<f64> = (0..20).map(|k| f64::from(k) / 10.0).collect();
+    let recording = record_with(&mut daq, &[&drive], &RecordOptions::at(100.0), revise, |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(rows, (0..20).collect::<Vec<_>>());
+    assert!(known, "the last block knows of samples of the first");
+    let played: Vec<f64> = recording.segments[0].samples.iter().map(|s| s.drive_v).collect();
+    assert_eq!(played, drive.iter().map(|v| 2.0 * v).collect::<Vec<_>>());
+    let retreat = &recording.segments[0].retreat;
+    assert!(retreat[0].drive_v < 3.8 && retreat[0].drive_v > 2.0, "from the revised end, {}", retreat[0].drive_v);
+}

@@ -9,4 +9,4 @@ pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use operator::{Base, Compensator, HostChain, Kind, NODES, Operator, OperatorInverse, PreisachSpec};
 
 pub(crate) use effects::Parameter;
-pub(crate) use operator::cell_index;
+pub(crate) use operator::{CREEP, OperatorState, TAPS, cell_index};

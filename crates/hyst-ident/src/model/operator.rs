@@ -13,9 +13,9 @@ pub const NODES: usize = 65;
 /// Samples that the host's delay holds.
 const DELAY: usize = 8192;
 /// Creep elements that the host's chain holds.
-const CREEP: usize = 32;
+pub(crate) const CREEP: usize = 32;
 /// Taps that one of the host's preview filters holds.
-const TAPS: usize = 4095;
+pub(crate) const TAPS: usize = 4095;
 
 /// The chain as the host runs it.
 pub type HostChain = Chain<f64, Operator, DELAY, CREEP>;

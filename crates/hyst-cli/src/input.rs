@@ -1,0 +1,72 @@
+//! Reading what commands are given: records, models, plants.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hyst_hw::{Plant, PlantConfig};
+use hyst_ident::model::{Model, ModelError};
+use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
+
+use crate::exit::{CommandError, CommandResult, Exit};
+
+/// The records of all files, joined to one.
+pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Record> {
+    let map = ColumnMap::parse(map)?;
+    let read = |path: &PathBuf| Record::read(path, &map, Need::InputAndOutput);
+    Ok(Record::join(paths.iter().map(read).collect::<Result<_, _>>()?)?)
+}
+
+/// One record.
+pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<Record> {
+    Ok(Record::read(path, &ColumnMap::parse(map)?, need)?)
+}
+
+/// A model and the text of its file.
+pub(crate) fn model(path: &Path) -> CommandResult<(Model, String)> {
+    let name = path.display().to_string();
+    let text = fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
+    Ok((Model::parse(&name, &text)?, text))
+}
+
+/// The unit of a model's output.
+pub(crate) fn output_unit(model: &Model) -> CommandResult<OutputUnit> {
+    OutputUnit::of_column(&model.output.column).ok_or_else(|| {
+        let message = format!(
+            "the model's output column is {:?}, which is none of this version; fit the model anew",
+            model.output.column
+        );
+        CommandError::bad_input(message)
+    })
+}
+
+/// The simulated plant that a file describes.
+pub(crate) fn plant(path: &Path) -> CommandResult<Plant> {
+    let named = |error: anyhow::Error| {
+        CommandError::new(Exit::BadInput, anyhow::anyhow!("{}: {error:#}; correct the plant's file", path.display()))
+    };
+    let text = fs::read_to_string(path).map_err(|error| named(error.into()))?;
+    let config = PlantConfig::from_toml(&text).map_err(|error| named(error.into()))?;
+    Plant::new(config).map_err(|error| named(error.into()))
+}
+
+/// Those of `names` that a file has as columns already.
+pub(crate) fn present<'a>(path: &Path, names: &[&'a str]) -> CommandResult<Vec<&'a str>> {
+    let bytes = fs::read(path)?;
+    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
+    let header = text.lines().find(|line| !line.is_empty()).unwrap_or_default();
+    let columns: Vec<&str> = header.split(',').map(|name| name.trim().trim_matches('"').trim()).collect();
+    Ok(names.iter().copied().filter(|name| columns.contains(name)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_found_in_the_header() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        fs::write(&path, "\u{feff}\n time_s, \"voltage_v\",x\n0,settling,1\n").unwrap();
+        assert_eq!(present(&path, &["voltage_v", "settling", "time_s"]).unwrap(), ["voltage_v", "time_s"]);
+    }
+}

@@ -1,0 +1,110 @@
+//! Numbers and tables as reports print them.
+
+use std::fmt::Write;
+
+use hyst_ident::metrics::Errors;
+use hyst_ident::record::OutputUnit;
+
+/// `x` with four significant digits.
+pub(crate) fn short(x: f64) -> String {
+    rounded(x, digits_for(x, 4))
+}
+
+/// `value ± std_error`, both to the second significant digit of the standard error; the value alone without one.
+pub(crate) fn with_error(value: f64, std_error: Option<f64>) -> String {
+    match std_error.filter(|error| *error > 0.0 && error.is_finite()) {
+        Some(error) => {
+            let decimals = digits_for(error, 2);
+            format!("{} ± {}", rounded(value, decimals), rounded(error, decimals))
+        }
+        None => short(value),
+    }
+}
+
+/// Decimals after the point that show `digits` significant digits of `x`.
+fn digits_for(x: f64, digits: i32) -> i32 {
+    if x == 0.0 || !x.is_finite() { 0 } else { digits - 1 - x.abs().log10().floor() as i32 }
+}
+
+fn rounded(x: f64, decimals: i32) -> String {
+    if decimals > 12 { format!("{x:.3e}") } else { format!("{x:.*}", decimals.max(0) as usize) }
+}
+
+/// `2.31 %`, or what stands for a span of zero.
+pub(crate) fn percent(x: f64) -> String {
+    if x.is_finite() { format!("{} %", rounded(x, digits_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
+}
+
+/// `1 row`, `2 rows`.
+pub(crate) fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    match names {
+        [] => String::new(),
+        [only] => only.as_ref().to_owned(),
+        [head @ .., last] => {
+            let head: Vec<&str> = head.iter().map(AsRef::as_ref).collect();
+            format!("{} and {}", head.join(", "), last.as_ref())
+        }
+    }
+}
+
+/// The unit of an output as a person reads it, from the ending of its column.
+pub(crate) fn symbol(suffix: &str) -> &str {
+    OutputUnit::of_suffix(suffix).map_or(suffix, OutputUnit::symbol)
+}
+
+/// The errors of a prediction in one line.
+pub(crate) fn errors(e: &Errors, unit: &str) -> String {
+    format!(
+        "RMSE {} {unit} ({} of span), largest {} {unit}, RMSE over all rows {} {unit}",
+        short(e.rmse),
+        percent(e.nrmse_percent),
+        short(e.max_abs),
+        short(e.rmse_all_rows)
+    )
+}
+
+/// A table: the first column flush left, the others flush right.
+pub(crate) fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let length = |cell: &String| cell.chars().count();
+    let widths: Vec<usize> =
+        (0..columns).map(|c| rows.iter().filter_map(|row| row.get(c)).map(length).max().unwrap_or(0)).collect();
+    let mut text = String::new();
+    for row in rows {
+        for (c, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            // Writing to a String does not fail.
+            let _ = if c == 0 { write!(text, "{cell:<width$}") } else { write!(text, "  {cell:>width$}") };
+        }
+        text.truncate(text.trim_end().len());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_show_what_is_known_of_them() {
+        assert_eq!([1234.56, 0.012_345_6, 0.0, -5.0].map(short), ["1235", "0.01235", "0", "-5.000"]);
+        assert_eq!(short(1e-20), "1.000e-20");
+        assert_eq!(with_error(0.123_456, Some(0.001_234)), "0.1235 ± 0.0012");
+        assert_eq!(with_error(1234.5, Some(56.0)), "1234 ± 56");
+        assert_eq!(with_error(2.0, None), "2.000");
+        assert_eq!([0.012_34, 12.34, f64::INFINITY].map(percent), ["0.0123 %", "12.3 %", "no span"]);
+        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
+        assert_eq!(count(1, "row") + &count(2, "row"), "1 row2 rows");
+    }
+
+    #[test]
+    fn tables_line_up() {
+        let rows = [vec!["a", "b", ""], vec!["long", "1", "2.5"]].map(|r| r.iter().map(ToString::to_string).collect());
+        assert_eq!(table(&rows), "a     b\nlong  1  2.5\n");
+    }
+}
