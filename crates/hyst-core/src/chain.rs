@@ -186,3 +186,71 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         through(&self.interference, x, |g, x| g.step(&mut (), e, x)) + self.zero
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Pi;
+    use std::vec::Vec;
+
+    fn chain<T: Real>() -> Chain<T, Pi<T, 4>, 16, 4> {
+        let cx = Sampling { period: 1e-3 };
+        Chain::new(Pi::new(0.1, &[5.0, 12.0, 25.0, 40.0], &[0.02, 0.02, 0.01, 0.01]).unwrap())
+            .with_zero(-1.5)
+            .with_delay(&DelayParams { seconds: 2.3e-3 }, &cx)
+            .and_then(|c| c.with_lag(&LagParams { seconds: 2e-3 }, &cx))
+            .and_then(|c| c.with_temperature(&TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0 }))
+            .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
+            .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
+            .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01 }))
+            .and_then(|c| c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3 }))
+            .unwrap()
+    }
+
+    fn run<T: Real>(rows: usize) -> Vec<f64> {
+        let chain = chain::<T>();
+        let mut s = chain.state();
+        (0..rows)
+            .map(|k| {
+                let t = 1e-3 * k as f64;
+                let u = 60.0 * (1.0 - libm::cos(9.0 * t)) * (0.6 + 0.4 * libm::sin(1.3 * t));
+                let e =
+                    Env { time: T::from_f64(t), temperature: T::from_f64(23.0 + 3.0 * libm::sin(t)), load: T::ZERO };
+                let u = T::from_f64(u);
+                if k == 0 { chain.reset(&mut s, &e, u).to_f64() } else { chain.step(&mut s, &e, u).to_f64() }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn single_precision_follows_double_precision() {
+        let (single, double) = (run::<f32>(5000), run::<f64>(5000));
+        let span = double.iter().fold(0.0f64, |m, y| m.max(y.abs()));
+        for (a, b) in single.iter().zip(&double) {
+            assert!((a - b).abs() < 2e-5 * span, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_step_is_the_same_alone_and_in_blocks() {
+        let c = chain::<f64>();
+        let (mut a, mut b) = (c.state(), c.state());
+        let e = [Env { temperature: 24.0, ..Env::default() }; 100];
+        let u: Vec<f64> = (0..100).map(|k| 1.1 * f64::from(k)).collect();
+        c.reset(&mut a, &e[0], 0.0);
+        c.reset(&mut b, &e[0], 0.0);
+        let mut y = [0.0; 100];
+        c.block(&mut a, &e, &u, &mut y);
+        for (u, y) in u.iter().zip(y) {
+            assert_eq!(c.step(&mut b, &e[0], *u), y);
+        }
+    }
+
+    #[test]
+    fn there_is_room_for_two_modes_and_an_error_for_a_third() {
+        let mode = ResonanceParams { hz: 50.0, damping: 0.1, gain: 1.0 };
+        let cx = Sampling { period: 1e-3 };
+        let two = chain::<f64>().with_resonance(&mode, &cx).unwrap();
+        assert!(matches!(two.with_resonance(&mode, &cx), Err(Error::Capacity { holds: MAX_RESONANCES, .. })));
+    }
+}

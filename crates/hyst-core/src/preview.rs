@@ -29,6 +29,9 @@ impl<T: Real, const N: usize> PreviewState<T, N> {
     }
 }
 
+/// Taps to each side, in periods of the band's edge.
+const REACH: f64 = 6.0;
+
 /// Points of the band at which the error is taken.
 const CHECKS: usize = 200;
 
@@ -37,15 +40,15 @@ impl<T: Real, const N: usize> Preview<T, N> {
     /// through beyond twice `band`, with a raised cosine between. `band` is in cycles per sample,
     /// up to 1/4.
     ///
-    /// Taps: 4 / `band` to each side while they fit in `N`, which is where the cut costs less than
-    /// 10⁻⁴ of the reference for well-behaved responses; [`error`](Self::error) says what it came to.
+    /// Taps: 6 / `band` to each side, or at least half of that where `N` holds no more;
+    /// [`error`](Self::error) says what the cut came to.
     ///
     /// # Errors
     /// If `band` is not in (0, 1/4] or so narrow that `N` taps cannot resolve it.
     pub fn new(band: f64, response: impl Fn(Complex) -> Complex) -> Result<Self, Error> {
         const PI2: f64 = 2.0 * core::f64::consts::PI;
         within("preview band", band, band > 0.0 && band <= 0.25, "above 0 and at most a quarter of the sample rate")?;
-        let wanted = 4.0 / band;
+        let wanted = REACH / band;
         let holds = (N.saturating_sub(1)) / 2;
         if wanted > 2.0 * holds as f64 {
             return Err(Error::Capacity { name: "preview taps", needed: wanted as usize + 1, holds: N });

@@ -105,10 +105,10 @@ impl<T: Real> Stage<T> for Resonance<T> {
 
 impl<T: Real> Resonance<T> {
     /// Highest frequency to which an inversion is sensible \[cycles/s\]: 2.5 times the mode's, where
-    /// its inverse amplifies fivefold, but at most 0.6 of its antiresonance f/√(1 − g), where the
-    /// inverse rings.
+    /// its inverse amplifies fivefold, but at most 0.4 of its antiresonance f/√(1 − g), at which the
+    /// inverse rings: the filter fades out up to twice its band.
     pub(crate) fn highest_band(&self) -> f64 {
-        self.hz * if self.antiresonance < 2.5 / 0.6 { 0.6 * self.antiresonance } else { 2.5 }
+        self.hz * (0.4 * self.antiresonance).at_most(2.5)
     }
 
     /// Response of the sampled stage at `z⁻¹`.

@@ -203,7 +203,12 @@ impl Follower {
     }
 }
 
-fn check(model: &Model, reference: &Record, samples: &Samples, options: &CompensateOptions) -> Result<(), CompensateError> {
+fn check(
+    model: &Model,
+    reference: &Record,
+    samples: &Samples,
+    options: &CompensateOptions,
+) -> Result<(), CompensateError> {
     let missing = |column: &str, advice: &str| {
         Err(CompensateError::Missing { record: reference.name(), column: column.into(), advice: advice.into() })
     };

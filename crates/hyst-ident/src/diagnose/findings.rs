@@ -147,8 +147,8 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         (true, RemainderKind::Unexplained) => Verdict::Unexplained,
     };
     let on = |train: &Simulation, test: Option<&Simulation>| OnRecords {
-        train: train.errors.clone(),
-        test: test.and_then(|t| t.errors.clone()),
+        train: train.errors,
+        test: test.and_then(|t| t.errors),
     };
     Findings {
         schema: SCHEMA.into(),

@@ -66,13 +66,13 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
         }
         linear += 1;
     }
-    if let Some(tone) = fit.effects.interference {
-        if let (Some(a), Some(b)) = (of(linear), of(linear + 1)) {
-            // Sine and cosine parts are nearly independent over many periods.
-            let (s, c) = tone.phase.sin_cos();
-            errors.insert("interference.amplitude".into(), (a * c).hypot(b * s));
-            errors.insert("interference.phase".into(), (a * s).hypot(b * c) / tone.amplitude.max(f64::MIN_POSITIVE));
-        }
+    if let Some(tone) = fit.effects.interference
+        && let (Some(a), Some(b)) = (of(linear), of(linear + 1))
+    {
+        // Sine and cosine parts are nearly independent over many periods.
+        let (s, c) = tone.phase.sin_cos();
+        errors.insert("interference.amplitude".into(), (a * c).hypot(b * s));
+        errors.insert("interference.phase".into(), (a * s).hypot(b * c) / tone.amplitude.max(f64::MIN_POSITIVE));
     }
     errors
 }

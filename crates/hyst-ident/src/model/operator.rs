@@ -137,6 +137,7 @@ impl Base {
 
 /// A hysteresis operator of the host.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one per chain; the common case goes without indirection")]
 pub enum Operator {
     /// Prandtl-Ishlinskii.
     Pi(Pi<f64, PLAYS>),
@@ -146,6 +147,7 @@ pub enum Operator {
 
 /// The inverse of a hysteresis operator of the host.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one per chain; the common case goes without indirection")]
 pub enum OperatorInverse {
     /// Prandtl-Ishlinskii.
     Pi(Pi<f64, PLAYS>),
