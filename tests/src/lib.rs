@@ -1,1 +1,255 @@
-//! Helpers that the cross-crate tests share.
+//! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
+
+use std::env;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A simulated actuator with hysteresis and a lag, quick to simulate: 0 to 100 V, about 20 µm.
+pub const PLANT: &str = "\
+seed = 3
+[actuator]
+max_v = 100
+gain_um_per_v = 0.2
+loop_share = 0.12
+relays = 2000
+[sensor]
+range_um = [-10, 40]
+noise_um = 0.005
+[lag]
+seconds = 0.01
+";
+
+/// What [`PLANT`] has to add so that a temperature is measured and acts on the gain.
+pub const WARM: &str = "\
+[temperature]
+per_k = 0.01
+reference_degc = 22.0
+mean_degc = 24.0
+swing_k = 6.0
+period_s = 5.0
+noise_k = 0.01
+";
+
+/// The binary `hystctl` of the same profile as this test, up to date.
+///
+/// # Panics
+/// When it cannot be built.
+pub fn hystctl() -> &'static Path {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    BINARY.get_or_init(|| {
+        let test = env::current_exe().expect("a test has a path");
+        // target/PROFILE/deps/TEST
+        let folder = test.parent().and_then(Path::parent).expect("tests lie two folders deep in the target folder");
+        let binary = folder.join(format!("hystctl{}", env::consts::EXE_SUFFIX));
+        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.args(["build", "--quiet", "--package", "hyst-cli", "--bin", "hystctl"]).current_dir(root());
+        cargo.arg("--target-dir").arg(folder.parent().expect("a profile has a target folder"));
+        if folder.file_name() != Some(OsStr::new("debug")) {
+            cargo.arg("--profile").arg(folder.file_name().expect("a profile has a name"));
+        }
+        // A binary of before would pass tests of a version that is no longer there; without cargo it is what there is.
+        match cargo.status() {
+            Ok(status) => assert!(status.success(), "hystctl cannot be built"),
+            Err(error) => assert!(binary.exists(), "hystctl is not built, and cargo cannot be run: {error}"),
+        }
+        binary
+    })
+}
+
+/// The workspace's folder.
+///
+/// # Panics
+/// Never: this package lies one folder deep in it.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package lies in the workspace")
+}
+
+/// The folder of measured and practice records (`HYST_DATA`, or beside the workspace), or `None` with a message that
+/// says so: such a test is skipped where the records are not at hand.
+pub fn data() -> Option<PathBuf> {
+    let folder = env::var_os("HYST_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: the records are not at {}; set HYST_DATA", folder.display());
+    None
+}
+
+/// What a run of `hystctl` left behind.
+#[derive(Debug)]
+pub struct Ran {
+    /// Exit code; -1 when a signal ended it.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl From<Output> for Ran {
+    fn from(output: Output) -> Self {
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("hystctl prints UTF-8");
+        Self { code: output.status.code().unwrap_or(-1), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+}
+
+impl Ran {
+    /// Standard output as JSON.
+    ///
+    /// # Panics
+    /// When it is none.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("no JSON ({error}): {self:?}"))
+    }
+}
+
+/// A folder of its own in which a test runs `hystctl`.
+#[derive(Debug)]
+pub struct Lab {
+    folder: TempDir,
+}
+
+impl Default for Lab {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Lab {
+    /// An empty folder.
+    ///
+    /// # Panics
+    /// When there is no place for it.
+    pub fn new() -> Self {
+        Self { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// A folder with `plant.toml` ([`PLANT`]), `train.csv` (4 s at 500 Hz) and `model.json` (kind `pi`).
+    pub fn with_model() -> Self {
+        let lab = Self::with_train("");
+        lab.ok("fit train.csv --model pi -o model.json");
+        lab
+    }
+
+    /// A folder with `plant.toml` ([`PLANT`] and `more`) and `train.csv` (4 s at 500 Hz).
+    pub fn with_train(more: &str) -> Self {
+        let lab = Self::new();
+        lab.write("plant.toml", &format!("{PLANT}{more}"));
+        lab.excite("u.csv", 1);
+        lab.ok("run --daq sim:plant.toml --drive u.csv --record train.csv");
+        lab
+    }
+
+    /// Writes a short identification drive.
+    pub fn excite(&self, name: &str, seed: u64) {
+        let options = "--rate 500 --high 100 --seconds 4 --slow 4 --hold 0.3 --rest 0.1";
+        self.ok(&format!("excite identification {options} --seed {seed} -o {name}"));
+    }
+
+    /// Writes a reference of `seconds` at 500 Hz: a raised cosine of 1 Hz from 2 to `top` µm.
+    pub fn reference(&self, name: &str, seconds: f64, top: f64) {
+        let mut text = String::from("time_s,displacement_um\n");
+        for k in 0..(seconds * 500.0) as u32 {
+            let t = f64::from(k) / 500.0;
+            let y = 2.0 + (top - 2.0) * (0.5 - 0.5 * (std::f64::consts::TAU * t).cos());
+            text.push_str(&format!("{t:.3},{y:.4}\n"));
+        }
+        self.write(name, &text);
+    }
+
+    /// The path of a file in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    ///
+    /// # Panics
+    /// When it cannot be written.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).expect("a file is written");
+    }
+
+    /// Reads a file.
+    ///
+    /// # Panics
+    /// When it cannot be read.
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// The names of all files, in order.
+    ///
+    /// # Panics
+    /// When the folder cannot be read.
+    pub fn files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("the folder is there");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// `hystctl` in the folder, with arguments that are separated by single spaces.
+    pub fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(hystctl());
+        command.args(line.split(' ').filter(|word| !word.is_empty())).current_dir(self.folder.path());
+        command
+    }
+
+    /// Runs `hystctl`.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    pub fn run(&self, line: &str) -> Ran {
+        self.command(line).output().expect("hystctl starts").into()
+    }
+
+    /// Runs `hystctl`, which has to succeed.
+    ///
+    /// # Panics
+    /// When it does not.
+    pub fn ok(&self, line: &str) -> Ran {
+        let ran = self.run(line);
+        assert_eq!(ran.code, 0, "hystctl {line}: {}", ran.stderr);
+        ran
+    }
+
+    /// Runs `hystctl`, which has to fail with `code`, leave the folder's files as they are, print nothing to stdout and
+    /// one message to stderr; returns the message.
+    ///
+    /// # Panics
+    /// When it does not.
+    pub fn refuses(&self, line: &str, code: i32) -> String {
+        let before = self.contents();
+        let ran = self.run(line);
+        assert_eq!(ran.code, code, "hystctl {line}: {} {}", ran.stdout, ran.stderr);
+        assert_eq!(ran.stdout, "", "hystctl {line}");
+        assert!(ran.stderr.contains("error: "), "hystctl {line}: {}", ran.stderr);
+        assert!(!ran.stderr.contains("panicked"), "hystctl {line}: {}", ran.stderr);
+        assert!(self.contents() == before, "hystctl {line} has changed files: {:?}", self.files());
+        ran.stderr
+    }
+
+    fn contents(&self) -> Vec<(String, Vec<u8>)> {
+        let content = |name: &String| fs::read(self.path(name)).unwrap_or_default();
+        self.files().into_iter().map(|name| (name.clone(), content(&name))).collect()
+    }
+}
+
+/// The column `name` of a CSV text.
+///
+/// # Panics
+/// When there is none, or it holds something else than numbers.
+pub fn column(csv: &str, name: &str) -> Vec<f64> {
+    let mut lines = csv.lines();
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let at = header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("no {name} in {header:?}"));
+    lines.map(|line| line.split(',').nth(at).and_then(|cell| cell.parse().ok()).expect("a number")).collect()
+}

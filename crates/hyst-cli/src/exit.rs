@@ -5,7 +5,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use hyst_hw::ConfigError;
+use hyst_hw::{ConfigError, PlantError};
 use hyst_ident::atomic_file::AtomicFileError;
 use hyst_ident::compensate::CompensateError;
 use hyst_ident::excite::ExciteError;
@@ -13,6 +13,8 @@ use hyst_ident::fit::FitError;
 use hyst_ident::metrics::MetricsError;
 use hyst_ident::model::ModelError;
 use hyst_ident::record::{MapError, RecordError, WriteError};
+
+use crate::log::LogError;
 
 /// What the exit code tells a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +83,8 @@ impl CommandError {
 }
 
 /// Which exit code an error of the libraries has.
-trait Classified: Error + Send + Sync + 'static {
+pub(crate) trait Classified: Error + Send + Sync + 'static {
+    /// The exit code.
     fn exit(&self) -> Exit;
 }
 
@@ -103,11 +106,21 @@ macro_rules! always {
 
 always!(BadInput: RecordError, MapError, ModelError, ExciteError, ConfigError);
 always!(Failed: AtomicFileError, WriteError, io::Error);
+always!(DeviceLost: LogError);
 
 impl Classified for FitError {
     fn exit(&self) -> Exit {
         match self {
             Self::Unsolvable { .. } | Self::Compare { source: MetricsError::NotFinite { .. }, .. } => Exit::Failed,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+impl Classified for PlantError {
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Running | Self::NotRunning | Self::SensorRange { .. } => Exit::DeviceLost,
             _ => Exit::BadInput,
         }
     }

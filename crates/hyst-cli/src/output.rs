@@ -134,15 +134,32 @@ impl Report {
     /// Prints one of the two.
     pub(crate) fn print(self, text: &str, json: &impl Serialize) -> CommandResult {
         if self.json {
-            let json = serde_json::to_string_pretty(json).map_err(io::Error::other)?;
-            Target::Stdout.write(|out| writeln!(out, "{json}"))
+            print_json(json)
         } else if self.text_to_stderr {
             say(text);
             Ok(())
         } else {
-            Target::Stdout.write(|out| writeln!(out, "{}", text.trim_end()))
+            print(text)
         }
     }
+}
+
+/// JSON as files and reports hold it.
+pub(crate) fn json(value: &impl Serialize) -> CommandResult<String> {
+    let mut text = serde_json::to_string_pretty(value).map_err(io::Error::other)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// Prints JSON to stdout.
+pub(crate) fn print_json(value: &impl Serialize) -> CommandResult {
+    let text = json(value)?;
+    Target::Stdout.write(|out| out.write_all(text.as_bytes()))
+}
+
+/// Prints a line (or more) to stdout.
+pub(crate) fn print(text: &str) -> CommandResult {
+    Target::Stdout.write(|out| writeln!(out, "{}", text.trim_end()))
 }
 
 /// Prints a line (or more) to stderr.

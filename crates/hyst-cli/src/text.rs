@@ -54,7 +54,7 @@ pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
 
 /// The unit of an output as a person reads it, from the ending of its column.
 pub(crate) fn symbol(suffix: &str) -> &str {
-    OutputUnit::of_suffix(suffix).map_or(suffix, OutputUnit::symbol)
+    OutputUnit::of_suffix(suffix).map_or(suffix, |unit| unit.symbol())
 }
 
 /// The errors of a prediction in one line.

@@ -64,9 +64,9 @@ pub enum CompensateError {
         value: f64,
         /// Unit of the values.
         unit: String,
-        /// Lowest output that the training record reached.
+        /// Lowest output that it reaches.
         low: f64,
-        /// Highest output that the training record reached.
+        /// Highest output that it reaches.
         high: f64,
     },
     /// A column is needed.
@@ -203,6 +203,16 @@ impl Follower {
     }
 }
 
+/// Lowest and highest output: what the training record reached, and what the model itself says of rest and
+/// of full drive.
+fn reach(model: &Model) -> Result<(f64, f64), hyst_core::Error> {
+    let operator = model.base.build()?;
+    let (mut state, env) = (operator.state(), Env::default());
+    let rest = model.zero + operator.reset(&mut state, &env, model.input.low);
+    let full = model.zero + operator.step(&mut state, &env, model.input.high);
+    Ok((model.output.low.min(rest), model.output.high.max(full)))
+}
+
 fn check(
     model: &Model,
     reference: &Record,
@@ -221,7 +231,7 @@ fn check(
     if model.needs_temperature() && reference.temperature().is_none() && options.temperature.is_none() {
         return missing("temperature_degc", "the model's gain depends on it");
     }
-    let (low, high) = (model.output.low, model.output.high);
+    let (low, high) = reach(model)?;
     let margin = MARGIN * (high - low);
     match samples.output.iter().position(|y| *y < low - margin || *y > high + margin) {
         Some(row) => Err(CompensateError::OutOfReach {

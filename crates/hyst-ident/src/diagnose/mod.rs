@@ -99,7 +99,8 @@ pub fn diagnose(
             .fit_linear(&moving)
             .map_err(stage)?
             .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
-        extended = to_model(train, &samples, kind, &fit, model.seed);
+        // Its reach is that of the motion, not of the sensor.
+        extended = to_model(train, &motion_only, kind, &fit, model.seed);
         extended.effects.clone_from(effects);
         extended.std_errors.clone_from(&errors);
     }

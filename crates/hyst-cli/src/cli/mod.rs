@@ -1,0 +1,337 @@
+//! The command line: what clap parses, and nothing else.
+
+mod excite;
+mod values;
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use hyst_ident::model::Kind;
+use hyst_ident::simulate::Zero;
+
+use crate::output::Target;
+pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm};
+pub(crate) use values::{Device, VoltageLimits};
+use values::{finite, positive, seconds};
+
+const EXAMPLES: &str = "\
+Examples (a simulated actuator, from its first record to a drive that follows a reference):
+  hystctl excite identification --high 120 -o u.csv
+  hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
+  hystctl fit train.csv --model pi -o model.json
+  hystctl diagnose train.csv --model model.json -o extended.json
+  hystctl compensate --model extended.json reference.csv -o drive.csv
+  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
+
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 device lost or data at risk.";
+
+const FIT: &str = "\
+Examples:
+  hystctl fit train.csv --model pi -o model.json
+  hystctl fit a.csv b.csv --model preisach --zero per-record -o model.json";
+
+const SIMULATE: &str = "\
+Example:
+  hystctl simulate --model model.json test.csv -o predicted.csv";
+
+const DIAGNOSE: &str = "\
+Examples:
+  hystctl diagnose train.csv --model model.json
+  hystctl diagnose train.csv --test test.csv --model model.json -o extended.json --findings findings.json";
+
+const COMPENSATE: &str = "\
+Example:
+  hystctl compensate --model extended.json reference.csv -o drive.csv --limit 0,120 --slew 5000";
+
+const RUN: &str = "\
+Examples:
+  hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
+  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap";
+
+const RECORDS: &str = "\
+Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one output
+of displacement_um (or _nm, _mm) and force_n, and where measured temperature_degc and load_n. An integer column segment
+tells apart stretches between which the device rested.";
+
+/// Identify, diagnose and compensate piezo actuators and others with hysteresis.
+#[derive(Debug, Parser)]
+#[command(name = "hystctl", version, after_help = EXAMPLES, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Fit(FitArgs),
+    Simulate(SimulateArgs),
+    Diagnose(DiagnoseArgs),
+    Compensate(CompensateArgs),
+    Excite(ExciteArgs),
+    Run(RunArgs),
+    Demo(DemoArgs),
+    /// Print a completion script for a shell
+    #[command(after_help = "Example:\n  hystctl completions bash > /etc/bash_completion.d/hystctl")]
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+}
+
+/// See the whole way on a simulated actuator: experiment, fit, diagnosis, compensation
+///
+/// The effect that the actuator has besides hysteresis is drawn from the seed and told to nobody. Writes records,
+/// models, findings, the drive, a log of the compensated run and a picture.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl demo --seed 3 --out demo-out")]
+pub(crate) struct DemoArgs {
+    /// Which actuator
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Folder to write into; files of an earlier demo there are replaced
+    #[arg(long, value_name = "FOLDER", default_value = "demo-out")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Fit a model of the hysteresis to one or more records
+#[derive(Debug, Args)]
+#[command(after_help = format!("{FIT}\n\n{RECORDS}"))]
+pub(crate) struct FitArgs {
+    /// Records to fit, as one
+    #[arg(required = true)]
+    pub(crate) train: Vec<PathBuf>,
+    /// Kind of model: pi (Prandtl-Ishlinskii) or preisach
+    #[arg(long, value_name = "KIND", value_parser = kinds())]
+    pub(crate) model: Kind,
+    /// Model file to write; - for stdout
+    #[arg(short, long, value_name = "MODEL")]
+    pub(crate) output: Target,
+    /// Seed of the search, kept in the model (the models of this version are fitted without chance)
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Predict the output of a record with a model
+///
+/// Writes the record's own columns untouched, then predicted_um (or _nm, _mm, _n) and settling (1 marks a start-up row
+/// of the model). Where the record has the output too, the errors are printed to stderr.
+#[derive(Debug, Args)]
+#[command(after_help = format!("{SIMULATE}\n\n{RECORDS}"))]
+pub(crate) struct SimulateArgs {
+    /// Model file
+    #[arg(long)]
+    pub(crate) model: PathBuf,
+    /// Record with the input; its output is compared, if it has one
+    pub(crate) input: PathBuf,
+    /// CSV file to write; stdout if not given
+    #[arg(short, long, value_name = "CSV", default_value = "-", hide_default_value = true)]
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Find out which effects a model lacks, name them and add them
+///
+/// Effects are searched on the training records alone; the test record is only simulated.
+#[derive(Debug, Args)]
+#[command(after_help = DIAGNOSE)]
+pub(crate) struct DiagnoseArgs {
+    /// Records that the model was fitted to
+    #[arg(required = true)]
+    pub(crate) train: Vec<PathBuf>,
+    /// Record to show the errors on, never fitted
+    #[arg(long)]
+    pub(crate) test: Option<PathBuf>,
+    /// Model file
+    #[arg(long)]
+    pub(crate) model: PathBuf,
+    /// Model file to write, with the effects that were found; - for stdout
+    #[arg(short, long, value_name = "MODEL")]
+    pub(crate) output: Option<Target>,
+    /// Findings file to write (JSON); - for stdout
+    #[arg(long, value_name = "JSON")]
+    pub(crate) findings: Option<Target>,
+    /// Seed of the bootstrap that judges effects
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Compute the drive that makes an actuator follow a reference
+///
+/// The reference has time_s and the model's output column, and temperature_degc where the model needs it. The drive has
+/// the reference's columns, then the computed input. What was limited is told on stderr. Nothing is moved.
+#[derive(Debug, Args)]
+#[command(after_help = COMPENSATE)]
+pub(crate) struct CompensateArgs {
+    /// Model file
+    #[arg(long)]
+    pub(crate) model: PathBuf,
+    /// Record of the wanted output
+    pub(crate) reference: PathBuf,
+    /// Temperature, where the model needs it and the reference has no column of it
+    #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = finite)]
+    pub(crate) temperature: Option<f64>,
+    /// Drive file to write (CSV); - for stdout
+    #[arg(short, long, value_name = "CSV")]
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Play a drive, or a reference through a model, on a device and record what it does
+///
+/// With --reference the drive is computed before anything moves, as by compensate, and the measured output is compared
+/// with the reference. With --drive a file with voltage_v is played as it stands; a drive outside the limits is refused.
+/// Ctrl-C ramps the device to rest.
+#[derive(Debug, Args)]
+#[command(after_help = RUN)]
+pub(crate) struct RunArgs {
+    /// Device: sim:PLANT.toml, the simulated actuator that the file describes
+    #[arg(long, value_name = "DEVICE")]
+    pub(crate) daq: Device,
+    /// Model file
+    #[arg(long, requires = "reference", conflicts_with = "drive")]
+    pub(crate) model: Option<PathBuf>,
+    /// Record of the wanted output
+    #[arg(long, requires = "model", required_unless_present = "drive", conflicts_with = "drive")]
+    pub(crate) reference: Option<PathBuf>,
+    /// Record of the voltages to play, as excite or compensate writes it
+    #[arg(long)]
+    pub(crate) drive: Option<PathBuf>,
+    /// Log to write while the device runs (MCAP): all samples, ramps included
+    #[arg(long, value_name = "MCAP")]
+    pub(crate) log: Option<PathBuf>,
+    /// Record to write when all is measured (CSV); - for stdout
+    #[arg(long, value_name = "CSV")]
+    pub(crate) record: Option<Target>,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
+    /// Rest between two segments
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds)]
+    pub(crate) rest: f64,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// What keeps a drive in bounds.
+#[derive(Debug, Args)]
+pub(crate) struct LimitArgs {
+    /// Lowest and highest voltage; if not given, those of the record that the model was fitted to
+    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
+    pub(crate) limit: Option<VoltageLimits>,
+    /// Steepest slope of the drive
+    #[arg(long, value_name = "V_PER_S", value_parser = positive)]
+    pub(crate) slew: Option<f64>,
+    /// Band in which lag, delay and resonances are inverted; chosen if not given
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub(crate) bandwidth: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MapArg {
+    /// Take a column of another name, as voltage_v=Vin; may be given several times
+    #[arg(long, value_name = "NAME=COLUMN")]
+    pub(crate) map: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct JsonArg {
+    /// Print the report as JSON to stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ZeroArg {
+    /// Zero of the sensor: the model's (none), or one constant for each file (per-record)
+    #[arg(long, value_enum, default_value_t = ZeroMode::None, hide_possible_values = true, value_name = "none|per-record")]
+    zero: ZeroMode,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ZeroMode {
+    None,
+    PerRecord,
+}
+
+impl ZeroArg {
+    pub(crate) fn get(&self) -> Zero {
+        match self.zero {
+            ZeroMode::None => Zero::None,
+            ZeroMode::PerRecord => Zero::PerRecord,
+        }
+    }
+}
+
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| name.parse::<Kind>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn parse(line: &str) -> Result<Command, String> {
+        Cli::try_parse_from(line.split(' ')).map(|cli| cli.command).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_run_has_either_a_reference_or_a_drive() {
+        let run = |rest: &str| parse(&format!("hystctl run --daq sim:p.toml {rest}"));
+        run("--drive u.csv").unwrap();
+        run("--model m.json --reference r.csv").unwrap();
+        for rest in ["--record a.csv", "--reference r.csv", "--model m.json", "--model m.json --drive u.csv"] {
+            run(rest).unwrap_err();
+        }
+        run("--model m.json --reference r.csv --drive u.csv").unwrap_err();
+    }
+
+    #[test]
+    fn negative_voltages_are_values() {
+        let line = "hystctl compensate --model m.json r.csv -o - --limit -20,120";
+        let Ok(Command::Compensate(args)) = parse(line) else { panic!("not a compensation") };
+        assert_eq!(args.limits.limit, Some(VoltageLimits { low: -20.0, high: 120.0 }));
+        assert_eq!(args.output, Target::Stdout);
+        parse("hystctl excite sine --frequency 1 --cycles 2 --low -20 --high 50 -o u.csv").unwrap();
+    }
+
+    #[test]
+    fn other_devices_and_models_are_refused_with_what_there_is() {
+        let message = parse("hystctl run --daq serial:/dev/ttyACM0 --drive u.csv").unwrap_err();
+        assert!(message.contains("sim:PLANT.toml"), "{message}");
+        let message = parse("hystctl fit a.csv --model gpi -o m.json").unwrap_err();
+        assert!(message.contains("pi, preisach"), "{message}");
+    }
+}

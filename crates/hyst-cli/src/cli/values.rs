@@ -1,0 +1,95 @@
+//! Arguments that are more than a number or a path.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Voltages between which a drive has to stay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct VoltageLimits {
+    /// Lowest \[V\].
+    pub(crate) low: f64,
+    /// Highest \[V\].
+    pub(crate) high: f64,
+}
+
+impl FromStr for VoltageLimits {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|volts| volts.is_finite());
+        match text.split_once(',').map(|(low, high)| (number(low), number(high))) {
+            Some((Some(low), Some(high))) if low < high => Ok(Self { low, high }),
+            Some((Some(_), Some(_))) => Err("the first voltage has to be the lower one".to_owned()),
+            _ => Err("give the lowest and the highest voltage, as 0,120".to_owned()),
+        }
+    }
+}
+
+/// Where a drive is played.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Device {
+    /// The simulated plant of this file.
+    Simulated(PathBuf),
+}
+
+impl FromStr for Device {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
+            Some((kind @ ("serial" | "slcan" | "can"), _)) => {
+                Err(format!("this version has no {kind}: devices, only the simulated plant: give sim:PLANT.toml"))
+            }
+            _ => Err("give sim:PLANT.toml, with the file that describes the simulated plant".to_owned()),
+        }
+    }
+}
+
+/// A positive, finite number.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    let usable = |x: &f64| x.is_finite() && *x > 0.0;
+    text.parse().ok().filter(usable).ok_or_else(|| "it has to be a positive number".to_owned())
+}
+
+/// A finite number.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "it has to be a finite number".to_owned())
+}
+
+/// A time from zero up.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let usable = |x: &f64| x.is_finite() && *x >= 0.0;
+    text.parse().ok().filter(usable).ok_or_else(|| "it has to be a number of seconds from 0 up".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_two_numbers_in_order() {
+        assert_eq!("0, 120".parse(), Ok(VoltageLimits { low: 0.0, high: 120.0 }));
+        for text in ["120", "120,0", "1,1", "a,1", "0,inf", "0,NaN", ""] {
+            text.parse::<VoltageLimits>().unwrap_err();
+        }
+    }
+
+    #[test]
+    fn devices_have_a_kind_and_a_place() {
+        assert_eq!("sim:a:b.toml".parse(), Ok(Device::Simulated("a:b.toml".into())));
+        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:x", "serial:COM3"] {
+            assert!(text.parse::<Device>().unwrap_err().contains("sim:PLANT.toml"), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_positive() {
+        assert_eq!(positive("2.5"), Ok(2.5));
+        for text in ["0", "-1", "nan", "inf", "x"] {
+            positive(text).unwrap_err();
+        }
+        assert_eq!(finite("-3"), Ok(-3.0));
+        finite("nan").unwrap_err();
+        assert_eq!(seconds("0"), Ok(0.0));
+        seconds("-1").unwrap_err();
+    }
+}

@@ -1,0 +1,119 @@
+//! `compensate`: the drive that makes the actuator follow a reference.
+
+use hyst_ident::compensate::{CompensateOptions, Drive, compensate};
+use hyst_ident::model::{Effect, Model};
+use hyst_ident::record::{Extra, Need, Record};
+use serde::Serialize;
+
+use crate::cli::{CompensateArgs, LimitArgs};
+use crate::exit::CommandResult;
+use crate::output::{self, Report, say};
+use crate::{input, text};
+
+/// What is said about a compensation.
+#[derive(Debug, Serialize)]
+pub(super) struct Compensation {
+    rows: usize,
+    lowest: f64,
+    highest: f64,
+    lead_samples: usize,
+    lead_s: f64,
+    /// None where no dynamic stage was inverted.
+    bandwidth_hz: Option<f64>,
+    /// Largest relative error of the inversion inside its band.
+    band_error: f64,
+    voltage_limited_rows: usize,
+    slew_limited_rows: usize,
+    /// Effects that are in the sensor.
+    not_compensated: Vec<&'static str>,
+    #[serde(skip)]
+    unit: String,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &CompensateArgs) -> CommandResult {
+    output::check(&[&args.model, &args.reference], &[&args.output])?;
+    let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
+    let (model, _) = input::model(&args.model)?;
+    let reference = input::record(&args.reference, &args.map.map, Need::Output)?;
+    let options = CompensateOptions { temperature: args.temperature, ..options(&args.limits) };
+    let drive = compensate(&model, &reference, &options)?;
+
+    // The reference file keeps its own input, if it has one: no output is an input's file.
+    let column = model.input.column.as_str();
+    let replaced = !input::present(&args.reference, &[column])?.is_empty();
+    let extra = [Extra::numbers(column, &drive.voltage)];
+    args.output.write(|out| reference.write_with(out, &extra).map_err(output::io_error))?;
+    if replaced {
+        say(&format!(
+            "note: {} has {column} already; in {} the computed drive stands in its place",
+            args.reference.display(),
+            args.output
+        ));
+    }
+    let compensation = Compensation::new(&model, &reference, &drive);
+    report.print(&compensation.text(), &compensation)
+}
+
+/// The limits of the command line, as the library takes them.
+pub(super) fn options(limits: &LimitArgs) -> CompensateOptions {
+    CompensateOptions {
+        voltage: limits.limit.map(|limit| (limit.low, limit.high)),
+        slew: limits.slew.unwrap_or(f64::INFINITY),
+        bandwidth_hz: limits.bandwidth,
+        temperature: None,
+    }
+}
+
+impl Compensation {
+    pub(super) fn new(model: &Model, reference: &Record, drive: &Drive) -> Self {
+        let (lowest, highest) =
+            drive.voltage.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let in_the_sensor = model.effects.names().into_iter().filter(|effect| !effect.acts_on_the_motion());
+        Self {
+            rows: drive.voltage.len(),
+            lowest,
+            highest,
+            lead_samples: drive.lead,
+            lead_s: drive.lead as f64 * reference.sample_period(),
+            bandwidth_hz: drive.bandwidth_hz,
+            band_error: drive.band_error,
+            voltage_limited_rows: drive.voltage_limited.len(),
+            slew_limited_rows: drive.slew_limited.len(),
+            not_compensated: in_the_sensor.map(Effect::name).collect(),
+            unit: model.input.unit.clone(),
+        }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let (unit, short) = (&self.unit, text::short);
+        let mut lines = vec![format!(
+            "drive: {}, {} to {} {unit}; limited by voltage in {}, by slew in {}",
+            text::count(self.rows, "row"),
+            short(self.lowest),
+            short(self.highest),
+            text::count(self.voltage_limited_rows, "row"),
+            text::count(self.slew_limited_rows, "row")
+        )];
+        if self.voltage_limited_rows + self.slew_limited_rows > 0 {
+            lines.push(
+                "where it is limited the actuator cannot follow: slow the reference down or shrink it".to_owned(),
+            );
+        }
+        let lead = format!("lead {} ({} s)", text::count(self.lead_samples, "sample"), short(self.lead_s));
+        lines.push(match self.bandwidth_hz {
+            Some(hz) => format!(
+                "{lead}; dynamics inverted up to {} Hz, to within {} there",
+                short(hz),
+                text::percent(100.0 * self.band_error)
+            ),
+            None => format!("{lead}; no dynamics to invert"),
+        });
+        if !self.not_compensated.is_empty() {
+            let (effects, verb) =
+                (text::listed(&self.not_compensated), if self.not_compensated.len() == 1 { "is" } else { "are" });
+            lines.push(format!("{effects} {verb} in the sensor, not in the motion, and {verb} not compensated"));
+        }
+        lines.join("\n")
+    }
+}

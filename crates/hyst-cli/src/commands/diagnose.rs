@@ -1,0 +1,70 @@
+//! `diagnose`: what a model lacks.
+
+use std::path::Path;
+
+use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
+use hyst_ident::model::Model;
+use hyst_ident::record::{Need, Record};
+
+use crate::cli::DiagnoseArgs;
+use crate::exit::CommandResult;
+use crate::output::{self, Report, Target, say};
+use crate::progress::Progress;
+use crate::{input, text};
+
+mod summary;
+
+/// Runs the command.
+pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
+    let mut read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
+    read.push(&args.model);
+    read.extend(args.test.as_deref());
+    let written: Vec<&Target> = args.output.iter().chain(&args.findings).collect();
+    output::check(&read, &written)?;
+    let report = Report::new(args.json.json, &written)?;
+    let (model, _) = input::model(&args.model)?;
+    let train = input::training(&args.train, &args.map.map)?;
+    let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    warn(&model, &train, test.as_ref());
+
+    let progress = Progress::spinner("diagnosing");
+    let options = DiagnoseOptions { zero: args.zero.get(), seed: args.seed };
+    let diagnosis = diagnose(&train, test.as_ref(), &model, &options, &|doing| progress.say(doing))?;
+    drop(progress);
+
+    let findings = &diagnosis.findings;
+    if let Some(target) = &args.output {
+        target.write(|out| out.write_all(diagnosis.extended.to_json().as_bytes()))?;
+    }
+    if let Some(target) = &args.findings {
+        let json = output::json(findings)?;
+        target.write(|out| out.write_all(json.as_bytes()))?;
+    }
+    let mut said = summary::of(findings);
+    for (target, what) in [(&args.output, "extended model"), (&args.findings, "findings")] {
+        if let Some(Target::File(path)) = target {
+            said.push_str(&format!("\n{what}: {}", path.display()));
+        }
+    }
+    report.print(&said, findings)
+}
+
+/// Warns where the files are not what they should be for the figures to mean something.
+fn warn(model: &Model, train: &Record, test: Option<&Record>) {
+    let fitted = |sha: &str| model.fitted_on.iter().any(|file| file.sha256 == sha);
+    let strange: Vec<&str> = train
+        .sources()
+        .iter()
+        .filter(|source| source.sha256.as_deref().is_some_and(|sha| !fitted(sha)))
+        .map(|source| source.name.as_str())
+        .collect();
+    if !strange.is_empty() {
+        let names = text::listed(&strange);
+        say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
+    }
+    let sha = test.and_then(|record| record.sources()[0].sha256.as_deref());
+    if sha.is_some_and(|sha| fitted(sha) || train.sources().iter().any(|source| source.sha256.as_deref() == Some(sha)))
+    {
+        say("note: the test record is one of those that were fitted; its errors say nothing about new data");
+    }
+}

@@ -1,0 +1,111 @@
+//! `fit`: a model of the hysteresis from records.
+
+use std::path::Path;
+
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::metrics::Errors;
+use hyst_ident::model::{Base, Model};
+use hyst_ident::simulate::{Zero, simulate};
+use serde::Serialize;
+
+use crate::cli::FitArgs;
+use crate::exit::CommandResult;
+use crate::output::{self, Report};
+use crate::progress::Progress;
+use crate::{input, text};
+
+/// What is said about a fit.
+#[derive(Debug, Serialize)]
+struct Summary {
+    model: &'static str,
+    output: String,
+    unit: String,
+    rows: usize,
+    settling_rows: usize,
+    zero: Zero,
+    errors: Option<Errors>,
+    base: BaseSummary,
+    sensor_zero: f64,
+    #[serde(skip)]
+    input_unit: String,
+}
+
+/// The hysteresis in a few numbers.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum BaseSummary {
+    /// `p0` is the gain of the part without hysteresis.
+    Pi { p0: f64, plays: usize, plays_with_weight: usize },
+    /// Cells of the Preisach triangle.
+    Preisach { cells: usize, cells_with_density: usize },
+}
+
+/// Runs the command.
+pub(super) fn run(args: &FitArgs) -> CommandResult {
+    let read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
+    output::check(&read, &[&args.output])?;
+    let report = Report::new(args.json.json, &[&args.output])?;
+    let record = input::training(&args.train, &args.map.map)?;
+    let zero = args.zero.get();
+
+    let progress = Progress::spinner(&format!("fitting {} to {}", args.model, text::count(record.rows(), "row")));
+    let options = FitOptions { seed: args.seed, zero_per_record: zero == Zero::PerRecord };
+    let model = fit(&record, args.model, &options)?;
+    let simulated = simulate(&model, &record, zero)?;
+    drop(progress);
+
+    args.output.write(|out| out.write_all(model.to_json().as_bytes()))?;
+    let summary = Summary {
+        model: args.model.name(),
+        output: args.output.to_string(),
+        unit: model.output.unit.clone(),
+        rows: record.rows(),
+        settling_rows: simulated.settling.iter().filter(|settling| **settling).count(),
+        zero,
+        errors: simulated.errors,
+        base: base_summary(&model),
+        sensor_zero: model.zero,
+        input_unit: model.input.unit.clone(),
+    };
+    report.print(&summary.text(), &summary)
+}
+
+fn base_summary(model: &Model) -> BaseSummary {
+    let nonzero = |weights: &[f64]| weights.iter().filter(|w| **w != 0.0).count();
+    match &model.base {
+        Base::Pi { gain, weights, .. } => {
+            BaseSummary::Pi { p0: *gain, plays: weights.len(), plays_with_weight: nonzero(weights) }
+        }
+        Base::Preisach(spec) => {
+            BaseSummary::Preisach { cells: spec.density.len(), cells_with_density: nonzero(&spec.density) }
+        }
+    }
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let unit = text::symbol(&self.unit);
+        let mut lines = vec![format!(
+            "{} fitted to {} ({} settling): {}",
+            self.model,
+            text::count(self.rows, "row"),
+            self.settling_rows,
+            self.output
+        )];
+        lines.extend(self.errors.map(|errors| text::errors(&errors, unit)));
+        lines.push(match self.base {
+            BaseSummary::Pi { p0, plays, plays_with_weight } => {
+                format!(
+                    "p0 {} {unit}/{}, {plays_with_weight} of {plays} plays with weight",
+                    text::short(p0),
+                    self.input_unit
+                )
+            }
+            BaseSummary::Preisach { cells, cells_with_density } => {
+                format!("{cells_with_density} of {cells} cells with density")
+            }
+        });
+        lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
+        lines.join("\n")
+    }
+}

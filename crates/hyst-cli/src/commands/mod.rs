@@ -1,0 +1,34 @@
+//! The commands, and the one place where they are dispatched.
+
+mod compensate;
+mod diagnose;
+mod excite;
+mod fit;
+mod run;
+mod simulate;
+
+use clap::CommandFactory;
+
+use crate::cli::{Cli, Command};
+use crate::demo;
+use crate::exit::CommandResult;
+use crate::output::Target;
+
+/// Runs one command.
+pub(crate) fn dispatch(command: Command) -> CommandResult {
+    match command {
+        Command::Fit(args) => fit::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
+        Command::Compensate(args) => compensate::run(&args),
+        Command::Excite(args) => excite::run(&args),
+        Command::Run(args) => run::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Completions { shell } => {
+            // The generator panics where its writer fails, as a closed pipe does.
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "hystctl", &mut script);
+            Target::Stdout.write(|out| out.write_all(&script))
+        }
+    }
+}

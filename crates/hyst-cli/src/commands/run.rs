@@ -1,0 +1,178 @@
+//! `run`: plays a drive, or a reference through a model, on a device.
+
+mod job;
+mod live;
+mod play;
+
+use std::path::{Path, PathBuf};
+
+use hyst_hw::{Daq, Recording, Sample};
+use hyst_ident::metrics::Errors;
+use hyst_ident::record::{Columns, Extra, OutputUnit, Record};
+use serde::Serialize;
+
+use super::compensate::Compensation;
+use crate::cli::{Device, RunArgs};
+use crate::exit::{Classified, CommandError, CommandResult, Exit};
+use crate::log::{LoggedModel, RunInfo, RunLog};
+use crate::output::{self, Report, Target};
+use crate::{input, text};
+use job::{Followed, Job};
+
+/// What is said about a run.
+#[derive(Debug, Serialize)]
+struct Summary {
+    device: String,
+    rate_hz: f64,
+    samples: usize,
+    segments: usize,
+    unit: &'static str,
+    lowest_output: f64,
+    highest_output: f64,
+    /// None when a drive was played.
+    tracking: Option<Tracking>,
+    compensation: Option<Compensation>,
+    /// Whether the drive was corrected by the measured temperature on the way.
+    temperature_followed: bool,
+    log: Option<String>,
+    record: Option<String>,
+    #[serde(skip)]
+    symbol: &'static str,
+}
+
+/// Measured output against the reference.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Tracking {
+    rmse: f64,
+    /// In percent of the reference's span.
+    nrmse_percent: f64,
+    max_abs: f64,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &RunArgs) -> CommandResult {
+    let log = args.log.clone().map(Target::File);
+    let written: Vec<&Target> = log.iter().chain(&args.record).collect();
+    if args.drive.is_some() && written.is_empty() {
+        return Err(CommandError::bad_input("what is measured would be lost: give --record, --log or both"));
+    }
+    let Device::Simulated(described) = &args.daq;
+    let mut read: Vec<&Path> = vec![described];
+    read.extend([&args.model, &args.reference, &args.drive].into_iter().filter_map(|path| path.as_deref()));
+    output::check(&read, &written)?;
+    let report = Report::new(args.json.json, &written)?;
+    on_device(&mut input::plant(described)?, args, report)
+}
+
+/// The run on any device.
+fn on_device<D: Daq>(daq: &mut D, args: &RunArgs, report: Report) -> CommandResult
+where
+    D::Error: Classified,
+{
+    let mut job = Job::read(args, daq.capabilities())?;
+    let unit = unit_of(daq.capabilities().output);
+    let device = daq.capabilities().device.clone();
+    let model = job.followed.as_ref().map(|followed| LoggedModel { model: &followed.model, json: &followed.json });
+    let info = RunInfo { device: &device, output: unit, sample_rate_hz: job.options.rate_hz, model };
+    let create = |path: &PathBuf| RunLog::create(path, &info).map_err(|error| CommandError::new(Exit::Failed, error));
+    let mut log = args.log.as_ref().map(create).transpose()?;
+    let played = play::play(daq, &mut job, log.as_mut());
+    // What was measured is kept in any case; the first error is the one to tell.
+    let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
+    let recording = played?;
+    closed?;
+
+    let wanted = job.followed.as_ref().map(Followed::wanted);
+    if let Some(target) = &args.record {
+        let record = record_of(&recording, target, unit)?;
+        let column = format!("reference_{}", unit.suffix());
+        let extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
+        target.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
+    }
+    let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
+    let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let summary = Summary {
+        device,
+        rate_hz: recording.rate_hz,
+        samples: measured.len(),
+        segments: recording.segments.len(),
+        unit: unit.suffix(),
+        lowest_output: low,
+        highest_output: high,
+        tracking: wanted.map(|wanted| Tracking::of(wanted, &measured)).transpose()?,
+        compensation: job.followed.as_ref().map(Followed::compensation),
+        temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
+        log: args.log.as_ref().map(|path| path.display().to_string()),
+        record: args.record.as_ref().map(ToString::to_string),
+        symbol: unit.symbol(),
+    };
+    report.print(&summary.text(), &summary)
+}
+
+/// The device's unit, as records know it.
+fn unit_of(unit: hyst_hw::OutputUnit) -> OutputUnit {
+    match unit {
+        hyst_hw::OutputUnit::Micrometre => OutputUnit::Micrometre,
+        hyst_hw::OutputUnit::Nanometre => OutputUnit::Nanometre,
+        hyst_hw::OutputUnit::Millimetre => OutputUnit::Millimetre,
+        hyst_hw::OutputUnit::Newton => OutputUnit::Newton,
+    }
+}
+
+/// What was measured, without the ramps, as a record.
+fn record_of(recording: &Recording, target: &Target, unit: OutputUnit) -> CommandResult<Record> {
+    let samples = || recording.segments.iter().flat_map(|segment| &segment.samples);
+    let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
+    let columns = Columns {
+        name: target.to_string(),
+        segment: Some(labels.collect()),
+        time: recording.segments.iter().flat_map(|segment| times(&segment.samples)).collect(),
+        input: Some(samples().map(|s| s.drive_v).collect()),
+        output: Some((unit, samples().map(|s| s.output).collect())),
+        // All samples of a device have a channel, or none has.
+        temperature: samples().map(|s| s.temperature_degc).collect(),
+        load: samples().map(|s| s.load_n).collect(),
+        ..Columns::default()
+    };
+    Ok(Record::from_samples(columns)?)
+}
+
+/// Times of a segment, moved by less than a nanosecond so that the first one is a short number.
+fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
+    let first = samples.first().map_or(0.0, |sample| sample.time_s);
+    let shift = (first * 1e9).round() / 1e9 - first;
+    samples.iter().map(move |sample| sample.time_s + shift)
+}
+
+impl Tracking {
+    fn of(wanted: &[f64], measured: &[f64]) -> CommandResult<Self> {
+        let errors = Errors::of(wanted, measured, &vec![false; wanted.len()]).map_err(CommandError::failed)?;
+        Ok(Self { rmse: errors.rmse, nrmse_percent: errors.nrmse_percent, max_abs: errors.max_abs })
+    }
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let (short, unit) = (text::short, self.symbol);
+        let mut lines = vec![format!(
+            "{}: {} at {} Hz in {}, output {} to {} {unit}",
+            self.device,
+            text::count(self.samples, "sample"),
+            self.rate_hz,
+            text::count(self.segments, "segment"),
+            short(self.lowest_output),
+            short(self.highest_output)
+        )];
+        lines.extend(self.tracking.map(|t| {
+            let (rmse, share, most) = (short(t.rmse), text::percent(t.nrmse_percent), short(t.max_abs));
+            format!("tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}")
+        }));
+        lines.extend(self.compensation.as_ref().map(Compensation::text));
+        if self.temperature_followed {
+            lines.push("the drive was corrected by the measured temperature on the way".to_owned());
+        }
+        lines.extend(self.log.iter().map(|path| format!("log: {path}")));
+        lines.extend(self.record.iter().map(|path| format!("record: {path}")));
+        lines.join("\n")
+    }
+}

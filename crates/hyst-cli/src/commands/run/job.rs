@@ -1,0 +1,163 @@
+//! What a run plays: a drive as it stands, or the one that makes the output follow a reference.
+
+use std::path::Path;
+
+use hyst_hw::{Capabilities, RecordOptions};
+use hyst_ident::compensate::{Drive, compensate};
+use hyst_ident::model::Model;
+use hyst_ident::record::{Need, Record};
+
+use super::live::Live;
+use crate::cli::{RunArgs, VoltageLimits};
+use crate::commands::compensate::{Compensation, options};
+use crate::exit::{CommandError, CommandResult};
+use crate::input;
+
+/// Everything that has to be known before a device moves.
+#[derive(Debug)]
+pub(super) struct Job {
+    /// Voltages of each segment \[V\].
+    pub(super) segments: Vec<Vec<f64>>,
+    /// How they are played.
+    pub(super) options: RecordOptions,
+    /// What is followed, unless a drive is played as it stands.
+    pub(super) followed: Option<Followed>,
+}
+
+/// A reference, and the model that computes its drive.
+#[derive(Debug)]
+pub(super) struct Followed {
+    pub(super) model: Model,
+    /// The text of the model's file.
+    pub(super) json: String,
+    pub(super) reference: Record,
+    /// The drive as planned.
+    pub(super) drive: Drive,
+    /// The drive as it is corrected on the way, where the model needs a temperature that the device measures.
+    pub(super) live: Option<Live>,
+}
+
+impl Followed {
+    /// Wanted output, over all segments.
+    pub(super) fn wanted(&self) -> &[f64] {
+        self.reference.output().unwrap_or_default()
+    }
+
+    /// What there is to say about the drive that was played.
+    pub(super) fn compensation(&self) -> Compensation {
+        let drive = self.live.as_ref().map_or(&self.drive, Live::drive);
+        Compensation::new(&self.model, &self.reference, drive)
+    }
+}
+
+/// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
+const LIVE_BLOCK_S: f64 = 0.05;
+
+impl Job {
+    /// Reads the files that `args` names and computes the drive for a device that can do `device`.
+    pub(super) fn read(args: &RunArgs, device: &Capabilities) -> CommandResult<Self> {
+        let limits = limits(args, device)?;
+        match (&args.model, &args.reference, &args.drive) {
+            (Some(model), Some(reference), None) => Self::follow(args, device, model, reference, limits),
+            (None, None, Some(drive)) => Self::play(args, drive, limits),
+            _ => Err(CommandError::bad_input("give either --model and --reference, or --drive")),
+        }
+    }
+
+    fn follow(
+        args: &RunArgs,
+        device: &Capabilities,
+        model: &Path,
+        reference: &Path,
+        limits: VoltageLimits,
+    ) -> CommandResult<Self> {
+        let (model, json) = input::model(model)?;
+        let (driven, measured) = (&model.input.column, &model.output.column);
+        if driven != "voltage_v" {
+            let message = format!("the model's input is {driven}, but the device is driven by a voltage");
+            return Err(CommandError::bad_input(message));
+        }
+        if measured != device.output.column() {
+            let message =
+                format!("the model's output is {measured}, but the device measures {}", device.output.column());
+            return Err(CommandError::bad_input(message));
+        }
+        let reference = input::record(reference, &args.map.map, Need::Output)?;
+        let mut options = options(&args.limits);
+        // Not given, the limits are the model's, as far as the device goes along.
+        options.voltage = Some(match args.limits.limit {
+            Some(limit) => (limit.low, limit.high),
+            None => (limits.low.max(model.input.low), limits.high.min(model.input.high)),
+        });
+        let mut play = play_options(args, &reference);
+        // A temperature that is measured is followed; the plan starts from the one that the gain is stated for.
+        let measured = model.effects.temperature.filter(|_| device.temperature);
+        if let Some(gain) = measured {
+            options.temperature = Some(gain.reference_degc);
+            play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
+        }
+        let drive = compensate(&model, &reference, &options)?;
+        let live = measured.map(|_| Live::new(&model, &reference, &options)).transpose()?;
+        Ok(Self {
+            segments: split(&reference, &drive.voltage),
+            options: play,
+            followed: Some(Followed { model, json, reference, drive, live }),
+        })
+    }
+
+    fn play(args: &RunArgs, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
+        if args.limits.bandwidth.is_some() {
+            return Err(CommandError::bad_input(
+                "--bandwidth needs --model and --reference: a drive is played as it stands",
+            ));
+        }
+        let drive = input::record(path, &args.map.map, Need::Input)?;
+        let (file, column) = (path.display(), drive.input_column());
+        if column != "voltage_v" {
+            let message = format!(
+                "{file}: the input is {column}, but the device is driven by voltage_v; use --map if only its name differs"
+            );
+            return Err(CommandError::bad_input(message));
+        }
+        let (time, volts) = (drive.time(), drive.input());
+        if let Some(row) = volts.iter().position(|u| !(limits.low..=limits.high).contains(u)) {
+            let (t, u, VoltageLimits { low, high }) = (time[row], volts[row], limits);
+            let message = format!("{file}: at {t} s the drive is {u} V, outside {low} to {high} V; nothing was played");
+            return Err(CommandError::bad_input(message));
+        }
+        let slew = args.limits.slew.unwrap_or(f64::INFINITY);
+        // A drive that was limited to this slew has been printed and read since.
+        let step = slew * drive.sample_period() * (1.0 + 1e-6);
+        let steep = |row: &usize| (volts[row + 1] - volts[*row]).abs() > step;
+        if let Some(row) = drive.segments().iter().find_map(|s| (s.start..s.end - 1).find(steep)) {
+            let message =
+                format!("{file}: after {} s the drive is steeper than {slew} V/s; nothing was played", time[row]);
+            return Err(CommandError::bad_input(message));
+        }
+        Ok(Self { segments: split(&drive, volts), options: play_options(args, &drive), followed: None })
+    }
+}
+
+/// The voltages that may be applied: what the device can do, and no more than what the command line allows.
+fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits> {
+    let (low, high) = (device.voltage.min_v, device.voltage.max_v);
+    match args.limits.limit {
+        None => Ok(VoltageLimits { low, high }),
+        Some(limit) if limit.low >= low && limit.high <= high => Ok(limit),
+        Some(limit) => Err(CommandError::bad_input(format!(
+            "--limit {},{} goes beyond the device, which can do {low} to {high} V; give limits within that",
+            limit.low, limit.high
+        ))),
+    }
+}
+
+fn play_options(args: &RunArgs, record: &Record) -> RecordOptions {
+    let mut options = RecordOptions::at(1.0 / record.sample_period());
+    options.rest_s = args.rest;
+    options.slew_v_per_s = options.slew_v_per_s.min(args.limits.slew.unwrap_or(f64::INFINITY));
+    options
+}
+
+fn split(record: &Record, values: &[f64]) -> Vec<Vec<f64>> {
+    record.segments().iter().map(|rows| values[rows.clone()].to_vec()).collect()
+}

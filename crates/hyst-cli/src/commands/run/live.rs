@@ -1,0 +1,40 @@
+//! A drive that is corrected while it is played, by the temperature that is measured.
+
+use hyst_hw::Revision;
+use hyst_ident::compensate::{CompensateError, CompensateOptions, Drive, Follower};
+use hyst_ident::model::Model;
+use hyst_ident::record::Record;
+
+/// The drive of a model whose gain depends on a temperature that is only known while the device runs.
+#[derive(Debug)]
+pub(super) struct Live {
+    follower: Follower,
+    drive: Drive,
+}
+
+impl Live {
+    /// A drive for `reference` from its first row on.
+    pub(super) fn new(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Self, CompensateError> {
+        let follower = Follower::new(model, reference, options)?;
+        let drive = follower.stated();
+        Ok(Self { follower, drive })
+    }
+
+    /// Replaces what was planned for the next rows by what the newest temperature asks for.
+    pub(super) fn revise(&mut self, revision: &mut Revision<'_>) {
+        let temperature = revision.latest.and_then(|sample| sample.temperature_degc);
+        for volts in revision.drive_v.iter_mut() {
+            let limited = self.follower.next(temperature);
+            let row = self.drive.voltage.len();
+            *volts = limited.drive;
+            self.drive.voltage.push(limited.drive);
+            self.drive.voltage_limited.extend(limited.voltage.then_some(row));
+            self.drive.slew_limited.extend(limited.slew.then_some(row));
+        }
+    }
+
+    /// The drive as it was played so far.
+    pub(super) fn drive(&self) -> &Drive {
+        &self.drive
+    }
+}

@@ -1,0 +1,84 @@
+//! `simulate`: what a model says about a record.
+
+use hyst_ident::metrics::Errors;
+use hyst_ident::record::{Extra, Need};
+use hyst_ident::simulate::{Zero, simulate};
+use serde::Serialize;
+
+use crate::cli::SimulateArgs;
+use crate::exit::CommandResult;
+use crate::output::{self, Report, say};
+use crate::{input, text};
+
+/// What is said about a simulation.
+#[derive(Debug, Serialize)]
+struct Summary {
+    record: String,
+    output: String,
+    unit: String,
+    rows: usize,
+    settling_rows: usize,
+    zero: Zero,
+    /// Constant that was added for the record, with `--zero per-record`.
+    zeros: Vec<f64>,
+    /// None without a measured output.
+    errors: Option<Errors>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &SimulateArgs) -> CommandResult {
+    output::check(&[&args.model, &args.input], &[&args.output])?;
+    let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
+    let (model, _) = input::model(&args.model)?;
+    let predicted_column = input::output_unit(&model)?.predicted_column();
+    let record = input::record(&args.input, &args.map.map, Need::Input)?;
+    let zero = args.zero.get();
+    let simulated = simulate(&model, &record, zero)?;
+
+    let replaced = input::present(&args.input, &[&predicted_column, "settling"])?;
+    let extra =
+        [Extra::numbers(&predicted_column, &simulated.predicted), Extra::flags("settling", &simulated.settling)];
+    args.output.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
+    if !replaced.is_empty() {
+        say(&format!(
+            "note: {} has {} already; in the output this simulation stands in its place",
+            args.input.display(),
+            text::listed(&replaced)
+        ));
+    }
+    if zero == Zero::PerRecord && simulated.errors.is_none() {
+        say("note: without a measured output --zero per-record has no effect");
+    }
+    let summary = Summary {
+        record: args.input.display().to_string(),
+        output: args.output.to_string(),
+        unit: model.output.unit.clone(),
+        rows: record.rows(),
+        settling_rows: simulated.settling.iter().filter(|settling| **settling).count(),
+        zero,
+        zeros: simulated.zeros,
+        errors: simulated.errors,
+    };
+    report.print(&summary.text(), &summary)
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let unit = text::symbol(&self.unit);
+        let rows = text::count(self.rows, "row");
+        match &self.errors {
+            None => format!("{}: {rows}, no measured output to compare with", self.record),
+            Some(errors) => {
+                let mut text = format!("{}: {rows} ({} settling), ", self.record, self.settling_rows);
+                text.push_str(&text::errors(errors, unit));
+                for zero in &self.zeros {
+                    text.push_str(&format!(
+                        "\nsensor zero of the record: {} {unit} from the model's",
+                        text::short(*zero)
+                    ));
+                }
+                text
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! `demo`: the whole way on a simulated actuator whose effect nobody declared.
+//!
+//! Experiment → fit → diagnosis → extension → compensation → measured again. The identification is
+//! given what an engineer would have: the drive, the measured output, a temperature if the device has
+//! one. Only at the very end is the plant's file opened to compare.
+
+mod experiment;
+mod picture;
+mod tracking;
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use hyst_hw::{Plant, PlantConfig};
+use hyst_ident::atomic_file::write_atomic;
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
+use hyst_ident::excite::{Drive, Identification, Limits};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::metrics::Errors;
+use hyst_ident::model::{Effect, Kind, Model};
+use hyst_ident::record::Record;
+use hyst_ident::simulate::{Zero, simulate};
+
+use crate::cli::DemoArgs;
+use crate::exit::{CommandError, CommandResult};
+use crate::output::{self, Report};
+use crate::progress::Progress;
+use crate::text;
+
+/// Sample rate of the experiments \[Hz\].
+const RATE_HZ: f64 = 1000.0;
+/// Added to the seed for the test record's drive, so that it is another one.
+const TEST_SEED: u64 = 1 << 32;
+
+/// Runs the command.
+pub(crate) fn run(args: &DemoArgs) -> CommandResult {
+    let out = &args.out;
+    fs::create_dir_all(out)
+        .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
+    let progress = Progress::spinner("simulating an actuator");
+
+    // The plant's seed is the demo's: its effect is drawn from it and told to nobody.
+    let config = PlantConfig::random(args.seed);
+    let mut plant = Plant::new(config.clone()).map_err(CommandError::failed)?;
+    let limits =
+        Limits { rate_hz: RATE_HZ, lo_v: config.actuator.min_v, hi_v: config.actuator.max_v, slew_v_per_s: None };
+    let design = |seed: u64| -> CommandResult<Drive> { Ok(Identification::at_rate(RATE_HZ, seed).drive(&limits)?) };
+
+    progress.say("driving the identification experiment");
+    let train = experiment::record(&mut plant, &design(args.seed)?, "train.csv")?;
+    progress.say("driving a second experiment, for the test");
+    let test = experiment::record(&mut plant, &design(args.seed.wrapping_add(TEST_SEED))?, "test.csv")?;
+    write_record(out, "train.csv", &train)?;
+    write_record(out, "test.csv", &test)?;
+
+    progress.say("fitting Prandtl-Ishlinskii");
+    let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, zero_per_record: false })?;
+    let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
+    let diagnosis = diagnose(&train, Some(&test), &model, &options, &|what| progress.say(what))?;
+
+    progress.say("compensating a reference on the actuator");
+    let runs = tracking::track(&mut plant, &train, &model, &diagnosis.extended, out)?;
+
+    progress.say("drawing");
+    let before = simulate(&model, &test, Zero::None)?;
+    let after = simulate(&diagnosis.extended, &test, Zero::None)?;
+    let picture = picture::draw(&test, &before.predicted, &after.predicted, &runs, &diagnosis.findings)?;
+
+    write(out, "model.json", &model.to_json())?;
+    write(out, "extended.json", &diagnosis.extended.to_json())?;
+    write(out, "findings.json", &json(&diagnosis.findings)?)?;
+    write(out, "picture.svg", &picture)?;
+    write(out, "plant.toml", &config.to_toml().map_err(CommandError::failed)?)?;
+    drop(progress);
+
+    let story = Story { diagnosis: &diagnosis, model: &model, runs: &runs, config: &config };
+    Report::new(args.json.json, &[])?.print(&story.text(out), &story.summary())
+}
+
+fn json(value: &impl serde::Serialize) -> CommandResult<String> {
+    Ok(serde_json::to_string_pretty(value).map_err(io::Error::other)? + "\n")
+}
+
+fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
+    Ok(write_atomic(&folder.join(name), |out| out.write_all(content.as_bytes()))?)
+}
+
+fn write_record(folder: &Path, name: &str, record: &Record) -> CommandResult {
+    Ok(write_atomic(&folder.join(name), |out| record.write_csv(out).map_err(output::io_error))?)
+}
+
+/// What is told at the end.
+struct Story<'a> {
+    diagnosis: &'a Diagnosis,
+    model: &'a Model,
+    runs: &'a tracking::Runs,
+    config: &'a PlantConfig,
+}
+
+impl Story<'_> {
+    fn text(&self, out: &Path) -> String {
+        let f = &self.diagnosis.findings;
+        let unit = text::symbol(&f.unit);
+        let mut lines = Vec::new();
+        let error = |e: Option<Errors>| {
+            e.map_or_else(String::new, |e| {
+                format!("{} {unit} ({})", text::short(e.rmse), text::percent(e.nrmse_percent))
+            })
+        };
+        lines.push(format!(
+            "fit          {} on {} rows: test error {}",
+            self.model.base.kind(),
+            self.model.fitted_on.iter().map(|f| f.rows).sum::<usize>(),
+            error(f.before.test)
+        ));
+        for effect in &f.effects {
+            lines.push(format!("found        {}: {}", effect.name, effect.evidence.join("; ")));
+            for other in effect.alternatives.iter().filter(|a| a.indistinguishable) {
+                lines.push(format!("             the record does not tell it from {}", other.name));
+            }
+        }
+        if f.effects.is_empty() {
+            lines.push(format!("found        no effect ({})", verdict(f.verdict)));
+        }
+        lines.push(format!("extended     test error {} → {}", error(f.before.test), error(f.after.test)));
+        lines.push(format!("left         {}", f.remainder.description));
+        lines.push(format!(
+            "tracking     RMS error on the actuator: plain gain {}, base inverse {}, extended inverse {} {unit}",
+            text::short(self.runs.plain.rmse),
+            text::short(self.runs.base.rmse),
+            text::short(self.runs.extended.rmse)
+        ));
+        lines.push(format!(
+            "             {:.1} times better than the plain gain, {:.2} times than the base inverse",
+            self.runs.plain.rmse / self.runs.extended.rmse,
+            self.runs.base.rmse / self.runs.extended.rmse
+        ));
+        let sensor: Vec<&str> =
+            f.effects.iter().map(|e| e.name).filter(|e| !e.acts_on_the_motion()).map(Effect::name).collect();
+        if !sensor.is_empty() {
+            lines.push(format!("             {} is in the sensor, not in the motion: taken out of all three errors, not driven against", text::listed(&sensor)));
+        }
+        let (truth, named) = (self.truth(), self.named());
+        let word = if truth == named { "as named" } else { "NOT as named" };
+        lines.push(format!(
+            "the plant    had {}: {word}",
+            if truth.is_empty() { "no effect".into() } else { text::listed(&truth) }
+        ));
+        lines.push(format!("written      {}", out.display()));
+        lines.join("\n")
+    }
+
+    fn truth(&self) -> Vec<&'static str> {
+        let mut names = self.config.effects();
+        names.sort_unstable();
+        names
+    }
+
+    fn named(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> = self.diagnosis.findings.effects.iter().map(|e| e.name.name()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    fn summary(&self) -> serde_json::Value {
+        let f = &self.diagnosis.findings;
+        serde_json::json!({
+            "named": self.named(),
+            "switched_on": self.truth(),
+            "verdict": f.verdict,
+            "unit": f.unit,
+            "test": { "before": f.before.test, "after": f.after.test },
+            "tracking_rmse": { "plain_gain": self.runs.plain.rmse, "base_inverse": self.runs.base.rmse, "extended_inverse": self.runs.extended.rmse },
+            "tracking_max_abs": { "plain_gain": self.runs.plain.max_abs, "base_inverse": self.runs.base.max_abs, "extended_inverse": self.runs.extended.max_abs },
+        })
+    }
+}
+
+fn verdict(v: Verdict) -> &'static str {
+    match v {
+        Verdict::Explained => "explained",
+        Verdict::NothingMissing => "the model is at the noise floor",
+        Verdict::BaseTooCoarse => "the base is too coarse",
+        Verdict::Unexplained => "something is left that nothing on the list explains",
+    }
+}

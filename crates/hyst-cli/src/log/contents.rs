@@ -1,0 +1,148 @@
+//! What stands in a log: the run, its samples and their schema.
+
+use std::collections::BTreeMap;
+
+use hyst_hw::Phase;
+use hyst_ident::model::{Effect, Model};
+use hyst_ident::record::OutputUnit;
+use serde::{Serialize, Serializer};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+
+/// What a log says about the whole run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RunInfo<'a> {
+    /// What the device calls itself.
+    pub(crate) device: &'a str,
+    /// Unit of output, reference and error.
+    pub(crate) output: OutputUnit,
+    /// Samples per second \[Hz\].
+    pub(crate) sample_rate_hz: f64,
+    /// The model that computed the drive, if one did.
+    pub(crate) model: Option<LoggedModel<'a>>,
+}
+
+/// A model and the text of its file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LoggedModel<'a> {
+    /// The model.
+    pub(crate) model: &'a Model,
+    /// Its file's text.
+    pub(crate) json: &'a str,
+}
+
+/// One sample of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct LoggedSample {
+    /// Lab clock \[s\].
+    pub(crate) time_s: f64,
+    /// Segment, from 0.
+    pub(crate) segment: usize,
+    /// What the sample is part of.
+    #[serde(serialize_with = "phase_name")]
+    pub(crate) phase: Phase,
+    /// Voltage that was applied \[V\].
+    pub(crate) drive_v: f64,
+    /// Measured output \[output unit\].
+    pub(crate) output: f64,
+    /// Wanted output \[output unit\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) reference: Option<f64>,
+    /// Output minus reference \[output unit\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) error: Option<f64>,
+    /// Temperature \[°C\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) temperature_degc: Option<f64>,
+    /// Load \[N\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) load_n: Option<f64>,
+}
+
+fn phase_name<S: Serializer>(phase: &Phase, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(match phase {
+        Phase::Approach => "approach",
+        Phase::Record => "record",
+        Phase::Retreat => "retreat",
+    })
+}
+
+impl LoggedSample {
+    /// A sample as measured; `reference` is what was wanted then, if anything was.
+    pub(crate) fn new(segment: usize, phase: Phase, sample: &hyst_hw::Sample, reference: Option<f64>) -> Self {
+        Self {
+            time_s: sample.time_s,
+            segment,
+            phase,
+            drive_v: sample.drive_v,
+            output: sample.output,
+            reference,
+            error: reference.map(|wanted| sample.output - wanted),
+            temperature_degc: sample.temperature_degc,
+            load_n: sample.load_n,
+        }
+    }
+}
+
+/// What ran, as text by key.
+pub(super) fn metadata(info: &RunInfo<'_>) -> BTreeMap<String, String> {
+    let mut entries = BTreeMap::from(
+        [
+            ("program", "hystctl"),
+            ("version", env!("CARGO_PKG_VERSION")),
+            ("device", info.device),
+            ("output_column", info.output.column()),
+            ("unit", info.output.symbol()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value.to_owned())),
+    );
+    entries.insert("sample_rate_hz".to_owned(), info.sample_rate_hz.to_string());
+    if let Some(LoggedModel { model, json }) = info.model {
+        entries.insert("model_kind".to_owned(), model.base.kind().to_string());
+        let effects: Vec<&str> = model.effects.names().into_iter().map(Effect::name).collect();
+        entries.insert("model_effects".to_owned(), effects.join(","));
+        entries.insert("model_sha256".to_owned(), format!("{:x}", Sha256::digest(json)));
+    }
+    entries
+}
+
+/// The JSON schema of [`LoggedSample`].
+pub(super) fn schema(unit: &str) -> serde_json::Value {
+    let number = |description: String| json!({ "type": "number", "description": description });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "hyst.actuator.Sample",
+        "description": "One sample of an actuator: what was applied, what was measured and what was wanted",
+        "type": "object",
+        "properties": {
+            "time_s": number("Time of the lab's clock [s]".to_owned()),
+            "segment": { "type": "integer", "description": "Segment, from 0; the device rests between segments" },
+            "phase": {
+                "type": "string",
+                "enum": ["approach", "record", "retreat"],
+                "description": "approach: ramp to the first value; record: the drive; retreat: ramp to rest"
+            },
+            "drive_v": number("Voltage that was applied [V]".to_owned()),
+            "output": number(format!("Measured output [{unit}]")),
+            "reference": number(format!("Wanted output [{unit}]; only in a record that follows a reference")),
+            "error": number(format!("Output minus reference [{unit}]")),
+            "temperature_degc": number("Temperature [degC], where it is measured".to_owned()),
+            "load_n": number("Load [N], where it is measured".to_owned())
+        },
+        "required": ["time_s", "segment", "phase", "drive_v", "output"]
+    })
+}
+
+/// The unit of every field, by `unit.FIELD`.
+pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
+    let fields = [
+        ("time_s", "s"),
+        ("drive_v", "V"),
+        ("output", unit),
+        ("reference", unit),
+        ("error", unit),
+        ("temperature_degc", "degC"),
+        ("load_n", "N"),
+    ];
+    fields.into_iter().map(|(field, unit)| (format!("unit.{field}"), unit.to_owned())).collect()
+}

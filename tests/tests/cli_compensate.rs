@@ -1,0 +1,127 @@
+//! `compensate`: the drive, its limits, and what is said about them.
+
+use hyst_tests::{Lab, column};
+
+fn lab() -> Lab {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 2.0, 12.0);
+    lab
+}
+
+#[test]
+fn the_drive_stands_beside_the_reference() {
+    let lab = lab();
+    let ran = lab.ok("compensate --model model.json reference.csv -o drive.csv");
+    assert_eq!(ran.stdout, "");
+    for part in ["1000 rows", "limited by voltage in 0 rows, by slew in 0 rows", "lead 0 samples"] {
+        assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
+    }
+    let (reference, drive) = (lab.read("reference.csv"), lab.read("drive.csv"));
+    assert_eq!(drive.lines().next(), Some("time_s,displacement_um,voltage_v"));
+    assert!(reference.lines().zip(drive.lines()).all(|(before, after)| after.starts_with(before)));
+    // The model itself follows: what it predicts for the drive is the reference.
+    lab.ok("simulate --model model.json drive.csv -o check.csv");
+    let check = lab.read("check.csv");
+    let (wanted, predicted) = (column(&check, "displacement_um"), column(&check, "predicted_um"));
+    assert!(wanted.iter().zip(&predicted).all(|(y, p)| (y - p).abs() < 1e-6));
+}
+
+#[test]
+fn limits_are_kept_and_reported() {
+    let lab = lab();
+    let report = lab.ok("compensate --model model.json reference.csv -o drive.csv --limit 0,50 --json").json();
+    let volts = column(&lab.read("drive.csv"), "voltage_v");
+    assert!(volts.iter().all(|u| (0.0..=50.0).contains(u)));
+    let limited = report["voltage_limited_rows"].as_u64().unwrap();
+    assert!(limited > 0 && report["highest"] == 50.0, "{report}");
+
+    let report = lab.ok("compensate --model model.json reference.csv -o drive.csv --slew 120 --json").json();
+    let volts = column(&lab.read("drive.csv"), "voltage_v");
+    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() <= 120.0 / 500.0 + 1e-9));
+    assert!(report["slew_limited_rows"].as_u64().unwrap() > 0, "{report}");
+
+    let ran = lab.ok("compensate --model model.json reference.csv -o drive.csv --limit 0,50");
+    assert!(ran.stderr.contains(&format!("limited by voltage in {limited} rows")), "{}", ran.stderr);
+    assert!(ran.stderr.contains("cannot follow"), "{}", ran.stderr);
+}
+
+#[test]
+fn voltage_limits_hold_from_the_first_row_whatever_the_slew() {
+    let lab = lab();
+    lab.ok("compensate --model model.json reference.csv -o drive.csv --limit 20,50 --slew 200");
+    let volts = column(&lab.read("drive.csv"), "voltage_v");
+    assert!(volts.iter().all(|u| (20.0..=50.0).contains(u)), "{:?}", &volts[..5]);
+}
+
+#[test]
+fn references_out_of_reach_are_refused() {
+    let lab = lab();
+    lab.reference("far.csv", 1.0, 400.0);
+    let message = lab.refuses("compensate --model model.json far.csv -o drive.csv", 2);
+    for part in ["far.csv", "row", "time", "um", "scale or shift"] {
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+    lab.write("nothing.csv", "time_s,voltage_v\n0,1\n0.002,2\n");
+    let message = lab.refuses("compensate --model model.json nothing.csv -o drive.csv", 2);
+    assert!(message.contains("nothing.csv, line 1"), "{message}");
+    lab.write("other.csv", lab.read("reference.csv").replace("displacement_um", "displacement_mm"));
+    let message = lab.refuses("compensate --model model.json other.csv -o drive.csv", 2);
+    assert!(message.contains("displacement_um"), "{message}");
+}
+
+#[test]
+fn options_out_of_range_are_refused() {
+    let lab = lab();
+    for options in ["--limit 50,0", "--limit 50", "--slew 0", "--slew -5", "--bandwidth 0", "--limit 0,nan"] {
+        lab.refuses(&format!("compensate --model model.json reference.csv -o drive.csv {options}"), 2);
+    }
+    lab.refuses("compensate --model model.json reference.csv -o - --json", 2);
+    lab.refuses("compensate --model model.json reference.csv -o reference.csv", 2);
+    lab.refuses("compensate --model model.json reference.csv -o model.json", 2);
+}
+
+#[test]
+fn a_drive_in_the_reference_is_replaced_in_the_copy_alone() {
+    let lab = lab();
+    let before = lab.read("train.csv");
+    let ran = lab.ok("compensate --model model.json train.csv -o drive.csv");
+    assert!(ran.stderr.contains("train.csv has voltage_v already"), "{}", ran.stderr);
+    assert_eq!(lab.read("train.csv"), before);
+    let drive = lab.read("drive.csv");
+    assert_eq!(drive.lines().next(), Some("segment,time_s,displacement_um,voltage_v"));
+    assert_ne!(column(&drive, "voltage_v"), column(&before, "voltage_v"));
+}
+
+#[test]
+fn a_dash_sends_the_drive_to_stdout() {
+    let lab = lab();
+    lab.ok("compensate --model model.json reference.csv -o drive.csv");
+    assert_eq!(lab.ok("compensate --model model.json reference.csv -o -").stdout, lab.read("drive.csv"));
+}
+
+#[test]
+fn what_is_in_the_sensor_is_not_driven_against() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    let drift = r#"{ "stage": "drift", "per_second": 0.02, "units": { "per_second": "um/s" } }"#;
+    let end = model.rfind(']').unwrap();
+    lab.write("drift.json", format!("{},{drift}{}", model[..end].trim_end(), &model[end..]));
+    let ran = lab.ok("compensate --model drift.json reference.csv -o drive.csv");
+    assert!(ran.stderr.contains("drift is in the sensor"), "{}", ran.stderr);
+    let report = lab.ok("compensate --model drift.json reference.csv -o drift.csv --json").json();
+    assert_eq!(report["not_compensated"], serde_json::json!(["drift"]));
+    lab.ok("compensate --model model.json reference.csv -o plain.csv");
+    assert_eq!(lab.read("plain.csv"), lab.read("drift.csv"));
+}
+
+#[test]
+fn lead_and_bandwidth_are_stated() {
+    let lab = lab();
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    let report = lab.ok("compensate --model extended.json reference.csv -o drive.csv --json").json();
+    assert!(report["lead_samples"].as_u64().unwrap() > 0, "{report}");
+    let band = report["bandwidth_hz"].as_f64().unwrap();
+    assert!(band > 0.0 && report["band_error"].as_f64().unwrap() < 0.1, "{report}");
+    let narrow = lab.ok("compensate --model extended.json reference.csv -o drive.csv --bandwidth 20 --json").json();
+    assert!(narrow["bandwidth_hz"].as_f64().unwrap() <= band, "{narrow}");
+}

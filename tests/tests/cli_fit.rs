@@ -1,0 +1,114 @@
+//! `fit`: what it writes, what it says, and what it leaves alone.
+
+use hyst_tests::{Lab, column, data};
+use serde_json::Value;
+
+#[test]
+fn a_model_is_written_and_told_about() {
+    let lab = Lab::with_train("");
+    for kind in ["pi", "preisach"] {
+        let ran = lab.ok(&format!("fit train.csv --model {kind} -o {kind}.json"));
+        for part in [kind, "1769 rows", "RMSE", "µm", "% of span"] {
+            assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
+        }
+        assert_eq!(ran.stderr, "");
+        let model: Value = serde_json::from_str(&lab.read(&format!("{kind}.json"))).unwrap();
+        assert_eq!(model["schema"], "hyst.model/1");
+        assert_eq!(model["kind"], kind);
+        assert_eq!(model["fitted_on"][0]["file"], "train.csv");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let lab = Lab::with_train("");
+    for kind in ["pi", "preisach"] {
+        lab.ok(&format!("fit train.csv --model {kind} --seed 7 -o a.json"));
+        lab.ok(&format!("fit train.csv --model {kind} --seed 7 -o b.json"));
+        assert_eq!(lab.read("a.json"), lab.read("b.json"));
+        lab.ok(&format!("fit train.csv --model {kind} --seed 8 -o b.json"));
+        assert_eq!(lab.read("a.json").replace("\"seed\": 7", "\"seed\": 8"), lab.read("b.json"));
+    }
+}
+
+#[test]
+fn the_report_as_json_agrees_with_a_simulation() {
+    let lab = Lab::with_train("");
+    let report = lab.ok("fit train.csv --model pi -o model.json --json").json();
+    assert_eq!(report["rows"], 1769);
+    assert_eq!(report["unit"], "um");
+    assert!(report["base"]["p0"].as_f64().unwrap() > 0.0);
+    let simulated = lab.ok("simulate --model model.json train.csv -o out.csv --json").json();
+    assert_eq!(report["errors"], simulated["errors"]);
+    assert_eq!(report["settling_rows"], simulated["settling_rows"]);
+}
+
+#[test]
+fn a_dash_sends_the_model_to_stdout_and_the_report_to_stderr() {
+    let lab = Lab::with_train("");
+    let ran = lab.ok("fit train.csv --model pi -o -");
+    assert_eq!(ran.json()["kind"], "pi");
+    assert!(ran.stderr.contains("RMSE"), "{}", ran.stderr);
+    let message = lab.refuses("fit train.csv --model pi -o - --json", 2);
+    assert!(message.contains("--json"), "{message}");
+}
+
+#[test]
+fn columns_go_by_other_names() {
+    let lab = Lab::with_train("");
+    lab.ok("fit train.csv --model pi -o a.json");
+    lab.write("other.csv", lab.read("train.csv").replace("voltage_v,displacement_um", "Vin,pos"));
+    lab.ok("fit other.csv --model pi --map voltage_v=Vin --map displacement_um=pos -o b.json");
+    let stages = |name: &str| serde_json::from_str::<Value>(&lab.read(name)).unwrap()["stages"].clone();
+    assert_eq!(stages("a.json"), stages("b.json"));
+}
+
+#[test]
+fn several_records_are_fitted_as_one() {
+    let lab = Lab::with_train("");
+    // The same record behind another zero: one zero for each file takes that out.
+    let train = lab.read("train.csv");
+    let volts = column(&train, "voltage_v");
+    let moved: Vec<f64> = column(&train, "displacement_um").iter().map(|y| y + 5.0).collect();
+    let mut text = String::from("segment,time_s,voltage_v,displacement_um\n");
+    let (labels, times) = (column(&train, "segment"), column(&train, "time_s"));
+    for k in 0..volts.len() {
+        text.push_str(&format!("{},{:.3},{},{}\n", labels[k], times[k], volts[k], moved[k]));
+    }
+    lab.write("moved.csv", text);
+    let fit = |options: &str| {
+        let report = lab.ok(&format!("fit train.csv moved.csv --model pi -o m.json --json {options}")).json();
+        assert_eq!(report["rows"], 2 * 1769);
+        report["errors"]["rmse"].as_f64().unwrap()
+    };
+    let (one, own) = (fit(""), fit("--zero per-record"));
+    assert!((own * own + 2.5 * 2.5).sqrt() < 1.05 * one, "{own} {one}");
+}
+
+#[test]
+fn inputs_are_never_overwritten() {
+    let lab = Lab::with_train("");
+    for output in ["train.csv", "./train.csv"] {
+        let message = lab.refuses(&format!("fit train.csv --model pi -o {output}"), 2);
+        assert!(message.contains("read by the same command"), "{message}");
+    }
+    let message = lab.refuses("fit train.csv --model pi -o absent/model.json", 2);
+    assert!(message.contains("absent/model.json") && message.contains("does not exist"), "{message}");
+}
+
+#[test]
+fn a_failure_leaves_the_older_model() {
+    let lab = Lab::with_model();
+    lab.write("bad.csv", "time_s,voltage_v,displacement_um\n0,1,x\n");
+    lab.refuses("fit bad.csv --model pi -o model.json", 2);
+}
+
+#[test]
+fn measured_records_are_fitted() {
+    let Some(data) = data() else { return };
+    let lab = Lab::new();
+    let train = data.join("measured/micromanipulator-train.csv");
+    let report = lab.ok(&format!("fit {} --model preisach -o model.json --json", train.display())).json();
+    assert!(report["errors"]["nrmse_percent"].as_f64().unwrap() < 2.0, "{report}");
+    assert_eq!(report["rows"], 8027);
+}

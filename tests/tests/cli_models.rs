@@ -1,0 +1,77 @@
+//! Model files that cannot be used: every command says so, and writes nothing.
+
+use hyst_tests::Lab;
+
+/// Every command that reads a model refuses this one with a message that holds all of `parts`.
+#[track_caller]
+fn refused(lab: &Lab, content: &str, parts: &[&str]) {
+    lab.write("bad.json", content);
+    for line in [
+        "simulate --model bad.json train.csv -o out.csv",
+        "simulate --model bad.json train.csv",
+        "diagnose train.csv --model bad.json -o out.json --findings findings.json",
+        "compensate --model bad.json reference.csv -o drive.csv",
+        "run --daq sim:plant.toml --model bad.json --reference reference.csv --log run.mcap --record out.csv",
+    ] {
+        let message = lab.refuses(line, 2);
+        for part in parts.iter().chain(&["bad.json"]) {
+            assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+        }
+    }
+}
+
+fn lab() -> Lab {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 1.0, 12.0);
+    lab
+}
+
+#[test]
+fn files_that_are_no_models() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    refused(&lab, "", &["truncated"]);
+    refused(&lab, &model[..model.len() / 2], &["line", "column", "truncated"]);
+    refused(&lab, &model[..model.len() - 3], &["truncated"]);
+    refused(&lab, "time_s,voltage_v\n0,1\n", &["line 1"]);
+    refused(&lab, "[1, 2]", &["bad.json"]);
+    refused(&lab, "{}", &["hyst.model/1"]);
+}
+
+#[test]
+fn models_of_another_schema() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    refused(&lab, &model.replace("hyst.model/1", "hyst.model/2"), &["hyst.model/2", "update hystctl"]);
+    refused(&lab, &model.replace("hyst.model/1", "hyst.findings/1"), &["hyst.findings/1", "model.json"]);
+}
+
+#[test]
+fn parameters_that_are_no_numbers() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    let gain = model.lines().find(|line| line.trim_start().starts_with("\"gain\": ") && !line.contains('V')).unwrap();
+    refused(&lab, &model.replace(gain, "      \"gain\": null,"), &["line"]);
+    refused(&lab, &model.replace(gain, "      \"gain\": NaN,"), &["line"]);
+    refused(&lab, &model.replace(gain, "      \"gain\": 1e999,"), &["line"]);
+    refused(&lab, &model.replace(gain, "      \"gain\": \"high\","), &["line"]);
+    let zero = model.lines().find(|line| line.trim_start().starts_with("\"zero\": ")).unwrap();
+    refused(&lab, &model.replace(zero, "  \"zero\": null,"), &["line"]);
+}
+
+#[test]
+fn stages_that_make_no_chain() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    let list = model.find("\"stages\"").unwrap();
+    refused(&lab, &format!("{}\"stages\": []\n}}\n", &model[..list]), &["no hysteresis stage"]);
+    refused(&lab, &model.replace("\"kind\": \"pi\"", "\"kind\": \"preisach\""), &["preisach"]);
+    refused(&lab, &model.replace("\"stage\": \"pi\"", "\"stage\": \"magic\""), &["line"]);
+}
+
+#[test]
+fn a_model_that_is_not_there() {
+    let lab = lab();
+    let message = lab.refuses("simulate --model absent.json train.csv -o out.csv", 2);
+    assert!(message.contains("absent.json"), "{message}");
+}

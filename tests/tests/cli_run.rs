@@ -1,0 +1,230 @@
+//! `run`: on the simulated plant, with its log and its record.
+
+use std::fs;
+
+use hyst_tests::{Lab, WARM, column};
+use serde_json::Value;
+
+/// All messages of a log, after a look at what stands around them.
+fn log(lab: &Lab, name: &str) -> Vec<Value> {
+    let bytes = fs::read(lab.path(name)).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().expect("the log has a summary");
+    let channel = summary.channels.values().next().unwrap();
+    assert_eq!((channel.topic.as_str(), channel.message_encoding.as_str()), ("/actuator/sample", "json"));
+    assert_eq!(channel.metadata["unit.output"], "µm");
+    let schema = channel.schema.as_ref().unwrap();
+    assert_eq!(schema.encoding, "jsonschema");
+    let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+    assert_eq!(schema["type"], "object");
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let mut time = 0;
+    messages
+        .map(|message| {
+            assert!(message.log_time > time, "log time goes on");
+            time = message.log_time;
+            let sample: Value = serde_json::from_slice(&message.data).unwrap();
+            let seconds = sample["time_s"].as_f64().unwrap();
+            assert!((seconds - message.log_time as f64 * 1e-9).abs() < 1e-6);
+            for field in sample.as_object().unwrap().keys() {
+                assert!(schema["properties"][field].is_object(), "{field} is not in the schema");
+            }
+            sample
+        })
+        .collect()
+}
+
+#[test]
+fn from_a_drive_to_a_record_that_is_fitted() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    lab.excite("u.csv", 1);
+    let ran = lab.ok("run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap");
+    assert!(ran.stdout.contains("simulated plant") && ran.stdout.contains("6 segments"), "{}", ran.stdout);
+    let (drive, record) = (lab.read("u.csv"), lab.read("train.csv"));
+    assert_eq!(record.lines().next(), Some("segment,time_s,voltage_v,displacement_um"));
+    assert_eq!(column(&drive, "voltage_v"), column(&record, "voltage_v"));
+    assert_eq!(column(&drive, "segment"), column(&record, "segment"));
+    lab.ok("fit train.csv --model preisach -o model.json");
+
+    let samples = log(&lab, "run.mcap");
+    let recorded: Vec<&Value> = samples.iter().filter(|sample| sample["phase"] == "record").collect();
+    let outputs: Vec<f64> = recorded.iter().map(|sample| sample["output"].as_f64().unwrap()).collect();
+    assert_eq!(outputs, column(&record, "displacement_um"));
+    assert!(recorded.iter().all(|sample| sample.get("reference").is_none()));
+}
+
+#[test]
+fn a_reference_is_followed_and_logged() {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 2.5, 12.0);
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    let follow = "run --daq sim:plant.toml --reference reference.csv";
+    let report = lab.ok(&format!("{follow} --model extended.json --log run.mcap --record out.csv --json")).json();
+    let out = lab.read("out.csv");
+    let (measured, wanted) = (column(&out, "displacement_um"), column(&out, "reference_um"));
+    assert_eq!(wanted, column(&lab.read("reference.csv"), "displacement_um"));
+    let squares: f64 = measured.iter().zip(&wanted).map(|(y, r)| (y - r).powi(2)).sum();
+    let rmse = (squares / wanted.len() as f64).sqrt();
+    let tracking = &report["tracking"];
+    assert!((tracking["rmse"].as_f64().unwrap() / rmse - 1.0).abs() < 1e-9, "{report}");
+    assert!(tracking["nrmse_percent"].as_f64().unwrap() < 5.0, "{report}");
+    let plain = lab.ok(&format!("{follow} --model model.json --json")).json();
+    let better = plain["tracking"]["rmse"].as_f64().unwrap() / rmse;
+    assert!(better > 1.5, "the extended model tracks {better} times better");
+
+    let samples = log(&lab, "run.mcap");
+    assert_eq!(report["log"], "run.mcap");
+    let recorded: Vec<&Value> = samples.iter().filter(|sample| sample["phase"] == "record").collect();
+    assert_eq!(recorded.len(), wanted.len());
+    for (sample, wanted) in recorded.iter().zip(&wanted) {
+        assert_eq!(sample["reference"].as_f64(), Some(*wanted));
+        let error = sample["output"].as_f64().unwrap() - wanted;
+        assert!((sample["error"].as_f64().unwrap() - error).abs() < 1e-12);
+    }
+    // Ramps to the first voltage and back to rest are in the log and not in the record.
+    assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
+    assert_eq!(samples.last().unwrap()["phase"], "retreat");
+    assert_eq!(samples.last().unwrap()["drive_v"], 0.0);
+
+    let bytes = fs::read(lab.path("run.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    assert_eq!(attachment.name, "model.json");
+    assert_eq!(attachment.data, lab.read("extended.json").into_bytes());
+    let metadata = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap().metadata;
+    assert_eq!((metadata["unit"].as_str(), metadata["model_kind"].as_str()), ("µm", "pi"));
+    assert_eq!(metadata["sample_rate_hz"], "500");
+    assert_eq!(metadata["model_sha256"].len(), 64);
+}
+
+#[test]
+fn a_measured_temperature_is_followed() {
+    let lab = Lab::with_train(WARM);
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    lab.reference("reference.csv", 3.0, 12.0);
+    let follow = |model: &str| {
+        let line =
+            format!("run --daq sim:plant.toml --model {model} --reference reference.csv --record out.csv --json");
+        lab.ok(&line).json()
+    };
+    let (warm, plain) = (follow("extended.json"), follow("model.json"));
+    assert_eq!(
+        (&warm["temperature_followed"], &plain["temperature_followed"]),
+        (&Value::Bool(true), &Value::Bool(false))
+    );
+    assert!(lab.read("out.csv").lines().next().unwrap().contains("temperature_degc"));
+    let rmse = |report: &Value| report["tracking"]["rmse"].as_f64().unwrap();
+    assert!(rmse(&warm) < 0.7 * rmse(&plain), "{} {}", rmse(&warm), rmse(&plain));
+}
+
+#[test]
+fn drives_beyond_the_limits_are_refused() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    lab.ok("excite sine --rate 500 --high 130 --cycles 1 -o high.csv");
+    lab.ok("excite sine --rate 500 --high 90 --cycles 1 -o fine.csv");
+    let run = "run --daq sim:plant.toml --record out.csv --log run.mcap --drive";
+    let message = lab.refuses(&format!("{run} high.csv"), 2);
+    for part in ["high.csv", "outside 0 to 100 V", "nothing was played"] {
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+    let message = lab.refuses(&format!("{run} fine.csv --limit 0,80"), 2);
+    assert!(message.contains("outside 0 to 80 V"), "{message}");
+    let message = lab.refuses(&format!("{run} fine.csv --limit 0,120"), 2);
+    assert!(message.contains("beyond the device"), "{message}");
+    let message = lab.refuses(&format!("{run} fine.csv --slew 100"), 2);
+    assert!(message.contains("steeper than 100 V/s"), "{message}");
+    lab.ok(&format!("{run} fine.csv --limit 0,95 --slew 1000"));
+}
+
+#[test]
+fn the_limits_of_a_reference_are_kept() {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 1.0, 12.0);
+    let follow = "run --daq sim:plant.toml --model model.json --reference reference.csv --record out.csv --json";
+    let report = lab.ok(&format!("{follow} --limit 0,40")).json();
+    assert!(report["compensation"]["voltage_limited_rows"].as_u64().unwrap() > 0, "{report}");
+    assert!(column(&lab.read("out.csv"), "voltage_v").iter().all(|u| (0.0..=40.0).contains(u)));
+    lab.refuses(&format!("{follow} --limit -10,40"), 2);
+}
+
+#[test]
+fn other_devices_are_not_there_yet() {
+    let lab = Lab::with_model();
+    for device in ["serial:/dev/ttyACM0", "slcan:/dev/ttyACM0", "can:can0"] {
+        let message = lab.refuses(&format!("run --daq {device} --drive u.csv --record out.csv"), 2);
+        assert!(message.contains("sim:PLANT.toml"), "{message}");
+    }
+    lab.refuses("run --daq plant.toml --drive u.csv --record out.csv", 2);
+    let message = lab.refuses("run --daq sim:absent.toml --drive u.csv --record out.csv", 2);
+    assert!(message.contains("absent.toml"), "{message}");
+    lab.write("odd.toml", hyst_tests::PLANT.replace("loop_share", "loop_shape"));
+    let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+    assert!(message.contains("odd.toml") && message.contains("loop_shape"), "{message}");
+}
+
+#[test]
+fn arguments_have_to_make_sense_together() {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 1.0, 12.0);
+    for (line, part) in [
+        ("--drive u.csv", "--record"),
+        ("--record out.csv", "--reference"),
+        ("--reference reference.csv --record out.csv", "--model"),
+        ("--model model.json --record out.csv", "--reference"),
+        ("--model model.json --reference reference.csv --drive u.csv --record out.csv", "--drive"),
+        ("--drive u.csv --record out.csv --bandwidth 10", "--bandwidth"),
+        ("--drive u.csv --record u.csv", "read by the same command"),
+        ("--drive u.csv --log plant.toml", "read by the same command"),
+        ("--drive u.csv --record out.csv --log out.csv", "two outputs"),
+        ("--drive train.csv --record out.csv --rest -1", "--rest"),
+        ("--drive reference.csv --record out.csv", "reference.csv, line 1"),
+    ] {
+        let message = lab.refuses(&format!("run --daq sim:plant.toml {line}"), 2);
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+    lab.write("fast.csv", "time_s,voltage_v\n0,0\n0.00001,1\n0.00002,0\n");
+    let message = lab.refuses("run --daq sim:plant.toml --drive fast.csv --record out.csv --log run.mcap", 2);
+    assert!(message.contains("100000 Hz"), "{message}");
+}
+
+#[test]
+fn what_was_measured_before_a_failure_is_in_the_log() {
+    let lab = Lab::new();
+    // The sensor runs into its end on the way up.
+    lab.write("plant.toml", hyst_tests::PLANT.replace("[-10, 40]", "[-1, 10]"));
+    lab.ok("excite sine --rate 500 --high 100 --cycles 2 -o u.csv");
+    let ran = lab.run("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("error: ") && ran.stderr.contains("sensor.range_um"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("can be read in run.mcap"), "{}", ran.stderr);
+    assert_eq!(lab.files(), ["plant.toml", "run.mcap", "u.csv"]);
+    let samples = log(&lab, "run.mcap");
+    assert!(!samples.is_empty() && samples.iter().all(|sample| sample["output"].as_f64().unwrap() <= 10.0));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ramps_the_device_to_rest() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    lab.ok("excite sine --frequency 0.1 --cycles 400 --high 100 -o u.csv");
+    let mut running = lab.command("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
+    let running = running.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let began = Instant::now();
+    while !lab.path("run.mcap").exists() && began.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &running.id().to_string()]).status().unwrap().success());
+    let ran = hyst_tests::Ran::from(running.wait_with_output().unwrap());
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    assert!(ran.stderr.contains("stopped on request"), "{}", ran.stderr);
+    assert!(!lab.path("out.csv").exists());
+    let samples = log(&lab, "run.mcap");
+    assert!(samples.len() < 4_000_000);
+    assert_eq!(samples.last().unwrap()["drive_v"], 0.0);
+}

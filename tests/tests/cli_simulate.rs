@@ -1,0 +1,138 @@
+//! `simulate`: the record's own columns, the prediction beside them, and the errors.
+
+use hyst_tests::{Lab, WARM, column, data};
+
+#[test]
+fn the_records_columns_come_back_untouched() {
+    let lab = Lab::with_model();
+    // Odd notation, a column that plays no role, a comment in quotes: all of it stays as it is.
+    let odd: Vec<String> = lab
+        .read("train.csv")
+        .lines()
+        .enumerate()
+        .map(|(k, line)| match k {
+            0 => format!("{line},note"),
+            1 => format!("{line}00,\"a, \"\"b\"\"\""),
+            _ => format!("{line},{k}"),
+        })
+        .collect();
+    lab.write("odd.csv", odd.join("\n"));
+    let ran = lab.ok("simulate --model model.json odd.csv -o out.csv");
+    assert_eq!(ran.stdout, "");
+    assert!(ran.stderr.contains("RMSE") && ran.stderr.contains("% of span"), "{}", ran.stderr);
+    let out = lab.read("out.csv");
+    assert_eq!(out.lines().count(), odd.len());
+    assert_eq!(out.lines().next().unwrap(), format!("{},predicted_um,settling", odd[0]));
+    for (before, after) in odd.iter().zip(out.lines()) {
+        assert!(after.starts_with(&format!("{before},")), "{before}\n{after}");
+        assert_eq!(after[before.len() + 1..].split(',').count(), 2);
+    }
+}
+
+#[test]
+fn the_errors_are_those_of_the_columns() {
+    let lab = Lab::with_model();
+    let report = lab.ok("simulate --model model.json train.csv -o out.csv --json").json();
+    let out = lab.read("out.csv");
+    let (measured, predicted) = (column(&out, "displacement_um"), column(&out, "predicted_um"));
+    let settling = column(&out, "settling");
+    assert!(settling.iter().all(|flag| *flag == 0.0 || *flag == 1.0));
+    let squares: Vec<f64> = measured
+        .iter()
+        .zip(&predicted)
+        .zip(&settling)
+        .filter(|(_, settling)| **settling == 0.0)
+        .map(|((y, p), _)| (y - p).powi(2))
+        .collect();
+    let rmse = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    assert!((report["errors"]["rmse"].as_f64().unwrap() / rmse - 1.0).abs() < 1e-9);
+    assert_eq!(report["rows"].as_u64().unwrap() as usize, measured.len());
+}
+
+#[test]
+fn without_a_file_the_csv_goes_to_stdout() {
+    let lab = Lab::with_model();
+    let ran = lab.ok("simulate --model model.json train.csv");
+    lab.ok("simulate --model model.json train.csv -o out.csv");
+    assert_eq!(ran.stdout, lab.read("out.csv"));
+    assert!(ran.stderr.contains("RMSE"), "{}", ran.stderr);
+    assert_eq!(lab.ok("simulate --model model.json train.csv -o -").stdout, ran.stdout);
+    lab.refuses("simulate --model model.json train.csv --json", 2);
+}
+
+#[test]
+fn a_drive_without_output_is_predicted_too() {
+    let lab = Lab::with_model();
+    let ran = lab.ok("simulate --model model.json u.csv -o out.csv --zero per-record");
+    assert!(!ran.stderr.contains("RMSE") && ran.stderr.contains("no effect"), "{}", ran.stderr);
+    assert!(lab.read("out.csv").starts_with("segment,time_s,voltage_v,predicted_um,settling\n"));
+    let report = lab.ok("simulate --model model.json u.csv -o out.csv --json").json();
+    assert!(report["errors"].is_null());
+}
+
+#[test]
+fn an_older_prediction_is_replaced_and_that_is_said() {
+    let lab = Lab::with_model();
+    lab.ok("simulate --model model.json train.csv -o once.csv");
+    let ran = lab.ok("simulate --model model.json once.csv -o twice.csv");
+    assert!(ran.stderr.contains("predicted_um and settling"), "{}", ran.stderr);
+    assert_eq!(lab.read("once.csv"), lab.read("twice.csv"));
+}
+
+#[test]
+fn a_zero_of_its_own_takes_the_mean_error_out() {
+    let lab = Lab::with_model();
+    let rmse = |options: &str| {
+        let line = format!("simulate --model model.json train.csv -o out.csv --json {options}");
+        lab.ok(&line).json()["errors"]["rmse"].as_f64().unwrap()
+    };
+    assert!(rmse("--zero per-record") <= rmse("--zero none"));
+    assert_eq!(rmse(""), rmse("--zero none"));
+}
+
+#[test]
+fn records_that_the_model_does_not_suit_are_refused() {
+    let lab = Lab::with_model();
+    let record = lab.read("train.csv");
+    for (from, to, parts) in [
+        ("displacement_um", "displacement_nm", ["displacement_um", "displacement_nm"]),
+        ("voltage_v", "force_in_n", ["voltage_v", "--map"]),
+    ] {
+        lab.write("other.csv", record.replace(from, to));
+        let message = lab.refuses("simulate --model model.json other.csv -o out.csv", 2);
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    }
+    let message = lab.refuses("simulate --model model.json train.csv -o train.csv", 2);
+    assert!(message.contains("read by the same command"), "{message}");
+}
+
+#[test]
+fn a_model_with_temperature_needs_one() {
+    let lab = Lab::with_train(WARM);
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    lab.ok("simulate --model extended.json train.csv -o out.csv");
+    lab.write("cold.csv", without_last_column(&lab.read("train.csv")));
+    let message = lab.refuses("simulate --model extended.json cold.csv -o cold-out.csv", 2);
+    assert!(message.contains("temperature_degc") && message.contains("cold.csv"), "{message}");
+    lab.reference("reference.csv", 1.0, 12.0);
+    let message = lab.refuses("compensate --model extended.json reference.csv -o drive.csv", 2);
+    assert!(message.contains("temperature_degc"), "{message}");
+    lab.ok("compensate --model extended.json reference.csv --temperature 23.5 -o drive.csv");
+}
+
+fn without_last_column(csv: &str) -> String {
+    csv.lines().map(|line| line.rsplit_once(',').map_or(line, |(rest, _)| rest)).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn measured_records_are_simulated() {
+    let Some(data) = data() else { return };
+    let lab = Lab::new();
+    let file = |name: &str| data.join("measured").join(name).display().to_string();
+    let (train, test) = (file("micromanipulator-train.csv"), file("micromanipulator-test.csv"));
+    lab.ok(&format!("fit {train} --model preisach -o model.json"));
+    let report = lab.ok(&format!("simulate --model model.json {test} --zero per-record -o out.csv --json")).json();
+    assert!(report["errors"]["nrmse_percent"].as_f64().unwrap() < 2.0, "{report}");
+    assert_eq!(report["zeros"].as_array().unwrap().len(), 1);
+}
