@@ -152,12 +152,12 @@ impl Lab {
         self.ok(&format!("excite identification {options} --seed {seed} -o {name}"));
     }
 
-    /// Writes a reference of `seconds` at 500 Hz: a raised cosine of 1 Hz from 2 to `top` µm.
+    /// Writes a reference of `seconds` at 500 Hz: a raised cosine of 1 Hz from 6 to `top` µm.
     pub fn reference(&self, name: &str, seconds: f64, top: f64) {
         let mut text = String::from("time_s,displacement_um\n");
         for k in 0..(seconds * 500.0) as u32 {
             let t = f64::from(k) / 500.0;
-            let y = 2.0 + (top - 2.0) * (0.5 - 0.5 * (std::f64::consts::TAU * t).cos());
+            let y = 6.0 + (top - 6.0) * (0.5 - 0.5 * (std::f64::consts::TAU * t).cos());
             text.push_str(&format!("{t:.3},{y:.4}\n"));
         }
         self.write(name, &text);
@@ -252,4 +252,33 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let at = header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("no {name} in {header:?}"));
     lines.map(|line| line.split(',').nth(at).and_then(|cell| cell.parse().ok()).expect("a number")).collect()
+}
+
+/// Plays the standard identification drive on an actuator at 1 kHz and returns the record.
+///
+/// # Panics
+/// When the drive or the plant refuses, which the tests' own configurations do not give cause for.
+pub fn experiment(plant: &mut hyst_hw::Plant, seed: u64, name: &str) -> hyst_ident::record::Record {
+    use hyst_ident::excite::{Identification, Limits};
+    use hyst_ident::record::{Columns, OutputUnit, Record};
+
+    let range = hyst_hw::Daq::capabilities(plant).voltage;
+    let limits = Limits { rate_hz: 1000.0, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
+    let drive = Identification::at_rate(1000.0, seed).drive(&limits).expect("the standard drive fits");
+    let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
+    let options = hyst_hw::RecordOptions::at(1000.0);
+    let recording = hyst_hw::record(plant, &segments, &options, |_| std::ops::ControlFlow::Continue(()))
+        .expect("the plant plays what lies in its range");
+    let samples = || recording.segments.iter().flat_map(|s| &s.samples);
+    let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
+    let columns = Columns {
+        name: name.to_owned(),
+        segment: Some(labels.collect()),
+        time: samples().map(|s| s.time_s).collect(),
+        input: Some(samples().map(|s| s.drive_v).collect()),
+        output: Some((OutputUnit::Micrometre, samples().map(|s| s.output).collect())),
+        temperature: samples().map(|s| s.temperature_degc).collect(),
+        ..Columns::default()
+    };
+    Record::from_samples(columns).expect("a recording is a sound record")
 }

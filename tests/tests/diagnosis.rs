@@ -1,0 +1,100 @@
+//! Diagnosis on simulated actuators whose physics is not the fitted model's: random relays, ODEs on a fine grid, a
+//! broad creep spectrum, noise, 16 bits.
+
+use hyst_hw::{Plant, PlantConfig};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::{Effect, Kind, Model};
+use hyst_ident::record::Record;
+use hyst_ident::simulate::{Zero, simulate};
+use hyst_tests::experiment;
+
+/// Train and test record of an actuator with these effects.
+fn records(seed: u64, effects: &[&str]) -> (PlantConfig, Record, Record) {
+    let config = PlantConfig::random_with(seed, effects).unwrap();
+    let mut plant = Plant::new(config.clone()).unwrap();
+    let train = experiment(&mut plant, seed, "train");
+    let test = experiment(&mut plant, seed + 1000, "test");
+    (config, train, test)
+}
+
+fn diagnosed(train: &Record, test: &Record) -> (Model, Diagnosis) {
+    let model = fit(train, Kind::Pi, &FitOptions::default()).unwrap();
+    let found = diagnose(train, Some(test), &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
+    (model, found)
+}
+
+fn names(d: &Diagnosis) -> Vec<&'static str> {
+    d.findings.effects.iter().map(|e| e.name.name()).collect()
+}
+
+/// One actuator per effect: exactly that effect is named and the error on a record that was not fitted falls.
+#[test]
+fn every_effect_is_named_and_nothing_else() {
+    for (k, effect) in Effect::ALL.into_iter().enumerate() {
+        let (_, train, test) = records(700 + k as u64, &[effect.name()]);
+        let (_, d) = diagnosed(&train, &test);
+        assert_eq!(names(&d), [effect.name()], "seed {}: {:#?}", 700 + k, d.findings);
+        assert_eq!(d.findings.verdict, Verdict::Explained);
+        let (before, after) = (d.findings.before.test.unwrap(), d.findings.after.test.unwrap());
+        assert!(after.rmse < 0.9 * before.rmse, "{effect}: {} → {}", before.rmse, after.rmse);
+    }
+}
+
+#[test]
+fn an_actuator_without_effects_gets_no_name() {
+    for seed in [720, 721, 722] {
+        let (_, train, test) = records(seed, &[]);
+        let (model, d) = diagnosed(&train, &test);
+        assert!(names(&d).is_empty(), "seed {seed}: {:#?}", d.findings.effects);
+        assert!(
+            matches!(d.findings.verdict, Verdict::BaseTooCoarse | Verdict::NothingMissing),
+            "{:?}",
+            d.findings.verdict
+        );
+        assert_eq!(d.extended, model, "nothing found, nothing changed");
+    }
+}
+
+#[test]
+fn a_pair_is_named_as_a_pair() {
+    let (_, train, test) = records(730, &["creep", "resonance"]);
+    let (_, d) = diagnosed(&train, &test);
+    assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
+}
+
+/// Parameters with a true value come out right, and the standard errors are of the right size.
+#[test]
+fn parameters_are_those_of_the_plant() {
+    let (config, train, test) = records(740, &["lag"]);
+    let (_, d) = diagnosed(&train, &test);
+    let truth = config.lag.unwrap().seconds;
+    let found = &d.findings.effects[0].parameters["seconds"];
+    assert!((found.value / truth - 1.0).abs() < 0.02, "{} {truth}", found.value);
+    assert!(found.std_error.is_some_and(|e| e > 0.0 && e < 0.02 * truth));
+}
+
+/// Whatever the number of threads, the same bits.
+#[test]
+fn one_thread_and_two_give_the_same_bits() {
+    let (_, train, test) = records(750, &["resonance"]);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let (_, d) = pool.install(|| diagnosed(&train, &test));
+        (d.extended.to_json(), serde_json::to_string(&d.findings).unwrap())
+    };
+    assert_eq!(run(1), run(2));
+}
+
+/// The figures of the findings are those of `simulate`, and a model file says all that there is to say.
+#[test]
+fn findings_are_what_simulate_gives() {
+    let (_, train, test) = records(760, &["temperature"]);
+    let (model, d) = diagnosed(&train, &test);
+    let reread = Model::parse("extended.json", &d.extended.to_json()).unwrap();
+    assert_eq!(reread, d.extended);
+    for (model, on) in [(&model, &d.findings.before), (&reread, &d.findings.after)] {
+        assert_eq!(simulate(model, &train, Zero::None).unwrap().errors, on.train);
+        assert_eq!(simulate(model, &test, Zero::None).unwrap().errors, on.test);
+    }
+}
