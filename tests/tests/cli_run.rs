@@ -170,6 +170,7 @@ fn arguments_have_to_make_sense_together() {
     lab.reference("reference.csv", 1.0, 12.0);
     for (line, part) in [
         ("--drive u.csv", "--record"),
+        ("--drive u.csv --log -", "--log needs a file"),
         ("--record out.csv", "--reference"),
         ("--reference reference.csv --record out.csv", "--model"),
         ("--model model.json --record out.csv", "--reference"),
@@ -227,4 +228,15 @@ fn an_interrupt_ramps_the_device_to_rest() {
     let samples = log(&lab, "run.mcap");
     assert!(samples.len() < 4_000_000);
     assert_eq!(samples.last().unwrap()["drive_v"], 0.0);
+}
+
+#[test]
+fn the_plant_of_the_help_can_be_run() {
+    let lab = Lab::new();
+    let help = lab.ok("run --help").stdout;
+    let lines = help.lines().skip_while(|line| line.trim() != "seed = 7").map(str::trim);
+    lab.write("plant.toml", lines.collect::<Vec<_>>().join("\n"));
+    lab.ok("excite sine --rate 500 --high 120 --cycles 1 -o u.csv");
+    lab.ok("run --daq sim:plant.toml --drive u.csv --record out.csv");
+    assert!(lab.read("out.csv").starts_with("segment,time_s,voltage_v,displacement_um,temperature_degc\n"));
 }

@@ -86,7 +86,7 @@ fn a_zero_of_its_own_takes_the_mean_error_out() {
         let line = format!("simulate --model model.json train.csv -o out.csv --json {options}");
         lab.ok(&line).json()["errors"]["rmse"].as_f64().unwrap()
     };
-    assert!(rmse("--zero per-record") <= rmse("--zero none"));
+    assert!(rmse("--zero per-record") <= rmse("--zero none") * (1.0 + 1e-9));
     assert_eq!(rmse(""), rmse("--zero none"));
 }
 

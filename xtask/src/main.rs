@@ -121,14 +121,26 @@ fn bare_metal() -> Outcome {
     if !installed {
         return without_std();
     }
-    let arguments = &["build", "--package", "hyst-core", "--no-default-features", "--features", "serde", "--target", BARE_METAL];
+    let arguments =
+        &["build", "--package", "hyst-core", "--no-default-features", "--features", "serde", "--target", BARE_METAL];
     run(&Check { name: "", arguments, environment: &[] })
 }
 
 /// Where the target is not installed: the core and all that it depends on must declare `no_std`.
 fn without_std() -> Outcome {
     let tree = cargo()
-        .args(["tree", "--package", "hyst-core", "--no-default-features", "--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .args([
+            "tree",
+            "--package",
+            "hyst-core",
+            "--no-default-features",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+        ])
         .output();
     let Ok(tree) = tree else { return Outcome::Failed };
     let packages = String::from_utf8_lossy(&tree.stdout).into_owned();

@@ -1,5 +1,5 @@
 //! dev only
-use hyst_ident::{record::*, fit::*, diagnose::*, model::*};
+use hyst_ident::{diagnose::*, fit::*, model::*, record::*};
 use std::time::Instant;
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -15,9 +15,22 @@ fn main() {
     let d = diagnose(&train, Some(&test), &m, &DiagnoseOptions::default(), &|_| {}).unwrap();
     let f = &d.findings;
     let names: Vec<_> = f.effects.iter().map(|e| e.name.name()).collect();
-    println!("{dir} {kind} fit {:.2}s diag {:.2}s names {names:?} verdict {:?} noise {:.4} train {:.4}->{:.4} test {:.4}->{:.4} settling {} rem {}", tf.as_secs_f64(), t.elapsed().as_secs_f64()-tf.as_secs_f64(), f.verdict, f.noise_floor,
-      f.before.train.unwrap().rmse, f.after.train.unwrap().rmse, f.before.test.unwrap().rmse, f.after.test.unwrap().rmse, m.fitted_on[0].settling_rows, f.remainder.description);
-    if verbose { println!("{}", serde_json::to_string_pretty(&f).unwrap()); }
+    println!(
+        "{dir} {kind} fit {:.2}s diag {:.2}s names {names:?} verdict {:?} noise {:.4} train {:.4}->{:.4} test {:.4}->{:.4} settling {} rem {}",
+        tf.as_secs_f64(),
+        t.elapsed().as_secs_f64() - tf.as_secs_f64(),
+        f.verdict,
+        f.noise_floor,
+        f.before.train.unwrap().rmse,
+        f.after.train.unwrap().rmse,
+        f.before.test.unwrap().rmse,
+        f.after.test.unwrap().rmse,
+        m.fitted_on[0].settling_rows,
+        f.remainder.description
+    );
+    if verbose {
+        println!("{}", serde_json::to_string_pretty(&f).unwrap());
+    }
     let back = Model::parse("x", &d.extended.to_json()).unwrap();
     assert_eq!(back, d.extended);
 }

@@ -51,13 +51,29 @@ impl Target {
         match self {
             Self::File(path) => Ok(write_atomic(path, content)?),
             Self::Stdout => {
-                let mut out = io::BufWriter::new(io::stdout().lock());
-                match content(&mut out).and_then(|()| out.flush()) {
-                    // Whoever reads has seen enough.
-                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-                    other => Ok(other?),
-                }
+                let mut out = io::BufWriter::new(Pipe(io::stdout().lock()));
+                content(&mut out)?;
+                Ok(out.flush()?)
             }
+        }
+    }
+}
+
+/// A writer that swallows what nobody reads any more: a reader that has seen enough is no error.
+struct Pipe<W>(W);
+
+impl<W: Write> Write for Pipe<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.0.write(bytes) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(bytes.len()),
+            other => other,
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self.0.flush() {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            other => other,
         }
     }
 }

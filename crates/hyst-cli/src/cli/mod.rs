@@ -39,7 +39,8 @@ Example:
 const DIAGNOSE: &str = "\
 Examples:
   hystctl diagnose train.csv --model model.json
-  hystctl diagnose train.csv --test test.csv --model model.json -o extended.json --findings findings.json";
+  hystctl diagnose train.csv --test test.csv --model model.json -o extended.json
+  hystctl diagnose a.csv b.csv --model model.json --zero per-record --findings findings.json";
 
 const COMPENSATE: &str = "\
 Example:
@@ -50,10 +51,48 @@ Examples:
   hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
   hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap";
 
+const RUN_USAGE: &str = "\
+hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>
+       hystctl run [OPTIONS] --daq <DEVICE> --model <MODEL> --reference <REFERENCE>";
+
+const PLANT: &str = "\
+A simulated plant is a file like this; every section after [sensor] is an effect and may be left out:
+  seed = 7
+  [actuator]
+  max_v = 120
+  gain_um_per_v = 0.2
+  loop_share = 0.12        # opening of the hysteresis loop over its span
+  [sensor]
+  range_um = [-12, 43]
+  noise_um = 0.007
+  [delay]
+  seconds = 0.002
+  [lag]
+  seconds = 0.003
+  [temperature]
+  per_k = 0.005
+  reference_degc = 22
+  mean_degc = 23
+  swing_k = 4
+  period_s = 45
+  [creep]
+  strength = 0.08
+  tau_min_s = 0.05
+  tau_max_s = 80
+  [[mode]]
+  hz = 100
+  damping = 0.02
+  gain = 0.9
+  [drift]
+  um_per_s = 0.01
+  [interference]
+  amplitude_um = 0.1
+  hz = 50";
+
 const RECORDS: &str = "\
-Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one output
-of displacement_um (or _nm, _mm) and force_n, and where measured temperature_degc and load_n. An integer column segment
-tells apart stretches between which the device rested.";
+Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one \
+output of displacement_um (or _nm, _mm) and force_n, and where measured temperature_degc and load_n. An integer \
+column segment tells apart stretches between which the device rested.";
 
 /// Identify, diagnose and compensate piezo actuators and others with hysteresis.
 #[derive(Debug, Parser)]
@@ -206,9 +245,10 @@ pub(crate) struct CompensateArgs {
 ///
 /// With --reference the drive is computed before anything moves, as by compensate, and the measured output is compared
 /// with the reference. With --drive a file with voltage_v is played as it stands; a drive outside the limits is refused.
-/// Ctrl-C ramps the device to rest.
+/// Limits that are not given are the device's, and with a model no wider than the record that it was fitted to. Ctrl-C
+/// ramps the device to rest.
 #[derive(Debug, Args)]
-#[command(after_help = RUN)]
+#[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
     /// Device: sim:PLANT.toml, the simulated actuator that the file describes
     #[arg(long, value_name = "DEVICE")]
@@ -231,7 +271,7 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
     /// Rest between two segments
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) rest: f64,
     #[command(flatten)]
     pub(crate) map: MapArg,
@@ -246,10 +286,10 @@ pub(crate) struct LimitArgs {
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(crate) limit: Option<VoltageLimits>,
     /// Steepest slope of the drive
-    #[arg(long, value_name = "V_PER_S", value_parser = positive)]
+    #[arg(long, value_name = "V_PER_S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) slew: Option<f64>,
     /// Band in which lag, delay and resonances are inverted; chosen if not given
-    #[arg(long, value_name = "HZ", value_parser = positive)]
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) bandwidth: Option<f64>,
 }
 

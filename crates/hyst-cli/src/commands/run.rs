@@ -56,6 +56,9 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     if args.drive.is_some() && written.is_empty() {
         return Err(CommandError::bad_input("what is measured would be lost: give --record, --log or both"));
     }
+    if args.log.as_deref() == Some(Path::new("-")) {
+        return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
+    }
     let Device::Simulated(described) = &args.daq;
     let mut read: Vec<&Path> = vec![described];
     read.extend([&args.model, &args.reference, &args.drive].into_iter().filter_map(|path| path.as_deref()));

@@ -100,54 +100,58 @@ struct Story<'a> {
 
 impl Story<'_> {
     fn text(&self, out: &Path) -> String {
-        let f = &self.diagnosis.findings;
+        let (f, runs) = (&self.diagnosis.findings, self.runs);
         let unit = text::symbol(&f.unit);
-        let mut lines = Vec::new();
         let error = |e: Option<Errors>| {
             e.map_or_else(String::new, |e| {
                 format!("{} {unit} ({})", text::short(e.rmse), text::percent(e.nrmse_percent))
             })
         };
-        lines.push(format!(
-            "fit          {} on {} rows: test error {}",
-            self.model.base.kind(),
-            self.model.fitted_on.iter().map(|f| f.rows).sum::<usize>(),
-            error(f.before.test)
-        ));
+        let rows: usize = self.model.fitted_on.iter().map(|f| f.rows).sum();
+        let mut lines = vec![
+            format!("fit        {} on {rows} rows of an identification experiment", self.model.base.kind()),
+            format!("           RMSE {} on a second experiment, which is never fitted", error(f.before.test)),
+        ];
+        if f.effects.is_empty() {
+            lines.push(format!("found      no effect: {}", verdict(f.verdict)));
+        }
         for effect in &f.effects {
-            lines.push(format!("found        {}: {}", effect.name, effect.evidence.join("; ")));
+            let mut evidence = effect.evidence.iter();
+            lines.push(format!("found      {}: {}", effect.name, evidence.next().map_or("", String::as_str)));
+            lines.extend(evidence.map(|line| format!("           {line}")));
             for other in effect.alternatives.iter().filter(|a| a.indistinguishable) {
-                lines.push(format!("             the record does not tell it from {}", other.name));
+                lines.push(format!("           the record does not tell it from {}", other.name));
             }
         }
-        if f.effects.is_empty() {
-            lines.push(format!("found        no effect ({})", verdict(f.verdict)));
+        lines.push(format!(
+            "extended   RMSE {} → {} on the second experiment",
+            error(f.before.test),
+            error(f.after.test)
+        ));
+        lines.push(format!("left       {}", f.remainder.description));
+        lines.push("tracking   of a reference on the actuator, RMS error:".to_owned());
+        for (name, run) in
+            [("plain gain", &runs.plain), ("base inverse", &runs.base), ("extended inverse", &runs.extended)]
+        {
+            let times = runs.plain.rmse / run.rmse;
+            lines.push(format!(
+                "             {name:<17} {} {unit}, {times:.1} × better than the plain gain",
+                text::short(run.rmse)
+            ));
         }
-        lines.push(format!("extended     test error {} → {}", error(f.before.test), error(f.after.test)));
-        lines.push(format!("left         {}", f.remainder.description));
-        lines.push(format!(
-            "tracking     RMS error on the actuator: plain gain {}, base inverse {}, extended inverse {} {unit}",
-            text::short(self.runs.plain.rmse),
-            text::short(self.runs.base.rmse),
-            text::short(self.runs.extended.rmse)
-        ));
-        lines.push(format!(
-            "             {:.1} times better than the plain gain, {:.2} times than the base inverse",
-            self.runs.plain.rmse / self.runs.extended.rmse,
-            self.runs.base.rmse / self.runs.extended.rmse
-        ));
         let sensor: Vec<&str> =
             f.effects.iter().map(|e| e.name).filter(|e| !e.acts_on_the_motion()).map(Effect::name).collect();
         if !sensor.is_empty() {
-            lines.push(format!("             {} is in the sensor, not in the motion: taken out of all three errors, not driven against", text::listed(&sensor)));
+            let (effects, verb) = (text::listed(&sensor), if sensor.len() == 1 { "is" } else { "are" });
+            lines.push(format!("           {effects} {verb} in the sensor, not in the motion: taken out of all three errors, not driven against"));
         }
         let (truth, named) = (self.truth(), self.named());
-        let word = if truth == named { "as named" } else { "NOT as named" };
+        let had = if truth.is_empty() { "no effect".to_owned() } else { text::listed(&truth) };
         lines.push(format!(
-            "the plant    had {}: {word}",
-            if truth.is_empty() { "no effect".into() } else { text::listed(&truth) }
+            "revealed   the plant's file has {had}: {}",
+            if truth == named { "as found" } else { "NOT as found" }
         ));
-        lines.push(format!("written      {}", out.display()));
+        lines.push(format!("written    {}", out.display()));
         lines.join("\n")
     }
 

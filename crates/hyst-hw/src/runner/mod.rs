@@ -164,7 +164,8 @@ fn start_and_play<D: Daq + ?Sized>(
     }
     recording.rate_hz = actual_hz;
     let total = segments.iter().map(|drive| drive.as_ref().len()).sum();
-    let mut run = Run { daq, options, revise, progress, recording, segments: segments.len(), done: 0, total, latest: None };
+    let mut run =
+        Run { daq, options, revise, progress, recording, segments: segments.len(), done: 0, total, latest: None };
     segments.iter().enumerate().try_for_each(|(k, drive)| run.segment(k, drive.as_ref()))
 }
 

@@ -276,7 +276,8 @@ fn each_row_is_revised_once_with_the_newest_sample_and_the_retreat_follows() {
         r.drive_v.iter_mut().for_each(|v| *v *= 2.0);
     };
     let drive: Vec<f64> = (0..20).map(|k| f64::from(k) / 10.0).collect();
-    let recording = record_with(&mut daq, &[&drive], &RecordOptions::at(100.0), revise, |_| ControlFlow::Continue(())).unwrap();
+    let recording =
+        record_with(&mut daq, &[&drive], &RecordOptions::at(100.0), revise, |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(rows, (0..20).collect::<Vec<_>>());
     assert!(known, "the last block knows of samples of the first");
     let played: Vec<f64> = recording.segments[0].samples.iter().map(|s| s.drive_v).collect();

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::search::{Named, Search};
 pub use crate::metrics::Errors;
 use crate::model::{Effect, Kind, Model};
+use crate::record::OutputUnit;
 use crate::samples::Samples;
 use crate::simulate::{Simulation, Zero};
 
@@ -165,21 +166,22 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
 }
 
 fn finding(m: &Material<'_>, named: &Named) -> Finding {
-    let unit = &m.model.output.unit;
+    let unit = symbol(m);
     let after = m.found.best.cv_rmse();
     let j = &named.judgement;
-    let mut evidence = vec![format!(
+    // First what a person can check against the device, then what the statistics say.
+    let mut evidence: Vec<String> = signature(m, named.effect).into_iter().collect();
+    evidence.push(format!(
         "cross-validated error {:.4} {unit} without it, {after:.4} {unit} with it; better in {:.1} % of {} bootstrap draws",
         named.cv_without,
         100.0 * j.confidence,
-        1000
-    )];
+        super::score::DRAWS
+    ));
     evidence.push(format!(
         "explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors",
         100.0 * j.share,
         j.over_noise
     ));
-    evidence.extend(signature(m, named.effect));
     Finding {
         name: named.effect,
         parameters: parameters(m, named.effect),
@@ -192,6 +194,12 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
         cv_rmse_before: named.cv_without,
         cv_rmse_after: after,
     }
+}
+
+/// The output's unit as a person writes it.
+fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
+    let unit = &m.model.output.unit;
+    OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
 }
 
 /// The effect in words that a person can check against the device.
@@ -217,14 +225,16 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             format!(
                 "the zero moves by {:+.4} {} over the record's {hours:.0} s",
                 e.drift?.per_second * hours,
-                m.model.output.unit
+                symbol(m)
             )
         }
         Effect::Interference => {
             let p = e.interference?;
             format!(
                 "a tone of {:.4} {} at {:.3} Hz stands in the sensor, whatever the drive",
-                p.amplitude, m.model.output.unit, p.hz
+                p.amplitude,
+                symbol(m),
+                p.hz
             )
         }
     })
@@ -246,7 +256,7 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             put("temperature", "reference_degc", p.reference_degc, "degC");
         }),
         Effect::Creep => e.creep.iter().for_each(|p| {
-            for (tau, share) in p.seconds.iter().zip(&p.shares) {
+            for (tau, share) in p.seconds.iter().zip(&p.shares).filter(|(_, share)| **share > 0.0) {
                 put("creep", &format!("share_{tau:.3}s"), *share, "1");
             }
             put("creep", "total", p.total(), "1");

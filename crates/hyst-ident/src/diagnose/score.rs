@@ -7,7 +7,7 @@ use super::search::Trial;
 use crate::Samples;
 
 /// Bootstrap draws.
-const DRAWS: usize = 1000;
+pub(super) const DRAWS: usize = 1000;
 /// Share of draws in which the gain must be above zero.
 const CONFIDENCE: f64 = 0.99;
 /// RMSE must fall at least by this share.

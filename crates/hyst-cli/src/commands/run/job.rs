@@ -152,7 +152,11 @@ fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits>
 }
 
 fn play_options(args: &RunArgs, record: &Record) -> RecordOptions {
-    let mut options = RecordOptions::at(1.0 / record.sample_period());
+    let rate_hz = 1.0 / record.sample_period();
+    let whole = rate_hz.round();
+    // 1 / 0.00001 is not 100000 to the last bit.
+    let rate_hz = if (rate_hz - whole).abs() < 1e-9 * rate_hz { whole } else { rate_hz };
+    let mut options = RecordOptions::at(rate_hz);
     options.rest_s = args.rest;
     options.slew_v_per_s = options.slew_v_per_s.min(args.limits.slew.unwrap_or(f64::INFINITY));
     options
