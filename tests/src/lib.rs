@@ -140,7 +140,7 @@ impl Lab {
     /// A folder with `plant.toml` ([`PLANT`] and `more`) and `train.csv` (4 s at 500 Hz).
     pub fn with_train(more: &str) -> Self {
         let lab = Self::new();
-        lab.write("plant.toml", &format!("{PLANT}{more}"));
+        lab.write("plant.toml", format!("{PLANT}{more}"));
         lab.excite("u.csv", 1);
         lab.ok("run --daq sim:plant.toml --drive u.csv --record train.csv");
         lab

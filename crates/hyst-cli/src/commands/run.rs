@@ -16,7 +16,7 @@ use crate::cli::{Device, RunArgs};
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
-use crate::{input, text};
+use crate::{input, recording, text};
 use job::{Followed, Job};
 
 /// What is said about a run.
@@ -73,7 +73,7 @@ where
     D::Error: Classified,
 {
     let mut job = Job::read(args, daq.capabilities())?;
-    let unit = unit_of(daq.capabilities().output);
+    let unit = recording::unit(daq.capabilities().output);
     let device = daq.capabilities().device.clone();
     let model = job.followed.as_ref().map(|followed| LoggedModel { model: &followed.model, json: &followed.json });
     let info = RunInfo { device: &device, output: unit, sample_rate_hz: job.options.rate_hz, model };
@@ -87,7 +87,7 @@ where
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
     if let Some(target) = &args.record {
-        let record = record_of(&recording, target, unit)?;
+        let record = recording::to_record(&recording, &target.to_string(), unit)?;
         let column = format!("reference_{}", unit.suffix());
         let extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
         target.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
@@ -110,41 +110,6 @@ where
         symbol: unit.symbol(),
     };
     report.print(&summary.text(), &summary)
-}
-
-/// The device's unit, as records know it.
-fn unit_of(unit: hyst_hw::OutputUnit) -> OutputUnit {
-    match unit {
-        hyst_hw::OutputUnit::Micrometre => OutputUnit::Micrometre,
-        hyst_hw::OutputUnit::Nanometre => OutputUnit::Nanometre,
-        hyst_hw::OutputUnit::Millimetre => OutputUnit::Millimetre,
-        hyst_hw::OutputUnit::Newton => OutputUnit::Newton,
-    }
-}
-
-/// What was measured, without the ramps, as a record.
-fn record_of(recording: &Recording, target: &Target, unit: OutputUnit) -> CommandResult<Record> {
-    let samples = || recording.segments.iter().flat_map(|segment| &segment.samples);
-    let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
-    let columns = Columns {
-        name: target.to_string(),
-        segment: Some(labels.collect()),
-        time: recording.segments.iter().flat_map(|segment| times(&segment.samples)).collect(),
-        input: Some(samples().map(|s| s.drive_v).collect()),
-        output: Some((unit, samples().map(|s| s.output).collect())),
-        // All samples of a device have a channel, or none has.
-        temperature: samples().map(|s| s.temperature_degc).collect(),
-        load: samples().map(|s| s.load_n).collect(),
-        ..Columns::default()
-    };
-    Ok(Record::from_samples(columns)?)
-}
-
-/// Times of a segment, moved by less than a nanosecond so that the first one is a short number.
-fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
-    let first = samples.first().map_or(0.0, |sample| sample.time_s);
-    let shift = (first * 1e9).round() / 1e9 - first;
-    samples.iter().map(move |sample| sample.time_s + shift)
 }
 
 impl Tracking {

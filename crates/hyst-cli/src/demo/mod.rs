@@ -4,15 +4,15 @@
 //! given what an engineer would have: the drive, the measured output, a temperature if the device has
 //! one. Only at the very end is the plant's file opened to compare.
 
-mod experiment;
 mod picture;
 mod tracking;
 
 use std::fs;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use hyst_hw::{Plant, PlantConfig};
+use hyst_hw::{Daq, Plant, PlantConfig, RecordOptions};
 use hyst_ident::atomic_file::write_atomic;
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
 use hyst_ident::excite::{Drive, Identification, Limits};
@@ -26,7 +26,7 @@ use crate::cli::DemoArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
-use crate::text;
+use crate::{recording, text};
 
 /// Sample rate of the experiments \[Hz\].
 const RATE_HZ: f64 = 1000.0;
@@ -48,9 +48,9 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let design = |seed: u64| -> CommandResult<Drive> { Ok(Identification::at_rate(RATE_HZ, seed).drive(&limits)?) };
 
     progress.say("driving the identification experiment");
-    let train = experiment::record(&mut plant, &design(args.seed)?, "train.csv")?;
+    let train = experiment(&mut plant, &design(args.seed)?, "train.csv")?;
     progress.say("driving a second experiment, for the test");
-    let test = experiment::record(&mut plant, &design(args.seed.wrapping_add(TEST_SEED))?, "test.csv")?;
+    let test = experiment(&mut plant, &design(args.seed.wrapping_add(TEST_SEED))?, "test.csv")?;
     write_record(out, "train.csv", &train)?;
     write_record(out, "test.csv", &test)?;
 
@@ -80,6 +80,14 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
 
 fn json(value: &impl serde::Serialize) -> CommandResult<String> {
     Ok(serde_json::to_string_pretty(value).map_err(io::Error::other)? + "\n")
+}
+
+/// Plays a designed drive, segment by segment with rests between, and returns the record.
+fn experiment(plant: &mut Plant, drive: &Drive, name: &str) -> CommandResult<Record> {
+    let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
+    let recording = hyst_hw::record(plant, &segments, &RecordOptions::at(RATE_HZ), |_| ControlFlow::Continue(()))
+        .map_err(|failure| CommandError::failed(format!("the simulated actuator: {failure}")))?;
+    recording::to_record(&recording, name, recording::unit(Daq::capabilities(plant).output))
 }
 
 fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
@@ -130,15 +138,13 @@ impl Story<'_> {
         ));
         lines.push(format!("left       {}", f.remainder.description));
         lines.push("tracking   of a reference on the actuator, RMS error:".to_owned());
-        for (name, run) in
-            [("plain gain", &runs.plain), ("base inverse", &runs.base), ("extended inverse", &runs.extended)]
-        {
+        let against = |run: &tracking::Run| {
             let times = runs.plain.rmse / run.rmse;
-            lines.push(format!(
-                "             {name:<17} {} {unit}, {times:.1} × better than the plain gain",
-                text::short(run.rmse)
-            ));
-        }
+            format!("{} {unit}, {times:.1} times better than the plain gain", text::short(run.rmse))
+        };
+        lines.push(format!("             plain gain        {} {unit}", text::short(runs.plain.rmse)));
+        lines.push(format!("             base inverse      {}", against(&runs.base)));
+        lines.push(format!("             extended inverse  {}", against(&runs.extended)));
         let sensor: Vec<&str> =
             f.effects.iter().map(|e| e.name).filter(|e| !e.acts_on_the_motion()).map(Effect::name).collect();
         if !sensor.is_empty() {

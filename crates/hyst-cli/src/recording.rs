@@ -1,0 +1,41 @@
+//! What a device measured, as a record.
+
+use hyst_hw::Recording;
+use hyst_ident::record::{Columns, OutputUnit, Record};
+
+use crate::exit::CommandResult;
+
+/// The device's unit, as records know it.
+pub(crate) fn unit(unit: hyst_hw::OutputUnit) -> OutputUnit {
+    match unit {
+        hyst_hw::OutputUnit::Micrometre => OutputUnit::Micrometre,
+        hyst_hw::OutputUnit::Nanometre => OutputUnit::Nanometre,
+        hyst_hw::OutputUnit::Millimetre => OutputUnit::Millimetre,
+        hyst_hw::OutputUnit::Newton => OutputUnit::Newton,
+    }
+}
+
+/// What was measured, without the ramps, as a record.
+pub(crate) fn to_record(recording: &Recording, name: &str, unit: OutputUnit) -> CommandResult<Record> {
+    let samples = || recording.segments.iter().flat_map(|segment| &segment.samples);
+    let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
+    let columns = Columns {
+        name: name.to_owned(),
+        segment: Some(labels.collect()),
+        time: recording.segments.iter().flat_map(|segment| times(&segment.samples)).collect(),
+        input: Some(samples().map(|s| s.drive_v).collect()),
+        output: Some((unit, samples().map(|s| s.output).collect())),
+        // All samples of a device have a channel, or none has.
+        temperature: samples().map(|s| s.temperature_degc).collect(),
+        load: samples().map(|s| s.load_n).collect(),
+        ..Columns::default()
+    };
+    Ok(Record::from_samples(columns)?)
+}
+
+/// Times of a segment, moved by less than a nanosecond so that the first one is a short number.
+fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
+    let first = samples.first().map_or(0.0, |sample| sample.time_s);
+    let shift = (first * 1e9).round() / 1e9 - first;
+    samples.iter().map(move |sample| sample.time_s + shift)
+}
