@@ -1,6 +1,6 @@
 //! What a device measured, as a record.
 
-use hyst_hw::Recording;
+use hyst_hw::{Recording, Sample};
 use hyst_ident::record::{Columns, OutputUnit, Record};
 
 use crate::exit::CommandResult;

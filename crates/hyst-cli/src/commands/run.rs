@@ -6,9 +6,9 @@ mod play;
 
 use std::path::{Path, PathBuf};
 
-use hyst_hw::{Daq, Recording, Sample};
+use hyst_hw::Daq;
 use hyst_ident::metrics::Errors;
-use hyst_ident::record::{Columns, Extra, OutputUnit, Record};
+use hyst_ident::record::Extra;
 use serde::Serialize;
 
 use super::compensate::Compensation;

@@ -91,11 +91,11 @@ fn experiment(plant: &mut Plant, drive: &Drive, name: &str) -> CommandResult<Rec
 }
 
 fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
-    Ok(write_atomic(&folder.join(name), |out| out.write_all(content.as_bytes()))?)
+    Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_bytes()))?)
 }
 
 fn write_record(folder: &Path, name: &str, record: &Record) -> CommandResult {
-    Ok(write_atomic(&folder.join(name), |out| record.write_csv(out).map_err(output::io_error))?)
+    Ok(write_atomic(folder.join(name), |out| record.write_csv(out).map_err(output::io_error))?)
 }
 
 /// What is told at the end.

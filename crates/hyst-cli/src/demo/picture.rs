@@ -78,12 +78,15 @@ fn panels(svg: &mut String, test: &Record, before: &[f64], after: &[f64], runs: 
     Ok(())
 }
 
+/// Name, colour and pieces of a line.
+type Curve = (String, RGBColor, Vec<Vec<(f64, f64)>>);
+
 /// A panel with axes, a legend and lines.
 struct Chart {
     title: String,
     x: String,
     y: String,
-    curves: Vec<(String, RGBColor, Vec<Vec<(f64, f64)>>)>,
+    curves: Vec<Curve>,
 }
 
 /// Points of one curve that are drawn: more than this no screen shows.

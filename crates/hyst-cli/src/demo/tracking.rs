@@ -81,7 +81,7 @@ pub(super) fn track<D: Daq>(
     log.finish().map_err(lost)?;
 
     let drive: Vec<f64> = followed.iter().map(|s| s.drive_v).collect();
-    write_atomic(&out.join("drive.csv"), |file| {
+    write_atomic(out.join("drive.csv"), |file| {
         reference.write_with(file, &[Extra::numbers("voltage_v", &drive)]).map_err(output::io_error)
     })?;
     let run = |samples: &[Sample]| judge(samples, &travel, extended);
