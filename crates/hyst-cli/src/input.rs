@@ -42,7 +42,10 @@ pub(crate) fn output_unit(model: &Model) -> CommandResult<OutputUnit> {
 /// The simulated plant that a file describes.
 pub(crate) fn plant(path: &Path) -> CommandResult<Plant> {
     let named = |error: anyhow::Error| {
-        CommandError::new(Exit::BadInput, anyhow::anyhow!("{}: {error:#}; correct the plant's file", path.display()))
+        CommandError::new(
+            Exit::BadInput,
+            anyhow::anyhow!("{}: {}; correct the plant's file", path.display(), format!("{error:#}").trim_end()),
+        )
     };
     let text = fs::read_to_string(path).map_err(|error| named(error.into()))?;
     let config = PlantConfig::from_toml(&text).map_err(|error| named(error.into()))?;

@@ -41,7 +41,9 @@ impl<T: Real> Limits<T> {
     #[inline]
     pub fn apply(&self, last: T, wanted: T) -> Limited<T> {
         let inside = wanted.at_least(self.low).at_most(self.high);
-        let drive = inside.at_least(last - self.step).at_most(last + self.step);
+        let slewed = inside.at_least(last - self.step).at_most(last + self.step);
+        // Should `last` lie outside the range, voltage comes before slew.
+        let drive = slewed.at_least(self.low).at_most(self.high);
         Limited {
             drive: if drive.is_finite() { drive } else { last },
             voltage: inside != wanted,
@@ -60,6 +62,7 @@ mod tests {
         assert_eq!(l.apply(50.0, 50.5), Limited { drive: 50.5, voltage: false, slew: false });
         assert_eq!(l.apply(50.0, 60.0), Limited { drive: 51.0, voltage: false, slew: true });
         assert_eq!(l.apply(119.5, 130.0), Limited { drive: 120.0, voltage: true, slew: false });
+        assert_eq!(l.apply(130.0, 130.0).drive, 120.0, "voltage comes before slew");
         assert!(l.apply(10.0, f64::NAN).drive.is_finite());
     }
 }

@@ -1,0 +1,79 @@
+//! Examples and explanations below the help of commands.
+
+pub(super) const EXAMPLES: &str = "\
+Examples (a simulated actuator, from its first record to a drive that follows a reference):
+  hystctl excite identification --high 120 -o u.csv
+  hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
+  hystctl fit train.csv --model pi -o model.json
+  hystctl diagnose train.csv --model model.json -o extended.json
+  hystctl compensate --model extended.json reference.csv -o drive.csv
+  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
+
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 device lost or data at risk.";
+
+pub(super) const FIT: &str = "\
+Examples:
+  hystctl fit train.csv --model pi -o model.json
+  hystctl fit a.csv b.csv --model preisach --zero per-record -o model.json";
+
+pub(super) const SIMULATE: &str = "\
+Example:
+  hystctl simulate --model model.json test.csv -o predicted.csv";
+
+pub(super) const DIAGNOSE: &str = "\
+Examples:
+  hystctl diagnose train.csv --model model.json
+  hystctl diagnose train.csv --test test.csv --model model.json -o extended.json
+  hystctl diagnose a.csv b.csv --model model.json --zero per-record --findings findings.json";
+
+pub(super) const COMPENSATE: &str = "\
+Example:
+  hystctl compensate --model extended.json reference.csv -o drive.csv --limit 0,120 --slew 5000";
+
+pub(super) const RUN: &str = "\
+Examples:
+  hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
+  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap";
+
+pub(super) const RUN_USAGE: &str = "\
+hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>
+       hystctl run [OPTIONS] --daq <DEVICE> --model <MODEL> --reference <REFERENCE>";
+
+pub(super) const PLANT: &str = "\
+A simulated plant is a file like this; every section after [sensor] is an effect and may be left out:
+  seed = 7
+  [actuator]
+  max_v = 120
+  gain_um_per_v = 0.2
+  loop_share = 0.12        # opening of the hysteresis loop over its span
+  [sensor]
+  range_um = [-12, 43]
+  noise_um = 0.007
+  [delay]
+  seconds = 0.002
+  [lag]
+  seconds = 0.003
+  [temperature]
+  per_k = 0.005
+  reference_degc = 22
+  mean_degc = 23
+  swing_k = 4
+  period_s = 45
+  [creep]
+  strength = 0.08
+  tau_min_s = 0.05
+  tau_max_s = 80
+  [[mode]]
+  hz = 100
+  damping = 0.02
+  gain = 0.9
+  [drift]
+  um_per_s = 0.01
+  [interference]
+  amplitude_um = 0.1
+  hz = 50";
+
+pub(super) const RECORDS: &str = "\
+Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one \
+output of displacement_um (or _nm, _mm) and force_n, and where measured temperature_degc and load_n. An integer \
+column segment tells apart stretches between which the device rested.";
