@@ -51,10 +51,10 @@ fn parameters_that_are_no_numbers() {
     let lab = lab();
     let model = lab.read("model.json");
     let gain = model.lines().find(|line| line.trim_start().starts_with("\"gain\": ") && !line.contains('V')).unwrap();
-    refused(&lab, &model.replace(gain, "      \"gain\": null,"), &["line"]);
+    refused(&lab, &model.replace(gain, "      \"gain\": null,"), &["stage pi", "field gain"]);
     refused(&lab, &model.replace(gain, "      \"gain\": NaN,"), &["line"]);
     refused(&lab, &model.replace(gain, "      \"gain\": 1e999,"), &["line"]);
-    refused(&lab, &model.replace(gain, "      \"gain\": \"high\","), &["line"]);
+    refused(&lab, &model.replace(gain, "      \"gain\": \"high\","), &["stage pi", "field gain"]);
     let zero = model.lines().find(|line| line.trim_start().starts_with("\"zero\": ")).unwrap();
     refused(&lab, &model.replace(zero, "  \"zero\": null,"), &["line"]);
 }
@@ -66,7 +66,7 @@ fn stages_that_make_no_chain() {
     let list = model.find("\"stages\"").unwrap();
     refused(&lab, &format!("{}\"stages\": []\n}}\n", &model[..list]), &["no hysteresis stage"]);
     refused(&lab, &model.replace("\"kind\": \"pi\"", "\"kind\": \"preisach\""), &["preisach"]);
-    refused(&lab, &model.replace("\"stage\": \"pi\"", "\"stage\": \"magic\""), &["line"]);
+    refused(&lab, &model.replace("\"stage\": \"pi\"", "\"stage\": \"magic\""), &["magic"]);
 }
 
 #[test]

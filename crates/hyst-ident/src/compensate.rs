@@ -239,7 +239,7 @@ fn check(
             row,
             time: samples.time[row],
             value: samples.output[row],
-            unit: model.output.unit.clone(),
+            unit: reference.output_unit().map_or_else(String::new, |u| u.symbol().into()),
             low,
             high,
         }),

@@ -19,7 +19,7 @@ pub const SCHEMA: &str = "hyst.model/1";
 pub struct Channel {
     /// Column of the record, unit included.
     pub column: String,
-    /// Unit, as it is printed.
+    /// Unit: `V` or `N` of an input, the column's ending (`um`, `nm`, `mm`, `n`) of an output.
     pub unit: String,
     /// Lowest value in the record that the model was fitted to.
     pub low: f64,
@@ -41,23 +41,23 @@ pub struct FittedOn {
 }
 
 /// One stage of the file: its parameters, their units, their standard errors.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 struct StageEntry {
     #[serde(flatten)]
     stage: StageSpec,
     units: BTreeMap<String, String>,
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     std_errors: BTreeMap<String, f64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 enum StageSpec {
     Base(Base),
     Effect(EffectSpec),
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "stage", rename_all = "kebab-case")]
 enum EffectSpec {
     Delay(DelayParams),
@@ -69,8 +69,44 @@ enum EffectSpec {
     Interference(InterferenceParams),
 }
 
+/// Reads a stage by its name, so that an error can name the stage and the field.
+fn read_stage(value: serde_json::Value) -> Result<(StageSpec, BTreeMap<String, f64>), String> {
+    #[derive(Deserialize)]
+    struct PiSpec {
+        gain: f64,
+        thresholds: Vec<f64>,
+        weights: Vec<f64>,
+    }
+    fn field<S: serde::de::DeserializeOwned>(name: &str, value: serde_json::Value) -> Result<S, String> {
+        serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
+            path if path == "." => format!("stage {name}: {}", e.inner()),
+            path => format!("stage {name}, field {path}: {}", e.inner()),
+        })
+    }
+    let name =
+        value.get("stage").and_then(|v| v.as_str()).ok_or("a stage has no name in its field \"stage\"")?.to_owned();
+    let std_errors = value.get("std_errors").cloned().map_or(Ok(BTreeMap::new()), |v| field(&name, v))?;
+    let effect = StageSpec::Effect;
+    let spec = match name.as_str() {
+        "pi" => {
+            let PiSpec { gain, thresholds, weights } = field(&name, value)?;
+            StageSpec::Base(Base::Pi { gain, thresholds, weights })
+        }
+        "preisach" => StageSpec::Base(Base::Preisach(field(&name, value)?)),
+        "delay" => effect(EffectSpec::Delay(field(&name, value)?)),
+        "lag" => effect(EffectSpec::Lag(field(&name, value)?)),
+        "temperature" => effect(EffectSpec::Temperature(field(&name, value)?)),
+        "creep" => effect(EffectSpec::Creep(field(&name, value)?)),
+        "resonance" => effect(EffectSpec::Resonance(field(&name, value)?)),
+        "drift" => effect(EffectSpec::Drift(field(&name, value)?)),
+        "interference" => effect(EffectSpec::Interference(field(&name, value)?)),
+        other => return Err(format!("there is no stage called {other:?} in this version")),
+    };
+    Ok((spec, std_errors))
+}
+
 #[derive(Serialize, Deserialize)]
-struct File {
+struct File<S> {
     schema: String,
     kind: Kind,
     version: String,
@@ -81,7 +117,7 @@ struct File {
     /// Sample period of the record; the parameters do not depend on it.
     recorded_at_hz: f64,
     fitted_on: Vec<FittedOn>,
-    stages: Vec<StageEntry>,
+    stages: Vec<S>,
 }
 
 /// A fitted chain: base, effects, and what they were fitted on.
@@ -152,7 +188,7 @@ pub enum ModelError {
         source: Error,
     },
     /// The stages do not make a chain.
-    #[error("{path}: stages: {message}")]
+    #[error("{path}: {message}; fit the model anew or correct that field")]
     Stages {
         /// The file.
         path: String,
@@ -317,7 +353,7 @@ impl Model {
             let advice = if newer { "update hystctl to read it" } else { "give a model.json" };
             return Err(ModelError::Schema { path, found, advice });
         }
-        let file: File = serde_json::from_str(text).map_err(syntax)?;
+        let file: File<serde_json::Value> = serde_json::from_str(text).map_err(syntax)?;
         let model = Self::from_file(file).map_err(|message| ModelError::Stages { path: path.clone(), message })?;
         // Whatever the sample period, a chain must come of it and every number must be finite.
         let period = 1.0 / model.recorded_at_hz;
@@ -330,12 +366,13 @@ impl Model {
         Ok(model)
     }
 
-    fn from_file(file: File) -> Result<Self, String> {
+    fn from_file(file: File<serde_json::Value>) -> Result<Self, String> {
         let mut effects = Effects::default();
         let mut base = None;
         let mut std_errors = BTreeMap::new();
-        for entry in file.stages {
-            let name = match entry.stage {
+        for value in file.stages {
+            let (spec, errors) = read_stage(value)?;
+            let name = match spec {
                 StageSpec::Base(b) => {
                     let name = b.kind().name();
                     if base.replace(b).is_some() {
@@ -362,7 +399,7 @@ impl Model {
                     name
                 }
             };
-            std_errors.extend(entry.std_errors.into_iter().map(|(k, v)| (format!("{name}.{k}"), v)));
+            std_errors.extend(errors.into_iter().map(|(k, v)| (format!("{name}.{k}"), v)));
         }
         let base = base.ok_or("there is no hysteresis stage")?;
         if base.kind() != file.kind {

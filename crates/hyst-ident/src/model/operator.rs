@@ -84,7 +84,7 @@ pub(crate) fn cell_index(a: usize, b: usize) -> usize {
 }
 
 /// The hysteresis of a model, as parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "stage", rename_all = "kebab-case")]
 pub enum Base {
     /// `y = gain u + Σ weights_i play_{thresholds_i}(u)`.
