@@ -14,6 +14,7 @@ mod score;
 mod search;
 mod spectrum;
 mod starts;
+mod trial;
 mod uncertainty;
 
 pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};

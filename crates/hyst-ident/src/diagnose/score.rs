@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::search::Trial;
+use super::trial::Trial;
 use crate::Samples;
 
 /// Bootstrap draws.

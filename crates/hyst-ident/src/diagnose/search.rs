@@ -4,42 +4,16 @@ use hyst_core::Error;
 use rayon::prelude::*;
 
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
+use super::trial::Trial;
 use super::{starts, visible};
 use crate::model::{Effect, Effects};
-use crate::nested::{Fitted, Problem, cross_validate, folds_interleaved};
+use crate::nested::{Fitted, Problem};
 use crate::noise::noise_floor;
 
 /// Sets of effects carried from one round to the next.
 const BEAM: usize = 2;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
-/// Folds of the interleaved cross-validation.
-const FOLDS: usize = 8;
-
-/// A fitted set of effects with its cross-validated errors.
-#[derive(Clone)]
-pub(crate) struct Trial {
-    pub(crate) fit: Fitted,
-    /// Σ residual² of each block, predicted from other blocks.
-    pub(crate) blocks: Vec<f64>,
-}
-
-impl Trial {
-    fn of(problem: &Problem<'_>, fit: Fitted) -> Option<Self> {
-        let blocks = cross_validate(&fit, &folds_interleaved(problem.blocks, FOLDS))?;
-        Some(Self { fit, blocks })
-    }
-
-    /// Σ residual² over all blocks, each predicted from others.
-    pub(crate) fn total(&self) -> f64 {
-        self.blocks.iter().sum()
-    }
-
-    /// Root mean square of the cross-validated residual \[output unit\].
-    pub(crate) fn cv_rmse(&self) -> f64 {
-        (self.total() / self.fit.rows.max(1) as f64).sqrt()
-    }
-}
 
 /// One named effect with how it was found.
 pub(crate) struct Named {

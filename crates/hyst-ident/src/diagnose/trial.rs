@@ -1,0 +1,31 @@
+//! A fitted set of effects, with its cross-validated errors.
+
+use crate::nested::{Fitted, Problem, cross_validate, folds_interleaved};
+
+/// Folds of the cross-validation.
+const FOLDS: usize = 8;
+
+/// A fitted set of effects with its cross-validated errors.
+#[derive(Clone)]
+pub(crate) struct Trial {
+    pub(crate) fit: Fitted,
+    /// Σ residual² of each block, predicted from other blocks.
+    pub(crate) blocks: Vec<f64>,
+}
+
+impl Trial {
+    pub(crate) fn of(problem: &Problem<'_>, fit: Fitted) -> Option<Self> {
+        let blocks = cross_validate(&fit, &folds_interleaved(problem.blocks, FOLDS))?;
+        Some(Self { fit, blocks })
+    }
+
+    /// Σ residual² over all blocks, each predicted from others.
+    pub(crate) fn total(&self) -> f64 {
+        self.blocks.iter().sum()
+    }
+
+    /// Root mean square of the cross-validated residual \[output unit\].
+    pub(crate) fn cv_rmse(&self) -> f64 {
+        (self.total() / self.fit.rows.max(1) as f64).sqrt()
+    }
+}
