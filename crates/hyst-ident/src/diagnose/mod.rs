@@ -19,7 +19,7 @@ mod uncertainty;
 
 pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
 
-use crate::base::ScreeningBasis;
+use crate::base::{Basis, ScreeningBasis};
 use crate::fit::{BLOCKS, FitError, basis_for, check, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Effects, Model};
@@ -77,6 +77,10 @@ pub fn diagnose(
     let per_record = options.zero == Zero::PerRecord;
 
     let screening = ScreeningBasis::for_samples(&samples);
+    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), 3 * screening.len());
+    if rows < needed {
+        return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
+    }
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
     let base =

@@ -392,14 +392,16 @@ fn combine(columns: &[Vec<f64>], weights: &[f64], rows: usize) -> Vec<f64> {
 /// Bounds of a nonlinear parameter for this record.
 fn box_of(p: &crate::model::Parameter<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;
-    match (p.effect, p.name.starts_with("hz")) {
+    let bounds = match (p.effect, p.name.starts_with("hz")) {
         (Effect::Resonance, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist },
         (Effect::Interference, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist },
         (Effect::Delay | Effect::Lag, _) => {
             Bounds { lower: 0.0, upper: p.upper.min(0.1 * samples.longest_segment()).min(4000.0 * samples.period) }
         }
         _ => Bounds { lower: p.lower, upper: p.upper },
-    }
+    };
+    // Segments of a few rows leave no room between the two.
+    Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
 }
 
 /// Values of the nonlinear parameters and their bounds (those of the parameter; `step` narrows them

@@ -1,0 +1,71 @@
+//! Legal records that are unlike the usual one: fits and diagnoses end with a result or an error that says why.
+
+use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
+use hyst_ident::fit::{FitError, FitOptions, fit};
+use hyst_ident::model::Kind;
+use hyst_ident::record::{Columns, OutputUnit, Record};
+
+/// A play with gain over `segments` segments of `rows` rows.
+fn record(segments: usize, rows: usize, rate_hz: f64, unit: OutputUnit, scale: f64) -> Record {
+    let (mut time, mut input, mut output, mut labels) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for s in 0..segments {
+        let mut p = 0.0;
+        for k in 0..rows {
+            let x = k as f64 / rows as f64;
+            let u = 50.0 * (1.0 - (40.0 * x).cos()) * (1.0 - 0.7 * x);
+            p = hyst_core::play(p, u, 8.0);
+            // A repeatable stand-in for noise: the last digits of a fast-turning phase.
+            let noise = 1e-3 * (1e4 * (u + 0.37 * k as f64)).sin();
+            time.push((s * (rows + 100) + k) as f64 / rate_hz);
+            input.push(u);
+            output.push(scale * (0.1 * u + 0.05 * p + noise));
+            labels.push(s as i64);
+        }
+    }
+    let columns = Columns {
+        name: "odd".into(),
+        segment: Some(labels),
+        time,
+        input: Some(input),
+        output: Some((unit, output)),
+        ..Columns::default()
+    };
+    Record::from_samples(columns).unwrap()
+}
+
+fn whole_way(record: &Record, kind: Kind) -> Result<Vec<&'static str>, FitError> {
+    let model = fit(record, kind, &FitOptions::default())?;
+    let d = diagnose(record, Some(record), &model, &DiagnoseOptions::default(), &|_| {})?;
+    Ok(d.findings.effects.iter().map(|e| e.name.name()).collect())
+}
+
+#[test]
+fn few_rows_are_an_error_that_counts_them() {
+    for rows in [2, 5, 20] {
+        let end = whole_way(&record(1, rows, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Pi);
+        assert!(matches!(end, Err(FitError::TooShort { .. } | FitError::ConstantInput { .. })), "{rows}: {end:?}");
+    }
+}
+
+#[test]
+fn many_segments_of_a_few_rows_end() {
+    let end = whole_way(&record(60, 4, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Pi);
+    assert!(end.is_ok() || matches!(end, Err(FitError::TooShort { .. } | FitError::Falling { .. })), "{end:?}");
+}
+
+#[test]
+fn other_rates_and_units_change_nothing() {
+    for (rate, unit, scale) in [
+        (200.0, OutputUnit::Nanometre, 1e3),
+        (50_000.0, OutputUnit::Newton, 0.1),
+        (1000.0, OutputUnit::Millimetre, 1e-3),
+    ] {
+        let named = whole_way(&record(1, 4000, rate, unit, scale), Kind::Pi).unwrap();
+        assert!(named.is_empty(), "{rate} Hz: {named:?}");
+    }
+}
+
+#[test]
+fn a_single_segment_and_a_preisach_base() {
+    assert!(whole_way(&record(1, 4000, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Preisach).unwrap().is_empty());
+}
