@@ -69,3 +69,40 @@ fn other_rates_and_units_change_nothing() {
 fn a_single_segment_and_a_preisach_base() {
     assert!(whole_way(&record(1, 4000, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Preisach).unwrap().is_empty());
 }
+
+/// A change of the output's unit changes no finding: creep is found at any scale, with either base.
+#[test]
+fn findings_do_not_depend_on_the_unit() {
+    let creeping = |scale: f64| {
+        let rows = 6000;
+        let (mut p, mut slow, mut input, mut output) = (0.0, 0.0, Vec::new(), Vec::new());
+        for k in 0..rows {
+            // Loops for two seconds, then holds at four levels.
+            let t = k as f64 * 1e-3;
+            let levels = [80.0, 20.0, 60.0, 30.0];
+            let u = if t < 2.0 { 50.0 * (1.0 - (9.0 * t).cos()) } else { levels[((t - 2.0) as usize).min(3)] };
+            p = hyst_core::play(p, u, 8.0);
+            let v = 0.1 * u + 0.05 * p;
+            slow += 1e-3 / 0.4 * (v - slow);
+            let noise = 1e-3 * (1e4 * (u + 0.37 * k as f64)).sin();
+            input.push(u);
+            output.push(scale * (v + 0.05 * slow + noise));
+        }
+        let time = (0..rows).map(|k| k as f64 * 1e-3).collect();
+        let columns = Columns {
+            name: "creeping".into(),
+            time,
+            input: Some(input),
+            output: Some((OutputUnit::Nanometre, output)),
+            ..Columns::default()
+        };
+        Record::from_samples(columns).unwrap()
+    };
+    for kind in Kind::ALL {
+        let in_um = whole_way(&creeping(1.0), kind).unwrap();
+        assert_eq!(in_um, ["creep"]);
+        for scale in [1e-3, 1e3, 1e6] {
+            assert_eq!(whole_way(&creeping(scale), kind).unwrap(), in_um, "{kind} at {scale}");
+        }
+    }
+}

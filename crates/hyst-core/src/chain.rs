@@ -1,5 +1,6 @@
 //! The actuator: a hysteresis operator and the optional stages around it, in physical order.
 
+use crate::stage::hold;
 use crate::{
     Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift, DriftParams, Env, Error,
     Interference, InterferenceParams, Lag, LagParams, LagState, Real, Resonance, ResonanceParams, ResonanceState,
@@ -38,6 +39,8 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
 /// History of a chain.
 #[derive(Clone, Debug)]
 pub struct ChainState<T, S, const D: usize, const C: usize> {
+    input: T,
+    temperature: T,
     delay: DelayState<T, D>,
     lag: LagState<T>,
     hysteresis: S,
@@ -151,6 +154,8 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
 
     fn state(&self) -> Self::State {
         ChainState {
+            input: T::ZERO,
+            temperature: T::ZERO,
             delay: DelayState::new(),
             lag: LagState::default(),
             hysteresis: self.hysteresis.state(),
@@ -160,6 +165,8 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        let e = &Env { temperature: hold(&mut s.temperature, e.temperature), ..*e };
+        let u0 = hold(&mut s.input, u0);
         let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
@@ -172,8 +179,11 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         through(&self.interference, x, |g, x| g.reset(&mut (), e, x)) + self.zero
     }
 
+    /// An input or temperature that is no finite number is replaced by the last one that was.
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
+        let e = &Env { temperature: hold(&mut s.temperature, e.temperature), ..*e };
+        let u = hold(&mut s.input, u);
         let mut x = through(&self.delay, u, |g, x| g.step(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
@@ -228,6 +238,24 @@ mod tests {
         let span = double.iter().fold(0.0f64, |m, y| m.max(y.abs()));
         for (a, b) in single.iter().zip(&double) {
             assert!((a - b).abs() < 2e-5 * span, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn a_dropout_leaves_no_trace() {
+        let c = chain::<f64>();
+        let e = Env { temperature: 24.0, ..Env::default() };
+        let (mut a, mut b) = (c.state(), c.state());
+        c.reset(&mut a, &e, 0.0);
+        c.reset(&mut b, &e, 0.0);
+        for k in 0..200 {
+            let u = 0.5 * f64::from(k);
+            let dropped = Env { temperature: f64::NAN, ..e };
+            // A repeated sample on one side, one that is no number on the other.
+            if k % 50 == 7 {
+                assert_eq!(c.step(&mut a, &e, 0.5 * f64::from(k - 1)), c.step(&mut b, &dropped, f64::NAN));
+            }
+            assert_eq!(c.step(&mut a, &e, u), c.step(&mut b, &e, u));
         }
     }
 

@@ -1,6 +1,7 @@
 //! The inverse of a chain: from a reference to the drive that makes the actuator follow it.
 
 use crate::preview::{Preview, PreviewState};
+use crate::stage::hold;
 use crate::{
     Build, Chain, Complex, CreepInverse, CreepState, Delay, DelayParams, DelayState, Env, Error, Invert, Real,
     Sampling, Stage, Temperature,
@@ -42,11 +43,19 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
 /// History of a compensator.
 #[derive(Clone, Debug)]
 pub struct CompensatorState<T, S, const C: usize, const N: usize> {
+    reference: T,
+    degc: T,
+    factor: T,
     output_side: PreviewState<T, N>,
     creep: CreepState<T, C>,
     temperature: DelayState<T, N>,
     hysteresis: S,
     input_side: PreviewState<T, N>,
+}
+
+/// The gain over temperature, or the last one that was positive.
+fn usable<T: Real>(held: &mut T, factor: T) -> T {
+    if factor > T::ZERO { hold(held, factor) } else { *held }
 }
 
 /// Band that is chosen where no mode narrows it \[cycles per sample\]. The filter fades out up to twice
@@ -132,6 +141,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
 
     fn state(&self) -> Self::State {
         CompensatorState {
+            reference: T::ZERO,
+            degc: T::ZERO,
+            factor: T::ONE,
             output_side: PreviewState::new(),
             creep: CreepState::new(),
             temperature: DelayState::new(),
@@ -142,7 +154,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
 
     /// As if the reference had been `u0` for ever: memory virgin, then at the drive for `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let mut x = u0 - self.zero;
+        let e = &Env { temperature: hold(&mut s.degc, e.temperature), ..*e };
+        let mut x = hold(&mut s.reference, u0) - self.zero;
         if let Some(filter) = &self.output_side {
             filter.fill(&mut s.output_side, x);
         }
@@ -151,7 +164,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         }
         if let Some(temperature) = &self.temperature {
             self.surroundings.reset(&mut s.temperature, e, e.temperature);
-            x = x / temperature.factor(e);
+            x = x / usable(&mut s.factor, temperature.factor(e));
         }
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
         if let Some(filter) = &self.input_side {
@@ -160,9 +173,12 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         x
     }
 
-    /// Takes the reference and the surroundings of time k + lead, returns the drive of time k.
+    /// Takes the reference and the surroundings of time k + lead, returns the drive of time k. A reference or
+    /// temperature that is no finite number is replaced by the last one that was, a temperature at which the model
+    /// has no gain left by the last gain.
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let mut x = u - self.zero;
+        let e = &Env { temperature: hold(&mut s.degc, e.temperature), ..*e };
+        let mut x = hold(&mut s.reference, u) - self.zero;
         if let Some(filter) = &self.output_side {
             x = filter.step(&mut s.output_side, x);
         }
@@ -171,7 +187,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         }
         if let Some(temperature) = &self.temperature {
             let then = self.surroundings.step(&mut s.temperature, e, e.temperature);
-            x = x / temperature.factor(&Env { temperature: then, ..*e });
+            x = x / usable(&mut s.factor, temperature.factor(&Env { temperature: then, ..*e }));
         }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         match &self.input_side {

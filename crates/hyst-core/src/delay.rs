@@ -32,6 +32,9 @@ impl<T: Real, const N: usize> Build<Delay<T, N>> for DelayParams {
     fn build(&self, cx: &Sampling) -> Result<Delay<T, N>, Error> {
         let h = cx.checked()?;
         let samples = within("delay.seconds", self.seconds, self.seconds >= 0.0, "zero or positive")? / h;
+        // Whole samples up to rounding are whole samples: a fraction would call for a preview filter.
+        let nearest = libm::round(samples);
+        let samples = if (samples - nearest).abs() <= 1e-9 * nearest { nearest } else { samples };
         let whole = libm::floor(samples);
         // Compared as f64: a huge delay must not wrap when it becomes an integer.
         if whole + 2.0 > N as f64 {

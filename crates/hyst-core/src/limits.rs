@@ -40,6 +40,7 @@ impl<T: Real> Limits<T> {
     /// The allowed drive nearest to `wanted`, one period after `last`. NaN gives `last`.
     #[inline]
     pub fn apply(&self, last: T, wanted: T) -> Limited<T> {
+        let wanted = if wanted.is_finite() { wanted } else { last };
         let inside = wanted.at_least(self.low).at_most(self.high);
         let slewed = inside.at_least(last - self.step).at_most(last + self.step);
         // Should `last` lie outside the range, voltage comes before slew.
@@ -63,6 +64,6 @@ mod tests {
         assert_eq!(l.apply(50.0, 60.0), Limited { drive: 51.0, voltage: false, slew: true });
         assert_eq!(l.apply(119.5, 130.0), Limited { drive: 120.0, voltage: true, slew: false });
         assert_eq!(l.apply(130.0, 130.0).drive, 120.0, "voltage comes before slew");
-        assert!(l.apply(10.0, f64::NAN).drive.is_finite());
+        assert_eq!(l.apply(60.0, f64::NAN).drive, 60.0, "what is no number holds the last drive");
     }
 }

@@ -2,6 +2,16 @@
 
 use crate::{Error, Real};
 
+/// The last finite value: `x` if it is finite, else what was held. One sample that is no number (a sensor that
+/// drops out) must not stay in a history for ever.
+#[inline]
+pub(crate) fn hold<T: Real>(held: &mut T, x: T) -> T {
+    if x.is_finite() {
+        *held = x;
+    }
+    *held
+}
+
 /// Measured surroundings at one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Env<T> {

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use hyst_core::Grid;
+
 use crate::base::{Basis, PiBasis, PreisachBasis};
 use crate::lsq::Blocks;
 use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError};
@@ -16,6 +18,9 @@ const CELLS: usize = 24;
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
 const ROWS: usize = 40_000;
+
+/// Rows below which no model of this version can be fitted, whatever they show.
+const FEWEST: usize = 45;
 
 /// Why a fit is impossible.
 #[derive(Debug, thiserror::Error)]
@@ -117,6 +122,14 @@ pub struct FitOptions {
 /// See [`FitError`].
 pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, FitError> {
     let mut samples = Samples::from_record(record);
+    if samples.len() < FEWEST {
+        return Err(FitError::TooShort {
+            record: record.name(),
+            rows: samples.len(),
+            unknowns: FEWEST / 3,
+            needed: FEWEST,
+        });
+    }
     check(record, &samples)?;
     let basis = basis_for(kind, &samples);
     let name = || record.name();
@@ -129,7 +142,7 @@ pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, F
     if settled < needed {
         return Err(FitError::TooShort { record: name(), rows: settled, unknowns: basis.len(), needed });
     }
-    Ok(to_model(record, &samples, kind, &fitted, options.seed))
+    Ok(to_model(record, &samples, &basis, &fitted, options.seed))
 }
 
 /// A base of a kind, with the grid or thresholds that the record calls for.
@@ -165,6 +178,23 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> BasisOf {
     match kind {
         Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
         Kind::Preisach => BasisOf::Preisach(PreisachBasis::for_samples(samples, CELLS)),
+    }
+}
+
+/// The base that a model has, for a record that it was fitted to: its own thresholds or grid.
+pub(crate) fn basis_of(model: &Model, samples: &Samples) -> BasisOf {
+    match &model.base {
+        Base::Pi { thresholds, .. } => {
+            BasisOf::Pi(PiBasis { thresholds: thresholds.clone(), ..PiBasis::for_samples(samples) })
+        }
+        Base::Preisach(spec) => {
+            let grid = Grid { low: spec.low, high: spec.high, cells: spec.cells };
+            BasisOf::Preisach(PreisachBasis {
+                grid,
+                rest: spec.rest,
+                ..PreisachBasis::for_samples(samples, spec.cells)
+            })
+        }
     }
 }
 
@@ -240,8 +270,7 @@ fn fit_settled(
 }
 
 /// Puts a fit into a model.
-pub(crate) fn to_model(record: &Record, samples: &Samples, kind: Kind, fitted: &Fitted, seed: u64) -> Model {
-    let basis = basis_for(kind, samples);
+pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitted: &Fitted, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
     let (least, most) =

@@ -20,6 +20,16 @@ pub(crate) fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     *median / 0.6745 / 70f64.sqrt()
 }
 
+/// Standard deviation that the output's own steps bring \[its unit\]: q/√12 with q the smallest gap between two of its
+/// values. Next to nothing where values are not quantised.
+pub(crate) fn quantisation(output: &[f64]) -> f64 {
+    let mut sorted = output.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let gaps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0);
+    let smallest = gaps.fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

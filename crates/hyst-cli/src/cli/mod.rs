@@ -53,7 +53,7 @@ pub(crate) struct DemoArgs {
     /// Which actuator
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Folder to write into; files of an earlier demo there are replaced
+    /// Folder to write into, empty or from an earlier demo, whose files are replaced
     #[arg(long, value_name = "FOLDER", default_value = "demo-out")]
     pub(crate) out: PathBuf,
     #[command(flatten)]

@@ -14,6 +14,8 @@ use crate::{input, text};
 #[derive(Debug, Serialize)]
 pub(super) struct Compensation {
     rows: usize,
+    /// Where the drive starts \[V\].
+    first: f64,
     lowest: f64,
     highest: f64,
     lead_samples: usize,
@@ -72,6 +74,7 @@ impl Compensation {
         let in_the_sensor = model.effects.names().into_iter().filter(|effect| !effect.acts_on_the_motion());
         Self {
             rows: drive.voltage.len(),
+            first: drive.voltage.first().copied().unwrap_or_default(),
             lowest,
             highest,
             lead_samples: drive.lead,
@@ -100,7 +103,11 @@ impl Compensation {
                 "where it is limited the actuator cannot follow: slow the reference down or shrink it".to_owned(),
             );
         }
-        let lead = format!("lead {} ({} s)", text::count(self.lead_samples, "sample"), short(self.lead_s));
+        let lead = format!(
+            "preview {} ({} s), rows aligned with the reference",
+            text::count(self.lead_samples, "sample"),
+            short(self.lead_s)
+        );
         lines.push(match self.bandwidth_hz {
             Some(hz) => format!(
                 "{lead}; dynamics inverted up to {} Hz, to within {} there",
@@ -109,6 +116,12 @@ impl Compensation {
             ),
             None => format!("{lead}; no dynamics to invert"),
         });
+        if self.first.abs() > 0.01 * (self.highest - self.lowest) {
+            lines.push(format!(
+                "the drive starts at {} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value",
+                short(self.first)
+            ));
+        }
         if !self.not_compensated.is_empty() {
             let (effects, verb) =
                 (text::listed(&self.not_compensated), if self.not_compensated.len() == 1 { "is" } else { "are" });

@@ -5,6 +5,7 @@ use std::path::Path;
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::{Base, Model};
+use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
 
@@ -28,6 +29,8 @@ struct Summary {
     sensor_zero: f64,
     #[serde(skip)]
     input_unit: String,
+    #[serde(skip)]
+    seen: String,
 }
 
 /// The hysteresis in a few numbers.
@@ -66,8 +69,29 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         base: base_summary(&model),
         sensor_zero: model.zero,
         input_unit: model.input.unit.clone(),
+        seen: seen(&record, &model),
     };
     report.print(&summary.text(), &summary)
+}
+
+/// What the record looks like: a slip of a unit shows here.
+fn seen(record: &Record, model: &Model) -> String {
+    let (time, period) = (record.time(), record.sample_period());
+    let active = record.rows() as f64 * period;
+    let lab = time.last().copied().unwrap_or_default() - time.first().copied().unwrap_or_default();
+    format!(
+        "record: {}, {} Hz, {} s of drive in {} s; input {} to {} {}, output {} to {} {}",
+        text::count(record.segments().len(), "segment"),
+        text::short(1.0 / period),
+        text::short(active),
+        text::short(lab),
+        text::short(model.input.low),
+        text::short(model.input.high),
+        model.input.unit,
+        text::short(model.output.low),
+        text::short(model.output.high),
+        text::symbol(&model.output.unit)
+    )
 }
 
 fn base_summary(model: &Model) -> BaseSummary {
@@ -92,6 +116,7 @@ impl Summary {
             self.settling_rows,
             self.output
         )];
+        lines.push(self.seen.clone());
         lines.extend(self.errors.map(|errors| text::errors(&errors, unit)));
         lines.push(match self.base {
             BaseSummary::Pi { p0, plays, plays_with_weight } => {

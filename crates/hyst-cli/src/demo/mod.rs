@@ -33,11 +33,24 @@ const RATE_HZ: f64 = 1000.0;
 /// Added to the seed for the test record's drive, so that it is another one.
 const TEST_SEED: u64 = 1 << 32;
 
+/// Summary of a demo, and the sign that a folder is one's.
+const MARK: &str = "demo.json";
+
 /// Runs the command.
 pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let out = &args.out;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
+    // Only a folder that is empty or that a demo has made: its file names are everybody's.
+    let foreign = fs::read_dir(out).is_ok_and(|mut files| files.next().is_some()) && !out.join(MARK).is_file();
+    if foreign {
+        let message = format!(
+            "{}: the folder holds files that no demo has written; choose another one with --out",
+            out.display()
+        );
+        return Err(CommandError::bad_input(message));
+    }
+    write(out, MARK, "{}\n")?;
     let progress = Progress::spinner("simulating an actuator");
 
     // The plant's seed is the demo's: its effect is drawn from it and told to nobody.
@@ -75,6 +88,7 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     drop(progress);
 
     let story = Story { diagnosis: &diagnosis, model: &model, runs: &runs, config: &config };
+    write(out, MARK, &json(&story.summary())?)?;
     Report::new(args.json.json, &[])?.print(&story.text(out), &story.summary())
 }
 

@@ -66,7 +66,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
             return Err(Error::OutOfRange { name: "preisach.cells", must: "at least 1" });
         }
         if cells >= N {
-            return Err(Error::Capacity { name: "preisach nodes", needed: cells + 1, holds: N });
+            return Err(Error::Capacity { name: "preisach nodes", needed: cells.saturating_add(1), holds: N });
         }
         let width = (high - low) / cells as f64;
         let mut map = Self {

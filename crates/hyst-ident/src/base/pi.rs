@@ -20,7 +20,7 @@ const FLOOR: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(crate) struct PiBasis {
     pub(crate) thresholds: Vec<f64>,
-    floor: f64,
+    pub(crate) floor: f64,
 }
 
 impl PiBasis {

@@ -23,7 +23,7 @@ const SMOOTHNESS: f64 = 3e-6;
 pub(crate) struct PreisachBasis {
     pub(crate) grid: Grid,
     pub(crate) rest: f64,
-    floor: f64,
+    pub(crate) floor: f64,
 }
 
 impl PreisachBasis {
@@ -32,12 +32,26 @@ impl PreisachBasis {
     pub(crate) fn for_samples(samples: &Samples, cells: usize) -> Self {
         let (low, high) = samples.input_range();
         let margin = MARGIN * (high - low);
-        // A device that is only driven upwards from 0 V has its rest on the edge of the triangle.
-        let low = if (0.0..=high).contains(&low) && low < 0.2 * (high - low) { 0.0 } else { low - margin };
-        let high = if high <= 0.0 && -high < 0.2 * (high - low) { 0.0 } else { high + margin };
+        // A device that is only driven to one side has its rest on the edge of the triangle, also where the
+        // measured drive passes 0 V by its own offset.
+        let near_zero = |edge: f64| edge.abs() <= 0.2 * (high - low);
+        let one_sided_up = near_zero(low) && low >= -margin;
+        let one_sided_down = !one_sided_up && near_zero(high) && high <= margin;
+        let (low, high) = match (one_sided_up, one_sided_down) {
+            (true, _) => (low.min(0.0), high + margin),
+            (_, true) => (low - margin, high.max(0.0)),
+            _ => (low - margin, high + margin),
+        };
+        let rest = if one_sided_up {
+            low
+        } else if one_sided_down {
+            high
+        } else {
+            0.0f64.clamp(low, high)
+        };
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
         let width = (high - low) / cells as f64;
-        Self { grid: Grid { low, high, cells }, rest: 0.0f64.clamp(low, high), floor: FLOOR * gain * width }
+        Self { grid: Grid { low, high, cells }, rest, floor: FLOOR * gain * width }
     }
 
     fn triangle(&self) -> usize {

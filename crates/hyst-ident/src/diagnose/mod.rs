@@ -20,7 +20,7 @@ mod uncertainty;
 pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
 
 use crate::base::{Basis, ScreeningBasis};
-use crate::fit::{BLOCKS, FitError, basis_for, check, to_model};
+use crate::fit::{BLOCKS, FitError, basis_of, check, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Effects, Model};
 use crate::nested::Problem;
@@ -52,6 +52,8 @@ pub struct Diagnosis {
     pub findings: Findings,
 }
 
+/// Rows that the search needs for each unknown of its base: with fewer, noise looks like an effect.
+const ROWS_PER_UNKNOWN: usize = 10;
 /// Rows that the search uses at most.
 const SEARCH_ROWS: usize = 16_000;
 /// Rows that the final fit uses at most.
@@ -77,7 +79,7 @@ pub fn diagnose(
     let per_record = options.zero == Zero::PerRecord;
 
     let screening = ScreeningBasis::for_samples(&samples);
-    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), 3 * screening.len());
+    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
     }
@@ -88,14 +90,13 @@ pub fn diagnose(
     let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
 
     progress("refitting the model with what was found");
-    let kind = model.base.kind();
     let effects = &found.best.fit.effects;
     let errors = uncertainty::standard_errors(&found.best.fit);
     let mut extended = model.clone();
     if effects.names() != model.effects.names() {
         // The effects keep the parameters that the rich base gave them: refitted on a coarser base
         // they would take up its misfit. Only the base's weights and the zero are solved again.
-        let own = basis_for(kind, &samples);
+        let own = basis_of(model, &samples);
         let motion_only = without_sensor_effects(&samples, effects);
         let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
         let final_problem = Problem::new(&motion_only, own.as_ref(), &final_blocks, per_record);
@@ -105,7 +106,7 @@ pub fn diagnose(
             .map_err(stage)?
             .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
         // Its reach is that of the motion, not of the sensor.
-        extended = to_model(train, &motion_only, kind, &fit, model.seed);
+        extended = to_model(train, &motion_only, &own, &fit, model.seed);
         extended.effects.clone_from(effects);
         extended.std_errors.clone_from(&errors);
     }

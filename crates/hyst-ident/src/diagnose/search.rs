@@ -8,7 +8,7 @@ use super::trial::Trial;
 use super::{starts, visible};
 use crate::model::{Effect, Effects};
 use crate::nested::{Fitted, Problem};
-use crate::noise::noise_floor;
+use crate::noise::{noise_floor, quantisation};
 
 /// Sets of effects carried from one round to the next.
 const BEAM: usize = 2;
@@ -73,7 +73,8 @@ pub(crate) fn search(
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Search, Error> {
-    let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments);
+    let steps = quantisation(&problem.samples.output);
+    let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments).max(steps);
     let mut judge = Judge { problem, noise, seed };
     let already = base.effects.names();
     let Some(start) = Trial::of(problem, base.clone()) else {
@@ -121,7 +122,7 @@ pub(crate) fn search(
         next.truncate(BEAM);
         best = next[0].clone();
         // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
-        judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments));
+        judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments)).max(steps);
         beam = next;
     }
 

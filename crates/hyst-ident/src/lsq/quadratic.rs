@@ -35,10 +35,12 @@ pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bound
     if let Some(p) = penalty {
         h += p;
     }
+    // The target of unit length, whatever its unit: the solver's tolerances are absolute.
+    let size = gram.matrix[(n, n)].sqrt().max(f64::MIN_POSITIVE);
     // Columns of unit length: volts, micrometres and hertz stand side by side here.
     let scale: Vec<f64> = (0..n).map(|i| if h[(i, i)] > 0.0 { h[(i, i)].sqrt() } else { 1.0 }).collect();
     for i in 0..n {
-        g[i] /= scale[i];
+        g[i] /= scale[i] * size;
         for j in 0..n {
             h[(i, j)] /= scale[i] * scale[j];
         }
@@ -47,8 +49,11 @@ pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bound
     if !h.iter().chain(g.iter()).all(|x| x.is_finite()) {
         return None;
     }
-    let scaled: Vec<Bounds> =
-        bounds.iter().zip(&scale).map(|(b, s)| Bounds { lower: b.lower * s, upper: b.upper * s }).collect();
+    let scaled: Vec<Bounds> = bounds
+        .iter()
+        .zip(&scale)
+        .map(|(b, s)| Bounds { lower: b.lower * s / size, upper: b.upper * s / size })
+        .collect();
     // Where no bound binds, the answer is the plain one.
     let free = h.clone().cholesky().map(|c| c.solve(&g));
     let inside = |z: &DVector<f64>| z.iter().zip(&scaled).all(|(z, b)| *z >= b.lower && *z <= b.upper);
@@ -56,7 +61,7 @@ pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bound
         Some(z) if inside(&z) => z,
         _ => bounded(&h, &g, &scaled)?,
     };
-    Some(DVector::from_fn(n, |i, _| z[i] / scale[i]))
+    Some(DVector::from_fn(n, |i, _| z[i] / scale[i] * size))
 }
 
 fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVector<f64>> {

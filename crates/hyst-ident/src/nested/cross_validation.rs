@@ -6,7 +6,12 @@ use crate::lsq::{Blocks, Gram, solve};
 /// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
 pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
     let n = blocks.rows.len();
-    (0..count.min(n)).map(|f| (f..n).step_by(count).collect()).collect()
+    // Shifted by one each round, so that equal segments do not lose the same piece together.
+    let fold = |b: usize| (b + b / count) % count;
+    (0..count.min(n))
+        .map(|f| (0..n).filter(|b| fold(*b) == f).collect())
+        .filter(|f: &Vec<usize>| !f.is_empty())
+        .collect()
 }
 
 /// Σ residual² of each block, predicted by a fit to the blocks of all other folds.

@@ -425,6 +425,8 @@ fn stepped(effects: &Effects, index: usize, samples: &Samples) -> Option<(Effect
                 (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
                 _ => 1e-5,
             };
+            // Downwards where the upper bound is near: beyond it the stage may not exist.
+            let step = if *p.value + step > p.upper { -step } else { step };
             *p.value += step;
             found = Some((step, p.effect));
         }

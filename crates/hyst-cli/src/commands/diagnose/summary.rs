@@ -12,6 +12,14 @@ pub(super) fn of(findings: &Findings) -> String {
     let mut text = format!("{}\n\n{}", verdict(findings), errors(findings, unit));
     // Writing to a String does not fail.
     let _ = writeln!(text, "noise floor {} {unit}", short(findings.noise_floor));
+    if let (Some(before), Some(after)) = (findings.before.test, findings.after.test)
+        && after.rmse > 1.02 * before.rmse
+    {
+        let _ = writeln!(
+            text,
+            "WARNING: on the test record the error grew; do not use the extended model. The training record may not show\nenough to tell effects apart: record the drive of `hystctl excite identification`."
+        );
+    }
     for effect in &findings.effects {
         let _ = write!(text, "\n{}", finding(effect, unit));
     }
@@ -31,7 +39,8 @@ fn verdict(findings: &Findings) -> String {
         Verdict::Explained => {
             let mut names: Vec<&str> = findings.effects.iter().map(|effect| effect.name.name()).collect();
             names.dedup();
-            format!("explained: the model lacks {}", listed(&names))
+            let part = if findings.remainder.kind == RemainderKind::None { "" } else { " in part" };
+            format!("explained{part}: the model lacks {}", listed(&names))
         }
         Verdict::NothingMissing => "nothing missing: the model is at the noise floor".to_owned(),
         Verdict::BaseTooCoarse => {
