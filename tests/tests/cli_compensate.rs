@@ -13,7 +13,7 @@ fn the_drive_stands_beside_the_reference() {
     let lab = lab();
     let ran = lab.ok("compensate --model model.json reference.csv -o drive.csv");
     assert_eq!(ran.stdout, "");
-    for part in ["1000 rows", "limited by voltage in 0 rows, by slew in 0 rows", "lead 0 samples"] {
+    for part in ["1000 rows", "limited by voltage in 0 rows, by slew in 0 rows", "preview 0 samples"] {
         assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
     }
     let (reference, drive) = (lab.read("reference.csv"), lab.read("drive.csv"));
@@ -58,7 +58,7 @@ fn references_out_of_reach_are_refused() {
     let lab = lab();
     lab.reference("far.csv", 1.0, 400.0);
     let message = lab.refuses("compensate --model model.json far.csv -o drive.csv", 2);
-    for part in ["far.csv", "row", "time", "um", "scale or shift"] {
+    for part in ["far.csv", "row", "time", "µm", "scale or shift"] {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
     lab.write("nothing.csv", "time_s,voltage_v\n0,1\n0.002,2\n");

@@ -15,7 +15,8 @@ fn a_lag_is_found_named_and_added() {
     let lab = lab();
     let line = "diagnose train.csv --test test.csv --model model.json -o extended.json --findings findings.json";
     let ran = lab.ok(line);
-    for part in ["explained: the model lacks lag", "train  before", "test   before", "±", "noise floor", "remainder:"]
+    for part in
+        ["explained in part: the model lacks lag", "train  before", "test   before", "±", "noise floor", "remainder:"]
     {
         assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
     }

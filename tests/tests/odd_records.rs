@@ -4,6 +4,7 @@ use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::fit::{FitError, FitOptions, fit};
 use hyst_ident::model::Kind;
 use hyst_ident::record::{Columns, OutputUnit, Record};
+use hyst_ident::simulate::{Zero, simulate};
 
 /// A play with gain over `segments` segments of `rows` rows.
 fn record(segments: usize, rows: usize, rate_hz: f64, unit: OutputUnit, scale: f64) -> Record {
@@ -68,6 +69,43 @@ fn other_rates_and_units_change_nothing() {
 #[test]
 fn a_single_segment_and_a_preisach_base() {
     assert!(whole_way(&record(1, 4000, 1000.0, OutputUnit::Micrometre, 1.0), Kind::Preisach).unwrap().is_empty());
+}
+
+/// The same record with its columns changed.
+fn changed(change: impl Fn(&mut Vec<f64>, &mut Vec<f64>)) -> Record {
+    let plain = record(2, 4000, 1000.0, OutputUnit::Micrometre, 1.0);
+    let (mut input, mut output) = (plain.input().to_vec(), plain.output().unwrap().to_vec());
+    change(&mut input, &mut output);
+    let columns = Columns {
+        name: "changed".into(),
+        segment: Some(plain.segments().iter().zip(0..).flat_map(|(s, k)| vec![k; s.len()]).collect()),
+        time: plain.time().to_vec(),
+        input: Some(input),
+        output: Some((OutputUnit::Micrometre, output)),
+        ..Columns::default()
+    };
+    Record::from_samples(columns).unwrap()
+}
+
+/// A drive that is measured with an offset of a millivolt still begins at rest on the edge of the triangle.
+#[test]
+fn a_millivolt_of_offset_does_not_change_the_fit() {
+    let error = |offset: f64| {
+        let record = changed(|input, _| input.iter_mut().for_each(|u| *u += offset));
+        let model = fit(&record, Kind::Preisach, &FitOptions::default()).unwrap();
+        assert_eq!(model.fitted_on[0].settling_rows, 0);
+        simulate(&model, &record, Zero::None).unwrap().errors.unwrap().rmse_all_rows
+    };
+    assert!(error(-1e-3) < 1.5 * error(0.0), "{} {}", error(-1e-3), error(0.0));
+}
+
+/// Where the output's steps are all the noise there is, they are the floor.
+#[test]
+fn a_quantised_output_is_not_unexplained() {
+    let record = changed(|_, output| output.iter_mut().for_each(|y| *y = (*y / 0.02).round() * 0.02));
+    let model = fit(&record, Kind::Pi, &FitOptions::default()).unwrap();
+    let d = diagnose(&record, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
+    assert!(d.findings.effects.is_empty() && d.findings.noise_floor > 0.004, "{:?}", d.findings);
 }
 
 /// A change of the output's unit changes no finding: creep is found at any scale, with either base.
