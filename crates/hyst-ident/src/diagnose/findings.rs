@@ -221,10 +221,10 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             format!("a mode rings at {:.1} Hz with damping ratio {:.4}", r.hz, r.damping)
         }
         Effect::Drift => {
-            let hours = m.samples.time.last()? - m.samples.time.first()?;
+            let seconds = m.samples.time.last()? - m.samples.time.first()?;
             format!(
-                "the zero moves by {:+.4} {} over the record's {hours:.0} s",
-                e.drift?.per_second * hours,
+                "the zero moves by {:+.4} {} over the record's {seconds:.0} s",
+                e.drift?.per_second * seconds,
                 symbol(m)
             )
         }

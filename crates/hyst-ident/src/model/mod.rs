@@ -6,7 +6,7 @@ mod operator;
 
 pub use effects::{CreepBank, Effect, Effects};
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
-pub use operator::{Base, Compensator, HostChain, Kind, NODES, Operator, OperatorInverse, PreisachSpec};
+pub use operator::{AnyOperator, Base, Compensator, HostChain, Kind, NODES, Operator, OperatorInverse, PreisachSpec};
 
 pub(crate) use effects::Parameter;
 pub(crate) use operator::{CREEP, OperatorState, TAPS, cell_index};

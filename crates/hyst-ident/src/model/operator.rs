@@ -135,25 +135,20 @@ impl Base {
     }
 }
 
-/// A hysteresis operator of the host.
+/// A hysteresis operator of the host, or the inverse of one.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one per chain; the common case goes without indirection")]
-pub enum Operator {
+pub enum AnyOperator<P, E> {
     /// Prandtl-Ishlinskii.
-    Pi(Pi<f64, PLAYS>),
+    Pi(P),
     /// Preisach.
-    Preisach(Box<Everett<f64, NODES>>),
+    Preisach(Box<E>),
 }
 
+/// A hysteresis operator of the host.
+pub type Operator = AnyOperator<Pi<f64, PLAYS>, Everett<f64, NODES>>;
 /// The inverse of a hysteresis operator of the host.
-#[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant, reason = "one per chain; the common case goes without indirection")]
-pub enum OperatorInverse {
-    /// Prandtl-Ishlinskii.
-    Pi(Pi<f64, PLAYS>),
-    /// Preisach.
-    Preisach(Box<EverettInverse<f64, NODES>>),
-}
+pub type OperatorInverse = AnyOperator<Pi<f64, PLAYS>, EverettInverse<f64, NODES>>;
 
 /// Memory of an operator of the host; an operator uses the half that is its own.
 #[derive(Clone, Debug)]
@@ -168,7 +163,11 @@ impl OperatorState {
     }
 }
 
-impl Stage<f64> for Operator {
+impl<P, E> Stage<f64> for AnyOperator<P, E>
+where
+    P: Stage<f64, State = PiState<f64, PLAYS>>,
+    E: Stage<f64, State = PreisachState<f64>>,
+{
     type State = OperatorState;
     fn state(&self) -> OperatorState {
         OperatorState::new()
@@ -194,24 +193,5 @@ impl Invert<f64> for Operator {
             Self::Pi(o) => OperatorInverse::Pi(o.invert()?),
             Self::Preisach(o) => OperatorInverse::Preisach(Box::new(o.invert()?)),
         })
-    }
-}
-
-impl Stage<f64> for OperatorInverse {
-    type State = OperatorState;
-    fn state(&self) -> OperatorState {
-        OperatorState::new()
-    }
-    fn reset(&self, s: &mut OperatorState, e: &Env<f64>, u0: f64) -> f64 {
-        match self {
-            Self::Pi(o) => o.reset(&mut s.pi, e, u0),
-            Self::Preisach(o) => o.reset(&mut s.preisach, e, u0),
-        }
-    }
-    fn step(&self, s: &mut OperatorState, e: &Env<f64>, u: f64) -> f64 {
-        match self {
-            Self::Pi(o) => o.step(&mut s.pi, e, u),
-            Self::Preisach(o) => o.step(&mut s.preisach, e, u),
-        }
     }
 }

@@ -1,5 +1,7 @@
 //! One fit: columns, Jacobian, damped Gauss-Newton.
 
+use std::borrow::Cow;
+
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
@@ -104,15 +106,18 @@ impl<'a> Problem<'a> {
         p
     }
 
+    /// The base's columns for what leads to the hysteresis; those of the drive as recorded are kept.
+    fn columns(&self, path: &SignalPath<'_>, effects: &Effects) -> Cow<'_, [Vec<f64>]> {
+        if effects.on_input_side() {
+            Cow::Owned(self.basis.columns(&path.input_side(), &self.samples.segments))
+        } else {
+            Cow::Borrowed(&self.raw)
+        }
+    }
+
     fn assemble(&self, effects: &Effects) -> Result<Option<Assembly>, Error> {
         let path = SignalPath::new(self.samples, effects)?;
-        let driven;
-        let base = if effects.on_input_side() {
-            driven = self.basis.columns(&path.input_side(), &self.samples.segments);
-            &driven
-        } else {
-            &self.raw
-        };
+        let base = self.columns(&path, effects);
         let extras = self.extras(effects);
         let width = base.len() + extras.len() + 1;
         let rows: Vec<Vec<usize>> =
@@ -147,14 +152,8 @@ impl<'a> Problem<'a> {
     /// The output of the motion (without the sensor's zero, drift and tone) for given weights.
     pub(crate) fn motion(&self, effects: &Effects, weights: &[f64]) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, effects)?;
-        let driven;
-        let base = if effects.on_input_side() {
-            driven = self.basis.columns(&path.input_side(), &self.samples.segments);
-            &driven
-        } else {
-            &self.raw
-        };
-        let mut v = combine(base, weights, self.samples.len());
+        let base = self.columns(&path, effects);
+        let mut v = combine(&base, weights, self.samples.len());
         path.output_side(&mut v);
         Ok(v)
     }
