@@ -69,7 +69,7 @@ fn stages(c: &mut Criterion) {
     let mode = ResonanceParams { hz: 90.0, damping: 0.03, gain: 1.0 };
     let resonance: hyst_core::Resonance<f64> = mode.build(&PERIOD).unwrap();
     run::<f64, _>(c, "resonance f64", &resonance);
-    let bank = CreepParams { seconds: &[0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0], shares: &[0.01; 7] };
+    let bank = CreepParams { seconds: [0.05, 0.16, 0.5, 1.6, 5.0, 16.0, 50.0], shares: [0.01; 7] };
     let creep: hyst_core::Creep<f64, 8> = bank.build(&PERIOD).unwrap();
     run::<f64, _>(c, "creep-7 f64", &creep);
     let chain: Chain<f64, _, 8, 8> = Chain::new(Pi::<f64, 16>::new(0.1, &r, &w).unwrap())

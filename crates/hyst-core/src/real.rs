@@ -28,6 +28,8 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
+    /// Distance from 1 to the next larger value.
+    const EPSILON: Self;
 
     /// Nearest value to `x`.
     fn from_f64(x: f64) -> Self;
@@ -41,6 +43,22 @@ pub trait Real:
     fn floor(self) -> Self;
     /// sin x, x in rad.
     fn sin(self) -> Self;
+    /// atan x \[rad\].
+    fn atan(self) -> Self;
+    /// √x.
+    fn sqrt(self) -> Self;
+    /// eˣ.
+    fn exp(self) -> Self;
+    /// eˣ − 1 without cancellation near 0.
+    fn exp_m1(self) -> Self;
+    /// ln x.
+    fn ln(self) -> Self;
+    /// ln(1 + x) without cancellation near 0.
+    fn ln_1p(self) -> Self;
+    /// tanh x.
+    fn tanh(self) -> Self;
+    /// xʸ.
+    fn powf(self, y: Self) -> Self;
 
     /// The larger of two values; the second if the first is NaN.
     #[inline]
@@ -61,10 +79,11 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($t:ty, $floor:path, $sin:path) => {
+    ($t:ident, $($name:ident = $function:path),+) => {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const EPSILON: Self = $t::EPSILON;
             #[inline]
             fn from_f64(x: f64) -> Self {
                 x as $t
@@ -82,16 +101,40 @@ macro_rules! real {
                 if self < 0.0 { -self } else { self }
             }
             #[inline]
-            fn floor(self) -> Self {
-                $floor(self)
+            fn powf(self, y: Self) -> Self {
+                real!(@pow $t)(self, y)
             }
-            #[inline]
-            fn sin(self) -> Self {
-                $sin(self)
-            }
+            $(#[inline]
+            fn $name(self) -> Self {
+                $function(self)
+            })+
         }
     };
+    (@pow f32) => { libm::powf };
+    (@pow f64) => { libm::pow };
 }
 
-real!(f32, libm::floorf, libm::sinf);
-real!(f64, libm::floor, libm::sin);
+real!(
+    f32,
+    floor = libm::floorf,
+    sin = libm::sinf,
+    atan = libm::atanf,
+    sqrt = libm::sqrtf,
+    exp = libm::expf,
+    exp_m1 = libm::expm1f,
+    ln = libm::logf,
+    ln_1p = libm::log1pf,
+    tanh = libm::tanhf
+);
+real!(
+    f64,
+    floor = libm::floor,
+    sin = libm::sin,
+    atan = libm::atan,
+    sqrt = libm::sqrt,
+    exp = libm::exp,
+    exp_m1 = libm::expm1,
+    ln = libm::log,
+    ln_1p = libm::log1p,
+    tanh = libm::tanh
+);

@@ -67,6 +67,13 @@ pub trait Invert<T: Real>: Stage<T> {
     fn invert(&self) -> Result<Self::Inverse, Error>;
 }
 
+/// A stage that can tell its next output for a trial input without moving its history. What has no closed-form inverse
+/// is inverted through this ([`Search`](crate::Search)).
+pub trait Probe<T: Real>: Stage<T> {
+    /// What [`step`](Stage::step) would return.
+    fn probe(&self, state: &Self::State, env: &Env<T>, u: T) -> T;
+}
+
 /// The sample period that coefficients are built for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
@@ -100,7 +107,7 @@ pub trait Build<C> {
 pub struct Meta {
     /// Name within its stage.
     pub name: &'static str,
-    /// Unit; `y` stands for the output's unit, the empty string for a ratio.
+    /// Unit; `u` stands for the input's unit, `y` for the output's, the empty string for a ratio: `y/u`, `u s`, `1/K`.
     pub unit: &'static str,
     /// Smallest physically sensible value.
     pub lower: f64,

@@ -95,7 +95,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     ///
     /// # Errors
     /// As [`CreepParams::build`].
-    pub fn with_creep(mut self, p: &CreepParams<'_>, cx: &Sampling) -> Result<Self, Error> {
+    pub fn with_creep<L: AsRef<[f64]>>(mut self, p: &CreepParams<L>, cx: &Sampling) -> Result<Self, Error> {
         self.creep = Some(p.build(cx)?);
         Ok(self)
     }

@@ -1,6 +1,6 @@
 //! The inverse of a chain: from a reference to the drive that makes the actuator follow it.
 
-use crate::preview::{Preview, PreviewState};
+use super::preview::{Preview, PreviewState};
 use crate::stage::hold;
 use crate::{
     Build, Chain, Complex, CreepInverse, CreepState, Delay, DelayParams, DelayState, Env, Error, Invert, Real,

@@ -1,6 +1,6 @@
 //! First-order lag of the amplifier: `τ ẏ + y = u`.
 
-use crate::first_order::FirstOrder;
+use crate::chain::FirstOrder;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a first-order lag `τ ẏ + y = u`. Zero is no lag.

@@ -4,17 +4,19 @@
 //! step response rises with log t, as piezoceramics do (Janocha and Kuhnen 2000). An element's
 //! share cᵢ is 1–2 % per decade in ordinary ceramics.
 
+use crate::chain::FirstOrder;
 use crate::error::{finite, within};
-use crate::first_order::FirstOrder;
 use crate::{Build, Env, Error, Invert, Real, Sampling, Stage};
 
-/// Parameters of a creep bank, borrowed: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`.
+/// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
+/// array, a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CreepParams<'a> {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CreepParams<L> {
     /// Time constants τᵢ \[s\], positive.
-    pub seconds: &'a [f64],
+    pub seconds: L,
     /// Shares cᵢ of the fully settled element in the output \[ratio\].
-    pub shares: &'a [f64],
+    pub shares: L,
 }
 
 /// Coefficients of a bank of at most `N` elements; exact for an input that is linear between
@@ -26,23 +28,21 @@ pub struct Creep<T, const N: usize> {
     len: usize,
 }
 
-impl<T: Real, const N: usize> Build<Creep<T, N>> for CreepParams<'_> {
+impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Creep<T, N>> for CreepParams<L> {
     type Context = Sampling;
     fn build(&self, cx: &Sampling) -> Result<Creep<T, N>, Error> {
         let h = cx.checked()?;
-        if self.seconds.len() != self.shares.len() {
+        let (seconds, shares) = (self.seconds.as_ref(), self.shares.as_ref());
+        if seconds.len() != shares.len() {
             return Err(Error::Lengths("creep.seconds and creep.shares"));
         }
-        if self.seconds.len() > N {
-            return Err(Error::Capacity { name: "creep elements", needed: self.seconds.len(), holds: N });
+        if seconds.len() > N {
+            return Err(Error::Capacity { name: "creep elements", needed: seconds.len(), holds: N });
         }
-        let mut creep = Creep {
-            elements: [FirstOrder { a: T::ZERO, b: T::ZERO }; N],
-            shares: [T::ZERO; N],
-            len: self.seconds.len(),
-        };
+        let mut creep =
+            Creep { elements: [FirstOrder { a: T::ZERO, b: T::ZERO }; N], shares: [T::ZERO; N], len: seconds.len() };
         let slots = creep.elements.iter_mut().zip(&mut creep.shares);
-        for ((element, share), (tau, c)) in slots.zip(self.seconds.iter().zip(self.shares)) {
+        for ((element, share), (tau, c)) in slots.zip(seconds.iter().zip(shares)) {
             within("creep.seconds", *tau, *tau > 0.0, "positive")?;
             *element = FirstOrder::new("creep.seconds", h, *tau)?;
             *share = T::from_f64(finite("creep.shares", *c)?);
@@ -164,8 +164,8 @@ impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
 mod tests {
     use super::*;
 
-    const BANK: CreepParams<'static> =
-        CreepParams { seconds: &[0.05, 0.5, 5.0, 50.0], shares: &[0.02, 0.015, 0.01, 0.02] };
+    const BANK: CreepParams<[f64; 4]> =
+        CreepParams { seconds: [0.05, 0.5, 5.0, 50.0], shares: [0.02, 0.015, 0.01, 0.02] };
 
     #[test]
     fn a_step_creeps_by_the_sum_of_exponentials() {
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn unequal_lists_are_refused() {
         let built: Result<Creep<f64, 4>, _> =
-            CreepParams { seconds: &[1.0], shares: &[] }.build(&Sampling { period: 1.0 });
+            CreepParams { seconds: &[1.0][..], shares: &[] }.build(&Sampling { period: 1.0 });
         assert!(matches!(built, Err(Error::Lengths(_))));
     }
 }

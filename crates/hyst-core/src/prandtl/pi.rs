@@ -4,7 +4,38 @@
 //! operator of the same type.
 
 use crate::error::{finite, within};
-use crate::{Env, Error, Invert, Real, Stage, play};
+use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage, play};
+
+/// Parameters of `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)`. `L` is any list of numbers: a vector, an array, a slice.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PiParams<L> {
+    /// Gain p₀ of the identity \[y/u\].
+    pub gain: f64,
+    /// Half-widths rᵢ of the plays \[u\], positive and strictly rising.
+    pub thresholds: L,
+    /// Weights wᵢ of the plays \[y/u\].
+    pub weights: L,
+}
+
+impl<L: AsMut<[f64]>> Params for PiParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        f(&Meta { name: "gain", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, &mut self.gain);
+        for r in self.thresholds.as_mut() {
+            f(&Meta { name: "thresholds", unit: "u", lower: 0.0, upper: f64::INFINITY }, r);
+        }
+        for w in self.weights.as_mut() {
+            f(&Meta { name: "weights", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, w);
+        }
+    }
+}
+
+impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Pi<T, N>> for PiParams<L> {
+    type Context = ();
+    fn build(&self, (): &()) -> Result<Pi<T, N>, Error> {
+        Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref())
+    }
+}
 
 /// Prandtl-Ishlinskii operator with at most `N` plays: `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)`.
 #[derive(Clone, Copy, Debug, PartialEq)]

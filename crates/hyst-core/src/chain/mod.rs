@@ -1,0 +1,26 @@
+//! The actuator as a chain: the optional stages around a hysteresis operator, and the inverse of the whole.
+
+#[allow(clippy::module_inception, reason = "the chain itself, beside its stages")]
+mod chain;
+mod compensator;
+mod creep;
+mod delay;
+mod drift;
+mod first_order;
+mod interference;
+mod lag;
+mod preview;
+mod resonance;
+mod temperature;
+
+pub use chain::{Chain, ChainState, MAX_RESONANCES};
+pub use compensator::{Compensator, CompensatorOptions, CompensatorState};
+pub use creep::{Creep, CreepInverse, CreepParams, CreepState};
+pub use delay::{Delay, DelayParams, DelayState};
+pub use drift::{Drift, DriftParams};
+pub(crate) use first_order::FirstOrder;
+pub use interference::{Interference, InterferenceParams};
+pub use lag::{Lag, LagParams, LagState};
+pub use preview::{Preview, PreviewState};
+pub use resonance::{Resonance, ResonanceParams, ResonanceState};
+pub use temperature::{Temperature, TemperatureParams};

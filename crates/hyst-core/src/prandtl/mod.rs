@@ -1,0 +1,5 @@
+//! The Prandtl-Ishlinskii family: weighted plays.
+
+mod pi;
+
+pub use pi::{Pi, PiParams, PiState};

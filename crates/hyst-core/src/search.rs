@@ -1,0 +1,182 @@
+//! The inverse of what has no closed form: a bounded search for the input.
+
+use crate::error::{finite, within};
+use crate::{Env, Error, Probe, Real, Stage};
+
+/// Inverse of a model whose output rises with the present input, by search.
+///
+/// Each sample looks for the input `u` with `model(u) = y`, beginning at the last input: a bracket that doubles, then
+/// regula falsi (Illinois) with a bisection whenever two steps did not halve it. It ends when the bracket is at most
+/// `tolerance` wide, or after [`EVALUATIONS`](Self::EVALUATIONS) evaluations. So the input is within `tolerance` of the exact one, and
+/// the output within the model's steepest slope times that. Outputs that the range of inputs cannot reach give the
+/// nearer end of it.
+///
+/// Where the output falls for a moment after a turn (a fold), the search crosses the fold: the input jumps, the
+/// output is still reached.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search<T, M> {
+    model: M,
+    low: T,
+    high: T,
+    tolerance: T,
+}
+
+/// History of a search: that of the model, and the last input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SearchState<T, S> {
+    model: S,
+    u: T,
+}
+
+impl<T: Real, M> Search<T, M> {
+    /// Most evaluations of the model for one sample.
+    pub const EVALUATIONS: usize = 128;
+
+    /// Inputs from `low` to `high`, found to within `tolerance` \[all: the model's input unit\].
+    ///
+    /// # Errors
+    /// If a number is not finite, `low ≥ high`, or the tolerance is not positive.
+    pub fn new(model: M, low: f64, high: f64, tolerance: f64) -> Result<Self, Error> {
+        finite("search.low", low)?;
+        within("search.high", high, high > low, "above search.low")?;
+        within("search.tolerance", tolerance, tolerance > 0.0, "positive")?;
+        Ok(Self { model, low: T::from_f64(low), high: T::from_f64(high), tolerance: T::from_f64(tolerance) })
+    }
+
+    /// The model that is inverted.
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+
+    /// How far an input may be from the exact one \[input unit\].
+    pub fn tolerance(&self) -> T {
+        self.tolerance
+    }
+
+    /// The root of the rising function `f`, sought from `start` on.
+    fn root(&self, start: T, mut f: impl FnMut(T) -> T) -> T {
+        let half = T::from_f64(0.5);
+        let (mut a, mut fa) = (start, f(start));
+        if !fa.is_finite() || fa == T::ZERO {
+            return start;
+        }
+        let up = fa < T::ZERO;
+        let end = if up { self.high } else { self.low };
+        let mut width = (self.high - self.low) * T::from_f64(1.0 / 1024.0);
+        let (mut b, mut fb) = (a, fa);
+        let mut left = Self::EVALUATIONS;
+        while left > 0 && (fb < T::ZERO) == up && fb != T::ZERO {
+            if b == end {
+                return end;
+            }
+            (a, fa) = (b, fb);
+            b = if up { (b + width).at_most(self.high) } else { (b - width).at_least(self.low) };
+            width += width;
+            fb = f(b);
+            left -= 1;
+        }
+        // From here on the root lies between a and b. `bend` keeps one end from staying for ever (Illinois).
+        let (mut kept, mut before) = (0i8, (b - a).abs());
+        for i in 0..left {
+            if fb == T::ZERO || (b - a).abs() <= self.tolerance {
+                break;
+            }
+            let secant = a - fa * ((b - a) / (fb - fa));
+            let slow = i % 3 == 2 && (b - a).abs() > before * half;
+            if i % 3 == 2 {
+                before = (b - a).abs();
+            }
+            let inside = (secant > a.at_most(b)) && (secant < a.at_least(b));
+            let c = if slow || !inside { a + (b - a) * half } else { secant };
+            if c == a || c == b {
+                break;
+            }
+            let fc = f(c);
+            if (fc < T::ZERO) == (fb < T::ZERO) {
+                (b, fb) = (c, fc);
+                fa = if kept == 1 { fa * half } else { fa };
+                kept = 1;
+            } else {
+                (a, fa) = (c, fc);
+                fb = if kept == -1 { fb * half } else { fb };
+                kept = -1;
+            }
+        }
+        if fa.abs() < fb.abs() { a } else { b }
+    }
+}
+
+impl<T: Real, M: Probe<T>> Stage<T> for Search<T, M> {
+    type State = SearchState<T, M::State>;
+
+    fn state(&self) -> Self::State {
+        SearchState { model: self.model.state(), u: T::ZERO.at_least(self.low).at_most(self.high) }
+    }
+
+    /// The model at rest at the input whose output is `u0`.
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        let rest = T::ZERO.at_least(self.low).at_most(self.high);
+        s.u = self.root(rest, |u| self.model.reset(&mut s.model, e, u) - u0);
+        self.model.reset(&mut s.model, e, s.u);
+        s.u
+    }
+
+    fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
+        s.u = self.root(s.u, |trial| self.model.probe(&s.model, e, trial) - u);
+        self.model.step(&mut s.model, e, s.u);
+        s.u
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `y = u³ + u − u_last / 2`: rises in u, has a memory, no use for a closed form.
+    #[derive(Clone)]
+    struct Cubic;
+    impl Stage<f64> for Cubic {
+        type State = f64;
+        fn state(&self) -> f64 {
+            0.0
+        }
+        fn reset(&self, s: &mut f64, _: &Env<f64>, u0: f64) -> f64 {
+            *s = u0;
+            u0 * u0 * u0 + u0 * 0.5
+        }
+        fn step(&self, s: &mut f64, e: &Env<f64>, u: f64) -> f64 {
+            let y = self.probe(s, e, u);
+            *s = u;
+            y
+        }
+    }
+    impl Probe<f64> for Cubic {
+        fn probe(&self, s: &f64, _: &Env<f64>, u: f64) -> f64 {
+            u * u * u + u - s * 0.5
+        }
+    }
+
+    #[test]
+    fn every_reachable_output_is_reached_to_the_tolerance() {
+        let inverse = Search::new(Cubic, -50.0, 50.0, 1e-12).unwrap();
+        let (mut s, mut forward, e) = (inverse.state(), 0.0, Env::default());
+        let first = inverse.reset(&mut s, &e, 3.0);
+        assert!((Cubic.reset(&mut forward, &e, first) - 3.0).abs() < 1e-10);
+        for k in 0..2000 {
+            let y = 900.0 * libm::sin(0.7 * f64::from(k)) * libm::cos(0.013 * f64::from(k));
+            let u = inverse.step(&mut s, &e, y);
+            // Slope at most 3·10² + 1 where |y| ≤ 1000.
+            assert!((Cubic.step(&mut forward, &e, u) - y).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_reach_gives_the_end_of_the_range() {
+        let inverse = Search::new(Cubic, -2.0, 3.0, 1e-9).unwrap();
+        let (mut s, e) = (inverse.state(), Env::default());
+        inverse.reset(&mut s, &e, 0.0);
+        assert_eq!(inverse.step(&mut s, &e, 1e9), 3.0);
+        assert_eq!(inverse.step(&mut s, &e, -1e9), -2.0);
+        assert!(inverse.step(&mut s, &e, f64::NAN).is_finite());
+    }
+}
