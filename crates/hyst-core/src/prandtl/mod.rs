@@ -1,5 +1,13 @@
 //! The Prandtl-Ishlinskii family: weighted plays.
 
+mod envelope;
+mod gpi;
 mod pi;
+mod td_pi;
+mod viscous;
 
+pub use envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState};
+pub use gpi::{Gpi, GpiInverse, GpiParams, GpiState};
 pub use pi::{Pi, PiParams, PiState};
+pub use td_pi::{TdPi, TdPiInverse, TdPiParams, TdPiState};
+pub use viscous::{ViscousPi, ViscousPiInverse, ViscousPiParams, ViscousPiState};

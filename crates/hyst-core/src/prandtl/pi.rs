@@ -74,8 +74,29 @@ impl<T: Real, const N: usize> Pi<T, N> {
         Ok(pi)
     }
 
+    /// From stops (elasto-slip elements): `y = p₀ u + Σᵢ kᵢ stop_{rᵢ}(u)`. Because play and stop add up to the input, this
+    /// is the operator with gain `p₀ + Σ kᵢ` and weights `−kᵢ`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn from_stops(gain: f64, yields: &[f64], stiffnesses: &[f64]) -> Result<Self, Error> {
+        let stiff = stiffnesses.iter().fold(0.0, |sum, k| sum + k);
+        let mut pi = Self::new(gain + stiff, yields, stiffnesses)?;
+        for w in &mut pi.weights {
+            *w = -*w;
+        }
+        Ok(pi)
+    }
+
+    /// Half-widths of the plays \[u\].
+    pub fn thresholds(&self) -> &[T] {
+        self.thresholds.get(..self.len).unwrap_or_default()
+    }
+
     #[inline]
     fn advance(&self, s: &mut PiState<T, N>, u: T) -> T {
+        let u = if u.is_finite() { u } else { s.u };
+        s.u = u;
         let mut y = self.gain * u;
         let plays = s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights).take(self.len);
         for ((p, r), w) in plays {
@@ -86,16 +107,17 @@ impl<T: Real, const N: usize> Pi<T, N> {
     }
 }
 
-/// History of the operator: the output of each play \[V\].
+/// History of the operator: the output of each play \[u\], and the last input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PiState<T, const N: usize> {
     plays: [T; N],
+    u: T,
 }
 
 impl<T: Real, const N: usize> PiState<T, N> {
     /// Virgin memory: every play at 0.
     pub fn virgin() -> Self {
-        Self { plays: [T::ZERO; N] }
+        Self { plays: [T::ZERO; N], u: T::ZERO }
     }
 }
 
