@@ -2,16 +2,20 @@
 
 use crate::stage::hold;
 use crate::{
-    Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift, DriftParams, Env, Error,
-    Interference, InterferenceParams, Lag, LagParams, LagState, Real, Resonance, ResonanceParams, ResonanceState,
-    Sampling, Stage, Temperature, TemperatureParams,
+    Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift,
+    DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Real,
+    Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams, Stage, Temperature,
+    TemperatureParams,
 };
 
 /// Structural modes that one chain can hold.
 pub const MAX_RESONANCES: usize = 2;
 
-/// `u → delay → lag → HYSTERESIS → ×temperature → +creep → resonance(s) → +drift → +interference →
-/// + zero → y`, every stage but the hysteresis optional.
+/// Dead zones that the asymmetry of one chain can hold.
+pub const MAX_DEAD_ZONES: usize = 4;
+
+/// `u → delay → lag → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
+/// +interference → + zero → y`, every stage but the hysteresis optional.
 ///
 /// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,12 +26,18 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub lag: Option<Lag<T>>,
     /// The memory operator.
     pub hysteresis: H,
+    /// Curve behind the memory operator.
+    pub asymmetry: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
     /// Gain over temperature.
     pub temperature: Option<Temperature<T>>,
     /// Creep bank.
     pub creep: Option<Creep<T, C>>,
+    /// Compliance under the load.
+    pub load: Option<Load<T>>,
     /// Structural modes, one after the other.
     pub resonances: [Option<Resonance<T>>; MAX_RESONANCES],
+    /// Ends of the motion.
+    pub saturation: Option<Saturation<T>>,
     /// Drift of the sensor.
     pub drift: Option<Drift<T>>,
     /// Tone in the sensor.
@@ -41,6 +51,7 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
 pub struct ChainState<T, S, const D: usize, const C: usize> {
     input: T,
     temperature: T,
+    load: T,
     delay: DelayState<T, D>,
     lag: LagState<T>,
     hysteresis: S,
@@ -55,9 +66,12 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             delay: None,
             lag: None,
             hysteresis,
+            asymmetry: None,
             temperature: None,
             creep: None,
+            load: None,
             resonances: [None; MAX_RESONANCES],
+            saturation: None,
             drift: None,
             interference: None,
             zero: T::ZERO,
@@ -79,6 +93,33 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// As [`LagParams::build`].
     pub fn with_lag(mut self, p: &LagParams, cx: &Sampling) -> Result<Self, Error> {
         self.lag = Some(p.build(cx)?);
+        Ok(self)
+    }
+
+    /// Adds a curve behind the hysteresis.
+    ///
+    /// # Errors
+    /// As [`AsymmetryParams::build`].
+    pub fn with_asymmetry<L: AsRef<[f64]>>(mut self, p: &AsymmetryParams<L>) -> Result<Self, Error> {
+        self.asymmetry = Some(p.build(&())?);
+        Ok(self)
+    }
+
+    /// Adds a compliance under the measured load.
+    ///
+    /// # Errors
+    /// As [`LoadParams::build`].
+    pub fn with_load(mut self, p: &LoadParams) -> Result<Self, Error> {
+        self.load = Some(p.build(&())?);
+        Ok(self)
+    }
+
+    /// Adds ends of the motion.
+    ///
+    /// # Errors
+    /// As [`SaturationParams::build`].
+    pub fn with_saturation(mut self, p: &SaturationParams) -> Result<Self, Error> {
+        self.saturation = Some(p.build(&())?);
         Ok(self)
     }
 
@@ -156,6 +197,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         ChainState {
             input: T::ZERO,
             temperature: T::ZERO,
+            load: T::ZERO,
             delay: DelayState::new(),
             lag: LagState::default(),
             hysteresis: self.hysteresis.state(),
@@ -165,33 +207,41 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let e = &Env { temperature: hold(&mut s.temperature, e.temperature), ..*e };
+        let (temperature, load) = (hold(&mut s.temperature, e.temperature), hold(&mut s.load, e.load));
+        let e = &Env { temperature, load, ..*e };
         let u0 = hold(&mut s.input, u0);
         let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
+        x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
+        x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
             x = through(g, x, |g, x| g.reset(s, e, x));
         }
+        x = through(&self.saturation, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.drift, x, |g, x| g.reset(&mut (), e, x));
         through(&self.interference, x, |g, x| g.reset(&mut (), e, x)) + self.zero
     }
 
-    /// An input or temperature that is no finite number is replaced by the last one that was.
+    /// An input, temperature or load that is no finite number is replaced by the last one that was.
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let e = &Env { temperature: hold(&mut s.temperature, e.temperature), ..*e };
+        let (temperature, load) = (hold(&mut s.temperature, e.temperature), hold(&mut s.load, e.load));
+        let e = &Env { temperature, load, ..*e };
         let u = hold(&mut s.input, u);
         let mut x = through(&self.delay, u, |g, x| g.step(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));
+        x = through(&self.load, x, |g, x| g.step(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
             x = through(g, x, |g, x| g.step(s, e, x));
         }
+        x = through(&self.saturation, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.drift, x, |g, x| g.step(&mut (), e, x));
         through(&self.interference, x, |g, x| g.step(&mut (), e, x)) + self.zero
     }
@@ -212,6 +262,9 @@ mod tests {
             .and_then(|c| c.with_temperature(&TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0 }))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [3.0, -2.0], weights: [0.1, -0.05] }))
+            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
+            .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
             .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01 }))
             .and_then(|c| c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3 }))
             .unwrap()

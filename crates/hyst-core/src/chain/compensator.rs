@@ -3,8 +3,8 @@
 use super::preview::{Preview, PreviewState};
 use crate::stage::hold;
 use crate::{
-    Build, Chain, Complex, CreepInverse, CreepState, Delay, DelayParams, DelayState, Env, Error, Invert, Real,
-    Sampling, Stage, Temperature,
+    AsymmetryInverse, Build, Chain, Complex, CreepInverse, CreepState, Delay, DelayParams, DelayState, Env, Error,
+    Invert, Load, MAX_DEAD_ZONES, Real, Sampling, SaturationInverse, Stage, Temperature,
 };
 
 /// How the dynamic stages are inverted.
@@ -18,9 +18,9 @@ pub struct CompensatorOptions {
 
 /// The inverse chain, stage by stage from the output back to the input:
 ///
-/// `y − zero → resonances⁻¹ → creep⁻¹ → ÷temperature → HYSTERESIS⁻¹ → (lag, delay)⁻¹ → u`.
+/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹ → (lag, delay)⁻¹ → u`.
 ///
-/// Creep, temperature and hysteresis are inverted exactly. Resonances, lag and delay are inverted in
+/// All but resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached). Resonances, lag and delay are inverted in
 /// a band with [`lead`](Self::lead) samples of preview; [`error`](Self::error) states how well. Drift
 /// and interference are in the sensor, not in the motion: the drive does not follow them.
 ///
@@ -29,9 +29,12 @@ pub struct CompensatorOptions {
 #[derive(Clone, Debug)]
 pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     zero: T,
+    saturation: Option<SaturationInverse<T>>,
     output_side: Option<Preview<T, N>>,
+    load: Option<Load<T>>,
     creep: Option<CreepInverse<T, C>>,
     temperature: Option<Temperature<T>>,
+    asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     hysteresis: HI,
     input_side: Option<Preview<T, N>>,
     /// Aligns the drive of a chain without lag and fraction: whole samples of dead time.
@@ -45,8 +48,10 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
 pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     reference: T,
     degc: T,
+    newton: T,
     factor: T,
     output_side: PreviewState<T, N>,
+    load: DelayState<T, N>,
     creep: CreepState<T, C>,
     temperature: DelayState<T, N>,
     hysteresis: S,
@@ -92,14 +97,17 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         } else {
             None
         };
-        // The temperature that reaches the division belongs to the sample that is divided.
+        // The temperature that divides a sample, and the load that is taken from it, belong to that sample.
         let late = output_side.as_ref().map_or(0, Preview::lead);
         Ok(Compensator {
             zero: self.zero,
             surroundings: DelayParams { seconds: late as f64 }.build(&Sampling { period: 1.0 })?,
             output_side,
+            saturation: self.saturation.as_ref().map(Invert::invert).transpose()?,
+            load: self.load,
             creep: self.creep.as_ref().map(Invert::invert).transpose()?,
             temperature: self.temperature,
+            asymmetry: self.asymmetry.as_ref().map(Invert::invert).transpose()?,
             hysteresis: self.hysteresis.invert()?,
             input_side,
             whole_delay: self.delay.as_ref().map_or(0, Delay::whole_samples),
@@ -143,8 +151,10 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         CompensatorState {
             reference: T::ZERO,
             degc: T::ZERO,
+            newton: T::ZERO,
             factor: T::ONE,
             output_side: PreviewState::new(),
+            load: DelayState::new(),
             creep: CreepState::new(),
             temperature: DelayState::new(),
             hysteresis: self.hysteresis.state(),
@@ -154,10 +164,17 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
 
     /// As if the reference had been `u0` for ever: memory virgin, then at the drive for `u0`.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let e = &Env { temperature: hold(&mut s.degc, e.temperature), ..*e };
+        let e = &Env { temperature: hold(&mut s.degc, e.temperature), load: hold(&mut s.newton, e.load), ..*e };
         let mut x = hold(&mut s.reference, u0) - self.zero;
+        if let Some(saturation) = &self.saturation {
+            x = saturation.reset(&mut (), e, x);
+        }
         if let Some(filter) = &self.output_side {
-            filter.fill(&mut s.output_side, x);
+            filter.reset(&mut s.output_side, e, x);
+        }
+        if let Some(load) = &self.load {
+            self.surroundings.reset(&mut s.load, e, e.load);
+            x -= load.deflection(e);
         }
         if let Some(creep) = &self.creep {
             x = creep.reset(&mut s.creep, e, x);
@@ -166,9 +183,12 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             self.surroundings.reset(&mut s.temperature, e, e.temperature);
             x = x / usable(&mut s.factor, temperature.factor(e));
         }
+        if let Some(asymmetry) = &self.asymmetry {
+            x = asymmetry.reset(&mut (), e, x);
+        }
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
         if let Some(filter) = &self.input_side {
-            filter.fill(&mut s.input_side, x);
+            filter.reset(&mut s.input_side, e, x);
         }
         x
     }
@@ -177,10 +197,17 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
     /// temperature that is no finite number is replaced by the last one that was, a temperature at which the model
     /// has no gain left by the last gain.
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let e = &Env { temperature: hold(&mut s.degc, e.temperature), ..*e };
+        let e = &Env { temperature: hold(&mut s.degc, e.temperature), load: hold(&mut s.newton, e.load), ..*e };
         let mut x = hold(&mut s.reference, u) - self.zero;
+        if let Some(saturation) = &self.saturation {
+            x = saturation.step(&mut (), e, x);
+        }
         if let Some(filter) = &self.output_side {
-            x = filter.step(&mut s.output_side, x);
+            x = filter.step(&mut s.output_side, e, x);
+        }
+        if let Some(load) = &self.load {
+            let then = self.surroundings.step(&mut s.load, e, e.load);
+            x -= load.deflection(&Env { load: then, ..*e });
         }
         if let Some(creep) = &self.creep {
             x = creep.step(&mut s.creep, e, x);
@@ -189,9 +216,12 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             let then = self.surroundings.step(&mut s.temperature, e, e.temperature);
             x = x / usable(&mut s.factor, temperature.factor(&Env { temperature: then, ..*e }));
         }
+        if let Some(asymmetry) = &self.asymmetry {
+            x = asymmetry.step(&mut (), e, x);
+        }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         match &self.input_side {
-            Some(filter) => filter.step(&mut s.input_side, x),
+            Some(filter) => filter.step(&mut s.input_side, e, x),
             None => x,
         }
     }
@@ -200,7 +230,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CreepParams, LagParams, Pi, ResonanceParams, TemperatureParams};
+    use crate::{
+        AsymmetryParams, CreepParams, LagParams, LoadParams, Pi, ResonanceParams, SaturationParams, TemperatureParams,
+    };
     use std::boxed::Box;
     use std::vec::Vec;
 
@@ -213,7 +245,7 @@ mod tests {
 
     fn env(k: usize) -> Env<f64> {
         let t = 1e-3 * k as f64;
-        Env { time: t, temperature: 23.0 + 5.0 * libm::sin(0.7 * t), load: 0.0 }
+        Env { time: t, temperature: 23.0 + 5.0 * libm::sin(0.7 * t), load: 10.0 * libm::sin(1.3 * t) }
     }
 
     /// Largest |reached − reference| of the chain driven by its compensator, both from rest.
@@ -251,13 +283,16 @@ mod tests {
     }
 
     #[test]
-    fn memory_creep_and_temperature_are_inverted_exactly() {
+    fn all_but_the_dynamic_stages_is_inverted_exactly() {
         let chain = Plain::new(pi())
             .with_zero(4.0)
             .with_temperature(&TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0 })
             .and_then(|c| {
                 c.with_creep(&CreepParams { seconds: &[0.05, 0.5, 5.0], shares: &[0.02, 0.02, 0.02] }, &PERIOD)
             })
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [2.0, -0.5], weights: [0.2, -0.1] }))
+            .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05 }))
+            .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
             .unwrap();
         let (worst, stated) = worst(&chain, |k| 4.0 + smooth(k), 4000);
         assert!(worst < 1e-11 && stated == 0.0, "{worst}");

@@ -1,5 +1,6 @@
 //! The actuator as a chain: the optional stages around a hysteresis operator, and the inverse of the whole.
 
+mod asymmetry;
 #[allow(clippy::module_inception, reason = "the chain itself, beside its stages")]
 mod chain;
 mod compensator;
@@ -9,11 +10,14 @@ mod drift;
 mod first_order;
 mod interference;
 mod lag;
+mod load;
 mod preview;
 mod resonance;
+mod saturation;
 mod temperature;
 
-pub use chain::{Chain, ChainState, MAX_RESONANCES};
+pub use asymmetry::{Asymmetry, AsymmetryInverse, AsymmetryParams};
+pub use chain::{Chain, ChainState, MAX_DEAD_ZONES, MAX_RESONANCES};
 pub use compensator::{Compensator, CompensatorOptions, CompensatorState};
 pub use creep::{Creep, CreepInverse, CreepParams, CreepState};
 pub use delay::{Delay, DelayParams, DelayState};
@@ -21,6 +25,8 @@ pub use drift::{Drift, DriftParams};
 pub(crate) use first_order::FirstOrder;
 pub use interference::{Interference, InterferenceParams};
 pub use lag::{Lag, LagParams, LagState};
+pub use load::{Load, LoadParams};
 pub use preview::{Preview, PreviewState};
 pub use resonance::{Resonance, ResonanceParams, ResonanceState};
+pub use saturation::{Saturation, SaturationInverse, SaturationParams};
 pub use temperature::{Temperature, TemperatureParams};

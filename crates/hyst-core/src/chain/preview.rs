@@ -5,7 +5,7 @@
 //! to a symmetric number of taps and to a band, so it needs `lead` samples of the future reference.
 
 use crate::error::within;
-use crate::{Complex, Error, Real};
+use crate::{Complex, Env, Error, Real, Stage};
 
 /// A two-sided filter `vₖ = Σₙ cₙ yₖ₋ₙ`, n from −lead to +lead, of at most `N` taps.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,15 +122,24 @@ impl<T: Real, const N: usize> Preview<T, N> {
     pub fn error(&self) -> f64 {
         self.error
     }
+}
+
+impl<T: Real, const N: usize> Stage<T> for Preview<T, N> {
+    type State = PreviewState<T, N>;
+
+    fn state(&self) -> Self::State {
+        PreviewState::new()
+    }
 
     /// As if the input had been `u0` for ever.
-    pub(crate) fn fill(&self, s: &mut PreviewState<T, N>, u0: T) {
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         s.ring = [u0; N];
+        u0
     }
 
     /// Takes the input of time k + lead and returns the output of time k.
     #[inline]
-    pub(crate) fn step(&self, s: &mut PreviewState<T, N>, u: T) -> T {
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
         s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
         if let Some(slot) = s.ring.get_mut(s.newest) {
             *slot = u;

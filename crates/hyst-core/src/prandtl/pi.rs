@@ -159,7 +159,8 @@ impl<T: Real, const N: usize> Invert<T> for Pi<T, N> {
             height += slope * (r.to_f64() - last);
             last = r.to_f64();
             let next = slope + w.to_f64();
-            if next.is_nan() || next <= 0.0 {
+            // A slope that is left over from rounding is none.
+            if next.is_nan() || next <= 8.0 * T::EPSILON.to_f64() * gain {
                 return Err(Error::NotInvertible(WHY));
             }
             *slot_r = T::from_f64(height);

@@ -1,0 +1,152 @@
+//! The Maxwell-slip operator in both of its readings.
+
+use crate::error::finite;
+use crate::{Build, Curve, Envelope, Error, Gpi, Meta, Params, Pi, Real};
+
+/// What a Maxwell-slip element of width d and gain g is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum SlipReading {
+    /// A backlash of total width d: `g play_{d/2}(u)`. The reading under which the printed numbers of the temperature-dependent
+    /// electromechanical model give the published loops.
+    #[default]
+    Backlash,
+    /// A spring of stiffness g that slips when it is deflected by d (Goldfarb and Celanovic 1997): `g stop_d(u)`. Saturates
+    /// once every element slips.
+    ElastoSlip,
+}
+
+/// Parameters of a bank of Maxwell-slip elements, `y = Σᵢ gᵢ element_{dᵢ}(u)`. `L` is any list of numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MaxwellSlipParams<L> {
+    /// What an element is.
+    pub reading: SlipReading,
+    /// Widths dᵢ \[u\], positive and strictly rising.
+    pub widths: L,
+    /// Gains gᵢ \[y/u\].
+    pub gains: L,
+}
+
+impl<L: AsMut<[f64]>> Params for MaxwellSlipParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        for d in self.widths.as_mut() {
+            f(&Meta { name: "widths", unit: "u", lower: 0.0, upper: f64::INFINITY }, d);
+        }
+        for g in self.gains.as_mut() {
+            f(&Meta { name: "gains", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, g);
+        }
+    }
+}
+
+/// A bank of at most `N` Maxwell-slip elements. It is a Prandtl-Ishlinskii operator: in the elasto-slip reading one made of stops;
+/// in the backlash reading the narrowest play in front (an envelope), the others behind it with that much less radius,
+/// because `play_r = play_{r−s} ∘ play_s`.
+///
+/// The inverse is exact. In the backlash reading its drive jumps across the narrowest play at every turn; in the elasto-slip
+/// reading there is none, because the bank saturates.
+///
+/// ```
+/// use hyst_core::{Build, Env, MaxwellSlip, MaxwellSlipParams, SlipReading, Stage};
+/// let slip = MaxwellSlipParams { reading: SlipReading::Backlash, widths: [8.0, 16.0], gains: [0.3, 0.1] };
+/// let bank: MaxwellSlip<f64, 2> = slip.build(&())?;
+/// let mut s = bank.state();
+/// let y = bank.step(&mut s, &Env::default(), 100.0);
+/// assert!((y - (0.3 * 96.0 + 0.1 * 92.0)).abs() < 1e-12);
+/// # Ok::<(), hyst_core::Error>(())
+/// ```
+pub type MaxwellSlip<T, const N: usize> = Gpi<T, N>;
+
+impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for MaxwellSlipParams<L> {
+    type Context = ();
+    fn build(&self, (): &()) -> Result<MaxwellSlip<T, N>, Error> {
+        let (widths, gains) = (self.widths.as_ref(), self.gains.as_ref());
+        let identity = Envelope::new(Curve::IDENTITY, Curve::IDENTITY)?;
+        // The operator's own checks, in the words of this model.
+        let checked = |gain: f64, r: &[f64], w: &[f64]| {
+            Pi::new(gain, r, w).map_err(|e| match e {
+                Error::OutOfRange { must, .. } => Error::OutOfRange { name: "maxwell-slip.widths", must },
+                Error::Lengths(_) => Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"),
+                Error::Capacity { needed, holds, .. } => {
+                    Error::Capacity { name: "maxwell-slip elements", needed, holds }
+                }
+                other => other,
+            })
+        };
+        let whole: Pi<T, N> = checked(0.0, widths, gains)?;
+        if self.reading == SlipReading::ElastoSlip {
+            return Ok(Gpi::new(identity, Pi::from_stops(0.0, widths, gains)?));
+        }
+        let (Some((narrowest, wider)), Some((first, others))) = (widths.split_first(), gains.split_first()) else {
+            return Ok(Gpi::new(identity, whole));
+        };
+        let mut radii = [0.0; N];
+        for (r, d) in radii.iter_mut().zip(wider) {
+            *r = 0.5 * (d - narrowest);
+        }
+        let side = |offset| Curve::Linear { slope: 1.0, offset };
+        let envelope = Envelope::new(side(-0.5 * narrowest), side(0.5 * narrowest))?;
+        let behind =
+            checked(finite("maxwell-slip.gains", *first)?, radii.get(..wider.len()).unwrap_or_default(), others)?;
+        Ok(Gpi::new(envelope, behind))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Env, Invert, Stage, play, stop};
+
+    const WIDTHS: [f64; 3] = [4.0, 10.0, 25.0];
+    const GAINS: [f64; 3] = [0.3, 0.1, 0.05];
+
+    fn drive(k: u32) -> f64 {
+        60.0 * libm::sin(0.11 * f64::from(k)) * libm::sin(0.007 * f64::from(k) + 0.4)
+    }
+
+    #[test]
+    fn both_readings_are_the_banks_they_say() {
+        for reading in [SlipReading::Backlash, SlipReading::ElastoSlip] {
+            let bank: MaxwellSlip<f64, 3> =
+                MaxwellSlipParams { reading, widths: WIDTHS, gains: GAINS }.build(&()).unwrap();
+            let (mut s, e) = (bank.state(), Env::default());
+            let (mut elements, mut last) = ([0.0; 3], 0.0);
+            for k in 0..2000 {
+                let u = drive(k);
+                let mut expected = 0.0;
+                for ((x, d), g) in elements.iter_mut().zip(WIDTHS).zip(GAINS) {
+                    *x = match reading {
+                        SlipReading::Backlash => play(*x, u, 0.5 * d),
+                        SlipReading::ElastoSlip => stop(*x, u - last, d),
+                    };
+                    expected += g * *x;
+                }
+                last = u;
+                assert!((bank.step(&mut s, &e, u) - expected).abs() < 1e-11, "{reading:?} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_backlash_bank_has_an_exact_inverse_and_the_elasto_slip_bank_none() {
+        let of = |reading| -> MaxwellSlip<f64, 3> {
+            MaxwellSlipParams { reading, widths: WIDTHS, gains: GAINS }.build(&()).unwrap()
+        };
+        let bank = of(SlipReading::Backlash);
+        let inverse = bank.invert().unwrap();
+        let (mut a, mut b, e) = (bank.state(), inverse.state(), Env::default());
+        for k in 0..2000 {
+            let reference = 0.4 * drive(k);
+            let u = inverse.step(&mut b, &e, reference);
+            assert!((bank.step(&mut a, &e, u) - reference).abs() < 1e-12 * 48.0);
+        }
+        assert!(matches!(of(SlipReading::ElastoSlip).invert(), Err(Error::NotInvertible(_))));
+    }
+
+    #[test]
+    fn errors_speak_of_this_model() {
+        let slip = MaxwellSlipParams { reading: SlipReading::Backlash, widths: [4.0, 3.0], gains: [1.0, 1.0] };
+        let built: Result<MaxwellSlip<f64, 2>, _> = slip.build(&());
+        assert!(matches!(built, Err(Error::OutOfRange { name: "maxwell-slip.widths", .. })));
+    }
+}
