@@ -1,5 +1,11 @@
-//! What stands between a model and the actuator: limits of the drive.
+//! What stands between a model and the actuator: feedback, the force observer, limits of the drive.
 
+mod force;
 mod limits;
+mod pid;
+mod tracking;
 
+pub use force::{AffineFit, ForceObservation, ForceObserver, ForceParams};
 pub use limits::{Limited, Limits};
+pub use pid::{Pid, PidParams, PidState};
+pub use tracking::{Tracking, TrackingState};

@@ -66,7 +66,7 @@ fn growth(a: &Matrix) -> Matrix {
     for _ in 0..halvings {
         let square = product(&e, &e);
         for (x, q) in e.iter_mut().flatten().zip(square.iter().flatten()) {
-            *x += *x + *q;
+            *x = 2.0 * *x + *q;
         }
     }
     e

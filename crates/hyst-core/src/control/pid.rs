@@ -1,0 +1,250 @@
+//! PID with a filtered derivative and anti-windup.
+
+use crate::error::{finite, within};
+use crate::stage::hold;
+use crate::{Build, Error, Meta, Params, Real, Sampling};
+
+/// Parameters of `u = u_ff + kₚ (b r − y) + kᵢ ∫ (r − y) dt + k_d d/dt (c r − y)`, the derivative through a first-order filter, the whole
+/// limited, the integral led back while a limit acts (Åström and Hägglund 2006, ch. 3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PidParams {
+    /// Proportional gain kₚ \[u/y\].
+    pub proportional: f64,
+    /// Integral gain kᵢ \[u/(y s)\].
+    pub integral: f64,
+    /// Derivative gain k_d \[u s/y\].
+    pub derivative: f64,
+    /// Corner of the derivative's filter \[Hz\], positive.
+    pub derivative_hz: f64,
+    /// Weight b of the reference in the proportional part, 0 to 1.
+    pub proportional_weight: f64,
+    /// Weight c of the reference in the derivative part, 0 to 1: 0 lets a step of the reference pass without a kick.
+    pub derivative_weight: f64,
+    /// Time in which the integral follows the limited drive back \[s\], positive.
+    pub anti_windup_seconds: f64,
+    /// Lowest drive \[u\].
+    pub low: f64,
+    /// Highest drive \[u\].
+    pub high: f64,
+}
+
+impl Params for PidParams {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        const INF: f64 = f64::INFINITY;
+        let mut one = |name, unit, lower, upper, x: &mut f64| f(&Meta { name, unit, lower, upper }, x);
+        one("proportional", "u/y", 0.0, INF, &mut self.proportional);
+        one("integral", "u/(y s)", 0.0, INF, &mut self.integral);
+        one("derivative", "u s/y", 0.0, INF, &mut self.derivative);
+        one("derivative_hz", "Hz", 0.0, INF, &mut self.derivative_hz);
+        one("proportional_weight", "", 0.0, 1.0, &mut self.proportional_weight);
+        one("derivative_weight", "", 0.0, 1.0, &mut self.derivative_weight);
+        one("anti_windup_seconds", "s", 0.0, INF, &mut self.anti_windup_seconds);
+    }
+}
+
+/// Coefficients of a PID at one sample period.
+///
+/// ```
+/// use hyst_core::{Build, Pid, PidParams, Sampling};
+/// let params = PidParams {
+///     proportional: 0.5, integral: 200.0, derivative: 0.0, derivative_hz: 100.0, proportional_weight: 1.0,
+///     derivative_weight: 0.0, anti_windup_seconds: 0.01, low: 0.0, high: 120.0,
+/// };
+/// let pid: Pid<f64> = params.build(&Sampling { period: 1e-3 })?;
+/// let mut s = pid.state();
+/// let mut y = 0.0;
+/// for _ in 0..2000 {
+///     let drive = pid.step(&mut s, 5.0, y, 0.0); // reference 5 µm
+///     y = 0.1 * drive;                           // an actuator of 0.1 µm/V
+/// }
+/// assert!((y - 5.0).abs() < 1e-9);
+/// # Ok::<(), hyst_core::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pid<T> {
+    proportional: T,
+    /// kᵢ h
+    integral: T,
+    /// k_d / (T_f + h)
+    derivative: T,
+    /// T_f / (T_f + h)
+    filter: T,
+    weights: [T; 2],
+    /// h / T_t, at most 1
+    tracking: T,
+    low: T,
+    high: T,
+}
+
+impl<T: Real> Build<Pid<T>> for PidParams {
+    type Context = Sampling;
+    fn build(&self, cx: &Sampling) -> Result<Pid<T>, Error> {
+        let h = cx.checked()?;
+        finite("pid.low", self.low)?;
+        within("pid.high", self.high, self.high > self.low, "above pid.low")?;
+        let corner = within("pid.derivative_hz", self.derivative_hz, self.derivative_hz > 0.0, "positive")?;
+        let back = self.anti_windup_seconds;
+        within("pid.anti_windup_seconds", back, back > 0.0, "positive")?;
+        for (name, w) in
+            [("pid.proportional_weight", self.proportional_weight), ("pid.derivative_weight", self.derivative_weight)]
+        {
+            within(name, w, (0.0..=1.0).contains(&w), "from 0 to 1")?;
+        }
+        let lag = 1.0 / (2.0 * core::f64::consts::PI * corner);
+        Ok(Pid {
+            proportional: T::from_f64(finite("pid.proportional", self.proportional)?),
+            integral: T::from_f64(finite("pid.integral", self.integral)? * h),
+            derivative: T::from_f64(finite("pid.derivative", self.derivative)? / (lag + h)),
+            filter: T::from_f64(lag / (lag + h)),
+            weights: [T::from_f64(self.proportional_weight), T::from_f64(self.derivative_weight)],
+            tracking: T::from_f64((h / back).at_most(1.0)),
+            low: T::from_f64(self.low),
+            high: T::from_f64(self.high),
+        })
+    }
+}
+
+/// History of a PID.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PidState<T> {
+    integral: T,
+    derivative: T,
+    /// c r − y of the last sample; none before the first.
+    last: Option<T>,
+    reference: T,
+    measured: T,
+    feedforward: T,
+    limited: bool,
+}
+
+impl<T> PidState<T> {
+    /// Whether a limit acted on the last drive.
+    pub fn limited(&self) -> bool {
+        self.limited
+    }
+}
+
+impl<T: Real> Pid<T> {
+    /// A history that begins with the integral at zero.
+    pub fn state(&self) -> PidState<T> {
+        PidState::default()
+    }
+
+    /// Takes over without a bump: the next drive at reference = measured = `y` and feedforward `feedforward` is `drive`.
+    pub fn take_over(&self, s: &mut PidState<T>, drive: T, y: T, feedforward: T) {
+        let proportional = self.proportional * (self.weights[0] * y - y);
+        *s = PidState {
+            integral: drive - feedforward - proportional,
+            last: Some(self.weights[1] * y - y),
+            reference: y,
+            measured: y,
+            ..PidState::default()
+        };
+    }
+
+    /// The drive for a reference and a measured output \[y\], added to a feedforward \[u\], within the limits. A value that is no
+    /// finite number is replaced by the last one that was.
+    #[inline]
+    pub fn step(&self, s: &mut PidState<T>, reference: T, measured: T, feedforward: T) -> T {
+        let r = hold(&mut s.reference, reference);
+        let y = hold(&mut s.measured, measured);
+        let ff = hold(&mut s.feedforward, feedforward);
+        let differentiated = self.weights[1] * r - y;
+        let change = s.last.map_or(T::ZERO, |last| differentiated - last);
+        s.last = Some(differentiated);
+        s.derivative = self.filter * s.derivative + self.derivative * change;
+        let wanted = ff + self.proportional * (self.weights[0] * r - y) + s.integral + s.derivative;
+        let drive = wanted.at_least(self.low).at_most(self.high);
+        s.limited = drive != wanted;
+        s.integral += self.integral * (r - y) + self.tracking * (drive - wanted);
+        drive
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    const PARAMS: PidParams = PidParams {
+        proportional: 2.0,
+        integral: 1000.0,
+        derivative: 0.001,
+        derivative_hz: 200.0,
+        proportional_weight: 1.0,
+        derivative_weight: 0.0,
+        anti_windup_seconds: 0.02,
+        low: 0.0,
+        high: 100.0,
+    };
+
+    fn pid() -> Pid<f64> {
+        PARAMS.build(&Sampling { period: 1e-3 }).unwrap()
+    }
+
+    /// A plant with a lag of 5 ms and a gain of 0.1.
+    fn closed(pid: &Pid<f64>, reference: impl Fn(u32) -> f64, rows: u32) -> Vec<f64> {
+        let (mut s, mut y) = (pid.state(), 0.0);
+        (0..rows)
+            .map(|k| {
+                let u = pid.step(&mut s, reference(k), y, 0.0);
+                y += (0.1 * u - y) * 0.2;
+                y
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_constant_reference_is_reached() {
+        let y = closed(&pid(), |_| 6.0, 3000);
+        assert!((y[2999] - 6.0).abs() < 1e-6);
+    }
+
+    /// 20 µm cannot be reached with 100 V. When the reference comes back, a wound-up integral would keep the drive at its limit.
+    #[test]
+    fn the_integral_does_not_wind_up() {
+        let y = closed(&pid(), |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
+        assert!((y[1999] - 10.0).abs() < 1e-3);
+        let back = y[2000..].iter().position(|y| (y - 5.0).abs() < 0.1).unwrap();
+        assert!(back < 100, "{back} samples");
+        let slow: Pid<f64> =
+            PidParams { anti_windup_seconds: 1e9, ..PARAMS }.build(&Sampling { period: 1e-3 }).unwrap();
+        let y = closed(&slow, |k| if k < 2000 { 20.0 } else { 5.0 }, 2300);
+        assert!(y[2000..].iter().all(|y| (y - 5.0).abs() > 0.1));
+    }
+
+    #[test]
+    fn the_derivative_of_a_ramp_is_its_slope() {
+        let only = PidParams {
+            proportional: 0.0,
+            integral: 0.0,
+            derivative: 0.5,
+            derivative_weight: 1.0,
+            low: -1e3,
+            ..PARAMS
+        };
+        let pid: Pid<f64> = only.build(&Sampling { period: 1e-3 }).unwrap();
+        let mut s = pid.state();
+        let mut u = 0.0;
+        for k in 0..200 {
+            u = pid.step(&mut s, 30.0 * 1e-3 * f64::from(k), 0.0, 0.0);
+        }
+        assert!((u - 0.5 * 30.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn it_takes_over_without_a_bump_and_survives_a_dropout() {
+        let pid = pid();
+        let mut s = pid.state();
+        pid.take_over(&mut s, 40.0, 4.0, 10.0);
+        assert!((pid.step(&mut s, 4.0, 4.0, 10.0) - 40.0).abs() < 1e-12);
+        assert!((pid.step(&mut s, f64::NAN, f64::NAN, f64::NAN) - 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bad_limits_are_named() {
+        let built: Result<Pid<f64>, _> = PidParams { high: -1.0, ..PARAMS }.build(&Sampling { period: 1e-3 });
+        assert!(matches!(built, Err(Error::OutOfRange { name: "pid.high", .. })));
+    }
+}
