@@ -53,18 +53,26 @@ pub trait Stage<T: Real> {
     }
 }
 
-/// A stage whose inverse is a stage: closed form, causal and exact.
+/// A stage whose inverse is a stage.
 ///
-/// Stages whose exact inverse is unstable or rings when it is taken sample by sample (lag, delay,
-/// resonance) do not implement this; [`Preview`](crate::Preview) inverts them in a band.
+/// Memory operators have causal inverses, most of them in closed form. Models with dynamics of their own (a circuit, a derivative) have inverses that
+/// need the reference of the next [`lead`](Self::lead) samples. The dynamic stages of a chain (lag, delay, resonance) do not implement
+/// this; [`Preview`](crate::Preview) inverts them in a band.
 pub trait Invert<T: Real>: Stage<T> {
     /// The inverse operator.
     type Inverse: Stage<T>;
-    /// Builds the inverse: `self ∘ inverse` is the identity on every input the inverse accepts.
+    /// Builds the inverse: `self ∘ inverse` is the identity on every input the inverse accepts, exactly or within what the
+    /// inverse states.
     ///
     /// # Errors
-    /// [`Error::NotInvertible`] if the operator is not strictly increasing.
+    /// [`Error::NotInvertible`] if there is none.
     fn invert(&self) -> Result<Self::Inverse, Error>;
+
+    /// Samples of preview that an inverse needs: its `step` takes the reference (and surroundings) of time k + lead and returns
+    /// the drive of time k.
+    fn lead(_inverse: &Self::Inverse) -> usize {
+        0
+    }
 }
 
 /// A stage that can tell its next output for a trial input without moving its history. What has no closed-form inverse

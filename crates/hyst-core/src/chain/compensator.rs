@@ -37,8 +37,8 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     hysteresis: HI,
     input_side: Option<Preview<T, N>>,
-    /// Aligns the drive of a chain without lag and fraction: whole samples of dead time.
-    whole_delay: usize,
+    /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
+    whole_samples: usize,
     surroundings: Delay<T, N>,
     sample_rate: f64,
 }
@@ -97,6 +97,7 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         } else {
             None
         };
+        let hysteresis = self.hysteresis.invert()?;
         // The temperature that divides a sample, and the load that is taken from it, belong to that sample.
         let late = output_side.as_ref().map_or(0, Preview::lead);
         Ok(Compensator {
@@ -108,9 +109,9 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
             creep: self.creep.as_ref().map(Invert::invert).transpose()?,
             temperature: self.temperature,
             asymmetry: self.asymmetry.as_ref().map(Invert::invert).transpose()?,
-            hysteresis: self.hysteresis.invert()?,
+            whole_samples: self.delay.as_ref().map_or(0, Delay::whole_samples) + H::lead(&hysteresis),
+            hysteresis,
             input_side,
-            whole_delay: self.delay.as_ref().map_or(0, Delay::whole_samples),
             sample_rate: 1.0 / h,
         })
     }
@@ -121,7 +122,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Comp
     /// the time `lead` samples before that of the reference it was given.
     pub fn lead(&self) -> usize {
         let half = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
-        half(&self.output_side) + half(&self.input_side) + self.whole_delay
+        half(&self.output_side) + half(&self.input_side) + self.whole_samples
     }
 
     /// Band in which the dynamic stages are inverted \[Hz\]; `None` if there are none.
@@ -172,15 +173,15 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(filter) = &self.output_side {
             filter.reset(&mut s.output_side, e, x);
         }
+        self.surroundings.reset(&mut s.temperature, e, e.temperature);
+        self.surroundings.reset(&mut s.load, e, e.load);
         if let Some(load) = &self.load {
-            self.surroundings.reset(&mut s.load, e, e.load);
             x -= load.deflection(e);
         }
         if let Some(creep) = &self.creep {
             x = creep.reset(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            self.surroundings.reset(&mut s.temperature, e, e.temperature);
             x = x / usable(&mut s.factor, temperature.factor(e));
         }
         if let Some(asymmetry) = &self.asymmetry {
@@ -205,16 +206,20 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(filter) = &self.output_side {
             x = filter.step(&mut s.output_side, e, x);
         }
+        // From here on everything belongs to the sample that left the filter.
+        let e = &Env {
+            temperature: self.surroundings.step(&mut s.temperature, e, e.temperature),
+            load: self.surroundings.step(&mut s.load, e, e.load),
+            ..*e
+        };
         if let Some(load) = &self.load {
-            let then = self.surroundings.step(&mut s.load, e, e.load);
-            x -= load.deflection(&Env { load: then, ..*e });
+            x -= load.deflection(e);
         }
         if let Some(creep) = &self.creep {
             x = creep.step(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            let then = self.surroundings.step(&mut s.temperature, e, e.temperature);
-            x = x / usable(&mut s.factor, temperature.factor(&Env { temperature: then, ..*e }));
+            x = x / usable(&mut s.factor, temperature.factor(e));
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
