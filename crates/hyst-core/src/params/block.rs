@@ -1,0 +1,214 @@
+//! A chain's parameters as a block of bytes that firmware loads without heap.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 4 | `HYST` |
+//! | 1 | version of the format |
+//! | 4 | length of the payload, little endian |
+//! | n | [`ChainParams`], [postcard](https://postcard.jamesmunns.com) |
+//! | 4 | CRC-32 (ISO-HDLC) of everything before, little endian |
+
+use core::fmt;
+
+use super::ChainParams;
+
+/// Version of the blocks that this version of the library writes, and the newest that it reads.
+pub const BLOCK_VERSION: u8 = 1;
+
+/// A list of at most `N` numbers without heap.
+pub type List<const N: usize> = heapless::Vec<f64, N>;
+
+const MAGIC: [u8; 4] = *b"HYST";
+const HEAD: usize = MAGIC.len() + 1 + 4;
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+const TAIL: usize = 4;
+
+/// Why a block cannot be read or written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BlockError {
+    /// The bytes do not begin with `HYST`.
+    NotABlock,
+    /// A newer format.
+    Newer {
+        /// Its version.
+        version: u8,
+    },
+    /// Fewer bytes than the head announces.
+    Truncated {
+        /// Bytes that are needed.
+        needed: usize,
+        /// Bytes that there are.
+        found: usize,
+    },
+    /// The check sum does not match: the bytes were changed.
+    Corrupt {
+        /// Check sum in the block.
+        stated: u32,
+        /// Check sum of the bytes.
+        computed: u32,
+    },
+    /// The payload is no set of parameters, or has a list that is longer than this firmware has room for.
+    Malformed,
+    /// The buffer is too small to write to.
+    NoRoom,
+}
+
+impl fmt::Display for BlockError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotABlock => f.write_str("not a parameter block: it does not begin with HYST"),
+            Self::Newer { version } => {
+                write!(f, "block version {version} is newer than {BLOCK_VERSION}: update the firmware")
+            }
+            Self::Truncated { needed, found } => write!(f, "block cut short: {found} of {needed} bytes"),
+            Self::Corrupt { stated, computed } => {
+                write!(f, "block damaged: check sum {computed:08x}, stated {stated:08x}")
+            }
+            Self::Malformed => {
+                f.write_str("the block's parameters cannot be read, or a list is too long for this build")
+            }
+            Self::NoRoom => f.write_str("the buffer is too small for the block"),
+        }
+    }
+}
+
+impl core::error::Error for BlockError {}
+
+fn number(bytes: Option<&[u8]>) -> Option<u32> {
+    Some(u32::from_le_bytes(bytes?.try_into().ok()?))
+}
+
+/// Writes a block into `buffer` and returns the bytes written.
+///
+/// # Errors
+/// [`BlockError::NoRoom`].
+pub fn write_block<'a, L: serde::Serialize>(
+    chain: &ChainParams<L>,
+    buffer: &'a mut [u8],
+) -> Result<&'a [u8], BlockError> {
+    let room = buffer.get_mut(HEAD..).ok_or(BlockError::NoRoom)?;
+    let length = postcard::to_slice(chain, room).map_err(|_| BlockError::NoRoom)?.len();
+    let announced = u32::try_from(length).map_err(|_| BlockError::NoRoom)?;
+    let end = HEAD + length;
+    let head = MAGIC.into_iter().chain([BLOCK_VERSION]).chain(announced.to_le_bytes());
+    for (slot, byte) in buffer.iter_mut().zip(head) {
+        *slot = byte;
+    }
+    let sum = CRC.checksum(buffer.get(..end).ok_or(BlockError::NoRoom)?).to_le_bytes();
+    buffer.get_mut(end..end + TAIL).ok_or(BlockError::NoRoom)?.copy_from_slice(&sum);
+    buffer.get(..end + TAIL).ok_or(BlockError::NoRoom)
+}
+
+/// Reads a block. Bytes after it are ignored, so a whole flash page may be given.
+///
+/// The parameters are not checked beyond their form: `build` does that.
+///
+/// ```
+/// use hyst_core::{Build, Chain, List, OperatorParams, Pi, Sampling, read_block};
+/// fn load(flash: &[u8]) -> Result<Chain<f32, Pi<f32, 16>, 32, 8>, &'static str> {
+///     let chain = read_block::<List<16>>(flash).map_err(|_| "bad block")?;
+///     let OperatorParams::Pi(pi) = &chain.operator else { return Err("this firmware runs pi only") };
+///     let pi: Pi<f32, 16> = pi.build(&()).map_err(|_| "bad parameters")?;
+///     let chain = chain.effects.around(pi, &Sampling { period: 1e-3 }).map_err(|_| "bad parameters")?;
+///     Ok(chain)
+/// }
+/// assert!(load(b"HYST").is_err());
+/// ```
+///
+/// # Errors
+/// See [`BlockError`].
+pub fn read_block<'a, L: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Result<ChainParams<L>, BlockError> {
+    let found = bytes.len();
+    if bytes.get(..MAGIC.len()) != Some(&MAGIC[..]) {
+        return Err(BlockError::NotABlock);
+    }
+    let short = |needed| BlockError::Truncated { needed, found };
+    let version = *bytes.get(MAGIC.len()).ok_or(short(HEAD))?;
+    if version > BLOCK_VERSION || version == 0 {
+        return Err(BlockError::Newer { version });
+    }
+    let length = number(bytes.get(MAGIC.len() + 1..HEAD)).ok_or(short(HEAD))? as usize;
+    let end = HEAD.saturating_add(length);
+    let needed = end.saturating_add(TAIL);
+    let stated = number(bytes.get(end..needed)).ok_or(short(needed))?;
+    let computed = CRC.checksum(bytes.get(..end).ok_or(short(needed))?);
+    if stated != computed {
+        return Err(BlockError::Corrupt { stated, computed });
+    }
+    postcard::from_bytes(bytes.get(HEAD..end).ok_or(short(needed))?).map_err(|_| BlockError::Malformed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CreepParams, EffectParams, LagParams, OperatorParams, PiParams, ResonanceParams};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn chain(plays: usize) -> ChainParams<Vec<f64>> {
+        ChainParams {
+            operator: OperatorParams::Pi(PiParams {
+                gain: 0.1,
+                thresholds: (1..=plays).map(|i| i as f64).collect(),
+                weights: (1..=plays).map(|i| 0.1 / i as f64).collect(),
+            }),
+            effects: EffectParams {
+                lag: Some(LagParams { seconds: 0.002 }),
+                creep: Some(CreepParams { seconds: std::vec![0.1, 1.0], shares: std::vec![0.01, 0.02] }),
+                resonances: [Some(ResonanceParams { hz: 90.0, damping: 0.03, gain: 1.0 }), None],
+                ..EffectParams::default()
+            },
+            zero: -1.5,
+            input: [0.0, 120.0],
+        }
+    }
+
+    #[test]
+    fn what_a_host_writes_firmware_reads() {
+        let mut buffer = [0; 512];
+        let host = chain(10);
+        let bytes = write_block(&host, &mut buffer).unwrap();
+        // 20 numbers of the operator, 4 of the bank, 7 others: 8 bytes each, and little else.
+        assert!(bytes.len() < 8 * 31 + 40, "{}", bytes.len());
+        let firmware: ChainParams<List<16>> = read_block(bytes).unwrap();
+        let OperatorParams::Pi(pi) = &firmware.operator else { panic!("{firmware:?}") };
+        assert_eq!(pi.weights.as_slice(), (1..=10).map(|i| 0.1 / f64::from(i)).collect::<Vec<_>>());
+        assert_eq!(firmware.effects.creep.unwrap().shares.as_slice(), [0.01, 0.02]);
+        let again: ChainParams<Vec<f64>> = read_block(bytes).unwrap();
+        assert_eq!(again, host);
+    }
+
+    #[test]
+    fn a_list_that_is_too_long_is_refused() {
+        let mut buffer = [0; 512];
+        let bytes = write_block(&chain(10), &mut buffer).unwrap();
+        assert_eq!(read_block::<List<8>>(bytes), Err(BlockError::Malformed));
+    }
+
+    #[test]
+    fn every_flipped_bit_and_every_cut_is_noticed() {
+        let mut buffer = [0; 512];
+        let bytes = write_block(&chain(3), &mut buffer).unwrap().to_vec();
+        for i in 0..bytes.len() {
+            assert!(read_block::<List<16>>(&bytes[..i]).is_err());
+            for bit in 0..8 {
+                let mut broken = bytes.clone();
+                broken[i] ^= 1 << bit;
+                assert!(read_block::<List<16>>(&broken).is_err(), "byte {i}, bit {bit}");
+            }
+        }
+        assert_eq!(write_block(&chain(3), &mut [0; 60]), Err(BlockError::NoRoom));
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_it_panic(body in prop::collection::vec(any::<u8>(), 0..300), honest: bool) {
+            let mut bytes: Vec<u8> = MAGIC.into_iter().chain([1]).chain((body.len() as u32).to_le_bytes()).chain(body).collect();
+            if honest {
+                bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+            }
+            let _ = read_block::<List<16>>(&bytes);
+        }
+    }
+}

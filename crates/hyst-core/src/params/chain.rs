@@ -1,0 +1,92 @@
+//! Parameters of the stages around an operator, and of a whole chain.
+
+use super::OperatorParams;
+use crate::{
+    AsymmetryParams, Chain, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams,
+    MAX_RESONANCES, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams,
+};
+
+/// The optional stages of a chain, in its order. `L` is any list of numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EffectParams<L> {
+    /// Dead time.
+    pub delay: Option<DelayParams>,
+    /// Lag of the amplifier.
+    pub lag: Option<LagParams>,
+    /// Curve behind the hysteresis.
+    pub asymmetry: Option<AsymmetryParams<L>>,
+    /// Gain over temperature.
+    pub temperature: Option<TemperatureParams>,
+    /// Creep bank.
+    pub creep: Option<CreepParams<L>>,
+    /// Compliance under the load.
+    pub load: Option<LoadParams>,
+    /// Structural modes, one after the other.
+    pub resonances: [Option<ResonanceParams>; MAX_RESONANCES],
+    /// Ends of the motion.
+    pub saturation: Option<SaturationParams>,
+    /// Drift of the sensor.
+    pub drift: Option<DriftParams>,
+    /// Tone in the sensor.
+    pub interference: Option<InterferenceParams>,
+}
+
+impl<L: AsRef<[f64]>> EffectParams<L> {
+    /// The chain of these stages around an operator.
+    ///
+    /// # Errors
+    /// Names the parameter that is not finite, out of range or too long for `D` or `C`.
+    pub fn around<T: Real, H, const D: usize, const C: usize>(
+        &self,
+        hysteresis: H,
+        cx: &Sampling,
+    ) -> Result<Chain<T, H, D, C>, Error> {
+        let mut chain = Chain::new(hysteresis);
+        if let Some(p) = &self.delay {
+            chain = chain.with_delay(p, cx)?;
+        }
+        if let Some(p) = &self.lag {
+            chain = chain.with_lag(p, cx)?;
+        }
+        if let Some(p) = &self.asymmetry {
+            chain = chain.with_asymmetry(p)?;
+        }
+        if let Some(p) = &self.temperature {
+            chain = chain.with_temperature(p)?;
+        }
+        if let Some(p) = &self.creep {
+            chain = chain.with_creep(p, cx)?;
+        }
+        if let Some(p) = &self.load {
+            chain = chain.with_load(p)?;
+        }
+        for p in self.resonances.iter().flatten() {
+            chain = chain.with_resonance(p, cx)?;
+        }
+        if let Some(p) = &self.saturation {
+            chain = chain.with_saturation(p)?;
+        }
+        if let Some(p) = &self.drift {
+            chain = chain.with_drift(p)?;
+        }
+        if let Some(p) = &self.interference {
+            chain = chain.with_interference(p)?;
+        }
+        Ok(chain)
+    }
+}
+
+/// A whole actuator: what firmware has to know of a model.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ChainParams<L> {
+    /// The memory operator.
+    pub operator: OperatorParams<L>,
+    /// The stages around it.
+    pub effects: EffectParams<L>,
+    /// What the sensor shows at rest \[y\].
+    pub zero: f64,
+    /// Inputs that the model was identified on, lowest and highest \[u\].
+    pub input: [f64; 2],
+}

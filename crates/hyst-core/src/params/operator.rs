@@ -1,0 +1,37 @@
+//! The parameters of any operator.
+
+use super::Kind;
+use crate::{GpiParams, MaxwellSlipParams, PiParams, TdEmParams, TdPiParams, ViscousPiParams};
+
+/// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
+///
+/// The order of the variants is part of the block format: new ones are added at the end.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum OperatorParams<L> {
+    /// Prandtl-Ishlinskii.
+    Pi(PiParams<L>),
+    /// Prandtl-Ishlinskii with viscous plays.
+    ViscousPi(ViscousPiParams<L>),
+    /// Generalised Prandtl-Ishlinskii.
+    Gpi(GpiParams<L>),
+    /// Temperature-dependent Prandtl-Ishlinskii.
+    TdPi(TdPiParams),
+    /// Maxwell-slip elements.
+    MaxwellSlip(MaxwellSlipParams<L>),
+    /// Temperature-dependent electromechanical model.
+    TdEm(TdEmParams<L>),
+}
+
+impl<L> OperatorParams<L> {
+    /// Which kind of model it is.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Pi(_) | Self::ViscousPi(_) => Kind::Pi,
+            Self::Gpi(_) => Kind::Gpi,
+            Self::TdPi(_) => Kind::TdPi,
+            Self::MaxwellSlip(_) => Kind::MaxwellSlip,
+            Self::TdEm(_) => Kind::TdEm,
+        }
+    }
+}
