@@ -5,6 +5,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use hyst_core::BlockError;
 use hyst_hw::{ConfigError, PlantError};
 use hyst_ident::atomic_file::AtomicFileError;
 use hyst_ident::compensate::CompensateError;
@@ -105,7 +106,7 @@ macro_rules! always {
 }
 
 always!(BadInput: RecordError, MapError, ModelError, ExciteError, ConfigError);
-always!(Failed: AtomicFileError, WriteError, io::Error);
+always!(Failed: AtomicFileError, WriteError, BlockError, io::Error);
 always!(DeviceLost: LogError);
 
 impl Classified for FitError {

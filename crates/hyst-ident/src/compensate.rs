@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Sampling, Stage};
 
-use crate::model::{CREEP, Compensator, Model, OperatorState, TAPS};
+use crate::model::{CREEP, Compensator, InverseState, Model, Operator, TAPS};
 use crate::record::Record;
 use crate::samples::Samples;
 
@@ -122,7 +122,7 @@ pub struct Follower {
     before: f64,
 }
 
-type State = CompensatorState<f64, OperatorState, CREEP, TAPS>;
+type State = CompensatorState<f64, InverseState, CREEP, TAPS>;
 
 impl Follower {
     /// Prepares to follow a reference from its first row.
@@ -206,10 +206,11 @@ impl Follower {
 /// Lowest and highest output: what the training record reached, and what the model itself says of rest and
 /// of full drive.
 fn reach(model: &Model) -> Result<(f64, f64), hyst_core::Error> {
-    let operator = model.base.build()?;
+    // Rest and full drive, settled: the sample period does not matter there.
+    let operator = Operator::new(&model.base, &Sampling { period: 1.0 / model.recorded_at_hz })?;
     let (mut state, env) = (operator.state(), Env::default());
     let rest = model.zero + operator.reset(&mut state, &env, model.input.low);
-    let full = model.zero + operator.step(&mut state, &env, model.input.high);
+    let full = model.zero + operator.reset(&mut state, &env, model.input.high);
     Ok((model.output.low.min(rest), model.output.high.max(full)))
 }
 
@@ -230,6 +231,9 @@ fn check(
     }
     if model.needs_temperature() && reference.temperature().is_none() && options.temperature.is_none() {
         return missing("temperature_degc", "the model's gain depends on it");
+    }
+    if model.needs_load() && reference.load().is_none() {
+        return missing("load_n", "the model yields under it");
     }
     let (low, high) = reach(model)?;
     let margin = MARGIN * (high - low);

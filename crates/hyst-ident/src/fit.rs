@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::Grid;
+use hyst_core::{Grid, PiParams};
 
 use crate::base::{Basis, PiBasis, PreisachBasis};
 use crate::lsq::Blocks;
@@ -105,6 +105,21 @@ pub enum FitError {
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// This version cannot identify such a model from a record.
+    #[error("{what} cannot be {done} by this version; {}", fitted_kinds())]
+    Unsupported {
+        /// Kind of model, or a stage.
+        what: &'static str,
+        /// What cannot be done with it.
+        done: &'static str,
+    },
+}
+
+/// Kinds of models that a fit of this version can identify.
+pub const FITTED: [Kind; 2] = [Kind::Pi, Kind::Preisach];
+
+fn fitted_kinds() -> String {
+    format!("it fits {}", FITTED.map(Kind::name).join(" and "))
 }
 
 /// What a fit may be told.
@@ -131,7 +146,7 @@ pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, F
         });
     }
     check(record, &samples)?;
-    let basis = basis_for(kind, &samples);
+    let basis = basis_for(kind, &samples)?;
     let name = || record.name();
     let needed = 3 * basis.len();
     if samples.len() < needed {
@@ -168,23 +183,29 @@ impl BasisOf {
         let smallest = 1e-9 * weights.iter().map(|w| w.abs()).sum::<f64>();
         let clean: Vec<f64> = weights.iter().map(|w| if w.abs() < smallest { 0.0 } else { *w }).collect();
         match self {
-            Self::Pi(b) => Base::Pi { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() },
+            Self::Pi(b) => {
+                Base::Pi(PiParams { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() })
+            }
             Self::Preisach(b) => Base::Preisach(b.spec(&clean)),
         }
     }
 }
 
-pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> BasisOf {
-    match kind {
+pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitError> {
+    Ok(match kind {
         Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
         Kind::Preisach => BasisOf::Preisach(PreisachBasis::for_samples(samples, CELLS)),
-    }
+        other => return Err(FitError::Unsupported { what: other.name(), done: "fitted" }),
+    })
 }
 
 /// The base that a model has, for a record that it was fitted to: its own thresholds or grid.
-pub(crate) fn basis_of(model: &Model, samples: &Samples) -> BasisOf {
-    match &model.base {
-        Base::Pi { thresholds, .. } => {
+pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, FitError> {
+    if let Some(what) = model.effects.beyond_diagnosis() {
+        return Err(FitError::Unsupported { what, done: "kept by a diagnosis" });
+    }
+    Ok(match &model.base {
+        Base::Pi(PiParams { thresholds, .. }) => {
             BasisOf::Pi(PiBasis { thresholds: thresholds.clone(), ..PiBasis::for_samples(samples) })
         }
         Base::Preisach(spec) => {
@@ -195,7 +216,11 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> BasisOf {
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-    }
+        Base::ViscousPi(_) => {
+            return Err(FitError::Unsupported { what: "rate-dependence", done: "kept by a diagnosis" });
+        }
+        other => return Err(FitError::Unsupported { what: other.kind().name(), done: "extended" }),
+    })
 }
 
 pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> {

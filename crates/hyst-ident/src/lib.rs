@@ -12,6 +12,7 @@ mod base;
 pub mod compensate;
 pub mod diagnose;
 pub mod excite;
+pub mod export;
 pub mod fit;
 mod lsq;
 pub mod metrics;

@@ -88,5 +88,8 @@ fn check_units(model: &Model, record: &Record) -> Result<(), FitError> {
     if model.needs_temperature() && record.temperature().is_none() {
         return missing("temperature_degc", "the model's gain depends on it".into());
     }
+    if model.needs_load() && record.load().is_none() {
+        return missing("load_n", "the model yields under it".into());
+    }
     Ok(())
 }

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use hyst_ident::fit::FITTED;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 
@@ -34,6 +35,7 @@ pub(crate) enum Command {
     Compensate(CompensateArgs),
     Excite(ExciteArgs),
     Run(RunArgs),
+    Export(ExportArgs),
     Demo(DemoArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  hystctl completions bash > /etc/bash_completion.d/hystctl")]
@@ -82,6 +84,35 @@ pub(crate) struct FitArgs {
     pub(crate) map: MapArg,
     #[command(flatten)]
     pub(crate) json: JsonArg,
+}
+
+/// Write a model's parameters for a board
+///
+/// postcard is a versioned, check-summed block of bytes that firmware loads without heap (`hyst_core::read_block`); rust
+/// is source with constants for `hyst-core`; c is a C99 header with the block and every parameter with its unit. None of
+/// them depends on a sample period.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl export extended.json --format postcard -o model.bin")]
+pub(crate) struct ExportArgs {
+    /// Model file
+    pub(crate) model: PathBuf,
+    /// What to write
+    #[arg(long, value_enum)]
+    pub(crate) format: ExportFormat,
+    /// File to write; stdout if not given
+    #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
+    pub(crate) output: Target,
+}
+
+/// Form of an exported model.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// A C99 header
+    C,
+    /// Rust source
+    Rust,
+    /// A block of bytes
+    Postcard,
 }
 
 /// Predict the output of a record with a model
@@ -254,7 +285,7 @@ impl ZeroArg {
 }
 
 fn kinds() -> impl TypedValueParser<Value = Kind> {
-    PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| name.parse::<Kind>())
+    PossibleValuesParser::new(FITTED.map(Kind::name)).try_map(|name| name.parse::<Kind>())
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hyst_core::PiParams;
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::{Base, Model};
@@ -25,7 +26,7 @@ struct Summary {
     settling_rows: usize,
     zero: Zero,
     errors: Option<Errors>,
-    base: BaseSummary,
+    base: Option<BaseSummary>,
     sensor_zero: f64,
     #[serde(skip)]
     input_unit: String,
@@ -94,15 +95,16 @@ fn seen(record: &Record, model: &Model) -> String {
     )
 }
 
-fn base_summary(model: &Model) -> BaseSummary {
+fn base_summary(model: &Model) -> Option<BaseSummary> {
     let nonzero = |weights: &[f64]| weights.iter().filter(|w| **w != 0.0).count();
     match &model.base {
-        Base::Pi { gain, weights, .. } => {
-            BaseSummary::Pi { p0: *gain, plays: weights.len(), plays_with_weight: nonzero(weights) }
+        Base::Pi(PiParams { gain, weights, .. }) => {
+            Some(BaseSummary::Pi { p0: *gain, plays: weights.len(), plays_with_weight: nonzero(weights) })
         }
         Base::Preisach(spec) => {
-            BaseSummary::Preisach { cells: spec.density.len(), cells_with_density: nonzero(&spec.density) }
+            Some(BaseSummary::Preisach { cells: spec.density.len(), cells_with_density: nonzero(&spec.density) })
         }
+        _ => None,
     }
 }
 
@@ -118,18 +120,18 @@ impl Summary {
         )];
         lines.push(self.seen.clone());
         lines.extend(self.errors.map(|errors| text::errors(&errors, unit)));
-        lines.push(match self.base {
+        lines.extend(self.base.as_ref().map(|base| match base {
             BaseSummary::Pi { p0, plays, plays_with_weight } => {
                 format!(
                     "p0 {} {unit}/{}, {plays_with_weight} of {plays} plays with weight",
-                    text::short(p0),
+                    text::short(*p0),
                     self.input_unit
                 )
             }
             BaseSummary::Preisach { cells, cells_with_density } => {
                 format!("{cells_with_density} of {cells} cells with density")
             }
-        });
+        }));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
         lines.join("\n")
     }

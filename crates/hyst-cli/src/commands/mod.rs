@@ -3,6 +3,7 @@
 mod compensate;
 mod diagnose;
 mod excite;
+mod export;
 mod fit;
 mod run;
 mod simulate;
@@ -23,6 +24,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Compensate(args) => compensate::run(&args),
         Command::Excite(args) => excite::run(&args),
         Command::Run(args) => run::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions { shell } => {
             // The generator panics where its writer fails, as a closed pipe does.

@@ -5,7 +5,7 @@
 //! same shape.
 
 use crate::error::{finite, within};
-use crate::{Build, Env, Error, Invert, Real, Stage};
+use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of the curve. `L` is any list of numbers. Weights of zero are no asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,6 +15,18 @@ pub struct AsymmetryParams<L> {
     pub thresholds: L,
     /// Change of slope cⱼ beyond each \[ratio\].
     pub weights: L,
+}
+
+impl<L: AsMut<[f64]>> Params for AsymmetryParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        const INF: f64 = f64::INFINITY;
+        for s in self.thresholds.as_mut() {
+            f(&Meta { name: "thresholds", unit: "y", lower: -INF, upper: INF }, s);
+        }
+        for c in self.weights.as_mut() {
+            f(&Meta { name: "weights", unit: "", lower: -1.0, upper: INF }, c);
+        }
+    }
 }
 
 /// The curve with at most `N` dead zones.

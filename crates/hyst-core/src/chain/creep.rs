@@ -6,7 +6,7 @@
 
 use crate::chain::FirstOrder;
 use crate::error::{finite, within};
-use crate::{Build, Env, Error, Invert, Real, Sampling, Stage};
+use crate::{Build, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
 /// array, a slice.
@@ -27,6 +27,28 @@ pub struct Creep<T, const N: usize> {
     shares: [T; N],
     len: usize,
 }
+
+impl<L: AsRef<[f64]>> CreepParams<L> {
+    /// What all elements add in the end, as a ratio of the motion at once.
+    pub fn total(&self) -> f64 {
+        self.shares.as_ref().iter().fold(0.0, |sum, c| sum + c)
+    }
+}
+
+impl<L: AsMut<[f64]>> Params for CreepParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        for tau in self.seconds.as_mut() {
+            f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: f64::INFINITY }, tau);
+        }
+        for c in self.shares.as_mut() {
+            f(&Meta { name: "shares", unit: "", lower: 0.0, upper: MOST_SHARE }, c);
+        }
+    }
+}
+
+/// Largest sensible share of one element. Ceramics creep by 1–2 % per decade of time; with two elements per decade this
+/// allows ten times that, beyond which the bank would stand in for hysteresis.
+const MOST_SHARE: f64 = 0.08;
 
 impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Creep<T, N>> for CreepParams<L> {
     type Context = Sampling;

@@ -1,7 +1,9 @@
 //! The parameters of any operator.
 
 use super::Kind;
-use crate::{GpiParams, MaxwellSlipParams, PiParams, TdEmParams, TdPiParams, ViscousPiParams};
+use crate::{
+    GpiParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
+};
 
 /// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
 ///
@@ -21,6 +23,8 @@ pub enum OperatorParams<L> {
     MaxwellSlip(MaxwellSlipParams<L>),
     /// Temperature-dependent electromechanical model.
     TdEm(TdEmParams<L>),
+    /// Classical Preisach.
+    Preisach(PreisachParams<L>),
 }
 
 impl<L> OperatorParams<L> {
@@ -32,6 +36,21 @@ impl<L> OperatorParams<L> {
             Self::TdPi(_) => Kind::TdPi,
             Self::MaxwellSlip(_) => Kind::MaxwellSlip,
             Self::TdEm(_) => Kind::TdEm,
+            Self::Preisach(_) => Kind::Preisach,
+        }
+    }
+}
+
+impl<L: AsMut<[f64]>> Params for OperatorParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        match self {
+            Self::Pi(p) => p.visit(f),
+            Self::ViscousPi(p) => p.visit(f),
+            Self::Gpi(p) => p.visit(f),
+            Self::TdPi(p) => p.visit(f),
+            Self::MaxwellSlip(p) => p.visit(f),
+            Self::TdEm(p) => p.visit(f),
+            Self::Preisach(p) => p.visit(f),
         }
     }
 }

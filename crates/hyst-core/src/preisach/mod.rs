@@ -6,8 +6,10 @@
 
 mod everett;
 mod operator;
+mod params;
 mod reversals;
 
 pub use everett::{Cell, Everett, Grid};
 pub use operator::{EverettInverse, PreisachState};
+pub use params::{PreisachParams, cell_index};
 pub use reversals::Reversals;

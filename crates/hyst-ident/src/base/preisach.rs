@@ -3,13 +3,13 @@
 
 use std::ops::Range;
 
-use hyst_core::{Env, Everett, Grid, Stage};
+use hyst_core::{Env, Everett, Grid, PreisachParams, Stage, cell_index};
 use nalgebra::DMatrix;
 
 use super::Basis;
 use crate::Samples;
 use crate::lsq::Bounds;
-use crate::model::{NODES, PreisachSpec, cell_index};
+use crate::model::NODES;
 
 /// Reversible slope of each diagonal cell is at least this share of the mean gain.
 const FLOOR: f64 = 0.05;
@@ -64,10 +64,10 @@ impl PreisachBasis {
     }
 
     /// The operator with these weights.
-    pub(crate) fn spec(&self, weights: &[f64]) -> PreisachSpec {
+    pub(crate) fn spec(&self, weights: &[f64]) -> PreisachParams<Vec<f64>> {
         let (density, once) = weights.split_at(self.triangle());
         let once = if self.has_strip() { once.to_vec() } else { vec![0.0; self.grid.cells] };
-        PreisachSpec {
+        PreisachParams {
             low: self.grid.low,
             high: self.grid.high,
             cells: self.grid.cells,

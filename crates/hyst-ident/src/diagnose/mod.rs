@@ -96,7 +96,7 @@ pub fn diagnose(
     if effects.names() != model.effects.names() {
         // The effects keep the parameters that the rich base gave them: refitted on a coarser base
         // they would take up its misfit. Only the base's weights and the zero are solved again.
-        let own = basis_of(model, &samples);
+        let own = basis_of(model, &samples)?;
         let motion_only = without_sensor_effects(&samples, effects);
         let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
         let final_problem = Problem::new(&motion_only, own.as_ref(), &final_blocks, per_record);

@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use hyst_core::{
-    DelayParams, DriftParams, InterferenceParams, LagParams, MAX_RESONANCES, Params, ResonanceParams, TemperatureParams,
+    AsymmetryParams, CreepParams, DelayParams, DriftParams, EffectParams, InterferenceParams, LagParams, LoadParams,
+    MAX_RESONANCES, Meta, Params, ResonanceParams, SaturationParams, TemperatureParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -75,26 +76,8 @@ impl FromStr for Effect {
     }
 }
 
-/// A bank of creep elements: element i adds `shares[i]` of a first-order response with
-/// `seconds[i]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CreepBank {
-    /// Time constants \[s\].
-    pub seconds: Vec<f64>,
-    /// Settled shares \[ratio\].
-    pub shares: Vec<f64>,
-}
-
-/// Largest share of one creep element. Ceramics creep by 1–2 % per decade of time; with two elements
-/// per decade this allows ten times that, beyond which the bank would stand in for hysteresis.
-const MOST_SHARE: f64 = 0.08;
-
-impl CreepBank {
-    /// What all elements add in the end, as a ratio of the motion at once.
-    pub fn total(&self) -> f64 {
-        self.shares.iter().sum()
-    }
-}
+/// A bank of creep elements, as parameters.
+pub type CreepBank = CreepParams<Vec<f64>>;
 
 /// Which effects a chain has, and their parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -113,6 +96,12 @@ pub struct Effects {
     pub drift: Option<DriftParams>,
     /// Tone.
     pub interference: Option<InterferenceParams>,
+    /// Curve behind the hysteresis. No diagnosis looks for it yet.
+    pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
+    /// Compliance under the load. No diagnosis looks for it yet.
+    pub load: Option<LoadParams>,
+    /// Ends of the motion. No diagnosis looks for them yet.
+    pub saturation: Option<SaturationParams>,
 }
 
 /// A parameter as it is searched, with what moves it.
@@ -143,6 +132,33 @@ impl Effects {
         push(self.drift.is_some(), Effect::Drift);
         push(self.interference.is_some(), Effect::Interference);
         names
+    }
+
+    /// The same effects as the core has them.
+    pub fn to_params(&self) -> EffectParams<Vec<f64>> {
+        let mut modes = self.resonances.iter().copied();
+        EffectParams {
+            delay: self.delay,
+            lag: self.lag,
+            asymmetry: self.asymmetry.clone(),
+            temperature: self.temperature,
+            creep: self.creep.clone(),
+            load: self.load,
+            resonances: std::array::from_fn(|_| modes.next()),
+            saturation: self.saturation,
+            drift: self.drift,
+            interference: self.interference,
+        }
+    }
+
+    /// Stages that a diagnosis of this version neither looks for nor keeps.
+    pub(crate) fn beyond_diagnosis(&self) -> Option<&'static str> {
+        let there = [
+            (self.asymmetry.is_some(), "asymmetry"),
+            (self.load.is_some(), "load"),
+            (self.saturation.is_some(), "saturation"),
+        ];
+        there.into_iter().find_map(|(there, name)| there.then_some(name))
     }
 
     /// Whether there is none.
@@ -202,15 +218,14 @@ impl Effects {
             pass(Effect::Temperature, "", p, f);
         }
         if let Some(bank) = &mut self.creep {
-            for (tau, share) in bank.seconds.iter().zip(&mut bank.shares) {
-                f(Parameter {
-                    effect: Effect::Creep,
-                    name: format!("share_{tau:.3}s"),
-                    lower: 0.0,
-                    upper: MOST_SHARE,
-                    value: share,
-                });
-            }
+            let taus = bank.seconds.clone();
+            let mut taus = taus.iter();
+            bank.visit(&mut |meta: &Meta, value| {
+                if let Some(tau) = (meta.name == "shares").then(|| taus.next()).flatten() {
+                    let name = format!("share_{tau:.3}s");
+                    f(Parameter { effect: Effect::Creep, name, lower: meta.lower, upper: meta.upper, value });
+                }
+            });
         }
         for (i, p) in self.resonances.iter_mut().enumerate() {
             pass(Effect::Resonance, if i == 0 { "" } else { "_2" }, p, f);

@@ -3,13 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hyst_core::{
-    CompensatorOptions, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, ResonanceParams,
-    Sampling, TemperatureParams,
-};
+use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
 
-use super::{Base, Compensator, CreepBank, Effects, HostChain, Kind};
+use super::{Base, Compensator, Effects, HostChain, Operator, stages};
 
 /// Schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
@@ -38,71 +35,6 @@ pub struct FittedOn {
     pub rows: usize,
     /// Rows that were left out as a start-up transient.
     pub settling_rows: usize,
-}
-
-/// One stage of the file: its parameters, their units, their standard errors.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-struct StageEntry {
-    #[serde(flatten)]
-    stage: StageSpec,
-    units: BTreeMap<String, String>,
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    std_errors: BTreeMap<String, f64>,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
-enum StageSpec {
-    Base(Base),
-    Effect(EffectSpec),
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "stage", rename_all = "kebab-case")]
-enum EffectSpec {
-    Delay(DelayParams),
-    Lag(LagParams),
-    Temperature(TemperatureParams),
-    Creep(CreepBank),
-    Resonance(ResonanceParams),
-    Drift(DriftParams),
-    Interference(InterferenceParams),
-}
-
-/// Reads a stage by its name, so that an error can name the stage and the field.
-fn read_stage(value: serde_json::Value) -> Result<(StageSpec, BTreeMap<String, f64>), String> {
-    #[derive(Deserialize)]
-    struct PiSpec {
-        gain: f64,
-        thresholds: Vec<f64>,
-        weights: Vec<f64>,
-    }
-    fn field<S: serde::de::DeserializeOwned>(name: &str, value: serde_json::Value) -> Result<S, String> {
-        serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
-            path if path == "." => format!("stage {name}: {}", e.inner()),
-            path => format!("stage {name}, field {path}: {}", e.inner()),
-        })
-    }
-    let name =
-        value.get("stage").and_then(|v| v.as_str()).ok_or("a stage has no name in its field \"stage\"")?.to_owned();
-    let std_errors = value.get("std_errors").cloned().map_or(Ok(BTreeMap::new()), |v| field(&name, v))?;
-    let effect = StageSpec::Effect;
-    let spec = match name.as_str() {
-        "pi" => {
-            let PiSpec { gain, thresholds, weights } = field(&name, value)?;
-            StageSpec::Base(Base::Pi { gain, thresholds, weights })
-        }
-        "preisach" => StageSpec::Base(Base::Preisach(field(&name, value)?)),
-        "delay" => effect(EffectSpec::Delay(field(&name, value)?)),
-        "lag" => effect(EffectSpec::Lag(field(&name, value)?)),
-        "temperature" => effect(EffectSpec::Temperature(field(&name, value)?)),
-        "creep" => effect(EffectSpec::Creep(field(&name, value)?)),
-        "resonance" => effect(EffectSpec::Resonance(field(&name, value)?)),
-        "drift" => effect(EffectSpec::Drift(field(&name, value)?)),
-        "interference" => effect(EffectSpec::Interference(field(&name, value)?)),
-        other => return Err(format!("there is no stage called {other:?} in this version")),
-    };
-    Ok((spec, std_errors))
 }
 
 #[derive(Serialize, Deserialize)]
@@ -204,30 +136,23 @@ impl Model {
     /// Names the parameter that is out of range.
     pub fn build(&self, period: f64) -> Result<HostChain, Error> {
         let cx = Sampling { period };
-        let mut chain = HostChain::new(self.base.build()?).with_zero(self.zero);
-        let e = &self.effects;
-        if let Some(p) = &e.delay {
-            chain = chain.with_delay(p, &cx)?;
+        let chain: HostChain = self.effects.to_params().around(Operator::new(&self.base, &cx)?, &cx)?;
+        Ok(chain.with_zero(self.zero))
+    }
+
+    /// The stages as the file has them: a JSON object each, with name, parameters, units and standard errors.
+    pub fn stages(&self) -> Vec<serde_json::Value> {
+        stages::write(self)
+    }
+
+    /// The parameters as firmware takes them.
+    pub fn to_params(&self) -> ChainParams<Vec<f64>> {
+        ChainParams {
+            operator: self.base.clone(),
+            effects: self.effects.to_params(),
+            zero: self.zero,
+            input: [self.input.low, self.input.high],
         }
-        if let Some(p) = &e.lag {
-            chain = chain.with_lag(p, &cx)?;
-        }
-        if let Some(p) = &e.temperature {
-            chain = chain.with_temperature(p)?;
-        }
-        if let Some(p) = &e.creep {
-            chain = chain.with_creep(&CreepParams { seconds: &p.seconds, shares: &p.shares }, &cx)?;
-        }
-        for p in &e.resonances {
-            chain = chain.with_resonance(p, &cx)?;
-        }
-        if let Some(p) = &e.drift {
-            chain = chain.with_drift(p)?;
-        }
-        if let Some(p) = &e.interference {
-            chain = chain.with_interference(p)?;
-        }
-        Ok(chain)
     }
 
     /// The compensator at a sample period.
@@ -240,7 +165,12 @@ impl Model {
 
     /// Whether the model needs a temperature.
     pub fn needs_temperature(&self) -> bool {
-        self.effects.temperature.is_some()
+        self.effects.temperature.is_some() || matches!(self.base, Base::TdPi(_) | Base::TdEm(_))
+    }
+
+    /// Whether the model needs a load.
+    pub fn needs_load(&self) -> bool {
+        self.effects.load.is_some()
     }
 
     /// The file's text.
@@ -259,65 +189,6 @@ impl Model {
         };
         // Plain numbers, strings and lists: this cannot fail.
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
-    }
-
-    fn stages(&self) -> Vec<StageEntry> {
-        let (u, y) = (&self.input.unit, &self.output.unit);
-        let mut list = Vec::new();
-        let mut push = |stage: StageSpec, name: &str, units: &[(&str, String)]| {
-            let own = |key: &String| key.strip_prefix(name).and_then(|k| k.strip_prefix('.')).map(str::to_owned);
-            list.push(StageEntry {
-                stage,
-                units: units.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect(),
-                std_errors: self.std_errors.iter().filter_map(|(k, v)| Some((own(k)?, *v))).collect(),
-            });
-        };
-        let e = &self.effects;
-        let effect = StageSpec::Effect;
-        if let Some(p) = e.delay {
-            push(effect(EffectSpec::Delay(p)), "delay", &[("seconds", "s".into())]);
-        }
-        if let Some(p) = e.lag {
-            push(effect(EffectSpec::Lag(p)), "lag", &[("seconds", "s".into())]);
-        }
-        let base = StageSpec::Base(self.base.clone());
-        match &self.base {
-            Base::Pi { .. } => {
-                let slope = format!("{y}/{u}");
-                push(base, "pi", &[("gain", slope.clone()), ("thresholds", u.clone()), ("weights", slope)]);
-            }
-            Base::Preisach(_) => {
-                let volts = ["low", "high", "rest"].map(|k| (k, u.clone()));
-                let outputs = ["density", "once"].map(|k| (k, y.clone()));
-                push(base, "preisach", &[&volts[..], &outputs[..]].concat());
-            }
-        }
-        if let Some(p) = e.temperature {
-            push(
-                effect(EffectSpec::Temperature(p)),
-                "temperature",
-                &[("per_kelvin", "1/K".into()), ("reference_degc", "degC".into())],
-            );
-        }
-        if let Some(p) = &e.creep {
-            push(effect(EffectSpec::Creep(p.clone())), "creep", &[("seconds", "s".into()), ("shares", "1".into())]);
-        }
-        for (i, p) in e.resonances.iter().enumerate() {
-            let name = if i == 0 { "resonance" } else { "resonance_2" };
-            push(
-                effect(EffectSpec::Resonance(*p)),
-                name,
-                &[("hz", "Hz".into()), ("damping", "1".into()), ("gain", "1".into())],
-            );
-        }
-        if let Some(p) = e.drift {
-            push(effect(EffectSpec::Drift(p)), "drift", &[("per_second", format!("{y}/s"))]);
-        }
-        if let Some(p) = e.interference {
-            let units = [("hz", "Hz".into()), ("amplitude", y.clone()), ("phase", "rad".into())];
-            push(effect(EffectSpec::Interference(p)), "interference", &units);
-        }
-        list
     }
 
     /// Reads a model file.
@@ -367,41 +238,7 @@ impl Model {
     }
 
     fn from_file(file: File<serde_json::Value>) -> Result<Self, String> {
-        let mut effects = Effects::default();
-        let mut base = None;
-        let mut std_errors = BTreeMap::new();
-        for value in file.stages {
-            let (spec, errors) = read_stage(value)?;
-            let name = match spec {
-                StageSpec::Base(b) => {
-                    let name = b.kind().name();
-                    if base.replace(b).is_some() {
-                        return Err("there are two hysteresis stages".into());
-                    }
-                    name
-                }
-                StageSpec::Effect(e) => {
-                    let (fresh, name) = match e {
-                        EffectSpec::Delay(p) => (effects.delay.replace(p).is_none(), "delay"),
-                        EffectSpec::Lag(p) => (effects.lag.replace(p).is_none(), "lag"),
-                        EffectSpec::Temperature(p) => (effects.temperature.replace(p).is_none(), "temperature"),
-                        EffectSpec::Creep(p) => (effects.creep.replace(p).is_none(), "creep"),
-                        EffectSpec::Resonance(p) => {
-                            effects.resonances.push(p);
-                            (true, if effects.resonances.len() == 1 { "resonance" } else { "resonance_2" })
-                        }
-                        EffectSpec::Drift(p) => (effects.drift.replace(p).is_none(), "drift"),
-                        EffectSpec::Interference(p) => (effects.interference.replace(p).is_none(), "interference"),
-                    };
-                    if !fresh {
-                        return Err(format!("there are two stages {name:?}"));
-                    }
-                    name
-                }
-            };
-            std_errors.extend(errors.into_iter().map(|(k, v)| (format!("{name}.{k}"), v)));
-        }
-        let base = base.ok_or("there is no hysteresis stage")?;
+        let stages::Stages { base, effects, std_errors } = stages::read(file.stages)?;
         if base.kind() != file.kind {
             return Err(format!("the kind is {}, but the hysteresis stage is {}", file.kind, base.kind()));
         }

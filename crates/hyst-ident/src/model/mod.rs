@@ -3,10 +3,12 @@
 mod effects;
 mod file;
 mod operator;
+mod stages;
 
 pub use effects::{CreepBank, Effect, Effects};
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
-pub use operator::{AnyOperator, Base, Compensator, HostChain, Kind, NODES, Operator, OperatorInverse, PreisachSpec};
+pub use hyst_core::Kind;
+pub use operator::{Base, Compensator, HostChain, InverseState, NODES, Operator, OperatorInverse, OperatorState};
 
 pub(crate) use effects::Parameter;
-pub(crate) use operator::{CREEP, OperatorState, TAPS, cell_index};
+pub(crate) use operator::{CREEP, TAPS};

@@ -1,6 +1,6 @@
 //! The stages around the hysteresis, over whole columns.
 
-use hyst_core::{Build, Creep, CreepParams, Delay, Env, Error, Lag, Resonance, Sampling, Stage};
+use hyst_core::{Build, Creep, Delay, Env, Error, Lag, Resonance, Sampling, Stage};
 
 use crate::Samples;
 use crate::model::Effects;
@@ -32,11 +32,7 @@ impl<'a> SignalPath<'a> {
             delay: effects.delay.as_ref().map(|p| p.build(&cx)).transpose()?,
             lag: effects.lag.as_ref().map(|p| p.build(&cx)).transpose()?,
             factor,
-            creep: effects
-                .creep
-                .as_ref()
-                .map(|p| CreepParams { seconds: &p.seconds, shares: &p.shares }.build(&cx))
-                .transpose()?,
+            creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
             resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
         })
     }

@@ -1,0 +1,228 @@
+//! The stages of a model file: each a JSON object with its name, its parameters, their units and standard errors.
+
+use std::collections::BTreeMap;
+
+use hyst_core::{Params, ViscousPiParams};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::{Base, Effects, Model};
+
+/// What the stages of a file say.
+pub(super) struct Stages {
+    pub(super) base: Base,
+    pub(super) effects: Effects,
+    pub(super) std_errors: BTreeMap<String, f64>,
+}
+
+/// Drag of the plays of a Prandtl-Ishlinskii base, in the file a stage of its own.
+#[derive(Serialize, Deserialize)]
+struct RateDependence {
+    seconds: f64,
+}
+
+/// `unit` with `u` and `y` replaced by the model's own units.
+fn unit(unit: &str, input: &str, output: &str) -> String {
+    if unit.is_empty() {
+        return "1".into();
+    }
+    let words = unit.split_inclusive(|c: char| !c.is_alphanumeric());
+    let mut text = String::new();
+    for word in words {
+        let (name, rest) = word.split_at(word.trim_end_matches(|c: char| !c.is_alphanumeric()).len());
+        text += match name {
+            "u" => input,
+            "y" => output,
+            other => other,
+        };
+        text += rest;
+    }
+    text
+}
+
+/// The stages of a model, in the chain's order.
+pub(super) fn write(model: &Model) -> Vec<Value> {
+    let (u, y) = (&model.input.unit, &model.output.unit);
+    let mut list = Vec::new();
+    let mut push = |name: &str, key: &str, fields: Value, params: &mut dyn Params| {
+        let mut units = BTreeMap::new();
+        params.visit(&mut |meta, _| {
+            units.entry(meta.name).or_insert_with(|| unit(meta.unit, u, y));
+        });
+        let mut entry = Map::new();
+        entry.insert("stage".into(), name.into());
+        if let Value::Object(fields) = fields {
+            if fields.contains_key("reference_degc") {
+                units.insert("reference_degc", "degC".into());
+            }
+            entry.extend(fields);
+        }
+        let own = |k: &String| k.strip_prefix(key).and_then(|k| k.strip_prefix('.')).map(str::to_owned);
+        let errors: Map<String, Value> =
+            model.std_errors.iter().filter_map(|(k, v)| Some((own(k)?, Value::from(*v)))).collect();
+        entry.insert("units".into(), units.into_iter().map(|(k, v)| (k.to_owned(), Value::from(v))).collect());
+        if !errors.is_empty() {
+            entry.insert("std_errors".into(), Value::Object(errors));
+        }
+        list.push(Value::Object(entry));
+    };
+    // Plain numbers, strings and lists: writing them cannot fail.
+    fn value(x: &impl Serialize) -> Value {
+        serde_json::to_value(x).unwrap_or_default()
+    }
+    let e = &mut model.effects.clone();
+    if let Some(p) = &mut e.delay {
+        push("delay", "delay", value(p), p);
+    }
+    if let Some(p) = &mut e.lag {
+        push("lag", "lag", value(p), p);
+    }
+    match &mut model.base.clone() {
+        Base::ViscousPi(p) => {
+            push("pi", "pi", value(&p.pi), &mut p.pi);
+            let drag = value(&RateDependence { seconds: p.seconds });
+            push("rate-dependence", "rate-dependence", drag, &mut hyst_core::LagParams { seconds: p.seconds });
+        }
+        base => {
+            let name = base.kind().name();
+            // The enum writes { "name": { fields } }.
+            let fields = match value(base) {
+                Value::Object(outer) => outer.into_iter().next().map(|(_, fields)| fields).unwrap_or_default(),
+                other => other,
+            };
+            push(name, name, fields, base);
+        }
+    }
+    if let Some(p) = &mut e.asymmetry {
+        push("asymmetry", "asymmetry", value(p), p);
+    }
+    if let Some(p) = &mut e.temperature {
+        push("temperature", "temperature", value(p), p);
+    }
+    if let Some(p) = &mut e.creep {
+        push("creep", "creep", value(p), p);
+    }
+    if let Some(p) = &mut e.load {
+        push("load", "load", value(p), p);
+    }
+    for (i, p) in e.resonances.iter_mut().enumerate() {
+        push("resonance", if i == 0 { "resonance" } else { "resonance_2" }, value(p), p);
+    }
+    if let Some(p) = &mut e.saturation {
+        push("saturation", "saturation", value(p), p);
+    }
+    if let Some(p) = &mut e.drift {
+        push("drift", "drift", value(p), p);
+    }
+    if let Some(p) = &mut e.interference {
+        push("interference", "interference", value(p), p);
+    }
+    list
+}
+
+/// Reads the parameters of the stage `name`, so that an error names the stage and the field.
+fn fields<S: DeserializeOwned>(name: &str, value: &Value) -> Result<S, String> {
+    serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
+        path if path == "." => format!("stage {name}: {}", e.inner()),
+        path => format!("stage {name}, field {path}: {}", e.inner()),
+    })
+}
+
+/// Puts a stage where none may be yet.
+fn only<S: DeserializeOwned>(slot: &mut Option<S>, name: &str, value: &Value) -> Result<(), String> {
+    if slot.replace(fields(name, value)?).is_some() { Err(format!("there are two stages {name:?}")) } else { Ok(()) }
+}
+
+/// The base model of a stage with this name; `None` if it is no base model.
+fn base(name: &str, v: &Value) -> Result<Option<Base>, String> {
+    Ok(Some(match name {
+        "pi" => Base::Pi(fields(name, v)?),
+        "gpi" => Base::Gpi(fields(name, v)?),
+        "td-pi" => Base::TdPi(fields(name, v)?),
+        "preisach" => Base::Preisach(fields(name, v)?),
+        "maxwell-slip" => Base::MaxwellSlip(fields(name, v)?),
+        "td-em" => Base::TdEm(fields(name, v)?),
+        _ => return Ok(None),
+    }))
+}
+
+/// Reads the stages of a file.
+pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
+    let mut effects = Effects::default();
+    let mut bases: Option<Base> = None;
+    let mut drag: Option<RateDependence> = None;
+    let mut std_errors = BTreeMap::new();
+    for value in &stages {
+        let name = value.get("stage").and_then(Value::as_str).ok_or("a stage has no name in its field \"stage\"")?;
+        let mut key = name;
+        if let Some(found) = base(name, value)? {
+            if bases.replace(found).is_some() {
+                return Err("there are two hysteresis stages".into());
+            }
+        } else {
+            match name {
+                "rate-dependence" => only(&mut drag, name, value)?,
+                "delay" => only(&mut effects.delay, name, value)?,
+                "lag" => only(&mut effects.lag, name, value)?,
+                "asymmetry" => only(&mut effects.asymmetry, name, value)?,
+                "temperature" => only(&mut effects.temperature, name, value)?,
+                "creep" => only(&mut effects.creep, name, value)?,
+                "load" => only(&mut effects.load, name, value)?,
+                "resonance" => {
+                    effects.resonances.push(fields(name, value)?);
+                    key = if effects.resonances.len() == 1 { "resonance" } else { "resonance_2" };
+                    if effects.resonances.len() > hyst_core::MAX_RESONANCES {
+                        return Err(format!("there are more than {} resonances", hyst_core::MAX_RESONANCES));
+                    }
+                }
+                "saturation" => only(&mut effects.saturation, name, value)?,
+                "drift" => only(&mut effects.drift, name, value)?,
+                "interference" => only(&mut effects.interference, name, value)?,
+                other => return Err(format!("there is no stage called {other:?} in this version")),
+            }
+        }
+        let errors: BTreeMap<String, f64> =
+            value.get("std_errors").map_or_else(|| Ok(BTreeMap::new()), |v| fields(name, v))?;
+        std_errors.extend(errors.into_iter().map(|(k, v)| (format!("{key}.{k}"), v)));
+    }
+    let base = match (bases.ok_or("there is no hysteresis stage")?, drag) {
+        (base, None) => base,
+        (Base::Pi(pi), Some(RateDependence { seconds })) => {
+            Base::ViscousPi(ViscousPiParams::<Vec<f64>> { pi, seconds })
+        }
+        (other, Some(_)) => {
+            let kind = other.kind();
+            return Err(format!("rate-dependence is a variant of pi; {kind} has none (of preisach it is dpm)"));
+        }
+    };
+    Ok(Stages { base, effects, std_errors })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hyst_core::PiParams;
+
+    #[test]
+    fn units_are_the_models_own() {
+        assert_eq!(unit("y/u", "V", "um"), "um/V");
+        assert_eq!(unit("u s/y", "V", "um"), "V s/um");
+        assert_eq!(unit("1/u", "V", "um"), "1/V");
+        assert_eq!(unit("", "V", "um"), "1");
+        assert_eq!(unit("Hz", "V", "um"), "Hz");
+    }
+
+    #[test]
+    fn rate_dependence_belongs_to_plays() {
+        let stage = |text: &str| serde_json::from_str::<Value>(text).unwrap();
+        let pi = stage(r#"{"stage":"pi","gain":0.1,"thresholds":[1.0],"weights":[0.1]}"#);
+        let drag = stage(r#"{"stage":"rate-dependence","seconds":0.002}"#);
+        let both = read(vec![pi.clone(), drag.clone()]).unwrap_or_else(|e| panic!("{e}"));
+        let expected = PiParams { gain: 0.1, thresholds: vec![1.0], weights: vec![0.1] };
+        assert_eq!(both.base, Base::ViscousPi(ViscousPiParams { pi: expected, seconds: 0.002 }));
+        let slip = stage(r#"{"stage":"maxwell-slip","reading":"backlash","widths":[1.0],"gains":[0.1]}"#);
+        assert!(read(vec![slip, drag]).is_err_and(|e| e.contains("variant of pi")));
+        assert!(read(vec![pi.clone(), pi]).is_err_and(|e| e.contains("two hysteresis")));
+    }
+}
