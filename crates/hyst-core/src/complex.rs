@@ -20,6 +20,14 @@ impl Complex {
     pub fn abs(self) -> f64 {
         libm::hypot(self.re, self.im)
     }
+    /// Phase in (−π, π] \[rad\].
+    pub fn arg(self) -> f64 {
+        libm::atan2(self.im, self.re)
+    }
+    /// The principal value of `selfᵖ`; of zero: 0, and 1 for p = 0.
+    pub fn powf(self, p: f64) -> Self {
+        Self::polar(libm::pow(self.abs(), p), p * self.arg())
+    }
 }
 
 impl From<f64> for Complex {

@@ -20,6 +20,7 @@
 //! | play and stop operators | `play.rs` | – |
 //! | Prandtl-Ishlinskii | `pi.rs` | closed form, the same type |
 //! | Preisach as an Everett map | `preisach/` | closed form cell by cell |
+//! | fractional models, LFDM and IFM | `fractional/` | the recursion solved for the input; IFM only where that is stable |
 //! | delay, lag, resonance | `delay.rs` `lag.rs` `resonance.rs` | band-limited with preview, `preview.rs` |
 //! | creep | `creep.rs` | recursive, exact |
 //! | temperature, drift, interference | `temperature.rs` `drift.rs` `interference.rs` | division; sensor effects are not driven against |
@@ -47,6 +48,7 @@ mod chain;
 mod complex;
 mod control;
 mod error;
+mod fractional;
 mod maxwell;
 mod params;
 mod play;
@@ -60,6 +62,7 @@ pub use chain::*;
 pub use complex::Complex;
 pub use control::*;
 pub use error::Error;
+pub use fractional::*;
 pub use maxwell::*;
 pub use params::*;
 pub use play::{play, stop};

@@ -59,6 +59,13 @@ impl<T: Real, const N: usize> DelayState<T, N> {
     pub(crate) fn new() -> Self {
         Self { ring: [T::ZERO; N], newest: 0 }
     }
+
+    /// The input `k` samples before the newest; `other` if the ring is shorter.
+    #[inline]
+    fn back(&self, k: usize, other: T) -> T {
+        let at = if self.newest >= k { self.newest - k } else { (self.newest + N).saturating_sub(k) };
+        self.ring.get(at).copied().unwrap_or(other)
+    }
 }
 
 impl<T: Real, const N: usize> Stage<T> for Delay<T, N> {
@@ -79,16 +86,28 @@ impl<T: Real, const N: usize> Stage<T> for Delay<T, N> {
         if let Some(slot) = s.ring.get_mut(s.newest) {
             *slot = u;
         }
-        let back = |k: usize| {
-            let at = if s.newest >= k { s.newest - k } else { s.newest + N - k };
-            s.ring.get(at).copied().unwrap_or(u)
-        };
-        let (near, far) = (back(self.whole), back(self.whole + 1));
-        near + self.fraction * (far - near)
+        self.between(s.back(self.whole, u), s.back(self.whole + 1, u))
     }
 }
 
 impl<T: Real, const N: usize> Delay<T, N> {
+    #[inline]
+    fn between(&self, near: T, far: T) -> T {
+        near + self.fraction * (far - near)
+    }
+
+    /// What [`step`](Stage::step) would return for the input `u`.
+    #[inline]
+    pub(crate) fn ahead(&self, s: &DelayState<T, N>, u: T) -> T {
+        let near = self.whole.checked_sub(1).map_or(u, |k| s.back(k, u));
+        self.between(near, s.back(self.whole, u))
+    }
+
+    /// Share of the present input in the present output.
+    pub(crate) fn at_once(&self) -> T {
+        if self.whole == 0 { T::ONE - self.fraction } else { T::ZERO }
+    }
+
     /// Whole samples of the dead time.
     pub fn whole_samples(&self) -> usize {
         self.whole
@@ -116,6 +135,21 @@ mod tests {
             let y = delay.step(&mut s, &e, t);
             if k > 4 {
                 assert!((y - (t - 3.25e-3)).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn ahead_is_what_the_step_returns() {
+        for seconds in [0.0, 0.4e-3, 1e-3, 3.25e-3] {
+            let delay: Delay<f64, 8> = DelayParams { seconds }.build(&Sampling { period: 1e-3 }).unwrap();
+            let (mut s, e) = (delay.state(), Env::default());
+            delay.reset(&mut s, &e, 0.3);
+            for k in 0..50 {
+                let u = libm::sin(1.7 * f64::from(k));
+                let (still, ahead) = (delay.ahead(&s, 0.0), delay.ahead(&s, u));
+                assert!((still + delay.at_once() * u - ahead).abs() < 1e-15);
+                assert_eq!(ahead, delay.step(&mut s, &e, u));
             }
         }
     }

@@ -25,6 +25,10 @@ pub enum OperatorParams<L> {
     TdEm(TdEmParams<L>),
     /// Classical Preisach.
     Preisach(PreisachParams<L>),
+    /// Linear fractional-order differential model.
+    Lfdm(LfdmParams),
+    /// Improved fractional-order model.
+    Ifm(IfmParams),
 }
 
 impl<L> OperatorParams<L> {
@@ -37,6 +41,8 @@ impl<L> OperatorParams<L> {
             Self::MaxwellSlip(_) => Kind::MaxwellSlip,
             Self::TdEm(_) => Kind::TdEm,
             Self::Preisach(_) => Kind::Preisach,
+            Self::Lfdm(_) => Kind::Lfdm,
+            Self::Ifm(_) => Kind::Ifm,
         }
     }
 }
@@ -51,6 +57,8 @@ impl<L: AsMut<[f64]>> Params for OperatorParams<L> {
             Self::MaxwellSlip(p) => p.visit(f),
             Self::TdEm(p) => p.visit(f),
             Self::Preisach(p) => p.visit(f),
+            Self::Lfdm(p) => p.visit(f),
+            Self::Ifm(p) => p.visit(f),
         }
     }
 }

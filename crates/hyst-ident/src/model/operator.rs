@@ -1,8 +1,9 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
 use hyst_core::{
-    Build, Chain, Env, Error, Everett, EverettInverse, Gpi, GpiInverse, Invert, MaxwellSlip, OperatorParams, Pi,
-    Sampling, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
+    Build, Chain, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse, Ifm, IfmInverse, Invert, Lfdm,
+    MaxwellSlip, OperatorParams, Pi, Sampling, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse, ViscousPi,
+    ViscousPiInverse,
 };
 
 /// Plays and elements that the host's operators hold.
@@ -23,6 +24,9 @@ pub type Base = OperatorParams<Vec<f64>>;
 pub type HostChain = Chain<f64, Operator, DELAY, CREEP>;
 /// The compensator as the host runs it.
 pub type Compensator = hyst_core::Compensator<f64, OperatorInverse, DELAY, CREEP, TAPS>;
+
+/// Memory of the host's fractional models: all of it, to 3e-7.
+type FullMemory = Exponentials<f64, 40>;
 
 /// Temperature for which the filter of an electromechanical model is made \[°C\]; its gain follows the measured one.
 const ROOM: f64 = 23.0;
@@ -119,6 +123,8 @@ operators! {
     TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, Invert::invert, at_once;
     TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>| o.band_limited(ROOM, None),
         TdEmInverse::lead;
+    Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, Invert::invert, at_once;
+    Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, Invert::invert, at_once;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, |o: &Everett<f64, NODES>| o.invert(), at_once;
 }
 
@@ -139,6 +145,8 @@ impl Operator {
             }
             Base::TdEm(p) => Any::TdEm(Box::new(p.build(cx)?)),
             Base::Preisach(p) => Any::Preisach(Box::new(p.build(&())?)),
+            Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
+            Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),
         }))
     }
 }
