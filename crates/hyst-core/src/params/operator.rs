@@ -2,7 +2,8 @@
 
 use super::Kind;
 use crate::{
-    GpiParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
+    GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams,
+    TdPiParams, ViscousPiParams,
 };
 
 /// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
