@@ -1,1 +1,38 @@
-//! The Python wheel `hyst` grows here; it holds nothing yet.
+//! The Python package `hyst`: models of `hyst-core` and the identification of `hyst-ident` on numpy arrays.
+//!
+//! Nothing is computed here. A signal comes in as a view of a numpy array, runs through a stage while Python's lock is
+//! released, and goes out as a new array. `models.rs` is the table of models; a new one is an entry there, an entry in the
+//! stub `python/hyst/_hyst.pyi` and a line in `python/hyst/__init__.py`.
+
+mod arrays;
+mod errors;
+mod ident;
+mod inverse;
+mod metrics;
+mod model_macro;
+mod models;
+mod operator;
+mod record;
+mod runner;
+
+use pyo3::prelude::*;
+
+/// The compiled half of the package `hyst`; import `hyst` instead.
+#[pymodule]
+mod _hyst {
+    #[pymodule_export]
+    use crate::ident::{Diagnosis, Drive, Model, Simulation, diagnose, fit};
+    #[pymodule_export]
+    use crate::metrics::{mape, max_abs, nrmse, peak_to_valley, rmse, smape};
+    #[pymodule_export]
+    use crate::operator::{Inverse, Operator};
+    #[pymodule_export]
+    use crate::record::{Record, read_record};
+
+    #[pymodule_init]
+    fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {
+        use super::PyModuleMethods;
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        crate::models::add_to(module)
+    }
+}

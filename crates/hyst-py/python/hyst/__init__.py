@@ -1,0 +1,30 @@
+"""Models of piezo hysteresis, their inverses, identification and diagnosis.
+
+Every model is a class with keyword parameters and the methods of ``Operator``: ``simulate``, ``reset``, ``step``,
+``inverse``, ``compensate``. ``fit``, ``diagnose`` and ``Model`` work on records. Signals are contiguous numpy arrays of
+float64.
+"""
+
+from ._errors import (
+    FitError,
+    HystError,
+    ModelFileError,
+    NotInvertibleError,
+    ParameterError,
+    ReachError,
+    RecordError,
+)
+from ._hyst import *  # noqa: F403
+from ._hyst import __all__ as _compiled
+from ._hyst import __version__ as __version__
+
+__all__ = [
+    "FitError",
+    "HystError",
+    "ModelFileError",
+    "NotInvertibleError",
+    "ParameterError",
+    "ReachError",
+    "RecordError",
+    *(name for name in _compiled if not name.startswith("_")),
+]

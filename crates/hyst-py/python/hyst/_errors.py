@@ -1,0 +1,29 @@
+"""Exceptions of the package."""
+
+
+class HystError(Exception):
+    """Anything that this package finds wrong with a model or a record."""
+
+
+class ParameterError(HystError, ValueError):
+    """A parameter is not finite, out of range, or a list is too long; the message names it."""
+
+
+class NotInvertibleError(HystError):
+    """The model has no inverse; the message says why."""
+
+
+class RecordError(HystError, ValueError):
+    """A record cannot be read, made, or used with this model; the message names file, line and column."""
+
+
+class ModelFileError(HystError, ValueError):
+    """A model file cannot be read or written."""
+
+
+class FitError(HystError):
+    """A record cannot be fitted or diagnosed."""
+
+
+class ReachError(HystError, ValueError):
+    """A reference leaves what the actuator reaches."""

@@ -1,0 +1,70 @@
+//! Errors of the crates below as Python's exceptions (`python/hyst/_errors.py`).
+
+use hyst_ident::compensate::CompensateError;
+use hyst_ident::fit::FitError;
+use hyst_ident::metrics::MetricsError;
+use hyst_ident::model::ModelError;
+use pyo3::PyErr;
+
+mod python {
+    #![allow(missing_docs, unreachable_pub, reason = "declarations of Python's classes, documented there")]
+    pyo3::import_exception!(hyst._errors, FitError);
+    pyo3::import_exception!(hyst._errors, ModelFileError);
+    pyo3::import_exception!(hyst._errors, NotInvertibleError);
+    pyo3::import_exception!(hyst._errors, ParameterError);
+    pyo3::import_exception!(hyst._errors, ReachError);
+    pyo3::import_exception!(hyst._errors, RecordError);
+}
+
+/// A parameter that is not finite, out of range or too long; or an operator without an inverse.
+pub(crate) fn core(error: hyst_core::Error) -> PyErr {
+    match error {
+        hyst_core::Error::NotInvertible(_) => not_invertible(error.to_string()),
+        _ => parameter(error.to_string()),
+    }
+}
+
+pub(crate) fn parameter(message: String) -> PyErr {
+    python::ParameterError::new_err(message)
+}
+
+pub(crate) fn not_invertible(message: String) -> PyErr {
+    python::NotInvertibleError::new_err(message)
+}
+
+/// Anything that is wrong with a record. What its message says of the command line's `--map` is said for Python too.
+pub(crate) fn record(error: impl std::error::Error) -> PyErr {
+    let mut message = error.to_string();
+    if message.contains("--map ") {
+        message.push_str(" (in Python --map NAME=COLUMN is map={\"NAME\": \"COLUMN\"})");
+    }
+    python::RecordError::new_err(message)
+}
+
+pub(crate) fn model_file(error: impl std::error::Error) -> PyErr {
+    python::ModelFileError::new_err(error.to_string())
+}
+
+pub(crate) fn fit(error: FitError) -> PyErr {
+    match error {
+        FitError::Model(error) => model(error),
+        FitError::Missing { .. } => record(error),
+        _ => python::FitError::new_err(error.to_string()),
+    }
+}
+
+pub(crate) fn model(error: ModelError) -> PyErr {
+    model_file(error)
+}
+
+pub(crate) fn compensate(error: CompensateError) -> PyErr {
+    match error {
+        CompensateError::Inverse(error) => core(error),
+        CompensateError::OutOfReach { .. } => python::ReachError::new_err(error.to_string()),
+        _ => record(error),
+    }
+}
+
+pub(crate) fn metrics(error: MetricsError) -> PyErr {
+    record(error)
+}

@@ -1,0 +1,105 @@
+//! How far a prediction is from the measurement (`hyst_ident::metrics`).
+
+use hyst_ident::metrics::{self, Errors};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+
+use crate::arrays::Signal;
+use crate::errors;
+
+/// Rows that are left out: the caller's flags, or none.
+fn flags(settling: Option<&Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<bool>> {
+    let Some(settling) = settling else { return Ok(vec![false; rows]) };
+    let array = settling.cast::<PyArray1<bool>>().ok().filter(|a| a.is_contiguous()).ok_or_else(|| {
+        PyTypeError::new_err(
+            "settling must be a one-dimensional contiguous numpy array of bool, true for rows to leave out",
+        )
+    })?;
+    Ok(array.try_readonly()?.as_slice()?.to_vec())
+}
+
+/// Runs `figure` on the three columns.
+fn with<R>(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+    figure: impl FnOnce(&[f64], &[f64], &[bool]) -> Result<R, metrics::MetricsError>,
+) -> PyResult<R> {
+    let (measured, predicted) = (Signal::new("measured", measured)?, Signal::new("predicted", predicted)?);
+    let (y, p) = (measured.values()?, predicted.values()?);
+    figure(y, p, &flags(settling, y.len())?).map_err(errors::metrics)
+}
+
+/// Root of the mean squared error, in the unit of the signals.
+///
+/// Parameters
+/// ----------
+/// measured, predicted : ndarray of float64, shape (n,)
+/// settling : ndarray of bool, shape (n,), optional
+///     Rows to leave out, as ``Simulation.settling``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn rmse(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    Ok(with(measured, predicted, settling, Errors::of)?.rmse)
+}
+
+/// ``rmse`` in percent of the span of the measured signal. Arguments as ``rmse``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn nrmse(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    Ok(with(measured, predicted, settling, Errors::of)?.nrmse_percent)
+}
+
+/// Largest error by magnitude, in the unit of the signals. Arguments as ``rmse``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn max_abs(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    Ok(with(measured, predicted, settling, Errors::of)?.max_abs)
+}
+
+/// Mean of ``|p − y| / |y|``, as a ratio. Rows where the measured signal is zero are left out; ``None`` if no row is
+/// left. Arguments as ``rmse``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn mape(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<f64>> {
+    with(measured, predicted, settling, metrics::mape)
+}
+
+/// Mean of ``2 |p − y| / (|p| + |y|)``, as a ratio from 0 to 2. Arguments as ``rmse``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn smape(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    with(measured, predicted, settling, metrics::smape)
+}
+
+/// The largest error minus the smallest, signs included, in the unit of the signals. Arguments as ``rmse``.
+#[pyfunction]
+#[pyo3(signature = (measured, predicted, *, settling=None))]
+pub(crate) fn peak_to_valley(
+    measured: &Bound<'_, PyAny>,
+    predicted: &Bound<'_, PyAny>,
+    settling: Option<&Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    with(measured, predicted, settling, metrics::peak_to_valley)
+}

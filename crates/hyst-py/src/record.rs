@@ -1,0 +1,251 @@
+//! Records (`hyst_ident::record`).
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use hyst_ident::record::{self as core, ColumnMap, Columns, Need, OutputUnit};
+use numpy::PyArray1;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arrays::{Signal, array};
+use crate::errors;
+
+/// What an actuator was told and what it did, over the lab's clock: evenly sampled columns, in segments between which the
+/// device rests.
+///
+/// Parameters
+/// ----------
+/// timepts : ndarray of float64, shape (n,)
+///     Time [s], even within each segment.
+/// inputs : ndarray of float64, shape (n,), optional
+///     Input, in the unit at the end of ``input_column``.
+/// outputs : ndarray of float64, shape (n,), optional
+///     Output, in the unit at the end of ``output_column``.
+/// temperature, load : ndarray of float64, shape (n,), optional
+///     Temperature [°C], external load [N].
+/// segment : sequence of int, length n, optional
+///     A label per row; the device rests where it changes. One segment if not given.
+/// input_column : str
+///     ``voltage_v``, or ``QUANTITY_in_UNIT``.
+/// output_column : str
+///     ``displacement_um``, ``displacement_nm``, ``displacement_mm`` or ``force_n``.
+/// name : str
+///     What messages and models call the record.
+///
+/// Raises
+/// ------
+/// RecordError
+///     If columns differ in length, values are not finite, time is not even or does not rise, or a label returns.
+#[pyclass(frozen, module = "hyst")]
+pub(crate) struct Record(pub(crate) Arc<core::Record>);
+
+impl Record {
+    fn wrap(record: core::Record) -> Self {
+        Self(Arc::new(record))
+    }
+}
+
+/// The columns of a call as a record.
+#[allow(clippy::too_many_arguments, reason = "keywords of one call")]
+pub(crate) fn of_arrays(
+    timepts: &Bound<'_, PyAny>,
+    inputs: Option<&Bound<'_, PyAny>>,
+    outputs: Option<&Bound<'_, PyAny>>,
+    temperature: Option<&Bound<'_, PyAny>>,
+    load: Option<&Bound<'_, PyAny>>,
+    segment: Option<Vec<i64>>,
+    input_column: &str,
+    output_column: &str,
+    name: &str,
+) -> PyResult<Record> {
+    let column = |name: &str, x: &Bound<'_, PyAny>| Ok::<_, PyErr>(Signal::new(name, x)?.values()?.to_vec());
+    let optional = |name: &str, x: Option<&Bound<'_, PyAny>>| x.map(|x| column(name, x)).transpose();
+    let unit = OutputUnit::of_column(output_column).ok_or_else(|| {
+        let known = OutputUnit::ALL.map(OutputUnit::column).join(", ");
+        PyValueError::new_err(format!("output_column is {output_column:?}; it must be one of {known}"))
+    })?;
+    let columns = Columns {
+        name: name.to_owned(),
+        segment,
+        time: column("timepts", timepts)?,
+        input_column: input_column.to_owned(),
+        input: optional("inputs", inputs)?,
+        output: optional("outputs", outputs)?.map(|y| (unit, y)),
+        temperature: optional("temperature", temperature)?,
+        load: optional("load", load)?,
+    };
+    Ok(Record::wrap(core::Record::from_samples(columns).map_err(errors::record)?))
+}
+
+#[pymethods]
+impl Record {
+    #[new]
+    #[pyo3(signature = (timepts, inputs=None, outputs=None, *, temperature=None, load=None, segment=None, input_column="voltage_v", output_column="displacement_um", name="record"))]
+    #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
+    fn new(
+        timepts: &Bound<'_, PyAny>,
+        inputs: Option<&Bound<'_, PyAny>>,
+        outputs: Option<&Bound<'_, PyAny>>,
+        temperature: Option<&Bound<'_, PyAny>>,
+        load: Option<&Bound<'_, PyAny>>,
+        segment: Option<Vec<i64>>,
+        input_column: &str,
+        output_column: &str,
+        name: &str,
+    ) -> PyResult<Self> {
+        of_arrays(timepts, inputs, outputs, temperature, load, segment, input_column, output_column, name)
+    }
+
+    /// Joins records of several files or experiments; each keeps its own clock.
+    #[staticmethod]
+    fn join(records: Vec<Bound<'_, Self>>) -> PyResult<Self> {
+        let records = records.iter().map(|r| (*r.get().0).clone()).collect();
+        Ok(Self::wrap(core::Record::join(records).map_err(errors::record)?))
+    }
+
+    /// Time [s] of the lab's clock, shape (n,).
+    #[getter]
+    fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.0.time().to_vec())
+    }
+
+    /// Input, in the unit at the end of ``input_column``, shape (n,); None in a reference.
+    #[getter]
+    fn inputs<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let input = self.0.input();
+        (!input.is_empty()).then(|| array(py, input.to_vec()))
+    }
+
+    /// Output, in the unit at the end of ``output_column``, shape (n,); None if there is none.
+    #[getter]
+    fn outputs<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0.output().map(|y| array(py, y.to_vec()))
+    }
+
+    /// Temperature [°C], shape (n,); None if it was not measured.
+    #[getter]
+    fn temperature<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0.temperature().map(|x| array(py, x.to_vec()))
+    }
+
+    /// External load [N], shape (n,); None if it was not measured.
+    #[getter]
+    fn load<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0.load().map(|x| array(py, x.to_vec()))
+    }
+
+    /// First row and row after the last of each segment.
+    #[getter]
+    fn segments(&self) -> Vec<(usize, usize)> {
+        self.0.segments().iter().map(|s| (s.start, s.end)).collect()
+    }
+
+    /// The input's name, unit included.
+    #[getter]
+    fn input_column(&self) -> &str {
+        self.0.input_column()
+    }
+
+    /// The output's name, unit included; None if there is none.
+    #[getter]
+    fn output_column(&self) -> Option<&'static str> {
+        self.0.output_unit().map(OutputUnit::column)
+    }
+
+    /// Sample period [s].
+    #[getter]
+    fn period(&self) -> f64 {
+        self.0.sample_period()
+    }
+
+    /// Names of the files that the rows come from.
+    #[getter]
+    fn name(&self) -> String {
+        self.0.name()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.rows()
+    }
+
+    fn __repr__(&self) -> String {
+        let (rows, segments) = (self.0.rows(), self.0.segments().len());
+        format!(
+            "<Record {:?}: {rows} rows in {segments} segments, period {:?} s>",
+            self.0.name(),
+            self.0.sample_period()
+        )
+    }
+}
+
+/// Reads a record from a CSV file.
+///
+/// Parameters
+/// ----------
+/// path : str or path-like, or a sequence of them
+///     The file; several are joined.
+/// map : dict of str to str, optional
+///     Which column stands for which name of the record format: ``{"voltage_v": "Vin", "displacement_um": "Sensor"}``.
+/// need : {"both", "input", "output"}
+///     Columns that have to be there: both to fit, the input to simulate, the output for a reference.
+///
+/// Raises
+/// ------
+/// RecordError
+///     Names file, line and column, and what to do.
+#[pyfunction]
+#[pyo3(signature = (path, *, map=None, need="both"))]
+pub(crate) fn read_record(
+    py: Python<'_>,
+    path: &Bound<'_, PyAny>,
+    map: Option<&Bound<'_, PyDict>>,
+    need: &str,
+) -> PyResult<Record> {
+    let need = match need {
+        "both" => Need::InputAndOutput,
+        "input" => Need::Input,
+        "output" => Need::Output,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "need is {other:?}; it must be \"both\", \"input\" or \"output\""
+            )));
+        }
+    };
+    let mut arguments = Vec::new();
+    for (name, column) in map.into_iter().flatten() {
+        arguments.push(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?));
+    }
+    let map = ColumnMap::parse(&arguments).map_err(errors::record)?;
+    let paths = paths(path)?;
+    let read = || {
+        let records = paths.iter().map(|path| core::Record::read(path, &map, need)).collect::<Result<_, _>>()?;
+        core::Record::join(records)
+    };
+    Ok(Record::wrap(py.detach(read).map_err(errors::record)?))
+}
+
+/// One path, or a sequence of them.
+fn paths(path: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
+    if let Ok(path) = path.extract::<PathBuf>() {
+        return Ok(vec![path]);
+    }
+    path.extract::<Vec<PathBuf>>().map_err(|_| PyTypeError::new_err("path must be a path or a sequence of paths"))
+}
+
+/// A record, the path of one, or a sequence of either.
+pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) -> PyResult<Arc<core::Record>> {
+    if let Ok(record) = record.cast::<Record>() {
+        return Ok(Arc::clone(&record.get().0));
+    }
+    if record.is_instance_of::<PyList>() || record.is_instance_of::<pyo3::types::PyTuple>() {
+        let each = record.try_iter()?.map(|r| any_record(py, &r?, need).map(|r| (*r).clone()));
+        let joined = core::Record::join(each.collect::<PyResult<_>>()?).map_err(errors::record)?;
+        return Ok(Arc::new(joined));
+    }
+    if record.extract::<PathBuf>().is_err() {
+        return Err(PyTypeError::new_err("record must be a Record, a path, or a list of them"));
+    }
+    read_record(py, record, None, need).map(|r| r.0)
+}

@@ -1,0 +1,97 @@
+//! One stage of any kind behind one interface.
+
+use std::sync::{Mutex, PoisonError};
+
+use hyst_core::{Env, Stage};
+
+use crate::arrays::Surroundings;
+
+/// Samples whose surroundings are laid out at a time.
+const BLOCK: usize = 512;
+
+/// What Python can do with a stage.
+pub(crate) trait Engine: Send + Sync {
+    /// The output for a whole input, from a fresh history.
+    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Vec<f64>;
+    /// As [`simulate`](Self::simulate) for a stage whose output belongs to `lead` samples before its input: the
+    /// input is held at its ends, and the outputs stand at the rows that they belong to.
+    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Vec<f64>;
+    /// Sets the stage's own history to rest at `u0`.
+    fn reset(&self, env: &Env<f64>, u0: f64) -> f64;
+    /// One sample of the stage's own history; the first one sets it to rest.
+    fn step(&self, env: &Env<f64>, u: f64) -> f64;
+}
+
+/// A stage and its own history.
+pub(crate) struct Runner<S: Stage<f64>> {
+    pub(crate) stage: Box<S>,
+    history: Mutex<Option<Box<S::State>>>,
+}
+
+impl<S: Stage<f64>> Runner<S> {
+    pub(crate) fn new(stage: S) -> Self {
+        Self { stage: Box::new(stage), history: Mutex::new(None) }
+    }
+}
+
+impl<S> Engine for Runner<S>
+where
+    S: Stage<f64> + Send + Sync,
+    S::State: Send,
+{
+    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; u.len()];
+        let (Some(first), Some((y0, mut y_left))) = (u.first(), y.split_first_mut()) else { return y };
+        let mut state = Box::new(self.stage.state());
+        *y0 = self.stage.reset(&mut state, &env.at(0), *first);
+        let mut surroundings = [env.at(0); BLOCK];
+        let mut row = 1;
+        for inputs in u[1..].chunks(BLOCK) {
+            if !env.constant() {
+                for (slot, k) in surroundings.iter_mut().zip(row..row + inputs.len()) {
+                    *slot = env.at(k);
+                }
+            }
+            let (outputs, rest) = y_left.split_at_mut(inputs.len());
+            self.stage.block(&mut state, &surroundings, inputs, outputs);
+            (y_left, row) = (rest, row + inputs.len());
+        }
+        y
+    }
+
+    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Vec<f64> {
+        if lead == 0 {
+            return self.simulate(env, u);
+        }
+        let (Some(first), Some(last)) = (u.first(), u.len().checked_sub(1)) else { return Vec::new() };
+        let mut state = Box::new(self.stage.state());
+        self.stage.reset(&mut state, &env.at(0), *first);
+        let mut ahead = |k: usize| {
+            let k = k.min(last);
+            self.stage.step(&mut state, &env.at(k), u[k])
+        };
+        for k in 1..lead {
+            ahead(k);
+        }
+        (0..u.len()).map(|k| ahead(k + lead)).collect()
+    }
+
+    fn reset(&self, env: &Env<f64>, u0: f64) -> f64 {
+        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = history.get_or_insert_with(|| Box::new(self.stage.state()));
+        self.stage.reset(state, env, u0)
+    }
+
+    fn step(&self, env: &Env<f64>, u: f64) -> f64 {
+        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        match history.as_deref_mut() {
+            Some(state) => self.stage.step(state, env, u),
+            None => {
+                let mut state = Box::new(self.stage.state());
+                let y = self.stage.reset(&mut state, env, u);
+                *history = Some(state);
+                y
+            }
+        }
+    }
+}
