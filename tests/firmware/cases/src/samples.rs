@@ -1,0 +1,86 @@
+//! The samples: integer arithmetic up to one exact division, so every machine makes the same bits.
+
+use hyst_core::Sampling;
+
+/// Number of samples, the one at rest included.
+pub const SAMPLES: usize = 1000;
+
+/// The sample period.
+pub const PERIOD: Sampling = Sampling { period: 1e-3 };
+
+/// Drive and surroundings at one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time \[s\].
+    pub time: f64,
+    /// Where the drive is in the range of the input: 0 to 1.
+    pub drive: f64,
+    /// Temperature \[°C\], 20 to 26.
+    pub temperature: f64,
+    /// Load \[N\], −5 to 5.
+    pub load: f64,
+}
+
+/// 1 in the fixed-point numbers below.
+const UNIT: i64 = 1 << 20;
+
+/// The samples: a slow triangle whose swing shrinks (nested loops), two parabolic near-sines of other periods (minor
+/// loops), a little noise (reversals at nearly every sample), and a stretch in which the input stands still.
+pub fn samples() -> impl Iterator<Item = Sample> {
+    let mut seed: u32 = 1;
+    let mut held = 0;
+    (0..SAMPLES as i64).map(move |k| {
+        // Numerical Recipes' generator; the high bits are the good ones.
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = i64::from(seed >> 12);
+        let slow = UNIT - (UNIT - triangle(k, 410)) * (1400 - k) / 1400;
+        let drive = 60 * slow + 25 * (UNIT + sine(k, 97)) / 2 + 13 * (UNIT - sine(k, 13)) / 2 + 2 * noise;
+        if !(640..680).contains(&k) {
+            held = if k == 0 { 0 } else { drive / 100 };
+        }
+        Sample {
+            time: k as f64 * PERIOD.period,
+            drive: fraction(held),
+            temperature: 20.0 + 6.0 * fraction(triangle(k, 733)),
+            load: 5.0 * fraction(sine(k, 171)),
+        }
+    })
+}
+
+fn fraction(x: i64) -> f64 {
+    x as f64 / UNIT as f64
+}
+
+/// 0 at k = 0, 1 at half a period, and back.
+fn triangle(k: i64, period: i64) -> i64 {
+    let phase = k.rem_euclid(period) * 2 * UNIT / period;
+    if phase < UNIT { phase } else { 2 * UNIT - phase }
+}
+
+/// Two parabolas that look like a sine, −1 to 1.
+fn sine(k: i64, period: i64) -> i64 {
+    let phase = k.rem_euclid(period) * 2 * UNIT / period - UNIT;
+    -(4 * phase * (UNIT - phase.abs())) / UNIT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drive_fills_its_range_and_turns_often() {
+        let (mut low, mut high, mut turns, mut still) = (1.0f64, 0.0f64, 0, 0);
+        let (mut last, mut rise) = (0.0, 0.0);
+        for s in samples() {
+            assert!((0.0..=1.0).contains(&s.drive) && (20.0..=26.0).contains(&s.temperature) && s.load.abs() <= 5.0);
+            (low, high) = (low.min(s.drive), high.max(s.drive));
+            let step = s.drive - last;
+            turns += usize::from(step * rise < 0.0);
+            still += usize::from(step == 0.0);
+            rise = if step == 0.0 { rise } else { step };
+            last = s.drive;
+        }
+        assert_eq!(low, 0.0);
+        assert!(high > 0.95 && turns > 100 && still >= 40, "{high} {turns} {still}");
+    }
+}
