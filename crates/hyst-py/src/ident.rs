@@ -377,7 +377,7 @@ pub(crate) fn fit(
     zero: &str,
     seed: u64,
 ) -> PyResult<Model> {
-    let kind: core::Kind = model.parse().map_err(|message: String| PyValueError::new_err(message))?;
+    let kind: core::Kind = model.parse().map_err(|e: hyst_core::UnknownKind| PyValueError::new_err(e.to_string()))?;
     let record = match (record, timepts, inputs, outputs) {
         (Some(record), None, None, None) => any_record(py, record, "both")?,
         (None, Some(t), Some(u), Some(y)) => {

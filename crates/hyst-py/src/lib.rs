@@ -12,6 +12,7 @@ mod metrics;
 mod model_macro;
 mod models;
 mod operator;
+mod operators;
 mod record;
 mod runner;
 
@@ -33,6 +34,7 @@ mod _hyst {
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {
         use super::PyModuleMethods;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        crate::models::add_to(module)
+        crate::models::add_to(module)?;
+        crate::operators::add_to(module)
     }
 }

@@ -25,7 +25,7 @@ macro_rules! plain_parameters {
         }
     )* };
 }
-plain_parameters!(f64, usize, String);
+plain_parameters!(f64, u16, usize, String);
 
 impl Parameter for bool {
     fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {

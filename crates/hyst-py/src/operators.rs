@@ -1,0 +1,328 @@
+//! The table of the papers' hysteresis models; `models.rs` has the stages of a chain and says how a table is read.
+
+use std::sync::Arc;
+
+use hyst_core::{
+    AsymmetryParams, Build, Curve, Error, Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams,
+    MaxwellSlipParams, PiParams, Sampling, SaturationParams, SlipReading, TdEmParams, TdPiParams, ViscousPiParams,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::Needs;
+use crate::errors;
+use crate::inverse::{Inverted, closed, compensator};
+use crate::model_macro::{Parameter, arguments, models, repr};
+use crate::operator::Operator;
+use crate::runner::Runner;
+
+/// Plays and elements that an operator holds.
+const PLAYS: usize = 64;
+/// Samples that a delay holds.
+const DELAY: usize = 8192;
+/// Taps that a preview filter holds.
+const TAPS: usize = 4095;
+
+/// All of a fractional model's memory, to 3e-7.
+type FullMemory = Exponentials<f64, 40>;
+
+/// An envelope from its two or four numbers.
+fn curve(name: &'static str, numbers: &[f64]) -> Result<Curve, Error> {
+    match numbers {
+        [slope, offset] => Ok(Curve::Linear { slope: *slope, offset: *offset }),
+        [height, rate, shift, offset] => {
+            Ok(Curve::Tanh { height: *height, rate: *rate, shift: *shift, offset: *offset })
+        }
+        _ => Err(Error::OutOfRange { name, must: "[slope, offset] or [height, rate, shift, offset]" }),
+    }
+}
+
+fn order_of(order: usize) -> Result<GlOrder, Error> {
+    match order {
+        1 => Ok(GlOrder::First),
+        2 => Ok(GlOrder::Second),
+        _ => Err(Error::OutOfRange { name: "order", must: "1 or 2" }),
+    }
+}
+
+fn reading_of(name: &str) -> Result<SlipReading, Error> {
+    match name {
+        "backlash" => Ok(SlipReading::Backlash),
+        "elasto-slip" => Ok(SlipReading::ElastoSlip),
+        _ => Err(Error::OutOfRange { name: "reading", must: "'backlash' or 'elasto-slip'" }),
+    }
+}
+
+models! {
+    /// Prandtl-Ishlinskii operator whose plays slide with viscous drag (rate-dependence):
+    /// ``y = gain·u + Σ weights[i]·pᵢ``, ``seconds·ṗᵢ = dead(u − pᵢ, thresholds[i])``.
+    ///
+    /// ``seconds = 0`` is ``Pi``. Exact inverse.
+    class ViscousPi {
+        /// Gain of the identity [y/u].
+        gain: f64,
+        /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
+        thresholds: Vec<f64>,
+        /// Weights of the plays [y/u], shape (n,).
+        weights: Vec<f64>,
+        /// Drag [s].
+        seconds: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: hyst_core::ViscousPi<f64, PLAYS>,
+    build: |p| {
+        let pi = PiParams { gain: p.gain, thresholds: &p.thresholds, weights: &p.weights };
+        ViscousPiParams { pi, seconds: p.seconds }.build(&Sampling { period: p.period })
+    },
+    inverse: closed,
+    needs: [],
+
+    /// Generalised Prandtl-Ishlinskii operator: plays between two envelope functions,
+    /// ``y = gain·F₀ + Σ weights[i]·Fᵢ``, ``Fᵢ ← max(left(u) − rᵢ, min(right(u) + rᵢ, Fᵢ))``.
+    ///
+    /// An envelope is ``[slope, offset]`` for ``slope·u + offset`` or ``[height, rate, shift, offset]`` for
+    /// ``height·tanh(rate·u + shift) + offset``. Exact inverse; its drive jumps where the reference turns.
+    class Gpi {
+        /// Weight of the play of radius 0 [y per unit of the envelope].
+        gain: f64,
+        /// Radii [unit of the envelope], positive and strictly rising, shape (n,), n ≤ 64.
+        thresholds: Vec<f64>,
+        /// Weights [y per unit of the envelope], shape (n,).
+        weights: Vec<f64>,
+        /// Envelope of the rising side, shape (2,) or (4,).
+        left: Vec<f64>,
+        /// Envelope of the falling side, shape (2,) or (4,).
+        right: Vec<f64>,
+    }
+    stage: hyst_core::Gpi<f64, PLAYS>,
+    build: |p| GpiParams {
+        left: curve("gpi.left", &p.left)?,
+        right: curve("gpi.right", &p.right)?,
+        gain: p.gain,
+        thresholds: &p.thresholds,
+        weights: &p.weights,
+    }.build(&()),
+    inverse: closed,
+    needs: [],
+
+    /// Temperature-dependent Prandtl-Ishlinskii model: thresholds ``alpha·i`` and weights
+    /// ``epsilon·exp(eta·(T − t0))·exp(−tau·alpha·i)``, i = 0 … n, plays between the envelopes ``a0·u + a1`` (rising) and
+    /// ``b0·u + b1`` (falling). Needs ``temperature`` [°C].
+    ///
+    /// Exact inverse, also while the temperature changes; its drive jumps where the reference turns.
+    class TdPi {
+        /// Spacing of the thresholds [unit of the envelope].
+        alpha: f64,
+        /// Weight at r = 0 and t0 [y per unit of the envelope].
+        epsilon: f64,
+        /// Decay of the weights with the threshold.
+        tau: f64,
+        /// Relative change of the weights with temperature [1/K].
+        eta: f64,
+        /// Slope of the rising side's envelope.
+        a0: f64,
+        /// Offset of the rising side's envelope.
+        a1: f64,
+        /// Slope of the falling side's envelope.
+        b0: f64,
+        /// Offset of the falling side's envelope.
+        b1: f64,
+        /// Number of thresholds besides 0, at most 64.
+        n: u16 = 9,
+        /// Reference temperature [°C].
+        t0: f64 = 23.0,
+    }
+    stage: hyst_core::TdPi<f64, PLAYS>,
+    build: |p| TdPiParams {
+        alpha: p.alpha,
+        epsilon: p.epsilon,
+        tau: p.tau,
+        eta: p.eta,
+        a0: p.a0,
+        a1: p.a1,
+        b0: p.b0,
+        b1: p.b1,
+        plays: p.n,
+        reference_degc: p.t0,
+    }.build(&()),
+    inverse: closed,
+    needs: [temperature],
+
+    /// Bank of Maxwell-slip elements, ``y = Σ gains[i]·element(u, widths[i])``.
+    ///
+    /// ``reading='backlash'``: an element is a backlash of that total width; exact inverse, whose drive jumps where the reference turns.
+    /// ``reading='elasto-slip'``: an element is a spring that slips at that deflection; saturates, no inverse.
+    class MaxwellSlip {
+        /// Widths [u], positive and strictly rising, shape (n,), n ≤ 64.
+        widths: Vec<f64>,
+        /// Gains [y/u], shape (n,).
+        gains: Vec<f64>,
+        /// 'backlash' or 'elasto-slip'.
+        reading: String = "backlash".to_owned(),
+    }
+    stage: hyst_core::MaxwellSlip<f64, PLAYS>,
+    build: |p| MaxwellSlipParams { reading: reading_of(&p.reading)?, widths: &p.widths, gains: &p.gains }.build(&()),
+    inverse: closed,
+    needs: [],
+
+    /// Temperature-dependent electromechanical model: a Maxwell-slip bank gives the current that charges C ∥ R; the voltage
+    /// drives a mass on a spring through the coupling ``ψ(T)``. Needs ``temperature`` [°C].
+    ///
+    /// The linear part is exact for a current that is linear between samples. Inverse: band-limited with preview, then exact.
+    class TdEm {
+        /// Widths of the slip elements [u], shape (n,), n ≤ 64.
+        widths: Vec<f64>,
+        /// Gains of the slip elements [A/u], shape (n,).
+        gains: Vec<f64>,
+        /// Capacitance [F].
+        capacitance: f64,
+        /// Resistance [Ω].
+        resistance: f64,
+        /// Mass [kg].
+        mass: f64,
+        /// Stiffness [N/m].
+        stiffness: f64,
+        /// Damping [N s/m].
+        damping: f64,
+        /// Coefficients of ``ψ(T) = psi[0] + psi[1]·T + psi[2]·T²`` [N/V, T in °C], shape (3,).
+        psi: Vec<f64>,
+        /// Sample period [s].
+        period: f64,
+        /// 'backlash' (the paper's numbers ask for it) or 'elasto-slip'.
+        reading: String = "backlash".to_owned(),
+        /// Output units in a metre: 1e6 for µm.
+        per_metre: f64 = 1.0,
+        /// Temperature for which the inverse's filter is made [°C]; its gain follows the given one.
+        filter_degc: f64 = 23.0,
+    }
+    stage: hyst_core::TdEm<f64, PLAYS>,
+    build: |p| {
+        let coupling = <[f64; 3]>::try_from(p.psi.as_slice())
+            .map_err(|_| Error::OutOfRange { name: "td-em.psi", must: "three coefficients" })?;
+        TdEmParams {
+            slip: MaxwellSlipParams { reading: reading_of(&p.reading)?, widths: &p.widths, gains: &p.gains },
+            capacitance: p.capacitance,
+            resistance: p.resistance,
+            mass: p.mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            coupling,
+            per_metre: p.per_metre,
+        }.build(&Sampling { period: p.period })
+    },
+    inverse: |p, stage, options| {
+        options.only(&["bandwidth_hz"])?;
+        let inverse = stage.band_limited::<TAPS>(p.filter_degc, options.bandwidth_hz).map_err(errors::core)?;
+        let (lead, bandwidth_hz, band_error) = (inverse.lead(), Some(inverse.bandwidth_hz()), inverse.error());
+        Ok(Inverted { engine: Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error })
+    },
+    needs: [temperature],
+
+    /// Linear fractional-order differential model ``(1 + c·s^beta) X = (a + b·s^alpha) U``, all of its memory as a sum of 40
+    /// exponentials (to 3e-7).
+    ///
+    /// Closed-form inverse.
+    class Lfdm {
+        /// Gain at rest [y/u].
+        a: f64,
+        /// Weight of the input's derivative.
+        b: f64,
+        /// Weight of the output's derivative.
+        c: f64,
+        /// Order of the input's derivative, 0 to 1.
+        alpha: f64,
+        /// Order of the output's derivative, 0 to 1.
+        beta: f64,
+        /// Sample period [s].
+        period: f64,
+        /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
+        order: usize = 1,
+    }
+    stage: hyst_core::Lfdm<f64, FullMemory>,
+    build: |p| LfdmParams { a: p.a, b: p.b, c: p.c, alpha: p.alpha, beta: p.beta, order: order_of(p.order)? }
+        .build(&Sampling { period: p.period }),
+    inverse: closed,
+    needs: [],
+
+    /// Improved fractional-order model ``X = delta·U + (a + b·s^alpha)/(1 + c·s^beta)·(e^(−tau·s) − 1)·U``, all of its memory as a
+    /// sum of 40 exponentials (to 3e-7).
+    ///
+    /// The inverse solves the recursion; it exists where the sampled model has no zero outside the unit circle.
+    class Ifm {
+        /// Gain of the hysteresis at rest [y/u].
+        a: f64,
+        /// Weight of the input's derivative.
+        b: f64,
+        /// Weight of the hysteresis' derivative.
+        c: f64,
+        /// Order of the input's derivative, 0 to 1.
+        alpha: f64,
+        /// Order of the hysteresis' derivative, 0 to 1.
+        beta: f64,
+        /// Time delay [s], at most 8190 periods.
+        tau: f64,
+        /// Gain of the linear part [y/u].
+        delta: f64,
+        /// Sample period [s].
+        period: f64,
+        /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
+        order: usize = 1,
+    }
+    stage: hyst_core::Ifm<f64, FullMemory, DELAY>,
+    build: |p| IfmParams {
+        a: p.a,
+        b: p.b,
+        c: p.c,
+        alpha: p.alpha,
+        beta: p.beta,
+        tau: p.tau,
+        delta: p.delta,
+        order: order_of(p.order)?,
+    }.build(&Sampling { period: p.period }),
+    inverse: closed,
+    needs: [],
+
+    /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,
+    /// ``y = u + Σ weights[j]·dead(u, thresholds[j])``.
+    ///
+    /// Closed-form inverse, if the curve rises.
+    class Asymmetry {
+        /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 4.
+        thresholds: Vec<f64>,
+        /// Changes of slope [ratio], shape (n,).
+        weights: Vec<f64>,
+    }
+    stage: hyst_core::Asymmetry<f64, 4>,
+    build: |p| AsymmetryParams { thresholds: &p.thresholds, weights: &p.weights }.build(&()),
+    inverse: closed,
+    needs: [],
+
+    /// Load ``y = u + per_newton·F``. Needs ``load`` [N].
+    class Load {
+        /// Compliance [y/N].
+        per_newton: f64,
+    }
+    stage: hyst_core::Load<f64>,
+    build: |p| LoadParams { per_newton: p.per_newton }.build(&()),
+    inverse: |p, _, options| compensator::<3, 1>(1.0, options, |chain, _| {
+        chain.with_load(&LoadParams { per_newton: p.per_newton })
+    }),
+    needs: [load],
+
+    /// Saturation: the output is the input between two knees and approaches the limits beyond.
+    ///
+    /// Closed-form inverse for references between the limits.
+    class Saturation {
+        /// Lower limit [y].
+        low: f64,
+        /// Upper limit [y].
+        high: f64,
+        /// Width of each knee as a share of the range, 0 (a hard stop) to 0.5.
+        knee: f64 = 0.1,
+    }
+    stage: hyst_core::Saturation<f64>,
+    build: |p| SaturationParams { low: p.low, high: p.high, knee: p.knee }.build(&()),
+    inverse: closed,
+    needs: [],
+}
