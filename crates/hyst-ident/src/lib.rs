@@ -13,6 +13,7 @@ pub mod compensate;
 pub mod diagnose;
 pub mod excite;
 pub mod fit;
+pub mod full_memory;
 mod lsq;
 pub mod metrics;
 pub mod model;
