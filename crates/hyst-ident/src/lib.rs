@@ -14,6 +14,7 @@ pub mod diagnose;
 pub mod excite;
 pub mod export;
 pub mod fit;
+pub mod full_memory;
 mod lsq;
 pub mod metrics;
 pub mod model;

@@ -1,4 +1,5 @@
-//! The improved fractional-order model: a fractional equation for the hysteresis, driven by what a short delay leaves of the input.
+//! The improved fractional-order model: a fractional equation for the hysteresis, driven by what a short delay leaves
+//! of the input.
 
 use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, zeros};
 use crate::chain::{Delay, DelayParams, DelayState};
@@ -7,7 +8,7 @@ use crate::stage::hold;
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 use core::f64::consts::PI;
 
-/// Parameters of the IFM `X(s) = Δ U(s) + (a + b s^α) / (1 + c s^β) (e^(−τs) − 1) U(s)` (eq. 7–11).
+/// Parameters of the IFM `X(s) = Δ U(s) + (a + b s^α) / (1 + c s^β) (e^(−τs) − 1) U(s)` (Zhu et al., eq. 7–11).
 ///
 /// Only the response is identifiable, as in [`LfdmParams`]; τ and Δ are the best known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,8 +60,9 @@ impl Params for IfmParams {
     }
 }
 
-/// The IFM at one sample period: the hysteresis h by Eq. 15 from `u_d(t) = u(t − τ) − u(t)` (eq. 11), `x = h + Δ u` (eq. 10). (Eq. 14 is
-/// garbled in print.) `W` is the [`Memory`] of its derivatives, `D` the room of its [`Delay`]: τ up to `D − 2` samples.
+/// The IFM at one sample period: the hysteresis h by Eq. 15 from `u_d(t) = u(t − τ) − u(t)` (eq. 11), `x = h + Δ u`
+/// (eq. 10). (Eq. 14 is garbled in print.) `W` is the [`Memory`] of its derivatives, `D` the room of its [`Delay`]: τ
+/// up to `D − 2` samples.
 ///
 /// Stable for all parameters. Its inverse is not: see [`invert`](Invert::invert).
 ///
@@ -182,9 +184,10 @@ impl<T: Real, W: Memory<T>, const D: usize> IfmInverse<T, W, D> {
 impl<T: Real, W: Memory<T>, const D: usize> Invert<T> for Ifm<T, W, D> {
     type Inverse = IfmInverse<T, W, D>;
 
-    /// Stable if the sampled response has no zero on or outside the unit circle; that is found from its turns about 0 on
-    /// the circle, in at most `64 (D + 66)` evaluations. It is so wherever the echo of −u that the model adds is weaker than Δ, as
-    /// with the printed parameters, whose gain is nowhere below 0.20 Δ (at 241 Hz, first order at 10 kHz).
+    /// Stable if the sampled response has no zero on or outside the unit circle; that is found from its turns about 0
+    /// on the circle, in at most `64 (D + 66)` evaluations. It is so wherever the echo of −u that the model adds is
+    /// weaker than Δ, as with the printed parameters, whose gain is nowhere below 0.20 Δ (at 241 Hz, first order at
+    /// 10 kHz).
     fn invert(&self) -> Result<Self::Inverse, Error> {
         // The response turns with z^(−whole): a step is a small part of such a turn.
         let widest = PI / (16.0 * (self.delay.whole_samples() as f64 + 2.0));
@@ -192,7 +195,7 @@ impl<T: Real, W: Memory<T>, const D: usize> Invert<T> for Ifm<T, W, D> {
             Ok(IfmInverse::unchecked(self.clone()))
         } else {
             Err(Error::NotInvertible(
-                "the ifm's delayed part outweighs ifm.delta at some frequency, so a causal inverse would grow without bound",
+                "the delayed part outweighs ifm.delta at some frequency, so a causal inverse would grow for ever",
             ))
         }
     }
@@ -314,7 +317,8 @@ mod tests {
         last > peak(&u[n / 4..n / 2]) || last > 1e100
     }
 
-    /// The smallest Δ that can be inverted lies where the inverse begins to grow: 1.4 with the other printed parameters.
+    /// The smallest Δ that can be inverted lies where the inverse begins to grow: 1.4 with the other printed
+    /// parameters.
     #[test]
     fn invertible_is_what_has_a_bounded_inverse() {
         for order in [GlOrder::First, GlOrder::Second] {

@@ -5,10 +5,10 @@ use crate::error::{finite, within};
 use crate::stage::hold;
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 
-/// Parameters of the LFDM `X(s) = (a + b s^α) / (1 + c s^β) U(s)` (eq. 5, 6).
+/// Parameters of the LFDM `X(s) = (a + b s^α) / (1 + c s^β) U(s)` (Zhu et al., eq. 5, 6).
 ///
-/// Only the response is identifiable: a, b, c and α trade against each other almost without a trace in a record of a few
-/// seconds.
+/// Only the response is identifiable: a, b, c and α trade against each other almost without a trace in a record of a
+/// few seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LfdmParams {
@@ -77,12 +77,13 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
     }
 }
 
-/// The LFDM at one sample period: `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of
-/// Eq. 15 with x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
+/// The LFDM at one sample period:
+/// `xₙ (1 + c p^(−β) ω₀) = a uₙ + b p^(−α) Σ_{k≥0} ωₖ uₙ₋ₖ − c p^(−β) Σ_{k≥1} ωₖ xₙ₋ₖ`, the explicit solution of Eq.
+/// 15 with x for h and u for u_d. `W` is the [`Memory`] of its two derivatives.
 ///
-/// The derivatives act on the deviation from [`reset`](Stage::reset)'s value, so the model is settled there. Stable for
-/// all parameters: both derivatives turn a signal by less than half a turn, so neither side of the equation has a zero outside the unit circle.
-/// For a > 0 the inverse is the same type, its two sides exchanged.
+/// The derivatives act on the deviation from [`reset`](Stage::reset)'s value, so the model is settled there. Stable
+/// for all parameters: both derivatives turn a signal by less than half a turn, so neither side of the equation has a
+/// zero outside the unit circle. For a > 0 the inverse is the same type, its two sides exchanged.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Exponentials, Invert, Lfdm, LfdmParams, Sampling, Stage};
@@ -215,8 +216,8 @@ impl<T: Real, W: Memory<T>> Probe<T> for Lfdm<T, W> {
 impl<T: Real, W: Memory<T>> Invert<T> for Lfdm<T, W> {
     type Inverse = Self;
 
-    /// The recursion solved for the input: an LFDM with `a′ = 1/a, b′ = c/a, c′ = b/a` and the orders exchanged, stable and exact in
-    /// the sampled sense. Exists for a > 0.
+    /// The recursion solved for the input: an LFDM with `a′ = 1/a, b′ = c/a, c′ = b/a` and the orders exchanged,
+    /// stable and exact in the sampled sense. Exists for a > 0.
     fn invert(&self) -> Result<Self, Error> {
         if self.input.gain > T::ZERO && self.input.at_once() > T::ZERO {
             Ok(Self::of(self.output.clone(), self.input.clone()))
@@ -428,6 +429,8 @@ pub(super) mod tests {
                 let x = run(&wide, &u);
                 let error = apart(&run(&narrow, &u), &x);
                 assert!(error < 2e-7 * span(&x), "{order:?} {}", error / span(&x));
+                let back = apart(&run(&narrow, &run(&narrow.invert().unwrap(), &x)), &x);
+                assert!(back < 5e-7 * span(&x), "{order:?} {}", back / span(&x));
             }
         }
     }

@@ -18,9 +18,9 @@ pub(super) mod sealed {
 /// held = Σ_{k≥1} (−ωₖ)(gₙ₋₁ − gₙ₋ₖ),
 /// ```
 ///
-/// in which a constant has the derivative zero whatever the weights were rounded to, and no two large numbers cancel. `held` is
-/// what the derivative will be if g stands still; [`advance`](Self::advance) returns it. All g are deviations from the value at rest
-/// (Caputo's form), which is where g stood for ever before the first sample.
+/// in which a constant has the derivative zero whatever the weights were rounded to, and no two large numbers cancel.
+/// `held` is what the derivative will be if g stands still; [`advance`](Self::advance) returns it. All g are
+/// deviations from the value at rest (Caputo's form), which is where g stood for ever before the first sample.
 ///
 /// This trait is sealed.
 pub trait Memory<T: Real>: Clone + sealed::Sealed {
@@ -87,10 +87,14 @@ impl<T: Real, const N: usize> Ring<T, N> {
     }
 }
 
-/// The paper's short memory (Eq. 15 and below): the sum of Eq. 12 cut after `M` samples.
+/// The paper's short memory (Zhu et al., below eq. 15): the sum of Eq. 12 cut after `M` samples.
 ///
 /// What happened earlier counts as rest. The cut leaves a derivative `M^(−μ)/Γ(1 − μ)` times p^(−μ) of a constant: of
 /// slow signals and small μ that is a large error.
+///
+/// Against full memory over 1e5 samples at 10 kHz, for five sines from 5 to 30 Hz about an offset: with the printed
+/// parameters 23, 7.3 and 2.1 % of the LFDM's span for M = 100, 1000 and 5000, and 1.3, 0.19 and 0.042 % of the
+/// IFM's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShortMemory<T, const M: usize> {
     /// −ω₁ … −ω_M.

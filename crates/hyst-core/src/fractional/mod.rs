@@ -1,8 +1,10 @@
 //! Fractional derivatives with bounded memory, and the two linear fractional models of a piezo actuator.
 //!
-//! A fractional derivative remembers everything: the Grünwald-Letnikov sum of Eq. 12 of the force-observer paper has one
-//! more term every sample. [`ShortMemory`] cuts it, as the paper does; [`Exponentials`] keeps all of it to a stated
+//! A fractional derivative remembers everything: the Grünwald-Letnikov sum of Eq. 12 has one more term every
+//! sample. [`ShortMemory`] cuts it, as the paper does; [`Exponentials`] keeps all of it to a stated
 //! error in a fixed number of states. [`Lfdm`] and [`Ifm`] take either.
+//!
+//! Equation numbers are those of Zhu, To, Li, Zhu and Bian (Mechanical Systems and Signal Processing 110, 2018).
 
 mod exponentials;
 mod ifm;

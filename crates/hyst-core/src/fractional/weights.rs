@@ -11,7 +11,7 @@ use crate::error::{Error, within};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum GlOrder {
-    /// Grünwald-Letnikov: `(1 − z⁻¹)^μ`, the paper's Eq. 12 and 13.
+    /// Grünwald-Letnikov: `(1 − z⁻¹)^μ`, Zhu et al., eq. 12 and 13.
     #[default]
     First,
     /// Its second-order form by the BDF2 formula: `(3/2 − 2z⁻¹ + z⁻²/2)^μ` (Lubich 1986).
@@ -31,8 +31,8 @@ impl GlOrder {
 
 /// The weights ω₀, ω₁, ω₂ … without end. They add up to zero for μ > 0.
 ///
-/// First order (Eq. 13): `ωₖ = (1 − (μ + 1)/k) ωₖ₋₁`, ω₀ = 1. Second order, from `g f′ = μ g′ f` for the power series f of g^μ:
-/// `3k/2 ωₖ = 2(k − 1 − μ) ωₖ₋₁ + (μ − (k − 2)/2) ωₖ₋₂`, ω₀ = (3/2)^μ.
+/// First order (Zhu et al., eq. 13): `ωₖ = (1 − (μ + 1)/k) ωₖ₋₁`, ω₀ = 1. Second order, from `g f′ = μ g′ f` for the
+/// power series f of g^μ: `3k/2 ωₖ = 2(k − 1 − μ) ωₖ₋₁ + (μ − (k − 2)/2) ωₖ₋₂`, ω₀ = (3/2)^μ.
 ///
 /// ```
 /// use hyst_core::{GlOrder, GlWeights};
@@ -79,7 +79,7 @@ pub(super) fn checked(name: &'static str, mu: f64) -> Result<f64, Error> {
     within(name, mu, (0.0..=1.0).contains(&mu), "from 0 to 1")
 }
 
-/// Where [`weight`] leaves the recursion for the asymptotic series.
+/// From here on [`decay`] can take over from the recursion.
 pub(super) const RECURSION: usize = 64;
 
 /// ωₖ over ω at [`RECURSION`], for k from there on, by the asymptotic series of `Γ(k − μ)/Γ(k + 1)`; good to 1e-8.

@@ -3,11 +3,13 @@
 use crate::{Complex, Real};
 use core::f64::consts::PI;
 
-/// Whether `response`, given at e^(−jθ), of a stable model with real coefficients has no zero on or outside the unit circle of z.
+/// Whether `response`, given at e^(−jθ), of a stable model with real coefficients has no zero on or outside the unit
+/// circle of z.
 ///
-/// As a function of z⁻¹ it is analytic inside the unit circle, so its zeros there are the turns that it makes about 0 on the
-/// way round; half the way is enough. A step from A to B is taken if |B − A| ≤ |A|/2, and halved if not; a zero that lies on the circle
-/// (or next to it) uses the work up and counts as one. `widest` is the largest step \[rad\].
+/// As a function of z⁻¹ it is analytic inside the unit circle, so its zeros there are the turns that it makes about 0
+/// on the way round; half the way is enough. A step from A to B is taken if |B − A| ≤ |A|/2, and halved if not; a
+/// zero that lies on the circle (or next to it) uses the work up and counts as one. `widest` is the largest step
+/// \[rad\].
 pub(super) fn none_outside(widest: f64, response: impl Fn(f64) -> Complex) -> bool {
     let steps = (4.0 * PI / widest).at_most(1e6).index(1_000_000) + 4096;
     let (mut theta, mut step, mut turned) = (0.0, widest.at_most(1e-9), 0.0);
