@@ -10,6 +10,33 @@ pub(crate) const CREEP: CreepParams<[f64; 4]> =
     CreepParams { seconds: [0.02, 0.2, 2.0, 20.0], shares: [0.02, 0.015, 0.01, 0.02] };
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
 pub(crate) const WARMTH: TemperatureParams = TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0 };
+pub(crate) const LFDM: LfdmParams =
+    LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
+pub(crate) const IFM: IfmParams = IfmParams {
+    a: 5.7342,
+    b: 6.8754,
+    c: 0.8885,
+    alpha: 0.6596,
+    beta: 0.9742,
+    tau: 0.0015,
+    delta: 1.7615,
+    order: GlOrder::First,
+};
+pub(crate) const BENT: AsymmetryParams<[f64; 3]> =
+    AsymmetryParams { thresholds: [4.0, 10.0, -3.0], weights: [0.1, -0.05, 0.2] };
+pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
+pub(crate) const STOPS: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
+pub(crate) const GAINS: PidParams = PidParams {
+    proportional: 0.5,
+    integral: 200.0,
+    derivative: 1e-4,
+    derivative_hz: 200.0,
+    proportional_weight: 1.0,
+    derivative_weight: 0.0,
+    anti_windup_seconds: 0.01,
+    low: 0.0,
+    high: 120.0,
+};
 pub(crate) const DRIFT: DriftParams = DriftParams { per_second: 0.01 };
 pub(crate) const MAINS: InterferenceParams = InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3 };
 pub(crate) const OPTIONS: CompensatorOptions = CompensatorOptions { bandwidth_hz: None };
@@ -17,6 +44,23 @@ pub(crate) const OPTIONS: CompensatorOptions = CompensatorOptions { bandwidth_hz
 pub(crate) fn pi<T: Real, const N: usize>() -> Result<Pi<T, N>, Error> {
     let thresholds: [f64; N] = from_fn(|i| 50.0 * (i + 1) as f64 / N as f64);
     given(PiParams { gain: 0.1, thresholds, weights: [1.0 / (10 * N) as f64; N] }).build(&())
+}
+
+const PI_10: PiParams<[f64; 10]> = PiParams {
+    gain: 0.1,
+    thresholds: [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0],
+    weights: [0.01; 10],
+};
+
+pub(crate) fn viscous<T: Real>() -> Result<ViscousPi<T, 10>, Error> {
+    given(ViscousPiParams { pi: PI_10, seconds: 2e-3 }).build(&PERIOD)
+}
+
+pub(crate) fn gpi<T: Real>() -> Result<Gpi<T, 10>, Error> {
+    let PiParams { gain, thresholds, weights } = PI_10;
+    let left = Curve::Linear { slope: 0.95, offset: -0.5 };
+    let right = Curve::Tanh { height: 400.0, rate: 2.6e-3, shift: 0.0, offset: 1.0 };
+    given(GpiParams { left, right, gain, thresholds, weights }).build(&())
 }
 
 pub(crate) fn everett<T: Real, const N: usize>() -> Result<Everett<T, N>, Error> {
@@ -35,6 +79,51 @@ pub(crate) fn chain<T: Real>() -> Result<Chain<T, Pi<T, 10>, 16, 4>, Error> {
         .with_resonance(&given(MODE), &PERIOD)?
         .with_drift(&given(DRIFT))?
         .with_interference(&given(MAINS))
+}
+
+/// A PID that holds a first-order plant at the reference: the drive of a closed loop, as a stage.
+#[derive(Clone, Debug)]
+pub struct Loop<T>(Pid<T>);
+
+pub(crate) fn pid_loop<T: Real>() -> Result<Loop<T>, Error> {
+    Ok(Loop(given(GAINS).build(&PERIOD)?))
+}
+
+impl<T: Real> Stage<T> for Loop<T> {
+    type State = (PidState<T>, T);
+    fn state(&self) -> Self::State {
+        (self.0.state(), T::ZERO)
+    }
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        *s = self.state();
+        self.step(s, e, u0)
+    }
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let drive = self.0.step(&mut s.0, u, s.1, T::ZERO);
+        s.1 += (drive * T::from_f64(0.15) - s.1) * T::from_f64(0.2);
+        drive
+    }
+}
+
+/// A force observer that takes the drive for the free model and the load for the measured displacement.
+#[derive(Clone, Debug)]
+pub struct Observer<T>(ForceObserver<T, Pi<T, 10>>);
+
+pub(crate) fn observer<T: Real>() -> Result<Observer<T>, Error> {
+    Ok(Observer(given(ForceParams { stiffness: 1.08, kappa: 1.02, chi: -0.3 }).observer(pi::<T, 10>()?)?))
+}
+
+impl<T: Real> Stage<T> for Observer<T> {
+    type State = PiState<T, 10>;
+    fn state(&self) -> Self::State {
+        PiState::virgin()
+    }
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        self.0.reset(s, e, u0, e.load)
+    }
+    fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
+        self.0.step(s, e, u, e.load)
+    }
 }
 
 /// Limits as a stage: the drive that may follow the last one.
