@@ -1,40 +1,37 @@
 //! `cargo xtask test`: every check of the project, in the order in which they fail fastest.
 //!
-//! `cargo xtask test` runs all of them and ends with a table; a check that cannot run here says why
-//! and how to make it run.
+//! It runs all of them and ends with a table; a check that cannot run here says why and how to make it run.
 
+mod command;
+mod firmware;
+
+use command::{Check, Outcome};
 use std::env;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::time::Instant;
 
-const USAGE: &str = "cargo xtask test    run every check: format, lints, tests, documentation, bare-metal core\n";
+const USAGE: &str = "\
+cargo xtask test                run every check: format, lints, tests, documentation, firmware
+cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
+cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
+";
 
 fn main() -> ExitCode {
-    match env::args().nth(1).as_deref() {
-        Some("test") => test(),
-        Some("help" | "--help" | "-h") | None => {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments[..] {
+        ["test"] => test(),
+        ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
+        ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
+        [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS
         }
-        Some(other) => {
-            eprintln!("error: no task is called {other:?}\n{USAGE}");
+        _ => {
+            eprintln!("error: no task is called {:?}\n{USAGE}", arguments.join(" "));
             ExitCode::from(2)
         }
     }
-}
-
-/// How a check ended.
-enum Outcome {
-    Passed,
-    Failed,
-    Skipped(String),
-}
-
-/// One check: what it is, and the cargo command that does it.
-struct Check {
-    name: &'static str,
-    arguments: &'static [&'static str],
-    environment: &'static [(&'static str, &'static str)],
 }
 
 const CHECKS: &[Check] = &[
@@ -60,14 +57,16 @@ const CHECKS: &[Check] = &[
 ];
 
 fn test() -> ExitCode {
-    let mut table = Vec::new();
-    for check in CHECKS {
-        table.push((check.name, timed(check.name, || run(check))));
-    }
-    table.push(("core on bare metal", timed("core on bare metal", bare_metal)));
+    let mut results: Vec<_> =
+        CHECKS.iter().map(|check| (check.name, timed(check.name, || command::run(check)))).collect();
+    results.push(("firmware", timed("firmware", || firmware::check(false))));
+    table(&results)
+}
+
+fn table(results: &[(&str, (Outcome, f64))]) -> ExitCode {
     eprintln!();
     let mut failed = false;
-    for (name, (outcome, seconds)) in &table {
+    for (name, (outcome, seconds)) in results {
         let word = match outcome {
             Outcome::Passed => "passed".to_owned(),
             Outcome::Failed => {
@@ -86,75 +85,4 @@ fn timed(name: &str, check: impl FnOnce() -> Outcome) -> (Outcome, f64) {
     let start = Instant::now();
     let outcome = check();
     (outcome, start.elapsed().as_secs_f64())
-}
-
-fn cargo() -> Command {
-    // Cargo tells its subcommands which cargo they belong to.
-    let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    command
-}
-
-fn run(check: &Check) -> Outcome {
-    let mut command = cargo();
-    command.args(check.arguments).envs(check.environment.iter().copied());
-    match command.status() {
-        Ok(status) if status.success() => Outcome::Passed,
-        Ok(_) => Outcome::Failed,
-        Err(error) => {
-            eprintln!("error: cargo could not be started: {error}");
-            Outcome::Failed
-        }
-    }
-}
-
-/// A target that has no standard library: what builds for it links none.
-const BARE_METAL: &str = "thumbv7em-none-eabihf";
-
-fn bare_metal() -> Outcome {
-    let installed = Command::new("rustc")
-        .args(["--print", "target-libdir", "--target", BARE_METAL])
-        .output()
-        .ok()
-        .and_then(|o| String::from_utf8(o.stdout).ok())
-        .is_some_and(|dir| std::path::Path::new(dir.trim()).is_dir());
-    if !installed {
-        return without_std();
-    }
-    let arguments =
-        &["build", "--package", "hyst-core", "--no-default-features", "--features", "serde", "--target", BARE_METAL];
-    run(&Check { name: "", arguments, environment: &[] })
-}
-
-/// Where the target is not installed: the core and all that it depends on must declare `no_std`.
-fn without_std() -> Outcome {
-    let tree = cargo()
-        .args([
-            "tree",
-            "--package",
-            "hyst-core",
-            "--no-default-features",
-            "--edges",
-            "normal",
-            "--prefix",
-            "none",
-            "--format",
-            "{p}",
-        ])
-        .output();
-    let Ok(tree) = tree else { return Outcome::Failed };
-    let packages = String::from_utf8_lossy(&tree.stdout).into_owned();
-    let names: Vec<&str> = packages.lines().filter_map(|l| l.split_whitespace().next()).collect();
-    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/hyst-core/src/lib.rs");
-    let declared = std::fs::read_to_string(source).is_ok_and(|s| s.contains("#![no_std]"));
-    // libm is no_std throughout; anything else that appears here has to be looked at first.
-    if declared && names.iter().all(|n| ["hyst-core", "libm"].contains(n)) {
-        eprintln!("hyst-core declares no_std and depends on: {}", names.join(", "));
-        Outcome::Skipped(format!(
-            "checked by its dependencies instead; `rustup target add {BARE_METAL}` makes it build"
-        ))
-    } else {
-        eprintln!("error: hyst-core must be no_std with no dependency but libm, found {names:?}");
-        Outcome::Failed
-    }
 }

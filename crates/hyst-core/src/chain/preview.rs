@@ -145,7 +145,7 @@ impl<T: Real, const N: usize> Stage<T> for Preview<T, N> {
             *slot = u;
         }
         // The first tap (n = −lead) meets the newest sample; older ones lie before it in the ring.
-        let (new, old) = s.ring.split_at(s.newest + 1);
+        let (new, old) = s.ring.split_at_checked(s.newest + 1).unwrap_or_default();
         let mut y = T::ZERO;
         for (x, c) in new.iter().rev().chain(old.iter().rev()).zip(&self.taps).take(2 * self.half + 1) {
             y += *c * *x;

@@ -115,10 +115,17 @@ impl<T: Real, const M: usize> Reversals<T, M> {
             }
         }
         if smallest.1.is_some() {
-            let first = smallest.0;
-            self.at.copy_within(first + 2.., first);
-            self.output.copy_within(first + 2.., first);
-            self.len -= 2;
+            drop_pair(&mut self.at, smallest.0);
+            drop_pair(&mut self.output, smallest.0);
+            self.wipe();
         }
+    }
+}
+
+/// Moves what lies behind the pair at `first` over it.
+fn drop_pair<T: Copy>(list: &mut [T], first: usize) {
+    let tail = list.get_mut(first..).unwrap_or_default();
+    if tail.len() >= 2 {
+        tail.copy_within(2.., 0);
     }
 }

@@ -1,0 +1,121 @@
+//! The core computes the same bits on a Cortex-M4F as here, within a bounded stack.
+//!
+//! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU and then this, with the path of what it printed in
+//! `HYST_FIRMWARE`.
+
+use hyst_cases::{Case, Hash, Precision, Visit, each, run};
+use std::collections::BTreeMap;
+use std::{env, fs};
+
+/// Bytes of stack that one step may use, the call included.
+const STEP_STACK: usize = 1024;
+
+/// Bytes of stack that building coefficients and resetting may use: several copies of the largest coefficients, since a
+/// `Result` is returned by value.
+const BUILD_STACK: usize = 32 * 1024;
+
+/// All outputs of all cases, computed here.
+#[derive(Default)]
+struct Here(Vec<(&'static str, &'static str, Vec<u64>, Vec<f64>)>);
+
+impl Visit for Here {
+    fn visit<C: Case, T: Precision>(&mut self) {
+        let y = run::<C, T>().unwrap_or_else(|error| panic!("{}: {error}", C::NAME));
+        self.0.push((C::NAME, T::NAME, y.iter().map(|y| y.bits()).collect(), y.iter().map(|y| y.to_f64()).collect()));
+    }
+}
+
+/// What the firmware printed: for each case and precision its figures and the bits of its outputs.
+#[derive(Default)]
+struct There {
+    figures: BTreeMap<(String, String), BTreeMap<String, String>>,
+    bits: BTreeMap<(String, String), Vec<u64>>,
+}
+
+impl There {
+    /// `None`, with a message that says so, where the firmware was not run.
+    fn read() -> Option<Self> {
+        let Some(path) = env::var_os("HYST_FIRMWARE") else {
+            println!("skipped: the firmware was not run; `cargo xtask firmware` does");
+            return None;
+        };
+        let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!(text.lines().last(), Some("done"), "the firmware did not come to its end");
+        let mut there = Self::default();
+        for line in text.lines() {
+            let mut words = line.split(' ');
+            let kind = words.next();
+            let key = (words.next().unwrap_or_default().to_owned(), words.next().unwrap_or_default().to_owned());
+            match kind {
+                Some("case") => {
+                    let pairs = words.filter_map(|word| word.split_once('='));
+                    there.figures.insert(key, pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).collect());
+                }
+                Some("bits") => {
+                    let bits = words.map(|word| u64::from_str_radix(word, 16).expect("hexadecimal digits"));
+                    there.bits.insert(key, bits.collect());
+                }
+                _ => {}
+            }
+        }
+        Some(there)
+    }
+}
+
+#[test]
+fn every_case_moves_and_single_precision_follows_double_precision() {
+    let mut here = Here::default();
+    each(&mut here);
+    assert!(here.0.len() >= 2);
+    for pair in here.0.chunks(2) {
+        let [(name, "f32", _, single), (_, "f64", _, double)] = pair else { panic!("cases come as f32 and f64") };
+        let (low, high) = double.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
+        assert!(single.iter().chain(double).all(|y| y.is_finite()) && high > low, "{name}: {low} to {high}");
+        let worst = single.iter().zip(double).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst <= 1e-4 * (high - low), "{name}: f32 is {worst} away from f64, which goes from {low} to {high}");
+    }
+}
+
+#[test]
+fn firmware_and_host_agree_bit_for_bit() {
+    let Some(there) = There::read() else { return };
+    let mut here = Here::default();
+    each(&mut here);
+    let mut differ = Vec::new();
+    for (name, precision, ours, values) in &here.0 {
+        let key = ((*name).to_owned(), (*precision).to_owned());
+        let Some(theirs) = there.bits.get(&key) else {
+            differ.push(format!("{name} {precision} was not run"));
+            continue;
+        };
+        if let Some(k) = (0..ours.len()).find(|k| ours.get(*k) != theirs.get(*k)) {
+            let count = ours.iter().zip(theirs).filter(|(a, b)| a != b).count();
+            differ.push(format!(
+                "{name} {precision}: {count} samples differ, first {k}: here {:x} ({:e}), there {:x}",
+                ours[k],
+                values[k],
+                theirs.get(k).copied().unwrap_or_default()
+            ));
+        }
+        // The fingerprint that the firmware took of its own numbers: nothing was lost on the way here.
+        let hash = match *precision {
+            "f32" => Hash::of(&theirs.iter().map(|b| f32::from_bits(*b as u32)).collect::<Vec<_>>()),
+            _ => Hash::of(&theirs.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>()),
+        };
+        assert_eq!(there.figures[&key]["hash"], format!("{:016x}", hash.0), "{name} {precision}");
+    }
+    assert!(differ.is_empty(), "host and firmware differ:\n{}", differ.join("\n"));
+    assert_eq!(there.bits.len(), here.0.len(), "the firmware was built from another list of cases");
+    println!("{} runs of 1000 samples agree in every bit", here.0.len());
+}
+
+#[test]
+fn the_stack_is_bounded() {
+    let Some(there) = There::read() else { return };
+    for ((name, precision), figures) in &there.figures {
+        let figure = |key: &str| figures[key].parse::<usize>().expect("a number");
+        assert!(figure("stack") <= STEP_STACK, "{name} {precision}: a step uses {} bytes of stack", figure("stack"));
+        let build = figure("build_stack");
+        assert!(build <= BUILD_STACK, "{name} {precision}: building uses {build} bytes of stack");
+    }
+}

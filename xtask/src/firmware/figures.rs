@@ -1,0 +1,133 @@
+//! What every model costs, as `docs/firmware.md` states it.
+
+use super::link;
+use super::toolchain::Toolchain;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+/// A table row may be this much off before it has to be written anew.
+const TOLERANCE: f64 = 0.1;
+
+const INTRODUCTION: &str = "\
+# What the models cost on a Cortex-M4F
+
+Measured by `cargo xtask firmware --table`: every model runs over the same 1000 samples in QEMU (machine mps2-an386), and
+its outputs are the host's in every bit, in `f32` and in `f64`.
+
+- **instructions**: executed by one `step`, call included, on average and at most. They are instructions, not cycles:
+  memory with wait states, `vdiv`, `vsqrt` and taken branches cost more than one cycle each. The Cortex-M4F computes `f32`
+  in hardware and `f64` in software.
+- **flash**: `reset` and `step` with all they call, linked alone; models share what they have in common (`sinf`, the
+  arithmetic of `f64`). *with build* adds the way from parameters to coefficients, which a host can take instead.
+- **RAM**: one actuator's coefficients (or flash, if they never change) and state; a model has no other data.
+- **stack**: what a `step` reached at most, 16 to 32 bytes of which are the call; and building and resetting.
+
+No function of any model can reach a panic: each is linked with a panic handler that does not link.
+";
+
+/// One case in one precision.
+struct Row {
+    case: String,
+    precision: String,
+    mean: f64,
+    worst: String,
+    flash: u32,
+    flash_with_build: u32,
+    coefficients: String,
+    state: String,
+    stack: String,
+    build_stack: String,
+}
+
+/// The figures of all cases.
+pub(crate) struct Figures {
+    compiler: String,
+    rows: Vec<Row>,
+}
+
+impl Figures {
+    /// From what the firmware printed, and from linking.
+    pub(crate) fn collect(toolchain: &Toolchain, library: &Path, printed: &Path) -> Result<Self, String> {
+        let text = fs::read_to_string(printed).map_err(|error| format!("{}: {error}", printed.display()))?;
+        let mut rows = Vec::new();
+        for line in text.lines().filter_map(|line| line.strip_prefix("case ")) {
+            let (case, rest) = line.split_once(' ').unwrap_or((line, ""));
+            let (precision, rest) = rest.split_once(' ').unwrap_or((rest, ""));
+            let figure = |name: &str| {
+                let value = rest.split(' ').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='));
+                value.map(str::to_owned).ok_or_else(|| format!("the firmware told no {name} of {case}"))
+            };
+            let number =
+                |name: &str| figure(name)?.parse::<f64>().map_err(|error| format!("{name} of {case}: {error}"));
+            let [build, reset, step] = ["build", "reset", "step"].map(|f| format!("{f}.{case}.{precision}"));
+            rows.push(Row {
+                mean: number("instructions")? / number("steps")?,
+                worst: figure("worst")?,
+                flash: link::flash(toolchain, library, &[&reset, &step])?,
+                flash_with_build: link::flash(toolchain, library, &[&build, &reset, &step])?,
+                coefficients: figure("coefficients")?,
+                state: figure("state")?,
+                stack: figure("stack")?,
+                build_stack: figure("build_stack")?,
+                case: case.to_owned(),
+                precision: precision.to_owned(),
+            });
+        }
+        Ok(Self { compiler: format!("{}, opt-level 3, LTO", toolchain.version), rows })
+    }
+
+    /// Writes the document.
+    pub(crate) fn write(&self, document: &Path) -> Result<(), String> {
+        let mut text = format!("{INTRODUCTION}\nCompiler: {}.\n", self.compiler);
+        for precision in ["f32", "f64"] {
+            let _ = write!(
+                text,
+                "\n## {precision}\n\n| model | instructions | at most | flash | with build | coefficients | state | stack | to build |\n\
+                 |---|--:|--:|--:|--:|--:|--:|--:|--:|\n"
+            );
+            for r in self.rows.iter().filter(|row| row.precision == precision) {
+                let _ = writeln!(
+                    text,
+                    "| `{}` | {:.0} | {} | {} | {} | {} | {} | {} | {} |",
+                    r.case,
+                    r.mean,
+                    r.worst,
+                    r.flash,
+                    r.flash_with_build,
+                    r.coefficients,
+                    r.state,
+                    r.stack,
+                    r.build_stack
+                );
+            }
+        }
+        print!("{text}");
+        let folder = document.parent().map_or(Ok(()), fs::create_dir_all);
+        folder.and_then(|()| fs::write(document, text)).map_err(|error| format!("{}: {error}", document.display()))
+    }
+
+    /// Refuses a document that lacks a model or, for the same compiler, states other figures.
+    pub(crate) fn compare(&self, document: &Path) -> Result<(), String> {
+        const ANEW: &str = "`cargo xtask firmware --table` writes it anew";
+        let text = fs::read_to_string(document).map_err(|error| format!("{}: {error}; {ANEW}", document.display()))?;
+        let same_compiler = text.contains(&self.compiler);
+        for precision in ["f32", "f64"] {
+            let section = text.split("\n## ").find(|section| section.starts_with(precision)).unwrap_or_default();
+            for row in self.rows.iter().filter(|row| row.precision == precision) {
+                let start = format!("| `{}` | ", row.case);
+                let line = section.lines().find_map(|line| line.strip_prefix(&start));
+                let stated = line.and_then(|line| line.split(' ').next()?.parse::<f64>().ok());
+                let off = stated.is_none_or(|stated| (stated - row.mean).abs() > TOLERANCE * row.mean + 1.0);
+                if stated.is_none() || (same_compiler && off) {
+                    let Row { case, mean, .. } = row;
+                    let is = document.display();
+                    return Err(format!(
+                        "{is}: {case} takes {mean:.0} instructions in {precision}, not {stated:?}; {ANEW}"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}

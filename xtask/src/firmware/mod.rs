@@ -1,0 +1,128 @@
+//! The firmware check: the core on a Cortex-M4F.
+//!
+//! It depends on nothing that needs an operating system; every model builds for the target; nothing in it can panic; in
+//! QEMU it computes the same bits as on this machine, within a bounded stack; and `docs/firmware.md` says what that costs.
+
+mod figures;
+mod link;
+mod toolchain;
+
+use crate::command::{Outcome, cargo, output, passes, root};
+use figures::Figures;
+use std::env;
+use std::path::{Path, PathBuf};
+use toolchain::{NotRun, TARGET, Toolchain};
+
+/// What the core may depend on: all of it is `no_std`. `libm` always, the others where a feature asks for them.
+const ALWAYS: &[&str] = &["hyst-core", "libm"];
+const ON_DEMAND: &[&str] = &[
+    "byteorder",
+    "cobs",
+    "crc",
+    "crc-catalog",
+    "hash32",
+    "heapless",
+    "postcard",
+    "serde",
+    "serde_core",
+    "stable_deref_trait",
+    "thiserror",
+];
+
+/// Runs the check; with `write`, writes `docs/firmware.md` instead of comparing it.
+pub(crate) fn check(write: bool) -> Outcome {
+    match steps(write) {
+        Ok(()) => Outcome::Passed,
+        Err(Ended::Failed(why)) => {
+            if !why.is_empty() {
+                eprintln!("error: {why}");
+            }
+            Outcome::Failed
+        }
+        Err(Ended::NotRun(why)) => Outcome::Skipped(why),
+    }
+}
+
+/// Why the check did not come to its end.
+enum Ended {
+    Failed(String),
+    NotRun(String),
+}
+
+impl From<String> for Ended {
+    fn from(why: String) -> Self {
+        Self::Failed(why)
+    }
+}
+
+fn steps(write: bool) -> Result<(), Ended> {
+    depends_on_no_std()?;
+    let toolchain = Toolchain::find()
+        .map_err(|how| Ended::NotRun(format!("no compiler for {TARGET}, only dependencies were checked; {how}")))?;
+    eprintln!("{} for {TARGET}", toolchain.version);
+
+    let target = target().join("firmware");
+    let built = target.join(TARGET).join("release");
+    done(toolchain.build(&target).args(["--package", "hyst-core", "--all-features"]).current_dir(root()))?;
+    done(toolchain.build(&target).args(["--release", "--locked"]).current_dir(root().join("tests/firmware")))?;
+
+    let library = built.join("libhyst_bare.a");
+    let functions = link::functions(&library)?;
+    let found = link::can_panic(&toolchain, &library, &functions)?;
+    if functions.is_empty() || !found.is_empty() {
+        let list = found.join("\n  ");
+        return Err(Ended::Failed(format!("{} of {} functions can panic:\n  {list}", found.len(), functions.len())));
+    }
+    eprintln!("{} functions link without a panic", functions.len());
+
+    let printed = target.join("agree.txt");
+    match toolchain::emulate(&built.join("agree"), &printed) {
+        Ok(()) => {}
+        Err(NotRun::Failed) => return Err(Ended::Failed(String::new())),
+        Err(NotRun::Missing(what)) => {
+            return Err(Ended::NotRun(format!(
+                "all of it builds and none of it can panic, but to run it needs {what}"
+            )));
+        }
+    }
+    let agree = ["test", "--quiet", "--package", "hyst-cases", "--test", "agree", "--", "--nocapture"];
+    done(cargo().args(agree).env("HYST_FIRMWARE", &printed))?;
+
+    let figures = Figures::collect(&toolchain, &library, &printed)?;
+    let document = root().join("docs/firmware.md");
+    let told = if write { figures.write(&document) } else { figures.compare(&document) };
+    Ok(told?)
+}
+
+/// Every package that the core is built from is a known one without a standard library.
+fn depends_on_no_std() -> Result<(), String> {
+    let tree = |features: &str| {
+        let arguments =
+            ["tree", "--package", "hyst-core", features, "--edges", "normal,no-proc-macro", "--prefix", "none"];
+        let tree = output(cargo().args(arguments).args(["--format", "{p}"])).ok_or("cargo tree failed")?;
+        Ok::<Vec<String>, String>(tree.lines().filter_map(|l| l.split(' ').next()).map(str::to_owned).collect())
+    };
+    for (features, allowed) in
+        [("--no-default-features", ALWAYS.to_vec()), ("--all-features", [ALWAYS, ON_DEMAND].concat())]
+    {
+        if let Some(name) = tree(features)?.iter().find(|name| !name.is_empty() && !allowed.contains(&name.as_str())) {
+            return Err(format!(
+                "hyst-core ({features}) depends on {name}, which is not on the list of xtask/src/firmware"
+            ));
+        }
+    }
+    let source = root().join("crates/hyst-core/src/lib.rs");
+    let source = std::fs::read_to_string(&source).map_err(|error| format!("{}: {error}", source.display()))?;
+    if source.contains("#![no_std]") { Ok(()) } else { Err("hyst-core does not declare no_std".to_owned()) }
+}
+
+fn done(command: &mut std::process::Command) -> Result<(), Ended> {
+    match passes(command) {
+        Outcome::Passed => Ok(()),
+        _ => Err(Ended::Failed(String::new())),
+    }
+}
+
+fn target() -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| Path::new(&root()).join(folder))
+}
