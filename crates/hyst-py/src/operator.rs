@@ -7,7 +7,7 @@ use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Given3, Needs, Signal, array};
+use crate::arrays::{GivenSurroundings, Needs, Signal, array};
 use crate::errors;
 use crate::inverse::{Inverted, Options};
 use crate::runner::{Engine, Runner};
@@ -59,7 +59,7 @@ impl Operator {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let signal = Signal::new(name, u)?;
         let u = signal.values()?;
-        let given = Given3::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(u.len())?;
         let y = py.detach(|| engine.follow(&env, u, lead));
         Ok(array(py, y))
@@ -72,7 +72,7 @@ impl Operator {
         given: [Option<&Bound<'_, PyAny>>; 3],
         run: impl FnOnce(&dyn Engine, &hyst_core::Env<f64>, f64) -> Option<f64>,
     ) -> PyResult<f64> {
-        let given = Given3::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(1)?.at(0);
         run(&*self.engine, &env, u)
             .ok_or_else(|| PyValueError::new_err(format!("{u} is no input to rest at: the first one must be finite")))

@@ -23,10 +23,16 @@ pub(crate) trait Engine: Send + Sync {
     fn step(&self, env: &Env<f64>, u: f64) -> Option<f64>;
 }
 
-/// A stage and its own history: state and last finite input.
+/// A stage and its own history.
 pub(crate) struct Runner<S: Stage<f64>> {
     pub(crate) stage: Box<S>,
-    history: Mutex<Option<Box<(S::State, f64)>>>,
+    history: Mutex<Option<Box<History<S>>>>,
+}
+
+struct History<S: Stage<f64>> {
+    state: S::State,
+    /// The last finite input.
+    last: f64,
 }
 
 impl<S: Stage<f64>> Runner<S> {
@@ -79,18 +85,18 @@ where
 
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64 {
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        let (state, last) = &mut **history.get_or_insert_with(|| Box::new((self.stage.state(), u0)));
-        *last = u0;
-        self.stage.reset(state, env, u0)
+        let own = history.get_or_insert_with(|| Box::new(History { state: self.stage.state(), last: u0 }));
+        own.last = u0;
+        self.stage.reset(&mut own.state, env, u0)
     }
 
     fn step(&self, env: &Env<f64>, u: f64) -> Option<f64> {
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((state, last)) = history.as_deref_mut() {
+        if let Some(own) = history.as_deref_mut() {
             if u.is_finite() {
-                *last = u;
+                own.last = u;
             }
-            return Some(self.stage.step(state, env, *last));
+            return Some(self.stage.step(&mut own.state, env, own.last));
         }
         drop(history);
         u.is_finite().then(|| self.reset(env, u))
