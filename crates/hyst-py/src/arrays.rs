@@ -128,13 +128,13 @@ pub(crate) struct Needs {
 }
 
 /// Surroundings of one call, checked.
-pub(crate) struct Given3<'py> {
+pub(crate) struct GivenSurroundings<'py> {
     temperature: Given<'py>,
     load: Given<'py>,
     time: Given<'py>,
 }
 
-impl<'py> Given3<'py> {
+impl<'py> GivenSurroundings<'py> {
     /// Looks at the arguments `temperature`, `load` and `time`.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::models::{DELAY, TAPS};
 use crate::runner::{Engine, Runner};
 
 /// What the caller asked of an inverse; each way takes some of it and refuses the rest.
@@ -115,14 +116,14 @@ pub(crate) fn refused<P, S>(why: &'static str) -> impl Fn(&P, &S, &Options) -> P
 
 /// The identity as a hysteresis operator.
 type Identity = Pi<f64, 1>;
-/// A chain of one stage.
-pub(crate) type Alone<const D: usize> = Chain<f64, Identity, D, 1>;
+/// A chain of one stage, with room for the surroundings of the longest preview.
+type Alone = Chain<f64, Identity, DELAY, 1>;
 
 /// Through the compensator of a chain that holds nothing but the stage which `add` puts into it.
-pub(crate) fn compensator<const D: usize, const TAPS: usize>(
+pub(crate) fn compensator(
     period: f64,
     options: &Options,
-    add: impl FnOnce(Alone<D>, &Sampling) -> Result<Alone<D>, Error>,
+    add: impl FnOnce(Alone, &Sampling) -> Result<Alone, Error>,
 ) -> PyResult<Inverted> {
     options.only(&["bandwidth_hz"])?;
     let sampling = Sampling { period };

@@ -21,11 +21,11 @@ const PLAYS: usize = 64;
 /// Nodes along one edge of a Preisach triangle.
 const NODES: usize = 65;
 /// Samples that a delay holds.
-const DELAY: usize = 8192;
+pub(crate) const DELAY: usize = 8192;
 /// Elements that a creep bank holds.
 const CREEP: usize = 32;
 /// Taps that a preview filter holds.
-const TAPS: usize = 4095;
+pub(crate) const TAPS: usize = 4095;
 
 const IN_THE_SENSOR: &str = "this effect is in the sensor, not in the motion; no drive should follow it";
 
@@ -113,7 +113,7 @@ models! {
     }
     stage: hyst_core::Delay<f64, DELAY>,
     build: |p| DelayParams { seconds: p.seconds }.build(&Sampling { period: p.period }),
-    inverse: |p, _, options| compensator::<DELAY, TAPS>(p.period, options, |chain, cx| {
+    inverse: |p, _, options| compensator(p.period, options, |chain, cx| {
         chain.with_delay(&DelayParams { seconds: p.seconds }, cx)
     }),
     needs: [],
@@ -127,7 +127,7 @@ models! {
     }
     stage: hyst_core::Lag<f64>,
     build: |p| LagParams { seconds: p.seconds }.build(&Sampling { period: p.period }),
-    inverse: |p, _, options| compensator::<DELAY, TAPS>(p.period, options, |chain, cx| {
+    inverse: |p, _, options| compensator(p.period, options, |chain, cx| {
         chain.with_lag(&LagParams { seconds: p.seconds }, cx)
     }),
     needs: [],
@@ -162,7 +162,7 @@ models! {
     }
     stage: hyst_core::Resonance<f64>,
     build: |p| ResonanceParams { hz: p.hz, damping: p.damping, gain: p.gain }.build(&Sampling { period: p.period }),
-    inverse: |p, _, options| compensator::<DELAY, TAPS>(p.period, options, |chain, cx| {
+    inverse: |p, _, options| compensator(p.period, options, |chain, cx| {
         chain.with_resonance(&ResonanceParams { hz: p.hz, damping: p.damping, gain: p.gain }, cx)
     }),
     needs: [],
@@ -176,7 +176,7 @@ models! {
     }
     stage: hyst_core::Temperature<f64>,
     build: |p| TemperatureParams { per_kelvin: p.per_kelvin, reference_degc: p.reference_degc }.build(&()),
-    inverse: |p, _, options| compensator::<3, 1>(1.0, options, |chain, _| {
+    inverse: |p, _, options| compensator(1.0, options, |chain, _| {
         chain.with_temperature(&TemperatureParams { per_kelvin: p.per_kelvin, reference_degc: p.reference_degc })
     }),
     needs: [temperature],

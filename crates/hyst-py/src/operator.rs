@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use hyst_core::{Error, Stage};
 use numpy::PyArray1;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Given3, Needs, Signal, array};
+use crate::arrays::{GivenSurroundings, Needs, Signal, array};
 use crate::errors;
 use crate::inverse::{Inverted, Options};
 use crate::runner::{Engine, Runner};
@@ -59,7 +59,7 @@ impl Operator {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let signal = Signal::new(name, u)?;
         let u = signal.values()?;
-        let given = Given3::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(u.len())?;
         let y = py.detach(|| engine.follow(&env, u, lead));
         Ok(array(py, y))
@@ -70,11 +70,12 @@ impl Operator {
         &self,
         u: f64,
         given: [Option<&Bound<'_, PyAny>>; 3],
-        run: impl FnOnce(&dyn Engine, &hyst_core::Env<f64>, f64) -> f64,
+        run: impl FnOnce(&dyn Engine, &hyst_core::Env<f64>, f64) -> Option<f64>,
     ) -> PyResult<f64> {
-        let given = Given3::new(&self.name, self.needs, given[0], given[1], given[2])?;
+        let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(1)?.at(0);
-        Ok(run(&*self.engine, &env, u))
+        run(&*self.engine, &env, u)
+            .ok_or_else(|| PyValueError::new_err(format!("{u} is no input to rest at: the first one must be finite")))
     }
 }
 
@@ -135,13 +136,13 @@ impl Operator {
         load: Option<&Bound<'_, PyAny>>,
         time: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<f64> {
-        self.one(u0, [temperature, load, time], |engine, env, u| engine.reset(env, u))
+        self.one(u0, [temperature, load, time], |engine, env, u| u.is_finite().then(|| engine.reset(env, u)))
     }
 
     /// The output one sample later, at input ``u``; moves the object's own history.
     ///
-    /// The first ``step`` of an object that was never reset is a ``reset``. An input that is not finite counts as the last
-    /// finite one.
+    /// The first ``step`` of an object that was never reset is a ``reset``. An input that is not finite
+    /// counts as the last finite one.
     ///
     /// Parameters
     /// ----------

@@ -18,14 +18,21 @@ pub(crate) trait Engine: Send + Sync {
     fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Vec<f64>;
     /// Sets the stage's own history to rest at `u0`.
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64;
-    /// One sample of the stage's own history; the first one sets it to rest.
-    fn step(&self, env: &Env<f64>, u: f64) -> f64;
+    /// One sample of the stage's own history; the first one sets it to rest. An input that is not finite counts as the
+    /// last finite one; `None` if there was none yet.
+    fn step(&self, env: &Env<f64>, u: f64) -> Option<f64>;
 }
 
 /// A stage and its own history.
 pub(crate) struct Runner<S: Stage<f64>> {
     pub(crate) stage: Box<S>,
-    history: Mutex<Option<Box<S::State>>>,
+    history: Mutex<Option<Box<History<S>>>>,
+}
+
+struct History<S: Stage<f64>> {
+    state: S::State,
+    /// The last finite input.
+    last: f64,
 }
 
 impl<S: Stage<f64>> Runner<S> {
@@ -78,20 +85,20 @@ where
 
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64 {
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        let state = history.get_or_insert_with(|| Box::new(self.stage.state()));
-        self.stage.reset(state, env, u0)
+        let own = history.get_or_insert_with(|| Box::new(History { state: self.stage.state(), last: u0 }));
+        own.last = u0;
+        self.stage.reset(&mut own.state, env, u0)
     }
 
-    fn step(&self, env: &Env<f64>, u: f64) -> f64 {
+    fn step(&self, env: &Env<f64>, u: f64) -> Option<f64> {
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        match history.as_deref_mut() {
-            Some(state) => self.stage.step(state, env, u),
-            None => {
-                let mut state = Box::new(self.stage.state());
-                let y = self.stage.reset(&mut state, env, u);
-                *history = Some(state);
-                y
+        if let Some(own) = history.as_deref_mut() {
+            if u.is_finite() {
+                own.last = u;
             }
+            return Some(self.stage.step(&mut own.state, env, own.last));
         }
+        drop(history);
+        u.is_finite().then(|| self.reset(env, u))
     }
 }

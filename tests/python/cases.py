@@ -1,0 +1,196 @@
+"""Every model with parameters, a drive, and what its reference says of it. Adding a model: one entry of ``CASES``."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from conftest import build
+from drives import both_ways, on_lattice, one_way
+from reference import activation, bouc_wen, fractional, linear, plays, preisach
+
+PERIOD = 1e-3
+N = 2000
+
+
+@dataclass
+class Case:
+    label: str
+    name: str
+    parameters: dict
+    u: np.ndarray
+    reference: Callable[[np.ndarray], np.ndarray]
+    surroundings: dict = field(default_factory=dict)
+    # Of the output's span.
+    tolerance: float = 1e-9
+    # Options of the exact inverse; None if there is none.
+    inverse: dict | None = None
+    # Of the input's span.
+    inverse_tolerance: float = 1e-9
+
+    def model(self):
+        return build(self.name, **self.parameters)
+
+
+CASES: list[Case] = []
+
+
+def case(label, name, parameters, u, reference, **more):
+    CASES.append(Case(label, name, parameters, np.ascontiguousarray(u), reference, **more))
+
+
+# --- plays
+
+R, W = 5.0 * np.arange(1, 11), 0.02 / np.arange(1, 11)
+SWING = both_ways(N, 100.0)
+TEMPERATURE = 31.0 + 8.0 * np.sin(np.arange(N) * 2e-3)
+
+case("play", "Play", dict(radius=12.0), SWING, lambda u: plays.plays(u, 12.0)[:, 0])
+case("stop", "Stop", dict(limit=12.0), SWING, lambda u: plays.stops(u, 12.0)[:, 0])
+case(
+    "pi", "Pi", dict(gain=0.1, thresholds=R, weights=W), SWING,
+    lambda u: plays.prandtl_ishlinskii(u, 0.1, R, W), inverse={},
+)  # fmt: skip
+case(
+    "pi from an offset", "Pi", dict(gain=0.1, thresholds=R, weights=W), SWING + 70.0,
+    lambda u: plays.prandtl_ishlinskii(u, 0.1, R, W), inverse={},
+)  # fmt: skip
+case(
+    "pi with negative weights", "Pi", dict(gain=0.3, thresholds=R, weights=-0.5 * W), SWING,
+    lambda u: plays.prandtl_ishlinskii(u, 0.3, R, -0.5 * W), inverse={},
+)  # fmt: skip
+case(
+    "gpi", "Gpi", dict(gain=0.1, thresholds=R, weights=W, left=[0.9, -2.0], right=[1.1, 3.0]), SWING,
+    lambda u: plays.generalised_prandtl_ishlinskii(u, 0.1, R, W, lambda u: 0.9 * u - 2.0, lambda u: 1.1 * u + 3.0),
+)  # fmt: skip
+for label, t in [("23 °C", 23.0), ("39 °C", 39.0), ("moving temperature", TEMPERATURE)]:
+    case(
+        f"td-pi, {label}", "TdPi", plays.TD_PI, 2 * SWING,
+        lambda u, t=t: plays.td_pi(u, t, **plays.TD_PI), surroundings=dict(temperature=t),
+    )  # fmt: skip
+case(
+    "maxwell-slip", "MaxwellSlip", dict(yields=R, stiffnesses=W), SWING,
+    lambda u: plays.maxwell_slip(u, R, W),
+)  # fmt: skip
+
+# --- Preisach
+
+CELLS, REFINE, LOW, HIGH = 6, 8, -10.0, 110.0
+LATTICE = (HIGH - LOW) / (CELLS * REFINE)
+DENSITY = np.random.default_rng(3).uniform(0.1, 1.0, CELLS * (CELLS + 1) // 2)
+ONCE = np.random.default_rng(4).uniform(0.1, 1.0, CELLS)
+FROM_BELOW = on_lattice(one_way(N, LOW, HIGH), LOW, LATTICE)
+# Between -10 V and 110 V, from a node in the middle.
+FROM_MIDDLE = on_lattice(50.0 + both_ways(N, 60.0), LOW, LATTICE)
+# No relays on the line on which a rest in the middle would cut cells in two.
+OFF_THE_LINE = np.where(np.add(*np.tril_indices(CELLS)) + 1 == CELLS, 0.0, DENSITY)
+
+
+def relays(**more):
+    return preisach.Relays(LOW, HIGH, refine=REFINE, **more)
+
+
+case(
+    "preisach", "Preisach", dict(low=LOW, high=HIGH, density=DENSITY, once=ONCE), FROM_BELOW,
+    relays(density=DENSITY, once=ONCE).simulate, inverse={},
+)  # fmt: skip
+case(
+    "preisach from an offset", "Preisach", dict(low=LOW, high=HIGH, density=DENSITY), FROM_BELOW[250:],
+    relays(density=DENSITY).simulate, inverse={},
+)  # fmt: skip
+case(
+    "preisach, rest in the middle", "Preisach", dict(low=LOW, high=HIGH, density=OFF_THE_LINE, rest=50.0), FROM_MIDDLE,
+    relays(density=OFF_THE_LINE, rest=50.0).simulate, inverse={},
+)  # fmt: skip
+
+# Falls with the rate and differs between rise and fall.
+MIRROR = 1.0 - 0.02 * preisach.DPM_RATES[:, None] - 0.0005 * (preisach.DPM_CHANGES[None, :] + 80.0)
+DPM_PERIOD = 1e-4
+FAST = on_lattice(one_way(N, LOW, HIGH, seed=5), LOW, LATTICE)
+DPM = dict(
+    low=LOW, high=HIGH, density=DENSITY, rates=1e3 * preisach.DPM_RATES, changes=preisach.DPM_CHANGES,
+    mirror=MIRROR, period=DPM_PERIOD,
+)  # fmt: skip
+
+
+def xi(d, p):
+    return preisach.mirror(preisach.DPM_RATES, preisach.DPM_CHANGES, MIRROR)(1e-3 * d, p)
+
+
+case(
+    "dpm", "Dpm", DPM, FAST,
+    lambda u: preisach.dpm(u, relays(density=DENSITY).simulate(u), xi, DPM_PERIOD),
+)  # fmt: skip
+case(
+    "dpm, recursive", "Dpm", dict(DPM, recursive=True), FAST,
+    lambda u: preisach.dpm_recursive(u, relays(density=DENSITY).simulate(u), xi, DPM_PERIOD),
+)  # fmt: skip
+
+# --- linear stages
+
+TAU, SHARES = [0.003, 0.05, 0.4, 3.0], [0.03, 0.02, 0.015, 0.01]
+case("delay", "Delay", dict(seconds=3.4e-3, period=PERIOD), SWING, lambda u: linear.delay(u, 3.4e-3, PERIOD))
+case("delay of nothing", "Delay", dict(seconds=0.0, period=PERIOD), SWING, lambda u: u)
+case("lag", "Lag", dict(seconds=4e-3, period=PERIOD), SWING + 5, lambda u: linear.lag(u, 4e-3, PERIOD))
+case(
+    "creep", "Creep", dict(seconds=TAU, shares=SHARES, period=PERIOD), SWING + 5,
+    lambda u: linear.creep(u, TAU, SHARES, PERIOD), inverse={},
+)  # fmt: skip
+for label, gain in [("", 1.0), (" beside a stiff part", 0.4)]:
+    case(
+        f"resonance{label}", "Resonance", dict(hz=65.9, damping=0.047, gain=gain, period=PERIOD), SWING + 5,
+        lambda u, gain=gain: linear.resonance(u, 65.9, 0.047, gain, PERIOD),
+    )  # fmt: skip
+case(
+    "temperature", "Temperature", dict(per_kelvin=0.005, reference_degc=23.0), SWING,
+    lambda u: u * (1 + 0.005 * (TEMPERATURE - 23.0)), surroundings=dict(temperature=TEMPERATURE), inverse={},
+)  # fmt: skip
+TIME = 17.0 + PERIOD * np.arange(N)
+case("drift", "Drift", dict(per_second=0.02), SWING, lambda u: u + 0.02 * TIME, surroundings=dict(time=TIME))
+case(
+    "interference", "Interference", dict(hz=50.0, amplitude=0.3, phase=0.4), SWING,
+    lambda u: u + 0.3 * np.sin(2 * np.pi * 50.0 * TIME + 0.4), surroundings=dict(time=TIME),
+)  # fmt: skip
+
+TD_EM_PERIOD = 2e-4
+for label, stop in [("plays", False), ("stops", True)]:
+    case(
+        f"td-em, {label}", "TdEm",
+        dict(linear.TD_EM, psi=list(linear.TD_EM_PSI), widths=linear.TD_EM_WIDTHS, slopes=linear.TD_EM_SLOPES,
+             stop=stop, period=TD_EM_PERIOD),
+        2 * SWING + 10,
+        lambda u, stop=stop: linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
+                                          **linear.TD_EM),
+        surroundings=dict(temperature=33.0),
+    )  # fmt: skip
+
+# --- Bouc-Wen
+
+SHORT = both_ways(400, 2.0)
+PAPER_4 = dict(k0=0.15, alpha=0.05, beta=0.06, gamma=-0.02)
+case("bouc-wen, paper 3", "BoucWen", dict(bouc_wen.PAPER_3, form="free-displacement"), SHORT,
+     lambda u: bouc_wen.paper_3(u, **bouc_wen.PAPER_3))  # fmt: skip
+case("bouc-wen, paper 3, from an offset", "BoucWen", dict(bouc_wen.PAPER_3, form="free-displacement"), SHORT + 1.5,
+     lambda u: bouc_wen.paper_3(u, **bouc_wen.PAPER_3))  # fmt: skip
+for n in (1.0, 1.7, 2.0):
+    case(f"bouc-wen, paper 4, n = {n}", "BoucWen", dict(PAPER_4, n=n, form="stiffness"), 20 * SHORT,
+         lambda u, n=n: bouc_wen.paper_4(u, n=n, **PAPER_4))  # fmt: skip
+OSCILLATOR_PERIOD = 1 / 750
+case("bouc-wen oscillator", "BoucWenOscillator", dict(bouc_wen.OSCILLATOR, period=OSCILLATOR_PERIOD),
+     both_ways(400, 120.0), lambda u: bouc_wen.oscillator(u, OSCILLATOR_PERIOD, **bouc_wen.OSCILLATOR),
+     tolerance=1e-6)  # fmt: skip
+
+# --- fractional
+
+FRACTIONAL_PERIOD = 1e-4
+case("lfdm", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD, memory=N), 0.02 * SWING + 1.0,
+     lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, **fractional.LFDM))  # fmt: skip
+case("ifm", "Ifm", dict(fractional.IFM, period=FRACTIONAL_PERIOD, memory=N), 0.02 * SWING + 1.0,
+     lambda u: fractional.ifm(u, FRACTIONAL_PERIOD, **fractional.IFM))  # fmt: skip
+case("lfdm, short memory", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD, memory=200), 0.02 * SWING + 1.0,
+     lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, memory=200, **fractional.LFDM))  # fmt: skip
+
+# --- activation functions
+
+for name, printed in activation.PRINTED.items():
+    case(name.lower(), name, dict(printed, period=PERIOD), one_way(N, 0.0, 40.0),
+         lambda u, name=name, printed=printed: activation.activation(name, u, PERIOD, **printed))  # fmt: skip

@@ -1,0 +1,71 @@
+"""Play and stop banks: Prandtl-Ishlinskii, generalised and temperature-dependent (paper 5, eq. 9-25), Maxwell slip."""
+
+import numpy as np
+
+
+def generalised_plays(left, right, r):
+    """Paper 5, eq. 24: ``F_k = max(left_k - r, min(right_k + r, F_{k-1}))`` from F = 0; shape (n, len(r))."""
+    r = np.atleast_1d(np.asarray(r, dtype=float))
+    outputs = np.empty((len(left), len(r)))
+    f = np.zeros(len(r))
+    for k, (a, b) in enumerate(zip(left, right)):
+        f = np.maximum(a - r, np.minimum(b + r, f))
+        outputs[k] = f
+    return outputs
+
+
+def plays(u, r):
+    """Paper 5, eq. 9."""
+    return generalised_plays(u, u, r)
+
+
+def stops(u, r):
+    """Elasto-slip elements ``s_k = clip(s_{k-1} + u_k - u_{k-1}, -r, r)``, s = 0 at u = 0; shape (n, len(r))."""
+    r = np.atleast_1d(np.asarray(r, dtype=float))
+    outputs = np.empty((len(u), len(r)))
+    s, before = np.zeros(len(r)), 0.0
+    for k, now in enumerate(u):
+        s = np.clip(s + (now - before), -r, r)
+        outputs[k], before = s, now
+    return outputs
+
+
+def prandtl_ishlinskii(u, gain, thresholds, weights):
+    return gain * u + plays(u, thresholds) @ np.asarray(weights, dtype=float)
+
+
+def generalised_prandtl_ishlinskii(u, gain, thresholds, weights, left, right):
+    """``left`` and ``right`` map an input to its envelopes; the identity is the play of no width."""
+    r = np.concatenate([[0.0], thresholds])
+    w = np.concatenate([[gain], weights])
+    return generalised_plays(left(u), right(u), r) @ w
+
+
+# Paper 5, section 5.2: n = 9, T in degrees Celsius, u in V, y in um.
+TD_PI = dict(
+    alpha=0.9975, epsilon=0.9770, tau=0.4167, eta=0.0091, a0=0.0599, a1=-0.1759, b0=0.0606, b1=0.2651, n=9, t0=23.0
+)
+
+
+def td_pi_weights(temperature, *, alpha, epsilon, tau, eta, n, t0):
+    """Paper 5, eq. 22 and section 5.2: thresholds ``r_i = alpha i`` and weights, i = 0 ... n; weights (len(T), n + 1)."""
+    r = alpha * np.arange(n + 1)
+    gain = epsilon * np.exp(eta * (np.asarray(temperature, dtype=float) - t0))
+    return r, np.multiply.outer(gain, np.exp(-tau * r))
+
+
+def td_pi(u, temperature, *, alpha, epsilon, tau, eta, a0, a1, b0, b1, n, t0):
+    """Paper 5, eq. 25, the term i = 0 being a generalised play too (eq. 25 as printed takes the bare input)."""
+    r, p = td_pi_weights(np.broadcast_to(temperature, np.shape(u)), alpha=alpha, epsilon=epsilon, tau=tau, eta=eta, n=n, t0=t0)
+    return np.sum(p * generalised_plays(a0 * u + a1, b0 * u + b1, r), axis=1)
+
+
+def td_pi_as_printed(u, temperature, *, alpha, epsilon, tau, eta, a0, a1, b0, b1, n, t0):
+    """Paper 5, eq. 25 as it stands: ``p_0 v`` without envelope."""
+    r, p = td_pi_weights(np.broadcast_to(temperature, np.shape(u)), alpha=alpha, epsilon=epsilon, tau=tau, eta=eta, n=n, t0=t0)
+    return p[:, 0] * u + np.sum(p[:, 1:] * generalised_plays(a0 * u + a1, b0 * u + b1, r[1:]), axis=1)
+
+
+def maxwell_slip(u, yields, stiffnesses):
+    """``sum k_i stop_i(u)``; element i slips at the deflection ``yields[i]``."""
+    return stops(u, yields) @ np.asarray(stiffnesses, dtype=float)

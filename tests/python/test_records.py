@@ -1,0 +1,207 @@
+"""Records, fits, diagnoses, compensation: what wraps the identification."""
+
+import json
+import pickle
+
+import hyst
+import numpy as np
+import pytest
+from drives import one_way
+from reference import linear, plays
+
+RATE = 500.0
+R = np.array([5.0, 12.0, 20.0, 30.0, 45.0])
+W = np.array([0.02, 0.015, 0.012, 0.01, 0.01])
+
+
+def actuator(n, seed, mode=None):
+    """A record of a Prandtl-Ishlinskii actuator, with a mode behind it if one is given."""
+    rng = np.random.default_rng(seed)
+    # Slow loops, then steps between levels: what an identification needs.
+    levels = np.repeat(np.concatenate([[0.0], rng.uniform(0, 100, n // 200)]), 100)[: n // 2]
+    u = np.concatenate([one_way(n - len(levels), 0.0, 100.0, seed), np.convolve(levels, np.ones(20) / 20)[: len(levels)]])
+    y = plays.prandtl_ishlinskii(u, 0.1, R, W)
+    if mode:
+        y = linear.resonance(y, *mode, 1.0, 1 / RATE)
+    return np.arange(n) / RATE, u, y + 0.002 * rng.normal(size=n)
+
+
+def record(n=8000, seed=1, mode=None):
+    return hyst.Record(*actuator(n, seed, mode), name=f"seed {seed}")
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return hyst.fit(record())
+
+
+def csv(path, columns):
+    names = ",".join(columns)
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=names, comments="", fmt="%.9f")
+    return path
+
+
+def test_a_record_gives_back_its_columns():
+    t, u, y = actuator(300, 1)
+    warm = np.full(300, 21.5)
+    r = hyst.Record(t, u, y, temperature=warm, segment=[0] * 100 + [1] * 200, output_column="force_n", name="a")
+    assert np.allclose(r.timepts, t) and np.array_equal(r.inputs, u) and np.array_equal(r.outputs, y)
+    assert np.array_equal(r.temperature, warm) and r.load is None
+    assert r.segments == [(0, 100), (100, 300)] and r.period == pytest.approx(1 / RATE) and len(r) == 300
+    assert (r.input_column, r.output_column, r.name) == ("voltage_v", "force_n", "a")
+    assert hyst.Record(t, outputs=y).inputs is None
+    both = hyst.Record.join([hyst.Record(t, u, y, name="a"), hyst.Record(t, u, y, name="b")])
+    assert len(both) == 600 and both.name == "a + b"
+
+
+def test_a_wrong_record_is_refused():
+    t, u, y = actuator(300, 1)
+    with pytest.raises(hyst.RecordError, match="voltage_v"):
+        hyst.Record(t, u[:-1], y)
+    with pytest.raises(hyst.RecordError, match="increase"):
+        hyst.Record(t[::-1].copy(), u, y)
+    with pytest.raises(ValueError, match=r"inputs\[7\]"):
+        hyst.Record(t, np.where(np.arange(300) == 7, np.nan, u), y)
+    with pytest.raises(ValueError, match="output_column"):
+        hyst.Record(t, u, y, output_column="volume_l")
+    with pytest.raises(TypeError, match="not list"):
+        hyst.Record(list(t), u, y)
+
+
+def test_reading(tmp_path):
+    t, u, y = actuator(300, 1)
+    path = csv(tmp_path / "a.csv", {"time_s": t, "Vin": u, "displacement_um": y})
+    names = {"voltage_v": "Vin"}
+    r = hyst.read_record(path, map=names)
+    assert np.allclose(r.inputs, u, atol=1e-9) and r.output_column == "displacement_um"
+    assert len(hyst.read_record([path, str(path)], map=names)) == 600
+    with pytest.raises(hyst.RecordError, match=r"a\.csv, line 1.*in Python --map NAME=COLUMN is map="):
+        hyst.read_record(path)
+    with pytest.raises(hyst.RecordError, match="cannot be read"):
+        hyst.read_record(tmp_path / "nothing.csv")
+    with pytest.raises(hyst.RecordError, match="NAME=COLUMN|no column of the record format"):
+        hyst.read_record(path, map={"volts": "Vin"})
+    with pytest.raises(ValueError, match="need is"):
+        hyst.read_record(path, need="everything")
+    with pytest.raises(TypeError, match="path"):
+        hyst.read_record(3)
+
+
+def test_fit_and_simulate(fitted):
+    assert fitted.kind == "pi" and fitted.effects == [] and fitted.input_column == "voltage_v"
+    test = record(seed=2)
+    said = fitted.simulate(test)
+    assert said.errors["nrmse_percent"] < 0.5
+    kept = ~said.settling
+    assert said.errors["rmse"] == pytest.approx(hyst.rmse(test.outputs, said.outputs, settling=said.settling))
+    assert said.errors["rmse"] == pytest.approx(np.sqrt(np.mean((said.outputs - test.outputs)[kept] ** 2)))
+    assert np.array_equal(said.inputs, test.inputs) and np.array_equal(said.timepts, test.timepts)
+    assert said.zeros == [] and len(fitted.simulate(test, zero="per-record").zeros) == 1
+    # The same model as an operator on arrays.
+    assert np.array_equal(fitted.operator(test.period).simulate(test.inputs), said.outputs)
+
+
+def test_fit_of_arrays_is_fit_of_the_record(fitted):
+    t, u, y = actuator(8000, 1)
+    of_arrays = hyst.fit(timepts=t, inputs=u, outputs=y)
+    assert of_arrays.to_dict()["stages"] == fitted.to_dict()["stages"]
+    assert hyst.fit([record()]).to_dict()["stages"] == fitted.to_dict()["stages"]
+    assert hyst.fit(record(), model="preisach").kind == "preisach"
+
+
+def test_wrong_fits():
+    t, u, y = actuator(300, 1)
+    with pytest.raises(TypeError, match="either a record"):
+        hyst.fit()
+    with pytest.raises(TypeError, match="either a record"):
+        hyst.fit(record(), inputs=u)
+    with pytest.raises(ValueError, match="no model is called"):
+        hyst.fit(record(), model="polynomial")
+    with pytest.raises(ValueError, match="zero is"):
+        hyst.fit(record(), zero="some")
+    with pytest.raises(hyst.FitError, match="constant"):
+        hyst.fit(timepts=t, inputs=np.ones(300), outputs=y)
+    with pytest.raises(hyst.FitError, match="too few"):
+        hyst.fit(timepts=t[:20], inputs=u[:20], outputs=y[:20])
+    with pytest.raises(TypeError, match="must be a Record, a path"):
+        hyst.fit(3)
+
+
+def test_files(fitted, tmp_path):
+    path = tmp_path / "model.json"
+    fitted.save(path)
+    again = hyst.Model.load(path)
+    assert again == fitted and again == hyst.Model.loads(path.read_text()) and again == pickle.loads(pickle.dumps(fitted))
+    assert json.loads(path.read_text()) == fitted.to_dict() and fitted.dumps() == path.read_text()
+    assert fitted.to_dict()["fitted_on"][0]["file"] == "seed 1"
+    newer = path.read_text().replace("hyst.model/1", "hyst.model/9")
+    with pytest.raises(hyst.ModelFileError, match="update"):
+        hyst.Model.loads(newer)
+    with pytest.raises(hyst.ModelFileError, match="nothing.json"):
+        hyst.Model.load(tmp_path / "nothing.json")
+    with pytest.raises(hyst.ModelFileError, match="line 1"):
+        hyst.Model.loads("{")
+    with pytest.raises(hyst.ModelFileError):
+        fitted.save(tmp_path / "no folder" / "model.json")
+
+
+def test_compensation(fitted):
+    t = np.arange(4000) / RATE
+    wanted = 5.0 - 4.0 * np.cos(2 * np.pi * 1.0 * t) * np.cos(2 * np.pi * 0.13 * t)
+    drive = fitted.compensate(hyst.Record(t, outputs=wanted), limit=(0.0, 120.0))
+    reached = plays.prandtl_ishlinskii(drive.inputs, 0.1, R, W)
+    assert np.sqrt(np.mean((reached - wanted) ** 2)) < 0.005 * np.ptp(wanted)
+    assert drive.lead == 0 and drive.bandwidth_hz is None and drive.voltage_limited == []
+    operator = fitted.operator(1 / RATE)
+    assert np.allclose(operator.compensate(wanted), drive.inputs, rtol=0, atol=1e-12 * 100)
+    assert fitted.compensate(hyst.Record(t, outputs=wanted), limit=(0.0, 30.0)).voltage_limited != []
+    assert fitted.compensate(hyst.Record(t, outputs=wanted), slew=50.0).slew_limited != []
+    with pytest.raises(hyst.ReachError, match="outside what the actuator reaches"):
+        fitted.compensate(hyst.Record(t, outputs=10 * wanted))
+    with pytest.raises(hyst.RecordError, match="displacement_um is missing"):
+        fitted.compensate(hyst.Record(t, outputs=wanted, output_column="displacement_nm"))
+
+
+def test_diagnosis():
+    train, test = record(mode=(61.0, 0.05)), record(seed=2, mode=(61.0, 0.05))
+    model = hyst.fit(train)
+    said = []
+    found = hyst.diagnose(train, model, test=test, progress=said.append)
+    assert found.effects == ["resonance"] and found.verdict == "explained" and said
+    assert found.extended.effects == ["resonance"] and model.effects == []
+    effect = found.findings["effects"][0]
+    assert effect["name"] == "resonance" and effect["parameters"]["hz"]["value"] == pytest.approx(61.0, rel=0.02)
+    before, after = (found.findings[k]["test"]["rmse"] for k in ("before", "after"))
+    assert after < 0.2 * before
+    assert found.extended.simulate(test).errors["rmse"] == pytest.approx(after)
+    # The extended model previews.
+    operator = found.extended.operator(train.period)
+    inverse = operator.inverse()
+    assert inverse.lead > 0 and inverse.bandwidth_hz > 0 and "resonance" in repr(operator)
+    wanted = np.ascontiguousarray(4.0 - 3.0 * np.cos(2 * np.pi * 2.0 * train.timepts[:2000]))
+    reached = operator.simulate(operator.compensate(wanted))
+    assert np.abs(reached - wanted)[500:-500].max() < 0.02 * np.ptp(wanted)
+
+    def refuse(_):
+        raise KeyError("stop")
+
+    with pytest.raises(KeyError):
+        hyst.diagnose(train, model, progress=refuse)
+
+
+def test_metrics():
+    y, p = np.array([0.0, 1.0, 2.0, 4.0]), np.array([9.0, 1.0, 5.0, 0.0])
+    settling = np.array([True, False, False, False])
+    assert hyst.rmse(y, p, settling=settling) == pytest.approx(np.sqrt(25 / 3))
+    assert hyst.nrmse(y, p, settling=settling) == pytest.approx(100 * np.sqrt(25 / 3) / 3)
+    assert hyst.max_abs(y, p) == 9.0 and hyst.max_abs(y, p, settling=settling) == 4.0
+    assert hyst.mape(y, p, settling=settling) == pytest.approx(2.5 / 3)
+    assert hyst.smape(y, p, settling=settling) == pytest.approx((3 / 3.5 + 2) / 3)
+    assert hyst.peak_to_valley(y, p, settling=settling) == 7.0
+    assert hyst.mape(np.zeros(2), np.ones(2)) is None
+    with pytest.raises(hyst.RecordError, match="3 values"):
+        hyst.rmse(y, p[:3])
+    with pytest.raises(hyst.RecordError, match="start-up rows"):
+        hyst.rmse(y, p, settling=np.ones(4, dtype=bool))
+    with pytest.raises(TypeError, match="bool"):
+        hyst.rmse(y, p, settling=np.ones(4))

@@ -1,0 +1,68 @@
+"""The stub says what the library has."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import hyst
+import pytest
+
+STUB = ast.parse((Path(hyst.__file__).parent / "_hyst.pyi").read_text())
+CLASSES = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef)}
+FUNCTIONS = {node.name: node for node in STUB.body if isinstance(node, ast.FunctionDef)}
+COMPILED = {name for name in vars(hyst._hyst) if not name.startswith("_")}
+
+
+def arguments(node):
+    """Names of positional and of keyword arguments, each with whether it has a default."""
+    a = node.args
+    positional = a.posonlyargs + a.args
+    defaults = [False] * (len(positional) - len(a.defaults)) + [True] * len(a.defaults)
+    positional = [(p.arg, d) for p, d in zip(positional, defaults) if p.arg not in ("self", "cls")]
+    return positional, [(k.arg, d is not None) for k, d in zip(a.kwonlyargs, a.kw_defaults)]
+
+
+def signature(thing):
+    positional, keyword = [], []
+    for p in inspect.signature(thing).parameters.values():
+        if p.name not in ("self", "cls"):
+            into = keyword if p.kind is p.KEYWORD_ONLY else positional
+            into.append((p.name, p.default is not p.empty))
+    return positional, keyword
+
+
+def block(name):
+    """What the stub of a class of parameters would look like, to be completed."""
+    _, keyword = signature(getattr(hyst, name))
+    head = ", ".join(f"{k}: float{' = ...' if d else ''}" for k, d in keyword)
+    properties = "".join(f"    @property\n    def {k}(self) -> float: ...\n" for k, _ in keyword)
+    return f"class {name}(Operator):\n    def __new__(cls, *, {head}) -> {name}: ...\n{properties}"
+
+
+def test_nothing_is_missing():
+    missing = sorted(COMPILED - CLASSES.keys() - FUNCTIONS.keys())
+    assert not missing, "add to _hyst.pyi:\n" + "\n".join(block(name) for name in missing)
+    assert not (CLASSES.keys() | FUNCTIONS.keys()) - COMPILED
+    assert COMPILED <= set(hyst.__all__)
+    assert (Path(hyst.__file__).parent / "py.typed").exists()
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+def test_functions(name):
+    assert arguments(FUNCTIONS[name]) == signature(getattr(hyst, name))
+
+
+@pytest.mark.parametrize("name", sorted(CLASSES))
+def test_classes(name):
+    real, stub = getattr(hyst, name), CLASSES[name]
+    assert [b.id for b in stub.bases] == [b.__name__ for b in real.__bases__ if b is not object]
+    said = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    public = {n for n in vars(real) if not n.startswith("_")}
+    assert {n for n in said if not n.startswith("_")} == public
+    for method, node in said.items():
+        if any(isinstance(d, ast.Name) and d.id == "property" for d in node.decorator_list):
+            assert inspect.isgetsetdescriptor(vars(real)[method])
+        elif method == "__new__":
+            assert arguments(node) == signature(real)
+        elif not method.startswith("__"):
+            assert arguments(node) == signature(getattr(real, method))
