@@ -62,14 +62,29 @@ case(
     "gpi", "Gpi", dict(gain=0.1, thresholds=R, weights=W, left=[0.9, -2.0], right=[1.1, 3.0]), SWING,
     lambda u: plays.generalised_prandtl_ishlinskii(u, 0.1, R, W, lambda u: 0.9 * u - 2.0, lambda u: 1.1 * u + 3.0),
 )  # fmt: skip
+case(
+    "gpi that saturates", "Gpi",
+    dict(gain=0.1, thresholds=R, weights=W, left=[90.0, 0.012, 0.1, -2.0], right=[95.0, 0.011, 0.0, 3.0]), SWING,
+    lambda u: plays.generalised_prandtl_ishlinskii(
+        u, 0.1, R, W, lambda u: 90 * np.tanh(0.012 * u + 0.1) - 2, lambda u: 95 * np.tanh(0.011 * u) + 3
+    ),
+)  # fmt: skip
 for label, t in [("23 °C", 23.0), ("39 °C", 39.0), ("moving temperature", TEMPERATURE)]:
     case(
         f"td-pi, {label}", "TdPi", plays.TD_PI, 2 * SWING,
         lambda u, t=t: plays.td_pi(u, t, **plays.TD_PI), surroundings=dict(temperature=t),
     )  # fmt: skip
 case(
-    "maxwell-slip", "MaxwellSlip", dict(yields=R, stiffnesses=W), SWING,
+    "maxwell-slip", "MaxwellSlip", dict(widths=R, gains=W, reading="elasto-slip"), SWING,
     lambda u: plays.maxwell_slip(u, R, W),
+)  # fmt: skip
+case(
+    "maxwell-slip as backlash", "MaxwellSlip", dict(widths=R, gains=W), SWING,
+    lambda u: plays.plays(u, R / 2) @ W,
+)  # fmt: skip
+case(
+    "viscous pi", "ViscousPi", dict(gain=0.1, thresholds=R, weights=W, seconds=3e-3, period=PERIOD), SWING,
+    lambda u: plays.viscous_prandtl_ishlinskii(u, 0.1, R, W, 3e-3, PERIOD), inverse={},
 )  # fmt: skip
 
 # --- Preisach
@@ -155,13 +170,47 @@ TD_EM_PERIOD = 2e-4
 for label, stop in [("plays", False), ("stops", True)]:
     case(
         f"td-em, {label}", "TdEm",
-        dict(linear.TD_EM, psi=list(linear.TD_EM_PSI), widths=linear.TD_EM_WIDTHS, slopes=linear.TD_EM_SLOPES,
-             stop=stop, period=TD_EM_PERIOD),
+        dict(linear.TD_EM, psi=list(reversed(linear.TD_EM_PSI)), widths=linear.TD_EM_WIDTHS, gains=linear.TD_EM_SLOPES,
+             reading="elasto-slip" if stop else "backlash", period=TD_EM_PERIOD),
         2 * SWING + 10,
         lambda u, stop=stop: linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
                                           **linear.TD_EM),
         surroundings=dict(temperature=33.0),
     )  # fmt: skip
+
+TD_EM_WARMING = np.repeat(np.linspace(23.0, 39.0, N // 20), 20)
+case(
+    "td-em, moving temperature", "TdEm",
+    dict(linear.TD_EM, psi=list(reversed(linear.TD_EM_PSI)), widths=linear.TD_EM_WIDTHS, gains=linear.TD_EM_SLOPES,
+         period=TD_EM_PERIOD),
+    2 * SWING,
+    lambda u: linear.td_em(u, TD_EM_WARMING, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, **linear.TD_EM),
+    surroundings=dict(temperature=TD_EM_WARMING),
+)  # fmt: skip
+
+# --- curves behind the hysteresis
+
+case(
+    "asymmetry", "Asymmetry", dict(thresholds=[4.0, 30.0, -3.0, -20.0], weights=[0.1, -0.05, 0.2, 0.1]), SWING,
+    lambda u: u + 0.1 * np.maximum(u - 4, 0) - 0.05 * np.maximum(u - 30, 0) + 0.2 * np.minimum(u + 3, 0)
+    + 0.1 * np.minimum(u + 20, 0), inverse={},
+)  # fmt: skip
+LOAD = 5.0 * np.cos(np.arange(N) * 7e-3)
+case(
+    "load", "Load", dict(per_newton=-0.02), SWING, lambda u: u - 0.02 * LOAD, surroundings=dict(load=LOAD), inverse={},
+)  # fmt: skip
+
+
+def soft_stop(u, low, high, knee):
+    w = knee * (high - low)
+    bend = np.clip(u, low + w, high - w)
+    return bend + w * np.tanh((u - bend) / w)
+
+
+case(
+    "saturation", "Saturation", dict(low=-70.0, high=90.0, knee=0.2), SWING, lambda u: soft_stop(u, -70.0, 90.0, 0.2),
+    inverse={},
+)  # fmt: skip
 
 # --- Bouc-Wen
 
@@ -182,12 +231,19 @@ case("bouc-wen oscillator", "BoucWenOscillator", dict(bouc_wen.OSCILLATOR, perio
 # --- fractional
 
 FRACTIONAL_PERIOD = 1e-4
-case("lfdm", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD, memory=N), 0.02 * SWING + 1.0,
-     lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, **fractional.LFDM))  # fmt: skip
-case("ifm", "Ifm", dict(fractional.IFM, period=FRACTIONAL_PERIOD, memory=N), 0.02 * SWING + 1.0,
-     lambda u: fractional.ifm(u, FRACTIONAL_PERIOD, **fractional.IFM))  # fmt: skip
-case("lfdm, short memory", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD, memory=200), 0.02 * SWING + 1.0,
-     lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, memory=200, **fractional.LFDM))  # fmt: skip
+# The sum of exponentials is right to 3e-7 of each weight.
+case("lfdm", "Lfdm", dict(fractional.LFDM, period=FRACTIONAL_PERIOD), 0.02 * SWING + 1.0,
+     lambda u: fractional.lfdm(u, FRACTIONAL_PERIOD, **fractional.LFDM), tolerance=1e-8, inverse={})  # fmt: skip
+case("ifm", "Ifm", dict(fractional.IFM, period=FRACTIONAL_PERIOD), 0.02 * SWING + 1.0,
+     lambda u: fractional.ifm(u, FRACTIONAL_PERIOD, **fractional.IFM), tolerance=1e-8, inverse={})  # fmt: skip
+for samples in (100, 1000):
+    case(f"lfdm, {samples} samples of memory", "Lfdm",
+         dict(fractional.LFDM, period=FRACTIONAL_PERIOD, memory=samples), 0.02 * SWING + 1.0,
+         lambda u, m=samples: fractional.lfdm(u, FRACTIONAL_PERIOD, memory=m, **fractional.LFDM),
+         inverse={})  # fmt: skip
+case("ifm, 1000 samples of memory", "Ifm", dict(fractional.IFM, period=FRACTIONAL_PERIOD, memory=1000),
+     0.02 * SWING + 1.0, lambda u: fractional.ifm(u, FRACTIONAL_PERIOD, memory=1000, **fractional.IFM),
+     inverse={})  # fmt: skip
 
 # --- activation functions
 

@@ -5,6 +5,7 @@
 //! stub `python/hyst/_hyst.pyi` and a line in `python/hyst/__init__.py`.
 
 mod arrays;
+mod either;
 mod errors;
 mod ident;
 mod inverse;

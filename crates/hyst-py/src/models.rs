@@ -17,7 +17,7 @@ use crate::model_macro::{Parameter, arguments, models, repr};
 use crate::operator::Operator;
 
 /// Plays that an operator holds.
-const PLAYS: usize = 64;
+pub(crate) const PLAYS: usize = 64;
 /// Nodes along one edge of a Preisach triangle.
 const NODES: usize = 65;
 /// Samples that a delay holds.

@@ -4,27 +4,34 @@ use std::sync::Arc;
 
 use hyst_core::{
     AsymmetryParams, Build, Curve, Error, Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams,
-    MaxwellSlipParams, PiParams, Sampling, SaturationParams, SlipReading, TdEmParams, TdPiParams, ViscousPiParams,
+    MaxwellSlipParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams, TdPiParams,
+    ViscousPiParams,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::Needs;
+use crate::either::Either;
 use crate::errors;
 use crate::inverse::{Inverted, closed, compensator};
 use crate::model_macro::{Parameter, arguments, models, repr};
+use crate::models::{DELAY, PLAYS, TAPS};
 use crate::operator::Operator;
 use crate::runner::Runner;
 
-/// Plays and elements that an operator holds.
-const PLAYS: usize = 64;
-/// Samples that a delay holds.
-const DELAY: usize = 8192;
-/// Taps that a preview filter holds.
-const TAPS: usize = 4095;
-
 /// All of a fractional model's memory, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;
+/// Samples that a short memory holds.
+const MEMORY: usize = 4096;
+type Short = ShortMemory<f64, MEMORY>;
+
+/// A length of memory that this build holds.
+fn cut(samples: usize) -> Result<usize, Error> {
+    match samples {
+        1..=MEMORY => Ok(samples),
+        _ => Err(Error::OutOfRange { name: "memory", must: "from 1 to 4096 samples, or None for all of it" }),
+    }
+}
 
 /// An envelope from its two or four numbers.
 fn curve(name: &'static str, numbers: &[f64]) -> Result<Curve, Error> {
@@ -219,8 +226,8 @@ models! {
     },
     needs: [temperature],
 
-    /// Linear fractional-order differential model ``(1 + c·s^beta) X = (a + b·s^alpha) U``, all of its memory as a sum of 40
-    /// exponentials (to 3e-7).
+    /// Linear fractional-order differential model ``(1 + c·s^beta) X = (a + b·s^alpha) U``, all of its memory (to 3e-7) or a short
+    /// one.
     ///
     /// Closed-form inverse.
     class Lfdm {
@@ -238,15 +245,23 @@ models! {
         period: f64,
         /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
         order: usize = 1,
+        /// Samples of memory, at most 4096: the paper's short memory. All of it, as 40 exponentials, if not given.
+        memory: Option<usize> = None,
     }
-    stage: hyst_core::Lfdm<f64, FullMemory>,
-    build: |p| LfdmParams { a: p.a, b: p.b, c: p.c, alpha: p.alpha, beta: p.beta, order: order_of(p.order)? }
-        .build(&Sampling { period: p.period }),
+    stage: Either<hyst_core::Lfdm<f64, FullMemory>, hyst_core::Lfdm<f64, Short>>,
+    build: |p| {
+        let params = LfdmParams { a: p.a, b: p.b, c: p.c, alpha: p.alpha, beta: p.beta, order: order_of(p.order)? };
+        let cx = Sampling { period: p.period };
+        Ok(match p.memory {
+            None => Either::First(params.build(&cx)?),
+            Some(samples) => Either::Second(Build::<hyst_core::Lfdm<f64, Short>>::build(&params, &cx)?.cut(cut(samples)?)),
+        })
+    },
     inverse: closed,
     needs: [],
 
-    /// Improved fractional-order model ``X = delta·U + (a + b·s^alpha)/(1 + c·s^beta)·(e^(−tau·s) − 1)·U``, all of its memory as a
-    /// sum of 40 exponentials (to 3e-7).
+    /// Improved fractional-order model ``X = delta·U + (a + b·s^alpha)/(1 + c·s^beta)·(e^(−tau·s) − 1)·U``, all of its memory
+    /// (to 3e-7) or a short one.
     ///
     /// The inverse solves the recursion; it exists where the sampled model has no zero outside the unit circle.
     class Ifm {
@@ -268,18 +283,29 @@ models! {
         period: f64,
         /// Order of accuracy of the sampled derivatives: 1 (the paper's) or 2.
         order: usize = 1,
+        /// Samples of memory, at most 4096: the paper's short memory. All of it, as 40 exponentials, if not given.
+        memory: Option<usize> = None,
     }
-    stage: hyst_core::Ifm<f64, FullMemory, DELAY>,
-    build: |p| IfmParams {
-        a: p.a,
-        b: p.b,
-        c: p.c,
-        alpha: p.alpha,
-        beta: p.beta,
-        tau: p.tau,
-        delta: p.delta,
-        order: order_of(p.order)?,
-    }.build(&Sampling { period: p.period }),
+    stage: Either<hyst_core::Ifm<f64, FullMemory, DELAY>, hyst_core::Ifm<f64, Short, DELAY>>,
+    build: |p| {
+        let params = IfmParams {
+            a: p.a,
+            b: p.b,
+            c: p.c,
+            alpha: p.alpha,
+            beta: p.beta,
+            tau: p.tau,
+            delta: p.delta,
+            order: order_of(p.order)?,
+        };
+        let cx = Sampling { period: p.period };
+        Ok(match p.memory {
+            None => Either::First(params.build(&cx)?),
+            Some(samples) => {
+                Either::Second(Build::<hyst_core::Ifm<f64, Short, DELAY>>::build(&params, &cx)?.cut(cut(samples)?))
+            }
+        })
+    },
     inverse: closed,
     needs: [],
 
@@ -305,7 +331,7 @@ models! {
     }
     stage: hyst_core::Load<f64>,
     build: |p| LoadParams { per_newton: p.per_newton }.build(&()),
-    inverse: |p, _, options| compensator::<3, 1>(1.0, options, |chain, _| {
+    inverse: |p, _, options| compensator(1.0, options, |chain, _| {
         chain.with_load(&LoadParams { per_newton: p.per_newton })
     }),
     needs: [load],

@@ -69,3 +69,21 @@ def td_pi_as_printed(u, temperature, *, alpha, epsilon, tau, eta, a0, a1, b0, b1
 def maxwell_slip(u, yields, stiffnesses):
     """``sum k_i stop_i(u)``; element i slips at the deflection ``yields[i]``."""
     return stops(u, yields) @ np.asarray(stiffnesses, dtype=float)
+
+
+def viscous_prandtl_ishlinskii(u, gain, thresholds, weights, drag, period):
+    """``drag p' = dead(u - p, r)`` by the backward Euler rule, each sample's equation solved as it stands:
+    ``p_k - p_{k-1} = (period / drag) dead(u_k - p_k, r)``."""
+    r, p = np.asarray(thresholds, dtype=float), np.zeros(len(thresholds))
+    y = np.empty(len(u))
+    for k, now in enumerate(u):
+        if k == 0:
+            p = np.clip(p, now - r, now + r)
+        else:
+            # Above, below or inside the band: the right side is linear in each case.
+            ratio = period / drag
+            above = (p + ratio * (now - r)) / (1 + ratio)
+            below = (p + ratio * (now + r)) / (1 + ratio)
+            p = np.where(now - r > p, above, np.where(now + r < p, below, p))
+        y[k] = gain * now + p @ np.asarray(weights, dtype=float)
+    return y

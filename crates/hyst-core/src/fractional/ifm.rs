@@ -1,7 +1,7 @@
 //! The improved fractional-order model: a fractional equation for the hysteresis, driven by what a short delay leaves
 //! of the input.
 
-use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, zeros};
+use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory, zeros};
 use crate::chain::{Delay, DelayParams, DelayState};
 use crate::error::{finite, within};
 use crate::stage::hold;
@@ -124,6 +124,13 @@ impl<T: Real, W: Memory<T>, const D: usize> Ifm<T, W, D> {
     /// How much of a step of the input is in the output at once \[y/u\].
     fn at_once(&self) -> T {
         self.delta - self.hysteresis.at_once() * (T::ONE - self.delay.at_once())
+    }
+}
+
+impl<T: Real, const M: usize, const D: usize> Ifm<T, ShortMemory<T, M>, D> {
+    /// The model with its memory cut after `samples`, if it is longer: a length that is known at run time only.
+    pub fn cut(self, samples: usize) -> Self {
+        Self { hysteresis: self.hysteresis.cut(samples), ..self }
     }
 }
 

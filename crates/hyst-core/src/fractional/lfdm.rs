@@ -1,6 +1,6 @@
 //! The linear fractional-order differential model, `X + c s^β X = a U + b s^α U`.
 
-use super::{GlOrder, Memory};
+use super::{GlOrder, Memory, ShortMemory};
 use crate::error::{finite, within};
 use crate::stage::hold;
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
@@ -164,6 +164,15 @@ impl<T: Real, W: Memory<T>> Lfdm<T, W> {
     fn rise(&self, s: &LfdmState<T, W::State>, u: T) -> T {
         let driven = self.input.sum(u, s.u, s.held.0);
         (driven - self.output.sum(s.x, s.x, s.held.1)) * self.scale
+    }
+}
+
+impl<T: Real, const M: usize> Lfdm<T, ShortMemory<T, M>> {
+    /// The model with its memory cut after `samples`, if it is longer: a length that is known at run time only.
+    pub fn cut(mut self, samples: usize) -> Self {
+        self.input.memory = self.input.memory.cut(samples);
+        self.output.memory = self.output.memory.cut(samples);
+        self
     }
 }
 

@@ -153,9 +153,33 @@ impl<T: Real, const M: usize> Memory<T> for ShortMemory<T, M> {
     }
 }
 
+impl<T: Real, const M: usize> ShortMemory<T, M> {
+    /// The same memory cut after `samples`, if it is longer.
+    pub fn cut(mut self, samples: usize) -> Self {
+        for w in self.weights.iter_mut().skip(samples).rev() {
+            self.rest += *w;
+            *w = T::ZERO;
+        }
+        self
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_longer_memory_can_be_cut() {
+        let (mut long, mut short) = ([0.0; 60], [0.0; 60]);
+        let cut = ShortMemory::<f64, 40>::new(0.37, GlOrder::First).unwrap().cut(7);
+        let made = ShortMemory::<f64, 7>::new(0.37, GlOrder::First).unwrap();
+        let (mut a, mut b) = (cut.state(), made.state());
+        for (k, (x, y)) in long.iter_mut().zip(&mut short).enumerate() {
+            let g = libm::sin(0.3 * k as f64);
+            (*x, *y) = (cut.advance(&mut a, g), made.advance(&mut b, g));
+            assert!((*x - *y).abs() < 1e-14);
+        }
+    }
 
     #[test]
     fn the_cut_sum_is_eq_12() {

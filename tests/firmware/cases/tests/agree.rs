@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::{env, fs};
 
 /// Bytes of stack that one step may use, the call included.
-const STEP_STACK: usize = 1024;
+const STEP_STACK: usize = 2048;
 
 /// Bytes of stack that building coefficients and resetting may use: several copies of the largest coefficients, since a
 /// `Result` is returned by value.
