@@ -6,8 +6,12 @@
 
 mod everett;
 mod operator;
+mod params;
 mod reversals;
+mod surface;
 
 pub use everett::{Cell, Everett, Grid};
 pub use operator::{EverettInverse, PreisachState};
+pub use params::{PreisachParams, preisach_cell};
 pub use reversals::Reversals;
+pub use surface::{SurfaceRule, Violation, surface_violations};

@@ -154,7 +154,7 @@ pub type OperatorInverse = AnyOperator<Pi<f64, PLAYS>, EverettInverse<f64, NODES
 #[derive(Clone, Debug)]
 pub struct OperatorState {
     pi: PiState<f64, PLAYS>,
-    preisach: PreisachState<f64>,
+    preisach: PreisachState<f64, NODES>,
 }
 
 impl OperatorState {
@@ -166,7 +166,7 @@ impl OperatorState {
 impl<P, E> Stage<f64> for AnyOperator<P, E>
 where
     P: Stage<f64, State = PiState<f64, PLAYS>>,
-    E: Stage<f64, State = PreisachState<f64>>,
+    E: Stage<f64, State = PreisachState<f64, NODES>>,
 {
     type State = OperatorState;
     fn state(&self) -> OperatorState {
