@@ -159,6 +159,12 @@ impl<T: Real, const N: usize> Everett<T, N> {
         self.low + self.width * T::from_f64(i as f64)
     }
 
+    /// Highest input of the grid \[V\].
+    #[inline]
+    pub(super) fn high(&self) -> T {
+        self.at(self.cells)
+    }
+
     /// Where `u` lies on the grid; inputs outside lie on its edge.
     #[inline]
     pub fn locate(&self, u: T) -> Cell<T> {
@@ -171,7 +177,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// What lies outside the grid: `u` minus the nearest input on it \[V\].
     #[inline]
     fn beyond(&self, u: T) -> T {
-        let high = self.at(self.cells);
+        let high = self.high();
         if u > high {
             u - high
         } else if u < self.low {

@@ -5,12 +5,14 @@
 //! `operator.rs` the operator and its inverse.
 
 mod everett;
+mod inverse_surface;
 mod operator;
 mod params;
 mod reversals;
 mod surface;
 
 pub use everett::{Cell, Everett, Grid};
+pub use inverse_surface::InverseSurface;
 pub use operator::{EverettInverse, PreisachState};
 pub use params::{PreisachParams, preisach_cell};
 pub use reversals::Reversals;

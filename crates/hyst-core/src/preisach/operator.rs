@@ -17,6 +17,11 @@ impl<T: Real, const N: usize> PreisachState<T, N> {
         Self { memory: Reversals::new(T::ZERO, T::ZERO), zero: T::ZERO }
     }
 
+    /// Every relay down, the input at the low end of the map.
+    pub(super) fn at_low_end(map: &Everett<T, N>) -> Self {
+        Self { memory: Reversals::new(map.low, T::ZERO), zero: T::ZERO }
+    }
+
     /// The reversal stack.
     pub fn memory(&self) -> &Reversals<T, N> {
         &self.memory
@@ -33,9 +38,8 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// Virgin memory at the rest input: relays with their centre below it are up. Seen from the low
     /// end that is a spiral of reversals, one node further in each time.
     fn virgin_memory(&self, s: &mut PreisachState<T, N>) {
-        s.memory = Reversals::new(self.low, T::ZERO);
-        s.zero = T::ZERO;
-        let mut reach = (self.at(self.cells()) - self.rest).at_most(self.rest - self.low);
+        *s = PreisachState::at_low_end(self);
+        let mut reach = (self.high() - self.rest).at_most(self.rest - self.low);
         let middle = self.rest;
         // `reach` falls by a cell each turn, so this ends after at most `cells` turns.
         for _ in 0..self.cells() {
@@ -54,7 +58,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
     fn reach(&self, s: &PreisachState<T, N>) -> (T, T) {
         let (mut down, mut up) = (s.memory.clone(), s.memory.clone());
         let low = down.advance(self.low, |m, u| self.output(m, u));
-        let high = up.advance(self.at(self.cells()), |m, u| self.output(m, u));
+        let high = up.advance(self.high(), |m, u| self.output(m, u));
         (low - s.zero, high - s.zero)
     }
 }
@@ -119,7 +123,7 @@ impl<T: Real, const N: usize> EverettInverse<T, N> {
         let at = |u: T| f.output(memory, u);
         let last = f.cells();
         // Edges first: outside the grid the branch goes on with a constant slope.
-        let (lowest, highest) = (f.low, f.at(last));
+        let (lowest, highest) = (f.low, f.high());
         if memory.now() > highest || up {
             let top = at(highest);
             if top <= y {
