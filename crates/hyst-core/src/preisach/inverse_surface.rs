@@ -12,7 +12,7 @@ use crate::{Env, Error, Invert, Real, Stage};
 /// Minor loops of a Preisach operator between two inputs are congruent, but those between two outputs are not, so its
 /// inverse is no Preisach operator. At the nodes of the table the inverse surface is exact on the first rise and on the
 /// descents that define it; inside the major loop it errs. What the output then misses on random minor loops, as RMSE
-/// of the span: 0.9 % with relays gathered about one point of the triangle, 1.8 % with a density that grows e³-fold along
+/// of the span: 0.9 % with relays gathered about one point of the triangle, 1.8 % with a density that grows e⁶-fold along
 /// the diagonal; only what 50 cells cannot resolve, 0.02 %, where the density depends on α − β alone, for then the
 /// operator is a Prandtl-Ishlinskii one and so is its inverse. [`EverettInverse`](super::EverettInverse) is exact; this
 /// one is for comparison.
@@ -69,6 +69,10 @@ impl<T: Real, const N: usize> InverseSurface<T, N> {
     /// The Everett map over outputs \[input unit over output unit\].
     pub fn map(&self) -> &Everett<T, N> {
         &self.map
+    }
+
+    pub(super) fn into_map(self) -> Everett<T, N> {
+        self.map
     }
 
     /// The input at rest \[input unit\].
@@ -168,7 +172,7 @@ mod tests {
                 (seed >> 11) as f64 / (1u64 << 53) as f64
             };
             let turns: Vec<f64> = (0..400).map(|_| span * (0.1 + 0.8 * random())).collect();
-            let mut run = |inverse: &dyn Fn(f64) -> f64, f: &mut PreisachState<f64, 51>| {
+            let run = |inverse: &dyn Fn(f64) -> f64, f: &mut PreisachState<f64, 51>| {
                 let (mut sum, mut worst, mut n) = (0.0, 0.0f64, 0.0);
                 for w in turns.windows(2) {
                     for k in 1..=20 {

@@ -88,10 +88,9 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         self.note.as_flattened().get(k).copied()
     }
 
-    /// Makes the present input a reversal. Returns the place of the first of the two reversals that were forgotten for
-    /// it, if any were.
-    pub(crate) fn push(&mut self, note: K) -> Option<usize> {
-        let forgotten = if self.len == 2 * N { Some(self.forget()) } else { None };
+    /// Makes the present input a reversal, if there is room.
+    #[inline]
+    pub(crate) fn push(&mut self, note: K) {
         let slots = (
             self.at.as_flattened_mut().get_mut(self.len),
             self.output.as_flattened_mut().get_mut(self.len),
@@ -101,7 +100,6 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
             (*u, *y, *k) = (self.now, self.output_now, note);
             self.len += 1;
         }
-        forgotten
     }
 
     /// Keeps the outermost `len` reversals.
@@ -116,10 +114,15 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
         (self.now, self.output_now) = (u, y);
     }
 
-    /// Forgets the pair (k, k + 1) with the smallest rectangle of relays between it and its neighbours of the same kind,
-    /// k − 1 and k + 2; the present input is the neighbour of the last pair. The outermost reversal stays: beyond it
-    /// lies no neighbour, and its relays reach to the low end.
-    fn forget(&mut self) -> usize {
+    /// If there is no room for one more, the k whose pair (k, k + 1) has the smallest rectangle of relays between it and its
+    /// neighbours of the same kind, k − 1 and k + 2; the present input is the neighbour of the last pair. The outermost
+    /// reversal stays: beyond it lies no neighbour, and its relays reach to the low end.
+    #[inline]
+    pub(crate) fn crowded(&self) -> Option<usize> {
+        if self.len < 2 * N { None } else { Some(self.smallest()) }
+    }
+
+    fn smallest(&self) -> usize {
         let at = self.in_force();
         let area = |a: T, b: T, c: T, d: T| (c - a).abs() * (d - b).abs();
         let mut first = self.len.saturating_sub(2);
@@ -135,19 +138,38 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
                 }
             }
         }
-        remove_two(self.at.as_flattened_mut(), first);
-        remove_two(self.output.as_flattened_mut(), first);
-        remove_two(self.note.as_flattened_mut(), first);
-        self.len = self.len.saturating_sub(2);
         first
+    }
+
+    /// Forgets reversals `k` and `k + 1`.
+    pub(crate) fn remove(&mut self, k: usize) {
+        remove_two(self.at.as_flattened_mut(), k);
+        remove_two(self.output.as_flattened_mut(), k);
+        remove_two(self.note.as_flattened_mut(), k);
+        self.len = self.len.saturating_sub(2);
+    }
+
+    /// Outputs and notes of the reversals from `k` on.
+    pub(crate) fn from_mut(&mut self, k: usize) -> impl Iterator<Item = (&mut T, &mut K)> {
+        let (outputs, notes) = (self.output.as_flattened_mut(), self.note.as_flattened_mut());
+        outputs.iter_mut().zip(notes).take(self.len).skip(k)
     }
 }
 
 impl<T: Real, const N: usize> Reversals<T, N> {
+    /// The same reversals, with room for a note at each.
+    pub(crate) fn noted<K: Copy + Default>(self) -> Reversals<T, N, K> {
+        let Self { at, output, len, now, output_now, .. } = self;
+        Reversals { at, output, note: [[K::default(); 2]; N], len, now, output_now }
+    }
+
     /// Begins the branch that leads towards `up` (or down), if the input is not on it yet.
     #[inline]
     pub(crate) fn turn(&mut self, up: bool) {
         if self.rising() != up {
+            if let Some(k) = self.crowded() {
+                self.remove(k);
+            }
             self.push(());
         }
     }
