@@ -24,6 +24,17 @@ pub enum Error {
         /// How many the type holds.
         holds: usize,
     },
+    /// A node of a table over (α, β) breaks a rule.
+    Node {
+        /// The table.
+        name: &'static str,
+        /// Place of the node along α.
+        alpha: usize,
+        /// Place of the node along β.
+        beta: usize,
+        /// The rule, in words.
+        must: &'static str,
+    },
     /// Two lists that belong together differ in length.
     Lengths(&'static str),
     /// The operator has no inverse.
@@ -38,6 +49,7 @@ impl fmt::Display for Error {
             Self::Capacity { name, needed, holds } => {
                 write!(f, "{name}: {needed} needed, but this type holds {holds}")
             }
+            Self::Node { name, alpha, beta, must } => write!(f, "{name}: node (α {alpha}, β {beta}) must {must}"),
             Self::Lengths(name) => write!(f, "{name} differ in length"),
             Self::NotInvertible(why) => write!(f, "no inverse: {why}"),
         }

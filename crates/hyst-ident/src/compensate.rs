@@ -207,7 +207,11 @@ impl Follower {
 /// of full drive.
 fn reach(model: &Model) -> Result<(f64, f64), hyst_core::Error> {
     // Rest and full drive, settled: the sample period does not matter there.
-    let operator = Operator::new(&model.base, &Sampling { period: 1.0 / model.recorded_at_hz })?;
+    let operator = Operator::new(
+        &model.base,
+        [model.input.low, model.input.high],
+        &Sampling { period: 1.0 / model.recorded_at_hz },
+    )?;
     let (mut state, env) = (operator.state(), Env::default());
     let rest = model.zero + operator.reset(&mut state, &env, model.input.low);
     let full = model.zero + operator.reset(&mut state, &env, model.input.high);

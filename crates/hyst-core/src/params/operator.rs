@@ -2,7 +2,7 @@
 
 use super::Kind;
 use crate::{
-    GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams,
+    DpmParams, GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams,
     TdPiParams, ViscousPiParams,
 };
 
@@ -30,6 +30,8 @@ pub enum OperatorParams<L> {
     Lfdm(LfdmParams),
     /// Improved fractional-order model.
     Ifm(IfmParams),
+    /// Dynamic Preisach.
+    Dpm(DpmParams<L>),
 }
 
 impl<L> OperatorParams<L> {
@@ -44,6 +46,7 @@ impl<L> OperatorParams<L> {
             Self::Preisach(_) => Kind::Preisach,
             Self::Lfdm(_) => Kind::Lfdm,
             Self::Ifm(_) => Kind::Ifm,
+            Self::Dpm(_) => Kind::Dpm,
         }
     }
 }
@@ -60,6 +63,7 @@ impl<L: AsMut<[f64]>> Params for OperatorParams<L> {
             Self::Preisach(p) => p.visit(f),
             Self::Lfdm(p) => p.visit(f),
             Self::Ifm(p) => p.visit(f),
+            Self::Dpm(p) => p.visit(f),
         }
     }
 }

@@ -35,9 +35,9 @@ pub struct Cell<T> {
 /// reversible slope of the outermost diagonal cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Everett<T, const N: usize> {
-    pub(super) nodes: [[T; N]; N],
-    pub(super) first: [T; N],
-    pub(super) cells: usize,
+    nodes: [[T; N]; N],
+    first: [T; N],
+    cells: usize,
     pub(super) low: T,
     pub(super) width: T,
     per_width: T,
@@ -50,14 +50,44 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// the grid. `rest` is the input at which the virgin memory was left \[V\]: relays that straddle
     /// it with their centre below are up.
     ///
+    /// A single density may be negative (noise of an identification) as long as the surface still rises with α and
+    /// falls with β, so that no branch runs backwards.
+    ///
     /// # Errors
-    /// If the grid is empty, larger than `N − 1` cells, or a density is negative or not finite.
+    /// If the grid is empty or larger than `N − 1` cells, a density is not finite, or the surface or the virgin curve
+    /// runs backwards somewhere: [`Error::Node`] says where.
     pub fn new(
         grid: Grid,
         rest: f64,
         mut density: impl FnMut(usize, usize) -> f64,
         mut once: impl FnMut(usize) -> f64,
     ) -> Result<Self, Error> {
+        // E(i, j) = E(i−1, j) + Σ_{b=j}^{i−1} density(i−1, b): one more row of cells.
+        let (mut row, mut above_low) = (0.0, 0.0);
+        Self::from_nodes(
+            grid,
+            rest,
+            |i, j, below| {
+                row = density(i - 1, j) + if j + 1 == i { 0.0 } else { row };
+                below + row
+            },
+            |i, edge| {
+                above_low += once(i - 1);
+                edge + above_low
+            },
+        )
+    }
+
+    /// The map with `surface(i, j, E(i−1, j))` at node (i, j), visited row by row and within a row from the diagonal on,
+    /// and the virgin curve `virgin(i, E(i, 0))`. Checks that both rise.
+    pub(super) fn from_nodes(
+        grid: Grid,
+        rest: f64,
+        mut surface: impl FnMut(usize, usize, f64) -> f64,
+        mut virgin: impl FnMut(usize, f64) -> f64,
+    ) -> Result<Self, Error> {
+        const SURFACE: &str = "preisach surface";
+        const VIRGIN: &str = "preisach virgin curve";
         let Grid { low, high, cells } = grid;
         finite("preisach.low", low)?;
         within("preisach.high", high, high > low, "above preisach.low")?;
@@ -78,29 +108,34 @@ impl<T: Real, const N: usize> Everett<T, N> {
             per_width: T::from_f64(1.0 / width),
             rest: T::from_f64(rest),
         };
-        let check = |d: f64| within("preisach density", d, d >= 0.0, "zero or positive");
-        // E(i, j) = E(i−1, j) + Σ_{b=j}^{i−1} density(i−1, b): one more row of cells.
-        let mut above_low = 0.0;
-        for i in 1..=cells {
-            let mut row = 0.0;
-            for j in (0..i).rev() {
-                row += check(density(i - 1, j))?;
-                let below = map.node(i - 1, j).to_f64();
-                map.set(i, j, below + row);
+        // The row before in f64, whatever T is: nodes are sums of many cells.
+        let (mut last, mut last_first) = ([0.0; N], 0.0);
+        let rows = map.nodes.iter_mut().zip(&mut map.first).enumerate().skip(1).take(cells);
+        for (i, (row, first)) in rows {
+            let (mut right, mut edge) = (0.0, 0.0);
+            for (j, (slot, below)) in row.iter_mut().zip(&mut last).enumerate().take(i).rev() {
+                let e = surface(i, j, *below);
+                let wrong = |must| Err(Error::Node { name: SURFACE, alpha: i, beta: j, must });
+                if !e.is_finite() {
+                    return wrong("be a finite number");
+                }
+                if e < *below {
+                    return wrong("not lie below the node before it in alpha");
+                }
+                if e < right {
+                    return wrong("not lie below the node after it in beta");
+                }
+                (*slot, *below) = (T::from_f64(e), e);
+                (right, edge) = (e, e);
             }
-            above_low += check(once(i - 1))?;
-            let e = map.node(i, 0).to_f64() + above_low;
-            if let Some(f) = map.first.get_mut(i) {
-                *f = T::from_f64(e);
+            let e = virgin(i, edge);
+            if !e.is_finite() || e < last_first {
+                let must = if e.is_finite() { "not lie below the node before it" } else { "be a finite number" };
+                return Err(Error::Node { name: VIRGIN, alpha: i, beta: 0, must });
             }
+            (*first, last_first) = (T::from_f64(e), e);
         }
         Ok(map)
-    }
-
-    fn set(&mut self, i: usize, j: usize, value: f64) {
-        if let Some(slot) = self.nodes.get_mut(i).and_then(|row| row.get_mut(j)) {
-            *slot = T::from_f64(value);
-        }
     }
 
     #[inline]
@@ -109,7 +144,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
     }
 
     #[inline]
-    pub(super) fn first_node(&self, i: usize) -> T {
+    fn first_node(&self, i: usize) -> T {
         self.first.get(i).copied().unwrap_or(T::ZERO)
     }
 
@@ -118,10 +153,16 @@ impl<T: Real, const N: usize> Everett<T, N> {
         self.cells
     }
 
-    /// Voltage of node `i` \[V\].
+    /// Input at node `i` \[V\].
     #[inline]
     pub(super) fn at(&self, i: usize) -> T {
         self.low + self.width * T::from_f64(i as f64)
+    }
+
+    /// Highest input of the grid \[V\].
+    #[inline]
+    pub(super) fn high(&self) -> T {
+        self.at(self.cells)
     }
 
     /// Where `u` lies on the grid; inputs outside lie on its edge.
@@ -136,7 +177,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
     /// What lies outside the grid: `u` minus the nearest input on it \[V\].
     #[inline]
     fn beyond(&self, u: T) -> T {
-        let high = self.at(self.cells);
+        let high = self.high();
         if u > high {
             u - high
         } else if u < self.low {
@@ -187,5 +228,60 @@ impl<T: Real, const N: usize> Everett<T, N> {
         let d = self.beyond(u);
         let edge = if d > T::ZERO { self.cells - 1 } else { 0 };
         d * self.reversible(edge)
+    }
+
+    /// The output at `u` on the branch that began `from` (input, output), or on the virgin curve.
+    #[inline]
+    pub(super) fn on_branch(&self, from: Option<(T, T)>, rising: bool, u: T) -> T {
+        match (from, rising) {
+            (None, _) => self.virgin(u),
+            (Some((from, y)), true) => y + self.value(u, from),
+            (Some((from, y)), false) => y - self.value(from, u),
+        }
+    }
+
+    /// Least slope of any branch on the grid, and the least ratio of a branch's slope to a slope earlier on the same
+    /// branch (1 if every branch only gets steeper, as those of piezoceramics nearly do).
+    ///
+    /// A branch that begins inside a cell has slopes between those of its two nodes, so nodes tell both.
+    pub(super) fn slopes(&self) -> (T, T) {
+        let mut all = Slopes { least: self.first_node(1), ratio: T::ONE, steepest: T::ZERO };
+        for i in 0..self.cells {
+            all.next(self.first_node(i + 1) - self.first_node(i));
+        }
+        for k in 0..=self.cells {
+            // From node k upwards, after what is left of the diagonal cell below it, and the same downwards.
+            all.begin(if k > 0 { self.node(k, k - 1) } else { T::ZERO });
+            for i in k..self.cells {
+                all.next(self.node(i + 1, k) - self.node(i, k));
+            }
+            all.begin(if k < self.cells { self.node(k + 1, k) } else { T::ZERO });
+            for j in (0..k).rev() {
+                all.next(self.node(k, j) - self.node(k, j + 1));
+            }
+        }
+        (all.least * self.per_width, all.ratio)
+    }
+}
+
+/// Rises of branches from node to node.
+struct Slopes<T> {
+    least: T,
+    ratio: T,
+    steepest: T,
+}
+
+impl<T: Real> Slopes<T> {
+    fn begin(&mut self, first: T) {
+        self.steepest = first;
+    }
+
+    fn next(&mut self, rise: T) {
+        self.least = self.least.at_most(rise);
+        self.steepest = self.steepest.at_least(rise);
+        // A branch that is flat all along has no ratio; `least` tells.
+        if self.steepest > T::ZERO {
+            self.ratio = self.ratio.at_most(rise / self.steepest);
+        }
     }
 }

@@ -4,12 +4,20 @@
 //! dominating reversals (Mayergoyz 2003). `reversals.rs` is that stack, `everett.rs` the map,
 //! `operator.rs` the operator and its inverse.
 
+mod dpm;
 mod everett;
+mod inverse_surface;
+mod mirror;
 mod operator;
 mod params;
 mod reversals;
+mod surface;
 
+pub use dpm::{Dpm, DpmParams, DpmState, DpmSurfaceInverse};
 pub use everett::{Cell, Everett, Grid};
+pub use inverse_surface::InverseSurface;
+pub use mirror::{Mirror, MirrorParams};
 pub use operator::{EverettInverse, PreisachState};
-pub use params::{PreisachParams, cell_index};
+pub use params::{PreisachParams, preisach_cell};
 pub use reversals::Reversals;
+pub use surface::{SurfaceRule, Violation, surface_violations};

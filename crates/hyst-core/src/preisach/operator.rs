@@ -3,71 +3,68 @@
 use super::{Everett, Reversals};
 use crate::{Env, Error, Invert, Real, Stage};
 
-/// Reversals that one operator keeps. Virgin memory in the middle of a grid needs two per cell.
-const DEPTH: usize = 128;
-
 /// History of a Preisach operator: the dominating reversals.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PreisachState<T> {
-    memory: Reversals<T, DEPTH>,
+pub struct PreisachState<T, const N: usize> {
+    pub(super) memory: Reversals<T, N>,
     /// The output at rest is zero by definition; this is what the map says it is.
-    zero: T,
+    pub(super) zero: T,
 }
 
-impl<T: Real> PreisachState<T> {
+impl<T: Real, const N: usize> PreisachState<T, N> {
     /// A memory that was never reset.
     pub fn empty() -> Self {
         Self { memory: Reversals::new(T::ZERO, T::ZERO), zero: T::ZERO }
     }
 
+    /// Every relay down, the input at the low end of the map.
+    pub(super) fn at_low_end(map: &Everett<T, N>) -> Self {
+        Self { memory: Reversals::new(map.low, T::ZERO), zero: T::ZERO }
+    }
+
     /// The reversal stack.
-    pub fn memory(&self) -> &Reversals<T, DEPTH> {
+    pub fn memory(&self) -> &Reversals<T, N> {
         &self.memory
     }
 }
 
 impl<T: Real, const N: usize> Everett<T, N> {
-    /// Output at `u` on the branch that the memory is on.
+    /// The output at `u` on the branch that the memory is on.
     #[inline]
-    fn on_branch<const M: usize>(&self, memory: &Reversals<T, M>, u: T) -> T {
-        match (memory.branch(), memory.rising()) {
-            (None, _) => self.virgin(u),
-            (Some((from, y)), true) => y + self.value(u, from),
-            (Some((from, y)), false) => y - self.value(from, u),
-        }
+    fn output(&self, memory: &Reversals<T, N>, u: T) -> T {
+        self.on_branch(memory.branch(), memory.rising(), u)
     }
 
     /// Virgin memory at the rest input: relays with their centre below it are up. Seen from the low
     /// end that is a spiral of reversals, one node further in each time.
-    fn virgin_memory(&self, s: &mut PreisachState<T>) {
-        s.memory = Reversals::new(self.low, T::ZERO);
-        s.zero = T::ZERO;
-        let mut reach = (self.at(self.cells) - self.rest).at_most(self.rest - self.low);
+    fn virgin_memory(&self, s: &mut PreisachState<T, N>) {
+        *s = PreisachState::at_low_end(self);
+        let mut reach = (self.high() - self.rest).at_most(self.rest - self.low);
         let middle = self.rest;
         // `reach` falls by a cell each turn, so this ends after at most `cells` turns.
-        for _ in 0..self.cells {
+        for _ in 0..self.cells() {
             if reach <= T::ZERO {
                 break;
             }
-            s.memory.advance(middle + reach, |m, u| self.on_branch(m, u));
-            s.memory.advance(middle - reach, |m, u| self.on_branch(m, u));
+            s.memory.advance(middle + reach, |m, u| self.output(m, u));
+            s.memory.advance(middle - reach, |m, u| self.output(m, u));
             reach -= self.width;
         }
-        s.memory.advance(middle, |m, u| self.on_branch(m, u));
+        s.memory.advance(middle, |m, u| self.output(m, u));
         s.zero = s.memory.output();
     }
 
     /// Output that the operator would have at its lowest and highest grid input, given the memory.
-    fn reach(&self, s: &PreisachState<T>) -> (T, T) {
+    fn reach(&self, s: &PreisachState<T, N>) -> (T, T) {
         let (mut down, mut up) = (s.memory.clone(), s.memory.clone());
-        let low = down.advance(self.low, |m, u| self.on_branch(m, u));
-        let high = up.advance(self.at(self.cells), |m, u| self.on_branch(m, u));
+        let low = down.advance(self.low, |m, u| self.output(m, u));
+        let high = up.advance(self.high(), |m, u| self.output(m, u));
         (low - s.zero, high - s.zero)
     }
 }
 
 impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
-    type State = PreisachState<T>;
+    type State = PreisachState<T, N>;
 
     fn state(&self) -> Self::State {
         PreisachState::empty()
@@ -80,13 +77,13 @@ impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
-        s.memory.advance(u, |m, u| self.on_branch(m, u)) - s.zero
+        s.memory.advance(u, |m, u| self.output(m, u)) - s.zero
     }
 }
 
 /// The exact inverse of a Preisach operator.
 ///
-/// The map rises strictly in the input on every branch, so the input that reaches an output is
+/// The map rises strictly in the input on every branch (densities may be negative where it does), so the input that reaches an output is
 /// unique: loops whose closing output is passed are wiped out, then the branch is searched by
 /// bisection over its grid nodes and solved linearly inside one cell. Outputs that the grid cannot
 /// reach are sought on the linear continuation outside it.
@@ -98,12 +95,16 @@ pub struct EverettInverse<T, const N: usize> {
 impl<T: Real, const N: usize> Invert<T> for Everett<T, N> {
     type Inverse = EverettInverse<T, N>;
 
-    /// Needs a positive reversible slope in every diagonal cell: then every branch rises strictly.
+    /// Needs a surface and a virgin curve that rise strictly from node to node: then every branch does. Where no
+    /// density is negative, a reversible slope in every diagonal cell is enough.
     fn invert(&self) -> Result<Self::Inverse, Error> {
-        if (0..self.cells).all(|i| self.reversible(i) > T::ZERO) {
+        if !(0..self.cells()).all(|i| self.reversible(i) > T::ZERO) {
+            return Err(Error::NotInvertible("a diagonal cell of the Preisach triangle has no reversible slope"));
+        }
+        if self.slopes().0 > T::ZERO {
             Ok(EverettInverse { forward: self.clone() })
         } else {
-            Err(Error::NotInvertible("a diagonal cell of the Preisach triangle has no reversible slope"))
+            Err(Error::NotInvertible("a branch of the Everett surface is flat between two nodes"))
         }
     }
 }
@@ -111,18 +112,18 @@ impl<T: Real, const N: usize> Invert<T> for Everett<T, N> {
 impl<T: Real, const N: usize> EverettInverse<T, N> {
     /// Outputs at the lowest and the highest input of the grid, from the present memory
     /// \[output unit\].
-    pub fn reach(&self, s: &PreisachState<T>) -> (T, T) {
+    pub fn reach(&self, s: &PreisachState<T, N>) -> (T, T) {
         self.forward.reach(s)
     }
 
     /// The input on the present branch at which the output is `y`.
-    fn solve(&self, memory: &Reversals<T, DEPTH>, y: T) -> T {
+    fn solve(&self, memory: &Reversals<T, N>, y: T) -> T {
         let f = &self.forward;
         let up = memory.rising();
-        let at = |u: T| f.on_branch(memory, u);
-        let last = f.cells;
+        let at = |u: T| f.output(memory, u);
+        let last = f.cells();
         // Edges first: outside the grid the branch goes on with a constant slope.
-        let (lowest, highest) = (f.low, f.at(last));
+        let (lowest, highest) = (f.low, f.high());
         if memory.now() > highest || up {
             let top = at(highest);
             if top <= y {
@@ -154,7 +155,7 @@ impl<T: Real, const N: usize> EverettInverse<T, N> {
 }
 
 impl<T: Real, const N: usize> Stage<T> for EverettInverse<T, N> {
-    type State = PreisachState<T>;
+    type State = PreisachState<T, N>;
 
     fn state(&self) -> Self::State {
         self.forward.state()

@@ -4,87 +4,185 @@ use crate::Real;
 
 /// Nested reversals of the input, outermost first: maxima at even, minima at odd places.
 ///
-/// An input that passes a reversal wipes it out together with its partner. At most `M` reversals
-/// are kept. When one more is needed, the pair with the smallest swing is forgotten: the output
-/// then errs by at most the Everett value of that swing, until an outer reversal is passed.
+/// An input that passes a reversal wipes it out together with its partner. At most `N` pairs are kept, one for each node
+/// along an edge of the map. Virgin memory in the middle of a grid of `N − 1` cells takes a reversal per cell and always
+/// fits. When more are needed, the pair is forgotten whose relays fill the smallest rectangle of the (α, β) plane. As
+/// nested reversals share one span, that rectangle is at most a quarter of a cell: this is the largest share of relays that
+/// one forgotten pair puts in the wrong position, until an outer reversal is passed. `K` is what an operator notes at each
+/// reversal besides its output.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reversals<T, const M: usize> {
-    at: [T; M],
+pub struct Reversals<T, const N: usize, K = ()> {
+    at: [[T; 2]; N],
     /// What the operator's output was at each reversal.
-    output: [T; M],
+    output: [[T; 2]; N],
+    note: [[K; 2]; N],
     len: usize,
     now: T,
     output_now: T,
 }
 
-impl<T: Real, const M: usize> Reversals<T, M> {
+impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
     /// Virgin memory at input `u`, output `y`.
     pub fn new(u: T, y: T) -> Self {
-        Self { at: [T::ZERO; M], output: [T::ZERO; M], len: 0, now: u, output_now: y }
+        Self {
+            at: [[T::ZERO; 2]; N],
+            output: [[T::ZERO; 2]; N],
+            note: [[K::default(); 2]; N],
+            len: 0,
+            now: u,
+            output_now: y,
+        }
     }
 
     /// The reversals in force, outermost first.
     pub fn in_force(&self) -> &[T] {
-        self.at.get(..self.len).unwrap_or_default()
+        self.at.as_flattened().get(..self.len).unwrap_or_default()
+    }
+
+    /// How many reversals are in force.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        self.len
     }
 
     /// The last input.
+    #[inline]
     pub fn now(&self) -> T {
         self.now
     }
 
     /// The last output.
+    #[inline]
     pub fn output(&self) -> T {
         self.output_now
     }
 
     /// Whether the branch that the input is on is a rising one.
+    #[inline]
     pub fn rising(&self) -> bool {
         self.len.is_multiple_of(2)
     }
 
     /// Where the present branch began, and the output there; `None` on the virgin curve.
+    #[inline]
     pub fn branch(&self) -> Option<(T, T)> {
-        self.back(1)
+        self.reversal(self.len.checked_sub(1)?)
     }
 
     /// The reversal that the present branch closes on, and the output there; `None` if it ends at
     /// the edge of the range.
+    #[inline]
     pub(crate) fn target(&self) -> Option<(T, T)> {
-        self.back(2)
+        self.reversal(self.len.checked_sub(2)?)
     }
 
-    fn back(&self, k: usize) -> Option<(T, T)> {
-        let i = self.len.checked_sub(k)?;
-        Some((*self.at.get(i)?, *self.output.get(i)?))
+    /// Reversal `k` and the output there.
+    #[inline]
+    pub(crate) fn reversal(&self, k: usize) -> Option<(T, T)> {
+        Some((*self.at.as_flattened().get(k)?, *self.output.as_flattened().get(k)?))
     }
 
-    /// Begins the branch that leads towards `up` (or down), if the input is not on it yet.
-    pub(crate) fn turn(&mut self, up: bool) {
-        if self.rising() == up {
-            return;
-        }
-        if self.len == M {
-            self.forget_smallest();
-        }
-        if let (Some(u), Some(y)) = (self.at.get_mut(self.len), self.output.get_mut(self.len)) {
-            (*u, *y) = (self.now, self.output_now);
+    /// What was noted at reversal `k`.
+    #[inline]
+    pub(crate) fn note(&self, k: usize) -> Option<K> {
+        self.note.as_flattened().get(k).copied()
+    }
+
+    /// Makes the present input a reversal, if there is room.
+    #[inline]
+    pub(crate) fn push(&mut self, note: K) {
+        let slots = (
+            self.at.as_flattened_mut().get_mut(self.len),
+            self.output.as_flattened_mut().get_mut(self.len),
+            self.note.as_flattened_mut().get_mut(self.len),
+        );
+        if let (Some(u), Some(y), Some(k)) = slots {
+            (*u, *y, *k) = (self.now, self.output_now, note);
             self.len += 1;
         }
     }
 
-    /// Wipes out the innermost pair: the input has passed the branch's target.
-    pub(crate) fn wipe(&mut self) {
-        self.len = self.len.saturating_sub(2);
+    /// Keeps the outermost `len` reversals.
+    #[inline]
+    pub(crate) fn truncate(&mut self, len: usize) {
+        self.len = self.len.min(len);
     }
 
     /// Records where the input and the output are.
+    #[inline]
     pub(crate) fn set(&mut self, u: T, y: T) {
         (self.now, self.output_now) = (u, y);
     }
 
+    /// If there is no room for one more, the k whose pair (k, k + 1) has the smallest rectangle of relays between it and its
+    /// neighbours of the same kind, k − 1 and k + 2; the present input is the neighbour of the last pair. The outermost
+    /// reversal stays: beyond it lies no neighbour, and its relays reach to the low end.
+    #[inline]
+    pub(crate) fn crowded(&self) -> Option<usize> {
+        if self.len < 2 * N { None } else { Some(self.smallest()) }
+    }
+
+    fn smallest(&self) -> usize {
+        let at = self.in_force();
+        let area = |a: T, b: T, c: T, d: T| (c - a).abs() * (d - b).abs();
+        let mut first = self.len.saturating_sub(2);
+        let mut least = match at.last_chunk() {
+            Some([a, b, c]) => area(*a, *b, *c, self.now),
+            None => T::ZERO,
+        };
+        for (k, four) in at.windows(4).enumerate() {
+            if let [a, b, c, d] = four {
+                let area = area(*a, *b, *c, *d);
+                if area < least {
+                    (first, least) = (k + 1, area);
+                }
+            }
+        }
+        first
+    }
+
+    /// Forgets reversals `k` and `k + 1`.
+    pub(crate) fn remove(&mut self, k: usize) {
+        remove_two(self.at.as_flattened_mut(), k);
+        remove_two(self.output.as_flattened_mut(), k);
+        remove_two(self.note.as_flattened_mut(), k);
+        self.len = self.len.saturating_sub(2);
+    }
+
+    /// Outputs and notes of the reversals from `k` on.
+    pub(crate) fn from_mut(&mut self, k: usize) -> impl Iterator<Item = (&mut T, &mut K)> {
+        let (outputs, notes) = (self.output.as_flattened_mut(), self.note.as_flattened_mut());
+        outputs.iter_mut().zip(notes).take(self.len).skip(k)
+    }
+}
+
+impl<T: Real, const N: usize> Reversals<T, N> {
+    /// The same reversals, with room for a note at each.
+    pub(crate) fn noted<K: Copy + Default>(self) -> Reversals<T, N, K> {
+        let Self { at, output, len, now, output_now, .. } = self;
+        Reversals { at, output, note: [[K::default(); 2]; N], len, now, output_now }
+    }
+
+    /// Begins the branch that leads towards `up` (or down), if the input is not on it yet.
+    #[inline]
+    pub(crate) fn turn(&mut self, up: bool) {
+        if self.rising() != up {
+            if let Some(k) = self.crowded() {
+                self.remove(k);
+            }
+            self.push(());
+        }
+    }
+
+    /// Wipes out the innermost pair: the input has passed the branch's target.
+    #[inline]
+    pub(crate) fn wipe(&mut self) {
+        self.truncate(self.len.saturating_sub(2));
+    }
+
     /// Follows the input to `u`: turns, wipes out, moves. `output` tells the operator's output at
     /// the end, given the branch.
+    #[inline]
     pub fn advance(&mut self, u: T, output: impl FnOnce(&Self, T) -> T) -> T {
         if u == self.now || !u.is_finite() {
             return self.output_now;
@@ -102,30 +200,88 @@ impl<T: Real, const M: usize> Reversals<T, M> {
         self.set(u, y);
         y
     }
+}
 
-    fn forget_smallest(&mut self) {
-        let mut smallest = (0, None);
-        for (i, pair) in self.at.windows(2).enumerate() {
-            let swing = match pair {
-                [a, b] => (*a - *b).abs(),
-                _ => continue,
-            };
-            if smallest.1.is_none_or(|s| swing < s) {
-                smallest = (i, Some(swing));
-            }
-        }
-        if smallest.1.is_some() {
-            drop_pair(&mut self.at, smallest.0);
-            drop_pair(&mut self.output, smallest.0);
-            self.wipe();
+fn remove_two<X: Copy>(list: &mut [X], first: usize) {
+    for k in first..list.len().saturating_sub(2) {
+        if let (Some(x), Some(slot)) = (list.get(k + 2).copied(), list.get_mut(k)) {
+            *slot = x;
         }
     }
 }
 
-/// Moves what lies behind the pair at `first` over it.
-fn drop_pair<T: Copy>(list: &mut [T], first: usize) {
-    let tail = list.get_mut(first..).unwrap_or_default();
-    if tail.len() >= 2 {
-        tail.copy_within(2.., 0);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const PAIRS: usize = 6;
+
+    /// A decaying oscillation between 0 and 1; the steps by which maxima fall and minima rise are given.
+    fn spiral(steps: &[(f64, f64)]) -> Vec<f64> {
+        let (mut high, mut low) = (1.0, 0.0);
+        let total: f64 = steps.iter().map(|(a, b)| a + b).sum();
+        let mut u = Vec::new();
+        for (a, b) in steps {
+            u.extend([high, low]);
+            high -= a / total;
+            low += b / total;
+        }
+        u
+    }
+
+    proptest! {
+        /// What is forgotten is the smallest rectangle, and at most a quarter of a cell.
+        #[test]
+        fn one_forgotten_pair_is_at_most_a_quarter_of_a_cell(
+            steps in prop::collection::vec((0.01..1.0f64, 0.01..1.0f64), PAIRS),
+        ) {
+            let mut m = Reversals::<f64, PAIRS>::new(0.0, 0.0);
+            let u = spiral(&steps);
+            let [.., high, low] = u[..] else { unreachable!() };
+            for u in u {
+                m.advance(u, |_, u| u);
+            }
+            // Two more inside the last loop: the memory is full, then over-full.
+            let (last, inside) = (low + 0.9 * (high - low), low + 0.1 * (high - low));
+            m.advance(last, |_, u| u);
+            let mut all: Vec<f64> = m.in_force().to_vec();
+            prop_assert_eq!(all.len(), 2 * PAIRS);
+            m.advance(inside, |_, u| u);
+            let after: Vec<f64> = m.in_force().to_vec();
+            prop_assert_eq!(after.len(), 2 * PAIRS - 1);
+            all.push(last);
+            let areas: Vec<f64> = all.windows(4).map(|w| (w[2] - w[0]).abs() * (w[3] - w[1]).abs()).collect();
+            let least = areas.iter().copied().fold(f64::INFINITY, f64::min);
+            prop_assert!(least <= 0.25 / ((PAIRS - 1) * (PAIRS - 1)) as f64);
+            let k = 1 + areas.iter().position(|a| *a == least).unwrap();
+            all.drain(k..k + 2);
+            prop_assert_eq!(after, all);
+        }
+
+        /// Maxima fall, minima rise, whatever the input, also when pairs are forgotten.
+        #[test]
+        fn reversals_stay_nested(u in prop::collection::vec(-1.0..1.0f64, 1..400), decay in 0.9..1.0f64) {
+            let mut m = Reversals::<f64, 3>::new(-1.0, 0.0);
+            let mut scale = 1.0;
+            for u in u {
+                m.advance(u * scale, |_, u| u);
+                scale *= decay;
+                for three in m.in_force().windows(3) {
+                    let inside = (three[1] - three[0]) * (three[2] - three[0]) >= 0.0;
+                    prop_assert!(inside && (three[2] - three[1]).abs() <= (three[1] - three[0]).abs());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn virgin_memory_of_a_single_pair_still_follows() {
+        let mut m = Reversals::<f64, 1>::new(0.0, 0.0);
+        for k in 0..100 {
+            let u = if k % 2 == 0 { 1.0 } else { -1.0 } / f64::from(k + 1);
+            assert_eq!(m.advance(u, |_, u| u), u);
+        }
     }
 }

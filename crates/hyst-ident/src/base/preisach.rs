@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use hyst_core::{Env, Everett, Grid, PreisachParams, Stage, cell_index};
+use hyst_core::{Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
 use nalgebra::DMatrix;
 
 use super::Basis;
@@ -89,9 +89,9 @@ impl PreisachBasis {
         for i in bottom..=top {
             let rows = sign * below(i);
             for j in bottom..i {
-                row[cell_index(i, j)] += rows * above(j);
+                row[preisach_cell(i, j)] += rows * above(j);
             }
-            row[cell_index(i, i)] += sign * (below(i) + above(i) - 1.0).max(0.0);
+            row[preisach_cell(i, i)] += sign * (below(i) + above(i) - 1.0).max(0.0);
         }
     }
 
@@ -166,7 +166,7 @@ impl Basis for PreisachBasis {
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.triangle() + if self.has_strip() { self.grid.cells } else { 0 }];
         for i in 0..self.grid.cells {
-            bounds[cell_index(i, i)] = Bounds::above(self.floor);
+            bounds[preisach_cell(i, i)] = Bounds::above(self.floor);
         }
         bounds
     }
@@ -185,13 +185,13 @@ impl Basis for PreisachBasis {
             p[(j, i)] -= weight;
         };
         for i in 1..self.grid.cells {
-            tie(cell_index(i, i), cell_index(i - 1, i - 1));
+            tie(preisach_cell(i, i), preisach_cell(i - 1, i - 1));
             for j in 0..i {
                 if i - 1 > j {
-                    tie(cell_index(i, j), cell_index(i - 1, j));
+                    tie(preisach_cell(i, j), preisach_cell(i - 1, j));
                 }
                 if j > 0 {
-                    tie(cell_index(i, j), cell_index(i, j - 1));
+                    tie(preisach_cell(i, j), preisach_cell(i, j - 1));
                 }
             }
             if self.has_strip() {

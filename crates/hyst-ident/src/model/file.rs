@@ -136,7 +136,8 @@ impl Model {
     /// Names the parameter that is out of range.
     pub fn build(&self, period: f64) -> Result<HostChain, Error> {
         let cx = Sampling { period };
-        let chain: HostChain = self.effects.to_params().around(Operator::new(&self.base, &cx)?, &cx)?;
+        let chain: HostChain =
+            self.effects.to_params().around(Operator::new(&self.base, [self.input.low, self.input.high], &cx)?, &cx)?;
         Ok(chain.with_zero(self.zero))
     }
 

@@ -1,9 +1,9 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
 use hyst_core::{
-    Build, Chain, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse, Ifm, IfmInverse, Invert, Lfdm,
-    MaxwellSlip, OperatorParams, Pi, Sampling, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse, ViscousPi,
-    ViscousPiInverse,
+    Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse, Ifm, IfmInverse, Invert,
+    Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse,
+    ViscousPi, ViscousPiInverse,
 };
 
 /// Plays and elements that the host's operators hold.
@@ -24,6 +24,9 @@ pub type Base = OperatorParams<Vec<f64>>;
 pub type HostChain = Chain<f64, Operator, DELAY, CREEP>;
 /// The compensator as the host runs it.
 pub type Compensator = hyst_core::Compensator<f64, OperatorInverse, DELAY, CREEP, TAPS>;
+
+/// The dynamic Preisach model with a mirror of at most 32 × 32 nodes.
+type HostDpm = Dpm<f64, NODES, 32, 32>;
 
 /// Memory of the host's fractional models: all of it, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;
@@ -54,33 +57,35 @@ macro_rules! operators {
             $($name(Box<<$inverse as Stage<f64>>::State>),)+
         }
 
-        operators!(@stage Operator, Any, OperatorState, AnyState, $($name)+);
-        operators!(@stage OperatorInverse, AnyInverse, InverseState, AnyInverseState, $($name)+);
+        operators!(@stage Operator, any, Any, OperatorState, AnyState, $($name)+);
+        operators!(@stage OperatorInverse, any, AnyInverse, InverseState, AnyInverseState, $($name)+);
 
         impl Invert<f64> for Operator {
             type Inverse = OperatorInverse;
             fn invert(&self) -> Result<OperatorInverse, Error> {
-                Ok(OperatorInverse(match &self.0 {
-                    $(Any::$name(o) => AnyInverse::$name(Box::new($invert(&**o)?)),)+
-                }))
+                let range = self.range;
+                let any = match &self.any {
+                    $(Any::$name(o) => AnyInverse::$name(Box::new($invert(&**o, range)?)),)+
+                };
+                Ok(OperatorInverse { any })
             }
             fn lead(inverse: &OperatorInverse) -> usize {
-                match &inverse.0 {
+                match &inverse.any {
                     $(AnyInverse::$name(i) => $lead(&**i),)+
                 }
             }
         }
     };
-    (@stage $outer:ident, $any:ident, $outer_state:ident, $any_state:ident, $($name:ident)+) => {
+    (@stage $outer:ident, $field:ident, $any:ident, $outer_state:ident, $any_state:ident, $($name:ident)+) => {
         impl Stage<f64> for $outer {
             type State = $outer_state;
             fn state(&self) -> $outer_state {
-                $outer_state(match &self.0 {
+                $outer_state(match &self.$field {
                     $($any::$name(o) => $any_state::$name(Box::new(o.state())),)+
                 })
             }
             fn reset(&self, s: &mut $outer_state, e: &Env<f64>, u0: f64) -> f64 {
-                match (&self.0, &mut s.0) {
+                match (&self.$field, &mut s.0) {
                     $(($any::$name(o), $any_state::$name(s)) => o.reset(s, e, u0),)+
                     // A state of another operator: begin one of this one.
                     (_, other) => {
@@ -90,7 +95,7 @@ macro_rules! operators {
                 }
             }
             fn step(&self, s: &mut $outer_state, e: &Env<f64>, u: f64) -> f64 {
-                match (&self.0, &mut s.0) {
+                match (&self.$field, &mut s.0) {
                     $(($any::$name(o), $any_state::$name(s)) => o.step(s, e, u),)+
                     (_, _) => self.reset(s, e, u),
                 }
@@ -101,10 +106,16 @@ macro_rules! operators {
 
 /// A hysteresis operator of the host.
 #[derive(Clone, Debug)]
-pub struct Operator(Any);
+pub struct Operator {
+    any: Any,
+    /// Inputs among which an inverse may have to search.
+    range: [f64; 2],
+}
 /// The inverse of a hysteresis operator of the host.
 #[derive(Clone, Debug)]
-pub struct OperatorInverse(AnyInverse);
+pub struct OperatorInverse {
+    any: AnyInverse,
+}
 /// History of an operator of the host.
 #[derive(Clone, Debug)]
 pub struct OperatorState(AnyState);
@@ -112,29 +123,41 @@ pub struct OperatorState(AnyState);
 #[derive(Clone, Debug)]
 pub struct InverseState(AnyInverseState);
 
+fn closed<O: Invert<f64>>(operator: &O, _: [f64; 2]) -> Result<O::Inverse, Error> {
+    operator.invert()
+}
+
+/// By search, to within a part in 10¹² of the range.
+fn searched<O: Probe<f64> + Clone>(operator: &O, [low, high]: [f64; 2]) -> Result<Search<f64, O>, Error> {
+    Search::new(operator.clone(), low, high, 1e-12 * (high - low))
+}
+
 fn at_once<I>(_: &I) -> usize {
     0
 }
 
 operators! {
-    Pi(Pi<f64, PLAYS>) => Pi<f64, PLAYS>, Invert::invert, at_once;
-    ViscousPi(ViscousPi<f64, PLAYS>) => ViscousPiInverse<f64, PLAYS>, Invert::invert, at_once;
-    Gpi(Gpi<f64, PLAYS>) => GpiInverse<f64, PLAYS>, Invert::invert, at_once;
-    TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, Invert::invert, at_once;
-    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>| o.band_limited(ROOM, None),
+    Pi(Pi<f64, PLAYS>) => Pi<f64, PLAYS>, closed, at_once;
+    ViscousPi(ViscousPi<f64, PLAYS>) => ViscousPiInverse<f64, PLAYS>, closed, at_once;
+    Gpi(Gpi<f64, PLAYS>) => GpiInverse<f64, PLAYS>, closed, at_once;
+    TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, closed, at_once;
+    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>, _| o.band_limited(ROOM, None),
         TdEmInverse::lead;
-    Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, Invert::invert, at_once;
-    Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, Invert::invert, at_once;
-    Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, |o: &Everett<f64, NODES>| o.invert(), at_once;
+    Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed, at_once;
+    Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed, at_once;
+    Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
+    Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
 
 impl Operator {
-    /// The operator with these parameters at a sample period.
+    /// The operator with these parameters at a sample period; `low` and `high` are the inputs that it was identified on.
     ///
     /// # Errors
     /// Names the parameter that is not finite, out of range or too long.
-    pub fn new(base: &Base, cx: &Sampling) -> Result<Self, Error> {
-        Ok(Self(match base {
+    pub fn new(base: &Base, [low, high]: [f64; 2], cx: &Sampling) -> Result<Self, Error> {
+        // What was never driven may have to be reached by an inverse: as much again on either side.
+        let reach = (high - low).abs().max(f64::MIN_POSITIVE);
+        let any = match base {
             Base::Pi(p) => Any::Pi(Box::new(p.build(&())?)),
             Base::ViscousPi(p) => Any::ViscousPi(Box::new(p.build(cx)?)),
             Base::Gpi(p) => Any::Gpi(Box::new(p.build(&())?)),
@@ -145,8 +168,10 @@ impl Operator {
             }
             Base::TdEm(p) => Any::TdEm(Box::new(p.build(cx)?)),
             Base::Preisach(p) => Any::Preisach(Box::new(p.build(&())?)),
+            Base::Dpm(p) => Any::Dpm(Box::new(p.build(cx)?)),
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),
-        }))
+        };
+        Ok(Self { any, range: [low - reach, high + reach] })
     }
 }

@@ -143,6 +143,7 @@ fn base(name: &str, v: &Value) -> Result<Option<Base>, String> {
         "preisach" => Base::Preisach(fields(name, v)?),
         "maxwell-slip" => Base::MaxwellSlip(fields(name, v)?),
         "td-em" => Base::TdEm(fields(name, v)?),
+        "dpm" => Base::Dpm(fields(name, v)?),
         "lfdm" => Base::Lfdm(fields(name, v)?),
         "ifm" => Base::Ifm(fields(name, v)?),
         _ => return Ok(None),

@@ -1,0 +1,337 @@
+//! The dynamic Preisach model: a classical one whose branches count by their rate.
+
+use super::{Everett, Mirror, MirrorParams, PreisachParams, Reversals};
+use crate::error::within;
+use crate::{Build, Env, Error, Meta, Params, Probe, Real, Sampling, Stage};
+
+mod inverse;
+mod path;
+#[cfg(test)]
+mod tests;
+
+pub use inverse::DpmSurfaceInverse;
+pub use path::DpmState;
+use path::{Path, Start, Turn};
+
+/// Parameters of the dynamic Preisach model. `L` is any list of numbers: a vector, an array, a slice.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DpmParams<L> {
+    /// The classical model.
+    pub preisach: PreisachParams<L>,
+    /// The mirror function.
+    pub mirror: MirrorParams<L>,
+    /// Travel of the input over which the step at a closing loop fades to 1/e \[u\]. Zero: the step stays a step.
+    pub fade: f64,
+}
+
+impl<L: AsMut<[f64]>> Params for DpmParams<L> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        self.preisach.visit(f);
+        self.mirror.visit(f);
+        f(&Meta { name: "fade", unit: "u", lower: 0.0, upper: f64::INFINITY }, &mut self.fade);
+    }
+}
+
+impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> Build<Dpm<T, N, R, C>> for DpmParams<L> {
+    type Context = Sampling;
+
+    /// # Errors
+    /// As the two parts, or if the fade is negative or not finite.
+    fn build(&self, cx: &Sampling) -> Result<Dpm<T, N, R, C>, Error> {
+        Dpm::new(self.preisach.build(&())?, self.mirror.build(&())?, self.fade, cx)
+    }
+}
+
+/// Dynamic Preisach model (Chen et al.): the classical operator F with its branches weighted by a mirror function,
+///
+/// ```text
+/// y = Y_r + ξ(D, P) · (F(u) − F_r) + δ,    P = u − u_r,    D = |P| / (n h).
+/// ```
+///
+/// r is the reversal at which the present branch began and Y_r the same expression, without δ, at that reversal. Written
+/// out this is the sum of eq. 6 and 7: each dominating reversal on the stack keeps the term `ξ(Dᵢ, Pᵢ) Eᵢ` of the piece
+/// that led to it, and the branch in progress has D_t and P_t (eq. 3 and 4). With ξ ≡ 1 it is the classical operator.
+/// `N` nodes of the Everett map, `R` by `C` of the mirror.
+///
+/// **Time.** n counts the samples (of period h) that the input has spent on the branch. Inner loops that began and closed
+/// meanwhile do not count: like their reversals, their duration is wiped out. The sample in which the input leaves a
+/// reversal still counts to the branch that led there, so that an input that rests for a moment and one that just begins
+/// to turn give the same output; with the paper's tᵢ this differs by one sample in n. Counters stop at 2³² − 1.
+/// After `reset` the input has rested at u0 for ever: the classical output, and the first branch begins there.
+///
+/// **Closing loops.** Where a loop closes that was left by a falling branch of weight ξ₁ and closed by a rising one of
+/// weight ξ₂, eq. 6 steps by `(ξ₂ − ξ₁) E(M, m)`. The offset δ takes that step, so the output is a continuous function of the
+/// input within every sample, and fades with the travel of the input: `δ ← δ exp(−|Δu| / fade)`. With `fade` = 0 there is no
+/// δ and the steps stay, as in the paper.
+///
+/// **Bound.** Let Ω = ξ_max − ξ_min ([`Mirror::range`]), E₀ the largest Everett value among the inputs that occur and S the
+/// largest `E(α, β) / (α − β)`. A loop of swing s adds at most Ω S s to |δ| and takes 2 s of travel that no other loop takes.
+/// So loops closed one after the other give `|δ| ≤ Ω S s / (1 − exp(−2 s / fade)) ≤ Ω S (s + fade / 2)`. Nested loops may all close
+/// in a moment: while the input travels by `fade`, at most the N pairs close that were on the stack, each with at most Ω E₀,
+/// besides loops that began meanwhile, with at most Ω S fade / 2 together. Earlier ones have faded by 1/e for each further
+/// `fade`, so always `|δ| ≤ Ω (N E₀ + S fade / 2) / (1 − 1/e)`. What remains is bounded by the stack: it differs from the classical
+/// output times (ξ_max + ξ_min) / 2 by at most Ω (N + 1) E₀.
+///
+/// A slowly decaying oscillation with ξ larger on rising than on falling branches drifts as long as its loops stay open (so
+/// do eq. 6 and 17); once they close the drift is gone, and a cycle that is closed leaves none.
+///
+/// **Inverse.** [`Search`](crate::Search) through [`Probe`]: exact to its tolerance wherever the output is continuous
+/// (`fade` > 0), unique where it rises; [`least_slope`](Self::least_slope) tells when.
+///
+/// ```
+/// use hyst_core::{Build, Dpm, DpmParams, Env, MirrorParams, PreisachParams, Sampling, Search, Stage};
+/// let (density, once): (Vec<f64>, Vec<f64>) =
+///     ((0..4).flat_map(|a| (0..=a).map(move |b| if a == b { 2.0 } else { 0.5 })).collect(), vec![0.0; 4]);
+/// let params = DpmParams {
+///     preisach: PreisachParams { low: 0.0, high: 80.0, cells: 4, rest: 0.0, density, once },
+///     mirror: MirrorParams {
+///         rate_low: 2e3,
+///         rate_high: 16e3,
+///         rates: 2,
+///         change_low: -80.0,
+///         change_high: 80.0,
+///         changes: 2,
+///         weights: vec![0.95, 0.97, 0.85, 0.9],
+///     },
+///     fade: 20.0,
+/// };
+/// let model: Dpm<f64, 5, 2, 2> = params.build(&Sampling { period: 1e-4 })?;
+/// assert!(model.least_slope() > 0.0);
+/// let inverse = Search::new(model.clone(), 0.0, 80.0, 1e-10)?;
+/// let (mut forward, mut backward, env) = (model.state(), inverse.state(), Env::default());
+/// model.reset(&mut forward, &env, 0.0);
+/// inverse.reset(&mut backward, &env, 0.0);
+/// for k in 1..200 {
+///     let reference = 4.0 - 4.0 * (0.2 * k as f64).cos();
+///     let drive = inverse.step(&mut backward, &env, reference);
+///     assert!((model.step(&mut forward, &env, drive) - reference).abs() < 1e-9);
+/// }
+/// # Ok::<(), hyst_core::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dpm<T, const N: usize, const R: usize, const C: usize> {
+    map: Everett<T, N>,
+    mirror: Mirror<T, R, C>,
+    per_period: T,
+    /// `None` for steps that stay.
+    per_fade: Option<T>,
+    /// Eq. 17 instead of eq. 6 and 7.
+    drifting: bool,
+}
+
+/// What a trial input would lead to.
+struct Trial<'a, T, const N: usize> {
+    path: Path<'a, T, N>,
+    input: T,
+    classical: T,
+    output: T,
+    offset: T,
+}
+
+impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
+    /// From the classical model, the mirror function, and the travel over which the step at a closing loop fades
+    /// \[input unit\].
+    ///
+    /// # Errors
+    /// If the sample period is not positive, or the fade is negative or not finite.
+    pub fn new(map: Everett<T, N>, mirror: Mirror<T, R, C>, fade: f64, cx: &Sampling) -> Result<Self, Error> {
+        within("dpm.fade", fade, fade >= 0.0, "zero or positive")?;
+        let per_fade = if fade > 0.0 { Some(T::from_f64(1.0 / fade)) } else { None };
+        Ok(Self { map, mirror, per_period: T::from_f64(1.0 / cx.checked()?), per_fade, drifting: false })
+    }
+
+    /// The recursion of eq. 17 instead: `y = F(t_i) + ξ (F_cpm − F_cpm(t_i))` with t_i the last reversal, whether loops have
+    /// closed since or not. Simpler, continuous at closing loops without an offset, but what a branch gains by its weight
+    /// it keeps for ever: a cycle between two inputs adds (ξ_up − ξ_down) E each time, 2.9 N per 80 V sawtooth at
+    /// ξ = 1 / 0.8 and 0.18 N/V. Not for long records.
+    #[must_use]
+    pub fn drifting(self) -> Self {
+        Self { drifting: true, ..self }
+    }
+
+    /// The classical model.
+    pub fn map(&self) -> &Everett<T, N> {
+        &self.map
+    }
+
+    /// The mirror function.
+    pub fn mirror(&self) -> &Mirror<T, R, C> {
+        &self.mirror
+    }
+
+    /// Lower bound of the slope of every branch on the grid, whatever its rate \[output unit / input unit\].
+    ///
+    /// Positive: the output rises strictly with the present input wherever `|δ| < fade × slope`
+    /// ([`DpmState::offset`]), so the inverse is unique there; the offset's fading may outrun a shallower branch.
+    ///
+    /// A branch with ξ = ψ(P) along its ray and classical gain G(P) has the slope ψ G' + ψ' G. If no branch of the map
+    /// gets shallower than κ times an earlier slope, |P| G' ≥ κ G, and ξ > 0 with `κ ξ + D ξ_D + P ξ_P > 0` everywhere
+    /// ([`Mirror::least_rise`]) makes it at least G' times the smaller of ξ and (κ ξ + D ξ_D + P ξ_P) / κ.
+    pub fn least_slope(&self) -> T {
+        let (slope, kappa) = self.map.slopes();
+        if slope <= T::ZERO || kappa <= T::ZERO {
+            return T::ZERO;
+        }
+        let share = self.mirror.range().0.at_most(self.mirror.least_rise(kappa) / kappa);
+        slope * share
+    }
+
+    /// The output without the offset `age` samples after `start`, from the classical output.
+    #[inline]
+    fn weighted(&self, start: Start<T>, age: u32, u: T, classical: T) -> T {
+        let change = u - start.at;
+        let rate = change.abs() * self.per_period / T::from_f64(f64::from(age));
+        start.output + self.mirror.weight(rate, change) * (classical - start.classical)
+    }
+
+    /// The classical output and the weighted one at `u` on the present branch of `path`.
+    #[inline]
+    fn outputs(&self, path: &Path<'_, T, N>, u: T) -> (T, T) {
+        let classical = self.map.on_branch(path.branch(), path.rising(), u);
+        (classical, self.weighted(path.start(), path.age, u, classical))
+    }
+
+    #[inline]
+    fn faded(&self, offset: T, travel: T) -> T {
+        match self.per_fade {
+            Some(per_fade) if offset != T::ZERO => offset * (-(travel.abs() * per_fade)).exp(),
+            _ => T::ZERO,
+        }
+    }
+
+    /// One sample on, at input `u`.
+    #[inline]
+    fn trial<'a>(&self, s: &'a DpmState<T, N>, u: T) -> Trial<'a, T, N> {
+        let memory = &s.memory;
+        let now = memory.now();
+        let input = if u.is_finite() { u } else { now };
+        let mut path = Path {
+            memory,
+            len: memory.len(),
+            new: None,
+            undated: s.undated,
+            start: s.start,
+            age: s.age.saturating_add(1),
+        };
+        let up = if input == now { memory.rising() } else { input > now };
+        if up != memory.rising() {
+            let classical = memory.output();
+            let output = self.weighted(path.start(), path.age, now, classical);
+            path.turn(Start { at: now, classical, output }, self.drifting);
+        }
+        let (mut offset, mut from) = (s.offset, now);
+        while let Some(target) = path.target() {
+            if if up { input < target } else { input > target } {
+                break;
+            }
+            if self.per_fade.is_none() {
+                path.close();
+                continue;
+            }
+            let (_, before) = self.outputs(&path, target);
+            path.close();
+            let (_, after) = self.outputs(&path, target);
+            offset = self.faded(offset, target - from) + (before - after);
+            from = target;
+        }
+        let (classical, output) = self.outputs(&path, input);
+        Trial { path, input, classical, output, offset: self.faded(offset, input - from) }
+    }
+
+    /// Makes room for the reversal `last`: forgets a pair as if its loop had closed, so that the next reversal ends the
+    /// branch that the pair interrupted. Returns what that adds to the classical output and to this one from there on.
+    fn forget(&self, s: &mut DpmState<T, N>, k: usize, last: &mut (Start<T>, u32)) -> (T, T) {
+        let read = |k: usize| {
+            let ((at, classical), turn) = (s.memory.reversal(k)?, s.memory.note(k)?);
+            Some((Start { at, classical, output: turn.output }, turn.age))
+        };
+        if k < s.undated {
+            // A loop that never was; if only its end did happen, the branch from there goes on.
+            if let (true, Some((end, _))) = (k + 1 == s.undated, read(k + 1)) {
+                s.start = end;
+            }
+            s.undated -= (s.undated - k).min(2);
+            s.memory.remove(k);
+            return (T::ZERO, T::ZERO);
+        }
+        let before = k.checked_sub(1);
+        let start = before.filter(|b| *b >= s.undated).and_then(read).map_or(s.start, |r| r.0);
+        let age = read(k).map_or(1, |r| r.1);
+        let (next, _) = read(k + 2).filter(|_| k + 2 < s.memory.len()).unwrap_or(*last);
+        // Maxima lie at even places: a rising branch led to them.
+        let branch = before.and_then(|b| s.memory.reversal(b));
+        let classical = self.map.on_branch(branch, k.is_multiple_of(2), next.at);
+        let output = self.weighted(start, age, next.at, classical);
+        let (by_classical, by_output) = (classical - next.classical, output - next.output);
+        s.memory.remove(k);
+        let mut ended = Some(age);
+        for (y, turn) in s.memory.from_mut(k) {
+            *y += by_classical;
+            turn.output += by_output;
+            turn.age = ended.take().unwrap_or(turn.age);
+        }
+        last.0.classical += by_classical;
+        last.0.output += by_output;
+        last.1 = ended.unwrap_or(last.1);
+        (by_classical, by_output)
+    }
+}
+
+impl<T: Real, const N: usize, const R: usize, const C: usize> Stage<T> for Dpm<T, N, R, C> {
+    type State = DpmState<T, N>;
+
+    fn state(&self) -> Self::State {
+        DpmState {
+            memory: Reversals::new(T::ZERO, T::ZERO),
+            undated: 0,
+            start: Start::default(),
+            age: 0,
+            offset: T::ZERO,
+            zero: T::ZERO,
+        }
+    }
+
+    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
+        let mut classical = self.map.state();
+        let y = self.map.reset(&mut classical, e, u0);
+        s.zero = classical.zero;
+        s.memory = classical.memory.noted();
+        s.undated = s.memory.len();
+        s.start = Start { at: s.memory.now(), classical: s.memory.output(), output: s.memory.output() };
+        (s.age, s.offset) = (0, T::ZERO);
+        y
+    }
+
+    #[inline]
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let Trial { path, input, classical, output, offset } = self.trial(s, u);
+        let Path { len, new, undated, start, age, .. } = path;
+        (s.undated, s.start, s.age, s.offset) = (undated, start, age, offset);
+        let mut shift = T::ZERO;
+        match new {
+            Some(mut last) if len > s.memory.len() => {
+                if let Some(k) = s.memory.crowded() {
+                    let (by_classical, by_output) = self.forget(s, k, &mut last);
+                    shift = by_classical;
+                    if self.per_fade.is_some() {
+                        s.offset -= by_output;
+                    }
+                    s.memory.set(s.memory.now(), last.0.classical);
+                }
+                s.memory.push(Turn { output: last.0.output, age: last.1 });
+            }
+            _ => s.memory.truncate(len),
+        }
+        s.memory.set(input, classical + shift);
+        output + offset - s.zero
+    }
+}
+
+impl<T: Real, const N: usize, const R: usize, const C: usize> Probe<T> for Dpm<T, N, R, C> {
+    #[inline]
+    fn probe(&self, s: &Self::State, _: &Env<T>, u: T) -> T {
+        let t = self.trial(s, u);
+        t.output + t.offset - s.zero
+    }
+}
