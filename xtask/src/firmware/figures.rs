@@ -2,7 +2,6 @@
 
 use super::link;
 use super::toolchain::Toolchain;
-use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
@@ -15,15 +14,21 @@ const INTRODUCTION: &str = "\
 Measured by `cargo xtask firmware --table`: every model runs over the same 1000 samples in QEMU (machine mps2-an386), and
 its outputs are the host's in every bit, in `f32` and in `f64`.
 
-- **instructions**: executed by one `step`, call included, on average and at most. They are instructions, not cycles:
-  memory with wait states, `vdiv`, `vsqrt` and taken branches cost more than one cycle each. The Cortex-M4F computes `f32`
-  in hardware and `f64` in software.
-- **flash**: `reset` and `step` with all they call, linked alone; models share what they have in common (`sinf`, the
-  arithmetic of `f64`). *with build* adds the way from parameters to coefficients, which a host can take instead.
-- **RAM**: one actuator's coefficients (or flash, if they never change) and state; a model has no other data.
-- **stack**: what a `step` reached at most, 16 to 32 bytes of which are the call; and building and resetting.
+- **instructions**: of one `step` beyond a call that does nothing, on average and at most. They are instructions, not
+  cycles: slow memory, branches, divisions and roots take more than one cycle each. The Cortex-M4F computes `f32` in
+  hardware and `f64` in software.
+- **flash**, in bytes: `reset` and `step` with all they call, each model linked alone; what models have in common (`sinf`,
+  the arithmetic of `f64`) is there once in a firmware that has several. *opt-level s* is the same optimised for size, *with
+  build* adds the way from parameters to coefficients, which can be left to a host.
+- **RAM**, in bytes: coefficients (flash, if they never change) and state, one of each per actuator; no model has other data.
+- **stack**, in bytes: what a `step` reached at most, the call included (16 to 32), and what building and resetting did.
 
-No function of any model can reach a panic: each is linked with a panic handler that does not link.
+No function of any model can reach a panic, at opt-level 3 and s: they link with a panic handler that does not.
+";
+
+const HEADER: &str = "\
+| model | instructions | at most | flash | opt-level s | with build | coefficients | state | stack | to build |
+|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
 /// One case in one precision.
@@ -33,11 +38,33 @@ struct Row {
     mean: f64,
     worst: String,
     flash: u32,
+    flash_small: u32,
     flash_with_build: u32,
     coefficients: String,
     state: String,
     stack: String,
     build_stack: String,
+}
+
+impl Row {
+    fn line(&self) -> String {
+        let Self {
+            case,
+            mean,
+            worst,
+            flash,
+            flash_small,
+            flash_with_build,
+            coefficients,
+            state,
+            stack,
+            build_stack,
+            ..
+        } = self;
+        format!(
+            "| `{case}` | {mean:.0} | {worst} | {flash} | {flash_small} | {flash_with_build} | {coefficients} | {state} | {stack} | {build_stack} |\n"
+        )
+    }
 }
 
 /// The figures of all cases.
@@ -48,7 +75,7 @@ pub(crate) struct Figures {
 
 impl Figures {
     /// From what the firmware printed, and from linking.
-    pub(crate) fn collect(toolchain: &Toolchain, library: &Path, printed: &Path) -> Result<Self, String> {
+    pub(crate) fn collect(toolchain: &Toolchain, library: &Path, small: &Path, printed: &Path) -> Result<Self, String> {
         let text = fs::read_to_string(printed).map_err(|error| format!("{}: {error}", printed.display()))?;
         let mut rows = Vec::new();
         for line in text.lines().filter_map(|line| line.strip_prefix("case ")) {
@@ -65,6 +92,7 @@ impl Figures {
                 mean: number("instructions")? / number("steps")?,
                 worst: figure("worst")?,
                 flash: link::flash(toolchain, library, &[&reset, &step])?,
+                flash_small: link::flash(toolchain, small, &[&reset, &step])?,
                 flash_with_build: link::flash(toolchain, library, &[&build, &reset, &step])?,
                 coefficients: figure("coefficients")?,
                 state: figure("state")?,
@@ -81,25 +109,9 @@ impl Figures {
     pub(crate) fn write(&self, document: &Path) -> Result<(), String> {
         let mut text = format!("{INTRODUCTION}\nCompiler: {}.\n", self.compiler);
         for precision in ["f32", "f64"] {
-            let _ = write!(
-                text,
-                "\n## {precision}\n\n| model | instructions | at most | flash | with build | coefficients | state | stack | to build |\n\
-                 |---|--:|--:|--:|--:|--:|--:|--:|--:|\n"
-            );
-            for r in self.rows.iter().filter(|row| row.precision == precision) {
-                let _ = writeln!(
-                    text,
-                    "| `{}` | {:.0} | {} | {} | {} | {} | {} | {} | {} |",
-                    r.case,
-                    r.mean,
-                    r.worst,
-                    r.flash,
-                    r.flash_with_build,
-                    r.coefficients,
-                    r.state,
-                    r.stack,
-                    r.build_stack
-                );
+            text.push_str(&format!("\n## {precision}\n\n{HEADER}"));
+            for row in self.rows.iter().filter(|row| row.precision == precision) {
+                text.push_str(&row.line());
             }
         }
         print!("{text}");

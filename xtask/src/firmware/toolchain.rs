@@ -28,6 +28,8 @@ pub(crate) struct Toolchain {
     arguments: &'static [&'static str],
     environment: Vec<(&'static str, OsString)>,
     linker: Vec<OsString>,
+    /// Whether clippy comes with it.
+    pub(crate) lints: bool,
 }
 
 impl Toolchain {
@@ -73,6 +75,7 @@ impl Toolchain {
             arguments: &[],
             environment: Vec::new(),
             linker,
+            lints: true,
         })
     }
 
@@ -97,13 +100,14 @@ impl Toolchain {
                 ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker.clone().into()),
             ],
             linker: vec![linker.into()],
+            lints: false,
         })
     }
 
-    /// A build for the target, into `target`.
-    pub(crate) fn build(&self, target: &Path) -> Command {
+    /// What cargo does (`build`, `clippy`) for the target, into `target`.
+    pub(crate) fn cargo(&self, what: &str, target: &Path) -> Command {
         let mut command = Command::new(&self.cargo);
-        command.args(["build", "--target", TARGET, "--target-dir"]).arg(target).args(self.arguments);
+        command.args([what, "--target", TARGET, "--target-dir"]).arg(target).args(self.arguments);
         // What the user sets for the host, or cargo for this program, is not meant for the target.
         for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "LD_LIBRARY_PATH"] {
             command.env_remove(name);

@@ -98,10 +98,16 @@ impl<T: Real, const N: usize> Pi<T, N> {
         let u = if u.is_finite() { u } else { s.u };
         s.u = u;
         let mut y = self.gain * u;
-        let plays = s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights).take(self.len);
-        for ((p, r), w) in plays {
+        let plays = s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights);
+        let mut add = |((p, r), w): ((&mut T, &T), &T)| {
             *p = play(*p, u, *r);
             y += *w * *p;
+        };
+        // With every slot in use the number of turns is a constant, which the compiler unrolls.
+        if self.len == N {
+            plays.for_each(&mut add);
+        } else {
+            plays.take(self.len).for_each(&mut add);
         }
         y
     }

@@ -18,6 +18,7 @@ mod measure;
 use core::fmt::Write;
 use core::hint::black_box;
 use core::panic::PanicInfo;
+use cortex_m::asm::wfi;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hio, hprintln};
 use hyst_cases::{Case, Hash, Precision, SAMPLES, State, Visit, each, inputs};
@@ -30,8 +31,7 @@ fn main() -> ! {
     assert!(counter.is_true(), "a loop of known length is miscounted; QEMU needs -icount shift=6");
     each(&mut Bench { counter });
     hprintln!("done");
-    debug::exit(debug::EXIT_SUCCESS);
-    loop {}
+    end(debug::EXIT_SUCCESS)
 }
 
 /// Steps of a case: the first sample is the one at rest.
@@ -175,16 +175,22 @@ impl Line {
     }
 }
 
+/// Ends the emulation.
+fn end(status: debug::ExitStatus) -> ! {
+    debug::exit(status);
+    loop {
+        wfi();
+    }
+}
+
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     hprintln!("error: {}", info);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    end(debug::EXIT_FAILURE)
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     hprintln!("error: hard fault, {:?}", frame);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    end(debug::EXIT_FAILURE)
 }

@@ -1,4 +1,4 @@
-//! The list of all cases: to add a model is to add a line here.
+//! The list of all cases: to add a model is to add a line here, and a constant to `models.rs` for its parameters.
 
 use crate::models::*;
 use crate::{Case, PERIOD, Visit, given};

@@ -62,6 +62,11 @@ impl There {
     }
 }
 
+/// The number that has these bits.
+fn value(precision: &str, bits: u64) -> f64 {
+    if precision == "f32" { f32::from_bits(bits as u32).into() } else { f64::from_bits(bits) }
+}
+
 #[test]
 fn every_case_moves_and_single_precision_follows_double_precision() {
     let mut here = Here::default();
@@ -82,19 +87,18 @@ fn firmware_and_host_agree_bit_for_bit() {
     let mut here = Here::default();
     each(&mut here);
     let mut differ = Vec::new();
-    for (name, precision, ours, values) in &here.0 {
+    for (name, precision, ours, _) in &here.0 {
         let key = ((*name).to_owned(), (*precision).to_owned());
         let Some(theirs) = there.bits.get(&key) else {
             differ.push(format!("{name} {precision} was not run"));
             continue;
         };
-        if let Some(k) = (0..ours.len()).find(|k| ours.get(*k) != theirs.get(*k)) {
-            let count = ours.iter().zip(theirs).filter(|(a, b)| a != b).count();
+        assert_eq!(ours.len(), theirs.len(), "{name} {precision}: samples");
+        let pairs = || ours.iter().zip(theirs).enumerate().filter(|(_, (a, b))| a != b);
+        if let Some((k, (a, b))) = pairs().next() {
+            let (count, is, was) = (pairs().count(), value(precision, *a), value(precision, *b));
             differ.push(format!(
-                "{name} {precision}: {count} samples differ, first {k}: here {:x} ({:e}), there {:x}",
-                ours[k],
-                values[k],
-                theirs.get(k).copied().unwrap_or_default()
+                "{name} {precision}: {count} samples differ, first {k}: {a:x} ({is:e}) here, {b:x} ({was:e}) there"
             ));
         }
         // The fingerprint that the firmware took of its own numbers: nothing was lost on the way here.
@@ -102,7 +106,11 @@ fn firmware_and_host_agree_bit_for_bit() {
             "f32" => Hash::of(&theirs.iter().map(|b| f32::from_bits(*b as u32)).collect::<Vec<_>>()),
             _ => Hash::of(&theirs.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>()),
         };
-        assert_eq!(there.figures[&key]["hash"], format!("{:016x}", hash.0), "{name} {precision}");
+        assert_eq!(
+            there.figures[&key]["hash"],
+            format!("{:016x}", hash.0),
+            "{name} {precision}: bits were lost on the way"
+        );
     }
     assert!(differ.is_empty(), "host and firmware differ:\n{}", differ.join("\n"));
     assert_eq!(there.bits.len(), here.0.len(), "the firmware was built from another list of cases");
