@@ -3,11 +3,14 @@
 //! `cargo xtask test` runs all of them and ends with a table; a check that cannot run here says why
 //! and how to make it run.
 
+mod python;
+
 use std::env;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
-const USAGE: &str = "cargo xtask test    run every check: format, lints, tests, documentation, bare-metal core\n";
+const USAGE: &str =
+    "cargo xtask test    run every check: format, lints, tests, documentation, bare-metal core, Python\n";
 
 fn main() -> ExitCode {
     match env::args().nth(1).as_deref() {
@@ -65,6 +68,7 @@ fn test() -> ExitCode {
         table.push((check.name, timed(check.name, || run(check))));
     }
     table.push(("core on bare metal", timed("core on bare metal", bare_metal)));
+    table.push(("python", timed("python", python::check)));
     eprintln!();
     let mut failed = false;
     for (name, (outcome, seconds)) in &table {
