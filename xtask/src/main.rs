@@ -4,6 +4,7 @@
 
 mod command;
 mod firmware;
+mod python;
 
 use command::{Check, Outcome};
 use std::env;
@@ -11,9 +12,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware
+cargo xtask test                run every check: format, lints, tests, documentation, firmware, Python
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
+cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
 
 fn main() -> ExitCode {
@@ -23,6 +25,7 @@ fn main() -> ExitCode {
         ["test"] => test(),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
+        ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
             ExitCode::SUCCESS
@@ -60,6 +63,7 @@ fn test() -> ExitCode {
     let mut results: Vec<_> =
         CHECKS.iter().map(|check| (check.name, timed(check.name, || command::run(check)))).collect();
     results.push(("firmware", timed("firmware", || firmware::check(false))));
+    results.push(("python", timed("python", python::check)));
     table(&results)
 }
 

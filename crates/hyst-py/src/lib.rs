@@ -1,8 +1,9 @@
 //! The Python package `hyst`: models of `hyst-core` and the identification of `hyst-ident` on numpy arrays.
 //!
 //! Nothing is computed here. A signal comes in as a view of a numpy array, runs through a stage while Python's lock is
-//! released, and goes out as a new array. `models.rs` is the table of models; a new one is an entry there, an entry in the
-//! stub `python/hyst/_hyst.pyi` and a line in `python/hyst/__init__.py`.
+//! released, and goes out as a new array. `models.rs` is the table of models; a new one is an entry there, a class in the stub
+//! `python/hyst/_hyst.pyi` and a case in `tests/python/cases.py`.
+#![allow(rustdoc::broken_intra_doc_links, reason = "documentation of classes is Python's, in which [V] is a unit")]
 
 mod arrays;
 mod either;

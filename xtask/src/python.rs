@@ -1,0 +1,48 @@
+//! The Python package: built and installed as a user would, tested against the references.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::command::Outcome;
+
+/// What the tests need besides the package.
+const NEEDED: &[&str] = &["numpy", "scipy", "pytest", "hypothesis"];
+/// Interpreters to try, in this order.
+const INTERPRETERS: &[&str] =
+    &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];
+/// Succeeds where the package can be built and tested.
+const SUITABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
+const INSTALL: &str =
+    "Python 3.10 or newer with its module venv is needed, and none was found; on Debian `apt install python3-venv`";
+
+pub(crate) fn check() -> Outcome {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let suitable = |python: &&&str| {
+        Command::new(python).args(["-c", SUITABLE]).output().is_ok_and(|output| output.status.success())
+    };
+    let Some(python) = INTERPRETERS.iter().find(suitable) else { return Outcome::Skipped(INSTALL.to_owned()) };
+    let own = root.join("target").join("python-tests");
+    let run = |program: &Path, arguments: &[&str]| {
+        let mut command = Command::new(program);
+        command.current_dir(root).args(arguments);
+        // An environment of the caller's must not lend its packages.
+        command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
+        match command.status() {
+            Ok(status) => status.success(),
+            Err(error) => {
+                eprintln!("error: {} could not be started: {error}", program.display());
+                false
+            }
+        }
+    };
+    let own_python = own.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    let package = PathBuf::from("crates").join("hyst-py").display().to_string();
+    let package = format!(".{}{package}", std::path::MAIN_SEPARATOR);
+    let install = [&["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package], NEEDED].concat();
+    let tests = ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "tests/python"];
+    let passed = run(Path::new(python), &["-m", "venv", "--clear", &own.display().to_string()])
+        && run(&own_python, &install)
+        && run(&own_python, &tests);
+    if passed { Outcome::Passed } else { Outcome::Failed }
+}
