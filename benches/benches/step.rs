@@ -2,8 +2,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hyst_core::{
-    Build, Chain, CompensatorOptions, CreepParams, Env, Everett, Grid, Invert, LagParams, Pi, Real, ResonanceParams,
-    Sampling, Stage, TemperatureParams,
+    Build, Chain, CompensatorOptions, CreepParams, Dpm, Env, Everett, Grid, Invert, LagParams, MirrorParams, Pi, Real,
+    ResonanceParams, Sampling, Search, Stage, TemperatureParams,
 };
 use std::hint::black_box;
 
@@ -17,13 +17,17 @@ fn drive<T: Real>() -> Vec<T> {
 }
 
 fn run<T: Real, S: Stage<T>>(c: &mut Criterion, name: &str, stage: &S) {
-    let (u, env) = (drive::<T>(), vec![Env::<T>::default(); ROWS]);
+    run_on(c, name, stage, &drive::<T>());
+}
+
+fn run_on<T: Real, S: Stage<T>>(c: &mut Criterion, name: &str, stage: &S, u: &[T]) {
+    let env = vec![Env::<T>::default(); ROWS];
     let mut y = vec![T::ZERO; ROWS];
     let mut state = stage.state();
     stage.reset(&mut state, &env[0], u[0]);
     let mut group = c.benchmark_group("step");
     group.throughput(Throughput::Elements(ROWS as u64));
-    group.bench_function(name, |b| b.iter(|| stage.block(&mut state, black_box(&env), black_box(&u), &mut y)));
+    group.bench_function(name, |b| b.iter(|| stage.block(&mut state, black_box(&env), black_box(u), &mut y)));
     group.finish();
 }
 
@@ -64,6 +68,22 @@ fn stages(c: &mut Criterion) {
         Box::new(Everett::<f64, 51>::new(grid, 0.0, |a, b| if a == b { 0.1 } else { 0.002 }, |_| 0.01).unwrap());
     run::<f64, _>(c, "preisach 50x50 f64", &*everett);
     run::<f64, _>(c, "preisach 50x50 inverse f64", &everett.invert().unwrap());
+    // A turn at every sample.
+    let jagged: Vec<f64> = (0..ROWS).map(|k| 60.0 + 59.0 * (2.4 * k as f64 + 0.3 * (k as f64).sin()).sin()).collect();
+    run_on(c, "preisach 50x50 f64, a reversal each sample", &*everett, &jagged);
+    let mirror = MirrorParams {
+        rate_low: 2e3,
+        rate_high: 16e3,
+        rates: 8,
+        change_low: -80.0,
+        change_high: 80.0,
+        changes: 9,
+        weights: [0.9; 72],
+    };
+    let dpm = Box::new(Dpm::new(*everett.clone(), mirror.build(&()).unwrap(), 20.0, &PERIOD).unwrap());
+    run::<f64, Dpm<f64, 51, 8, 9>>(c, "dpm 50x50 f64", &dpm);
+    run_on(c, "dpm 50x50 f64, a reversal each sample", &*dpm, &jagged);
+    run::<f64, _>(c, "dpm 50x50 inverse by search f64", &Search::new(*dpm, 0.0, 120.0, 1e-9).unwrap());
     let lag: hyst_core::Lag<f64> = LagParams { seconds: 3e-3 }.build(&PERIOD).unwrap();
     run::<f64, _>(c, "lag f64", &lag);
     let mode = ResonanceParams { hz: 90.0, damping: 0.03, gain: 1.0 };

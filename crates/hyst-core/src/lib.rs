@@ -20,6 +20,7 @@
 //! | play and stop operators | `play.rs` | – |
 //! | Prandtl-Ishlinskii | `pi.rs` | closed form, the same type |
 //! | Preisach as an Everett map | `preisach/` | closed form cell by cell |
+//! | dynamic Preisach | `preisach/dpm/` | search, exact; inverse surface, approximate |
 //! | delay, lag, resonance | `delay.rs` `lag.rs` `resonance.rs` | band-limited with preview, `preview.rs` |
 //! | creep | `creep.rs` | recursive, exact |
 //! | temperature, drift, interference | `temperature.rs` `drift.rs` `interference.rs` | division; sensor effects are not driven against |
