@@ -3,7 +3,7 @@
 //! An actuator is a chain of named stages,
 //!
 //! ```text
-//! u [V] → delay → lag → HYSTERESIS → ×temperature → +creep → resonance(s) → +drift → +interference → y
+//! u [V] → delay → lag → HYSTERESIS → ×temperature → +creep → +load → resonance(s) → saturation → +drift → +interference → y
 //! ```
 //!
 //! and every stage but the hysteresis is *identity plus a correction*: leave it out and the chain is
@@ -15,16 +15,25 @@
 //! reads, in seconds, hertz, 1/K, always `f64`), **coefficients** ([`Lag`], …: per sample period,
 //! built once by a fallible [`Build::build`]) and **state** (the history, one per actuator).
 //!
-//! | idea | file | inverse |
+//! | model | folder or file | inverse |
 //! |---|---|---|
-//! | play and stop operators | `play.rs` | – |
-//! | Prandtl-Ishlinskii | `pi.rs` | closed form, the same type |
-//! | Preisach as an Everett map | `preisach/` | closed form cell by cell |
+//! | play and stop | `play.rs` | – |
+//! | Prandtl-Ishlinskii, of plays or of stops | `prandtl/pi.rs` | closed form, the same type |
+//! | … with envelopes, with temperature | `prandtl/gpi.rs` `prandtl/td_pi.rs` | closed form, exact while the temperature changes |
+//! | … rate-dependent: viscous plays | `prandtl/viscous.rs` | exact, one pass over the plays |
+//! | Preisach as an Everett map | `preisach/operator.rs` | exact, cell by cell; approximate by the inverse surface |
+//! | dynamic Preisach | `preisach/dpm/` | search, exact; approximate by the inverse surface |
+//! | Maxwell slip | `maxwell/slip.rs` | closed form |
+//! | temperature-dependent electromechanical | `maxwell/td_em.rs` | band-limited with preview, then exact |
+//! | Bouc-Wen | `bouc_wen/` | search |
 //! | fractional models, LFDM and IFM | `fractional/` | the recursion solved for the input; IFM only where that is stable |
-//! | delay, lag, resonance | `delay.rs` `lag.rs` `resonance.rs` | band-limited with preview, `preview.rs` |
-//! | creep | `creep.rs` | recursive, exact |
-//! | temperature, drift, interference | `temperature.rs` `drift.rs` `interference.rs` | division; sensor effects are not driven against |
-//! | the whole chain | `chain.rs` | `compensator.rs` |
+//! | activation functions | `activation/` | search, or backwards in time with preview |
+//! | delay, lag, resonance | `chain/` | band-limited with preview, `chain/preview.rs` |
+//! | creep, asymmetry, temperature, load, saturation | `chain/` | exact |
+//! | drift, interference | `chain/` | none: they are in the sensor, no drive follows them |
+//! | the whole chain | `chain/chain.rs` | `chain/compensator.rs` |
+//! | PID, force observer, feedforward with feedback | `control/` | – |
+//! | a chain's parameters as a block of bytes | `params/` | – |
 //!
 //! ```
 //! use hyst_core::{Env, Invert, Pi, Stage};

@@ -7,8 +7,8 @@ use super::slip::{MaxwellSlip, MaxwellSlipParams, SlipReading};
 use crate::error::{finite, within};
 use crate::stage::hold;
 use crate::{
-    Build, Delay, DelayParams, DelayState, Env, Error, GpiInverse, GpiState, Invert, Meta, Params, Preview,
-    PreviewState, Real, Sampling, Stage,
+    Build, Delay, DelayParams, DelayState, Env, Error, GpiInverse, GpiInverseState, GpiState, Invert, Meta, Params,
+    Preview, PreviewState, Real, Sampling, Stage,
 };
 
 /// Parameters of the model: a Maxwell-slip bank gives the *current* `i = H(u)` (eq. 2), which charges `C ∥ R`; the voltage
@@ -253,7 +253,7 @@ impl<T: Real, const N: usize, const P: usize> TdEmInverse<T, N, P> {
 pub struct TdEmInverseState<T, const N: usize, const P: usize> {
     filter: PreviewState<T, P>,
     late: DelayState<T, P>,
-    slip: GpiState<T, N>,
+    slip: GpiInverseState<T, N>,
     degc: T,
     reference: T,
 }

@@ -1,7 +1,7 @@
 //! The generalised play of radius 0: what envelope functions do to the input of a Prandtl-Ishlinskii operator.
 //!
 //! A generalised play has its own curve on each side, `F_r ← max(γₗ(u) − r, min(γᵣ(u) + r, F_r))` (Visintin 1994; Al Janaideh,
-//! Rakheja and Su 2011). All of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u), min(γᵣ(u), G))`. So a
+//! Rakheja and Su 2011). Where γₗ ≤ γᵣ all of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u), min(γᵣ(u), G))`. There a
 //! generalised Prandtl-Ishlinskii operator is an ordinary one behind `G`, and its inverse is the ordinary inverse before `G⁻¹`.
 
 use crate::error::{finite, within};
@@ -103,6 +103,12 @@ impl<T: Real> Envelope<T> {
         Ok(Self { left: left.checked("envelope.left")?, right: right.checked("envelope.right")? })
     }
 
+    /// The two sides at an input: γₗ(u), γᵣ(u).
+    #[inline]
+    pub(super) fn sides(&self, u: T) -> (T, T) {
+        (self.left.value(u), self.right.value(u))
+    }
+
     /// How far the inverse's drive jumps when the reference turns at drive `u`: from the left side to the right one
     /// \[u\]. Negative where γₗ > γᵣ.
     pub fn jump(&self, u: T) -> T {
@@ -117,6 +123,14 @@ pub struct EnvelopeState<T> {
     g: T,
     /// The drive: the last input of the play, the last output of the inverse \[u\].
     u: T,
+}
+
+impl<T: Real> EnvelopeState<T> {
+    /// The last input of the play.
+    #[inline]
+    pub(super) fn drive(&self) -> T {
+        self.u
+    }
 }
 
 impl<T: Real> Stage<T> for Envelope<T> {
@@ -213,7 +227,7 @@ mod tests {
             }
         }
 
-        /// The identity on which the whole family rests: F_r = play_r ∘ G.
+        /// The identity on which the inverse rests: F_r = play_r ∘ G.
         #[test]
         fn every_generalised_play_is_a_play_behind_the_envelope(r in 0.1..5.0f64, gap in 0.0..3.0f64, slope in 0.2..2.0f64, u in prop::collection::vec(-20.0..20.0f64, 50..200)) {
             let (left, right) = (Curve::Linear { slope, offset: -gap }, Curve::Linear { slope, offset: gap });

@@ -10,7 +10,7 @@ use crate::{Build, Env, Error, Invert, Meta, Params, Pi, PiState, Real, Stage};
 pub struct GpiParams<L> {
     /// Envelope γₗ of the rising side.
     pub left: Curve,
-    /// Envelope γᵣ of the falling side; at least γₗ where loops are to be real ones.
+    /// Envelope γᵣ of the falling side; at least γₗ wherever the operator is to be inverted.
     pub right: Curve,
     /// Weight p₀ of the play of radius 0 \[y per unit of γ\].
     pub gain: f64,
@@ -100,9 +100,16 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Gpi<T, N>> for GpiParams<L>
     }
 }
 
-/// History of a generalised operator or of its inverse.
+/// History of a generalised operator: its plays, the one of radius 0 apart, and the last input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GpiState<T, const N: usize> {
+    envelope: EnvelopeState<T>,
+    plays: [T; N],
+}
+
+/// History of the inverse of a generalised operator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GpiInverseState<T, const N: usize> {
     envelope: EnvelopeState<T>,
     pi: PiState<T, N>,
 }
@@ -111,22 +118,24 @@ impl<T: Real, const N: usize> Stage<T> for Gpi<T, N> {
     type State = GpiState<T, N>;
 
     fn state(&self) -> Self::State {
-        GpiState { envelope: self.envelope.state(), pi: self.pi.state() }
+        GpiState { envelope: self.envelope.state(), plays: [T::ZERO; N] }
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let g = self.envelope.reset(&mut s.envelope, e, u0);
-        self.pi.reset(&mut s.pi, e, g)
+        *s = self.state();
+        self.step(s, e, u0)
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
         let g = self.envelope.step(&mut s.envelope, e, u);
-        self.pi.step(&mut s.pi, e, g)
+        let (left, right) = self.envelope.sides(s.envelope.drive());
+        self.pi.between(&mut s.plays, left, right, g)
     }
 }
 
-/// The exact inverse: the inverse Prandtl-Ishlinskii operator, then the inverse envelope of the active branch. Its drive
+/// The inverse: the inverse Prandtl-Ishlinskii operator, then the inverse envelope of the active branch. Exact where γₗ ≤ γᵣ along
+/// the drive; where the envelopes cross, the operator is no ordinary one behind an envelope. Its drive
 /// jumps across the envelope where the reference turns ([`Envelope::jump`]); a slew limit that cannot follow the jump
 /// makes the actuator miss the turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,10 +152,10 @@ impl<T: Real, const N: usize> Invert<T> for Gpi<T, N> {
 }
 
 impl<T: Real, const N: usize> Stage<T> for GpiInverse<T, N> {
-    type State = GpiState<T, N>;
+    type State = GpiInverseState<T, N>;
 
     fn state(&self) -> Self::State {
-        GpiState { envelope: self.envelope.state(), pi: self.pi.state() }
+        GpiInverseState { envelope: self.envelope.state(), pi: self.pi.state() }
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
@@ -184,7 +193,8 @@ mod tests {
             }
             let params = GpiParams {
                 left: Curve::Linear { slope: slopes.0, offset: -gap },
-                right: Curve::Linear { slope: slopes.1, offset: gap },
+                // Above the left side as far as the references lead (50 u, by the lesser slope).
+                right: Curve::Linear { slope: slopes.1, offset: gap + 60.0 / 0.02 * (slopes.1 - slopes.0).abs() },
                 gain, thresholds, weights,
             };
             let gpi: Gpi<f64, 8> = params.build(&()).unwrap();

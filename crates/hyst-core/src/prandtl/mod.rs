@@ -7,7 +7,8 @@ mod td_pi;
 mod viscous;
 
 pub use envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState};
-pub use gpi::{Gpi, GpiInverse, GpiParams, GpiState};
+pub use gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
+
 pub use pi::{Pi, PiParams, PiState};
 pub use td_pi::{TdPi, TdPiInverse, TdPiParams, TdPiState};
 pub use viscous::{ViscousPi, ViscousPiInverse, ViscousPiParams, ViscousPiState};

@@ -4,7 +4,7 @@
 //! operator of the same type.
 
 use crate::error::{finite, within};
-use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage, play};
+use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)`. `L` is any list of numbers: a vector, an array, a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,10 +97,16 @@ impl<T: Real, const N: usize> Pi<T, N> {
     fn advance(&self, s: &mut PiState<T, N>, u: T) -> T {
         let u = if u.is_finite() { u } else { s.u };
         s.u = u;
-        let mut y = self.gain * u;
-        let plays = s.plays.iter_mut().zip(&self.thresholds).zip(&self.weights);
+        self.between(&mut s.plays, u, u, u)
+    }
+
+    /// The output of plays that are pushed by `left` and pulled by `right`, and of the play of radius 0, which is at `g`.
+    #[inline]
+    pub(super) fn between(&self, plays: &mut [T; N], left: T, right: T, g: T) -> T {
+        let mut y = self.gain * g;
+        let plays = plays.iter_mut().zip(&self.thresholds).zip(&self.weights);
         let mut add = |((p, r), w): ((&mut T, &T), &T)| {
-            *p = play(*p, u, *r);
+            *p = p.at_most(right + *r).at_least(left - *r);
             y += *w * *p;
         };
         // With every slot in use the number of turns is a constant, which the compiler unrolls.

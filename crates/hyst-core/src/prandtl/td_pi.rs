@@ -4,7 +4,7 @@
 //! (model) and 33–43 (inverse).
 
 use super::envelope::Curve;
-use super::gpi::{Gpi, GpiInverse, GpiParams, GpiState};
+use super::gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
 use crate::error::{finite, within};
 use crate::stage::hold;
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
@@ -150,15 +150,15 @@ impl<T: Real, const N: usize> TdPi<T, N> {
     }
 }
 
-/// History of a TD-PI model or of its inverse.
+/// History of a TD-PI model (`G` is [`GpiState`](crate::GpiState)) or of its inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TdPiState<T, const N: usize> {
-    gpi: GpiState<T, N>,
+pub struct TdPiState<T, G> {
+    gpi: G,
     degc: T,
 }
 
 impl<T: Real, const N: usize> Stage<T> for TdPi<T, N> {
-    type State = TdPiState<T, N>;
+    type State = TdPiState<T, GpiState<T, N>>;
 
     fn state(&self) -> Self::State {
         TdPiState { gpi: self.at_reference.state(), degc: self.factor.reference }
@@ -197,7 +197,7 @@ impl<T: Real, const N: usize> Invert<T> for TdPi<T, N> {
 }
 
 impl<T: Real, const N: usize> Stage<T> for TdPiInverse<T, N> {
-    type State = TdPiState<T, N>;
+    type State = TdPiState<T, GpiInverseState<T, N>>;
 
     fn state(&self) -> Self::State {
         TdPiState { gpi: self.at_reference.state(), degc: self.factor.reference }

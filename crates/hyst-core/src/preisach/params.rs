@@ -14,7 +14,7 @@ use crate::{Build, Error, Meta, Params, Real};
 /// let (mut state, env) = (map.state(), Env::default());
 /// map.reset(&mut state, &env, 0.0);
 /// assert_eq!(map.step(&mut state, &env, 100.0), 10.0);
-/// assert_eq!(map.step(&mut state, &env, 50.0), 5.0);
+/// assert_eq!(map.step(&mut state, &env, 50.0), 6.0);
 /// # Ok::<(), hyst_core::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -150,7 +150,7 @@ impl<T: Real, const N: usize, K: Copy + Default> Reversals<T, N, K> {
     }
 
     /// Outputs and notes of the reversals from `k` on.
-    pub(crate) fn from_mut(&mut self, k: usize) -> impl Iterator<Item = (&mut T, &mut K)> {
+    pub(crate) fn tail_mut(&mut self, k: usize) -> impl Iterator<Item = (&mut T, &mut K)> {
         let (outputs, notes) = (self.output.as_flattened_mut(), self.note.as_flattened_mut());
         outputs.iter_mut().zip(notes).take(self.len).skip(k)
     }

@@ -55,29 +55,35 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
 /// `N` nodes of the Everett map, `R` by `C` of the mirror.
 ///
 /// **Time.** n counts the samples (of period h) that the input has spent on the branch. Inner loops that began and closed
-/// meanwhile do not count: like their reversals, their duration is wiped out. The sample in which the input leaves a
-/// reversal still counts to the branch that led there, so that an input that rests for a moment and one that just begins
-/// to turn give the same output; with the paper's tᵢ this differs by one sample in n. Counters stop at 2³² − 1.
-/// After `reset` the input has rested at u0 for ever: the classical output, and the first branch begins there.
+/// meanwhile do not count: like their reversals, their duration is wiped out, so that a closed cycle leaves no trace but
+/// δ. The sample in which the input leaves a reversal still counts to the branch that led there, so that an input that
+/// rests and one that just begins to turn give the same output; with the paper's tᵢ, n at a reversal is one less.
+/// Counters are integers and stop at 2³² − 1, in `f32` too. After `reset` the input has rested at u0 for ever: the output
+/// is the classical one, and the first branch begins there.
 ///
-/// **Closing loops.** Where a loop closes that was left by a falling branch of weight ξ₁ and closed by a rising one of
-/// weight ξ₂, eq. 6 steps by `(ξ₂ − ξ₁) E(M, m)`. The offset δ takes that step, so the output is a continuous function of the
-/// input within every sample, and fades with the travel of the input: `δ ← δ exp(−|Δu| / fade)`. With `fade` = 0 there is no
-/// δ and the steps stay, as in the paper.
+/// **Closing loops.** A loop that was left on a branch of weight ξ₁ and closed on one of weight ξ₂ makes eq. 6 step by
+/// `(ξ₂ − ξ₁) E(M, m)`. The offset δ takes that step, so that within every sample the output is a continuous function of
+/// the input, and fades as the input travels: `δ ← δ exp(−|Δu| / fade)`. With `fade` = 0 there is no δ and the steps stay,
+/// as in the paper.
 ///
 /// **Bound.** Let Ω = ξ_max − ξ_min ([`Mirror::range`]), E₀ the largest Everett value among the inputs that occur and S the
-/// largest `E(α, β) / (α − β)`. A loop of swing s adds at most Ω S s to |δ| and takes 2 s of travel that no other loop takes.
-/// So loops closed one after the other give `|δ| ≤ Ω S s / (1 − exp(−2 s / fade)) ≤ Ω S (s + fade / 2)`. Nested loops may all close
-/// in a moment: while the input travels by `fade`, at most the N pairs close that were on the stack, each with at most Ω E₀,
-/// besides loops that began meanwhile, with at most Ω S fade / 2 together. Earlier ones have faded by 1/e for each further
-/// `fade`, so always `|δ| ≤ Ω (N E₀ + S fade / 2) / (1 − 1/e)`. What remains is bounded by the stack: it differs from the classical
-/// output times (ξ_max + ξ_min) / 2 by at most Ω (N + 1) E₀.
+/// largest `E(α, β) / (α − β)`. A loop of swing s adds at most Ω S s to |δ|, and takes 2 s of travel that no other loop
+/// takes. So loops closed one after the other give `|δ| ≤ Ω S s / (1 − exp(−2 s / fade)) ≤ Ω S (s + fade / 2)`. Nested
+/// loops may all close in a moment: while the input travels by `fade`, at most the N pairs close that were on the stack
+/// before, each with at most Ω E₀, and loops that began meanwhile, with at most Ω S fade / 2 together. Earlier ones have
+/// faded by 1/e for each further `fade`, so always `|δ| ≤ Ω (N E₀ + S fade / 2) / (1 − 1/e)`. What remains is a sum of at
+/// most 2 N + 1 terms: it differs from the classical output times (ξ_max + ξ_min) / 2 by at most Ω (2 N + 1) E₀.
 ///
-/// A slowly decaying oscillation with ξ larger on rising than on falling branches drifts as long as its loops stay open (so
-/// do eq. 6 and 17); once they close the drift is gone, and a cycle that is closed leaves none.
+/// A pair that the full stack forgets ([`Reversals`]) is treated as if its loop had closed: what it held, at most a
+/// constant times its swing, goes to δ too, so the output does not move and the bound only changes its constant.
 ///
-/// **Inverse.** [`Search`](crate::Search) through [`Probe`]: exact to its tolerance wherever the output is continuous
-/// (`fade` > 0), unique where it rises; [`least_slope`](Self::least_slope) tells when.
+/// The bound is wide because the model is: where ξ is larger on rising than on falling branches, an oscillation that
+/// decays slowly drifts (as eq. 6 and 17 do) while its loops are open. Once they close the drift fades.
+///
+/// **Inverse.** [`Search`](crate::Search) through [`Probe`]: exact to its tolerance for every output that its range of
+/// inputs reaches if `fade` > 0, and unique where the output rises with the input, for which
+/// [`least_slope`](Self::least_slope) has a sufficient condition. With `fade` = 0 outputs inside a step are not reached.
+/// [`DpmSurfaceInverse`] is the paper's approximation.
 ///
 /// ```
 /// use hyst_core::{Build, Dpm, DpmParams, Env, MirrorParams, PreisachParams, Sampling, Search, Stage};
@@ -103,7 +109,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
 /// model.reset(&mut forward, &env, 0.0);
 /// inverse.reset(&mut backward, &env, 0.0);
 /// for k in 1..200 {
-///     let reference = 4.0 - 4.0 * (0.2 * k as f64).cos();
+///     let reference = 4.5 - 3.5 * (0.2 * k as f64).cos();
 ///     let drive = inverse.step(&mut backward, &env, reference);
 ///     assert!((model.step(&mut forward, &env, drive) - reference).abs() < 1e-9);
 /// }
@@ -142,9 +148,9 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
     }
 
     /// The recursion of eq. 17 instead: `y = F(t_i) + ξ (F_cpm − F_cpm(t_i))` with t_i the last reversal, whether loops have
-    /// closed since or not. Simpler, continuous at closing loops without an offset, but what a branch gains by its weight
-    /// it keeps for ever: a cycle between two inputs adds (ξ_up − ξ_down) E each time, 2.9 N per 80 V sawtooth at
-    /// ξ = 1 / 0.8 and 0.18 N/V. Not for long records.
+    /// closed since or not. It is continuous at closing loops without an offset, but keeps for ever what a branch gains by
+    /// its weight: a cycle between two inputs adds (ξ_up − ξ_down) E each time, 2.88 N per 80 V sawtooth at ξ = 1 / 0.8 and
+    /// 0.18 N/V, without bound.
     #[must_use]
     pub fn drifting(self) -> Self {
         Self { drifting: true, ..self }
@@ -163,11 +169,13 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
     /// Lower bound of the slope of every branch on the grid, whatever its rate \[output unit / input unit\].
     ///
     /// Positive: the output rises strictly with the present input wherever `|δ| < fade × slope`
-    /// ([`DpmState::offset`]), so the inverse is unique there; the offset's fading may outrun a shallower branch.
+    /// ([`DpmState::offset`]), so the inverse is unique there; a larger offset may fade faster than a branch rises.
     ///
-    /// A branch with ξ = ψ(P) along its ray and classical gain G(P) has the slope ψ G' + ψ' G. If no branch of the map
-    /// gets shallower than κ times an earlier slope, |P| G' ≥ κ G, and ξ > 0 with `κ ξ + D ξ_D + P ξ_P > 0` everywhere
-    /// ([`Mirror::least_rise`]) makes it at least G' times the smaller of ξ and (κ ξ + D ξ_D + P ξ_P) / κ.
+    /// Along the ray of its rate a branch is ξ = ψ(|P|) times the classical gain G(|P|), with the slope ψ G' + ψ' G. Where no
+    /// branch of the map has a slope below κ times one that it had before, |P| G' ≥ κ G. Then
+    /// `κ ξ + D ∂ξ/∂D + P ∂ξ/∂P > 0` for all D and P ([`Mirror::least_rise`]) is enough: the slope is at least G' times the
+    /// smaller of ξ and that sum by κ. (Maps without negative densities; with them the branches that leave virgin memory
+    /// in the middle of a grid are not covered.)
     pub fn least_slope(&self) -> T {
         let (slope, kappa) = self.map.slopes();
         if slope <= T::ZERO || kappa <= T::ZERO {
@@ -266,7 +274,7 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         let (by_classical, by_output) = (classical - next.classical, output - next.output);
         s.memory.remove(k);
         let mut ended = Some(age);
-        for (y, turn) in s.memory.from_mut(k) {
+        for (y, turn) in s.memory.tail_mut(k) {
             *y += by_classical;
             turn.output += by_output;
             turn.age = ended.take().unwrap_or(turn.age);
