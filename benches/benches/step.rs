@@ -68,9 +68,9 @@ fn stages(c: &mut Criterion) {
         Box::new(Everett::<f64, 51>::new(grid, 0.0, |a, b| if a == b { 0.1 } else { 0.002 }, |_| 0.01).unwrap());
     run::<f64, _>(c, "preisach 50x50 f64", &*everett);
     run::<f64, _>(c, "preisach 50x50 inverse f64", &everett.invert().unwrap());
-    // A turn at every sample.
+    // A turn at nearly every sample.
     let jagged: Vec<f64> = (0..ROWS).map(|k| 60.0 + 59.0 * (2.4 * k as f64 + 0.3 * (k as f64).sin()).sin()).collect();
-    run_on(c, "preisach 50x50 f64, a reversal each sample", &*everett, &jagged);
+    run_on(c, "preisach 50x50 f64, jagged drive", &*everett, &jagged);
     let mirror = MirrorParams {
         rate_low: 2e3,
         rate_high: 16e3,
@@ -82,7 +82,7 @@ fn stages(c: &mut Criterion) {
     };
     let dpm = Box::new(Dpm::new(*everett.clone(), mirror.build(&()).unwrap(), 20.0, &PERIOD).unwrap());
     run::<f64, Dpm<f64, 51, 8, 9>>(c, "dpm 50x50 f64", &dpm);
-    run_on(c, "dpm 50x50 f64, a reversal each sample", &*dpm, &jagged);
+    run_on(c, "dpm 50x50 f64, jagged drive", &*dpm, &jagged);
     run::<f64, _>(c, "dpm 50x50 inverse by search f64", &Search::new(*dpm, 0.0, 120.0, 1e-9).unwrap());
     let lag: hyst_core::Lag<f64> = LagParams { seconds: 3e-3 }.build(&PERIOD).unwrap();
     run::<f64, _>(c, "lag f64", &lag);
