@@ -235,7 +235,6 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(128))]
 
         /// References that the model itself gives. Where the output provably rises with the input, the input is found too.
         #[test]

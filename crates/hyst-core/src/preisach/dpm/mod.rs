@@ -54,12 +54,12 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
 /// that led to it, and the branch in progress has D_t and P_t (eq. 3 and 4). With ξ ≡ 1 it is the classical operator.
 /// `N` nodes of the Everett map, `R` by `C` of the mirror.
 ///
-/// **Time.** n counts the samples (of period h) that the input has spent on the branch. Inner loops that began and closed
-/// meanwhile do not count: like their reversals, their duration is wiped out, so that a closed cycle leaves no trace but
-/// δ. The sample in which the input leaves a reversal still counts to the branch that led there, so that an input that
-/// rests and one that just begins to turn give the same output; with the paper's tᵢ, n at a reversal is one less.
-/// Counters are integers and stop at 2³² − 1, in `f32` too. After `reset` the input has rested at u0 for ever: the output
-/// is the classical one, and the first branch begins there.
+/// **Time.** With `fade` = 0 all is as in eq. 3, 4, 6 and 7: n counts the samples (of period h) since the reversal, what
+/// inner loops took included. With `fade` > 0, n counts the samples that the input has spent on the branch: the time of inner
+/// loops that began and closed meanwhile is wiped out like their reversals, so that a closed cycle leaves no trace but δ; and
+/// the sample in which the input leaves a reversal still counts to the branch that led there, so that an input that rests
+/// and one that just begins to turn give the same output. Counters are integers and stop at 2³² − 1, in `f32` too. After `reset`
+/// the input has rested at u0 for ever: the output is the classical one, and the first branch begins there.
 ///
 /// **Closing loops.** A loop that was left on a branch of weight ξ₁ and closed on one of weight ξ₂ makes eq. 6 step by
 /// `(ξ₂ − ξ₁) E(M, m)`. The offset δ takes that step, so that within every sample the output is a continuous function of
@@ -185,11 +185,17 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         slope * share
     }
 
+    /// Whether time is counted as in print, at the price of outputs that jump (and that no input reaches).
+    #[inline]
+    fn as_printed(&self) -> bool {
+        self.per_fade.is_none() || self.drifting
+    }
+
     /// The output without the offset `age` samples after `start`, from the classical output.
     #[inline]
     fn weighted(&self, start: Start<T>, age: u32, u: T, classical: T) -> T {
         let change = u - start.at;
-        let rate = change.abs() * self.per_period / T::from_f64(f64::from(age));
+        let rate = change.abs() * self.per_period / T::from_f64(f64::from(age.max(1)));
         start.output + self.mirror.weight(rate, change) * (classical - start.classical)
     }
 
@@ -225,6 +231,10 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
         let up = if input == now { memory.rising() } else { input > now };
         if up != memory.rising() {
             let classical = memory.output();
+            if self.as_printed() {
+                // The reversal was the last sample; the branch that led there ended with it.
+                path.age = s.age;
+            }
             let output = self.weighted(path.start(), path.age, now, classical);
             path.turn(Start { at: now, classical, output }, self.drifting);
         }
@@ -234,11 +244,11 @@ impl<T: Real, const N: usize, const R: usize, const C: usize> Dpm<T, N, R, C> {
                 break;
             }
             if self.per_fade.is_none() {
-                path.close();
+                path.close(self.as_printed());
                 continue;
             }
             let (_, before) = self.outputs(&path, target);
-            path.close();
+            path.close(self.as_printed());
             let (_, after) = self.outputs(&path, target);
             offset = self.faded(offset, target - from) + (before - after);
             from = target;

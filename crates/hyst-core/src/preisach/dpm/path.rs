@@ -106,14 +106,15 @@ impl<T: Real, const N: usize> Path<'_, T, N> {
         self.age = 1;
     }
 
-    /// The innermost loop closes: back on the branch that it interrupted. One that never began has no start and no time
-    /// of its own, and the present one simply goes on.
-    pub(super) fn close(&mut self) {
+    /// The innermost loop closes: back on the branch that it interrupted, with the time of the loop or without it. A branch
+    /// that never began has no start and no time of its own, and the present one simply goes on.
+    pub(super) fn close(&mut self, with_the_loop: bool) {
         let target = self.len.saturating_sub(2);
         if target < self.undated {
             (self.start, self.undated) = (self.start(), target);
         } else if let Some((_, age)) = self.reversal(target) {
-            self.age = age;
+            let inside = self.reversal(target + 1).map_or(0, |(_, age)| age).saturating_add(self.age);
+            self.age = if with_the_loop { age.saturating_add(inside) } else { age };
         }
         self.len = target;
     }
