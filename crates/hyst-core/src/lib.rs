@@ -20,6 +20,8 @@
 //! | play and stop operators | `play.rs` | – |
 //! | Prandtl-Ishlinskii | `pi.rs` | closed form, the same type |
 //! | Preisach as an Everett map | `preisach/` | closed form cell by cell |
+//! | Bouc-Wen, and its oscillator | `bouc_wen/` | search; none for the oscillator |
+//! | activation functions | `activation/` | a sample at a time, or backwards in time with preview |
 //! | delay, lag, resonance | `delay.rs` `lag.rs` `resonance.rs` | band-limited with preview, `preview.rs` |
 //! | creep | `creep.rs` | recursive, exact |
 //! | temperature, drift, interference | `temperature.rs` `drift.rs` `interference.rs` | division; sensor effects are not driven against |
@@ -43,6 +45,8 @@
 #[cfg(test)]
 extern crate std;
 
+mod activation;
+mod bouc_wen;
 mod chain;
 mod complex;
 mod control;
@@ -54,6 +58,7 @@ mod real;
 mod search;
 mod stage;
 
+pub use bouc_wen::*;
 pub use chain::*;
 pub use complex::Complex;
 pub use control::*;
