@@ -25,9 +25,9 @@
 //! | dynamic Preisach | `preisach/dpm/` | search, exact; approximate by the inverse surface |
 //! | Maxwell slip | `maxwell/slip.rs` | closed form |
 //! | temperature-dependent electromechanical | `maxwell/td_em.rs` | band-limited with preview, then exact |
-//! | Bouc-Wen | `bouc_wen/` | search |
+//! | Bouc-Wen, and its oscillator | `bouc_wen/` | search; none for the oscillator |
 //! | fractional models, LFDM and IFM | `fractional/` | the recursion solved for the input; IFM only where that is stable |
-//! | activation functions | `activation/` | search, or backwards in time with preview |
+//! | activation functions | `activation/` | a sample at a time, or backwards in time with preview |
 //! | delay, lag, resonance | `chain/` | band-limited with preview, `chain/preview.rs` |
 //! | creep, asymmetry, temperature, load, saturation | `chain/` | exact |
 //! | drift, interference | `chain/` | none: they are in the sensor, no drive follows them |
@@ -53,6 +53,8 @@
 #[cfg(test)]
 extern crate std;
 
+mod activation;
+mod bouc_wen;
 mod chain;
 mod complex;
 mod control;
@@ -67,6 +69,7 @@ mod real;
 mod search;
 mod stage;
 
+pub use bouc_wen::*;
 pub use chain::*;
 pub use complex::Complex;
 pub use control::*;

@@ -43,6 +43,8 @@ pub trait Real:
     fn floor(self) -> Self;
     /// sin x, x in rad.
     fn sin(self) -> Self;
+    /// tan x, x in rad.
+    fn tan(self) -> Self;
     /// atan x \[rad\].
     fn atan(self) -> Self;
     /// √x.
@@ -118,6 +120,7 @@ real!(
     f32,
     floor = libm::floorf,
     sin = libm::sinf,
+    tan = libm::tanf,
     atan = libm::atanf,
     sqrt = libm::sqrtf,
     exp = libm::expf,
@@ -130,6 +133,7 @@ real!(
     f64,
     floor = libm::floor,
     sin = libm::sin,
+    tan = libm::tan,
     atan = libm::atan,
     sqrt = libm::sqrt,
     exp = libm::exp,

@@ -1,0 +1,96 @@
+//! The two printed forms of the Bouc-Wen operator.
+
+use super::BoucWen;
+use crate::error::{finite, within};
+use crate::{Build, Error, Meta, Params, Real};
+
+/// Parameters of `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7).
+///
+/// Valid are n from 1 to 20 (beyond, the loop is that of the [`stop`](crate::stop)) and |γ| ≤ β: then every cycle dissipates
+/// (Erlicher and Point 2004), and the way back to zero is never slower than α. The memory saturates where α u̇ is used up,
+/// at `g∞ = (|α| / (β + sgn(α)γ))^(1/n)`, so |g| ≤ g∞ for every input; |γ| > β could make that sum negative, and g grow with
+/// every cycle. At γ = −sgn(α)β nothing saturates, and |g| stays below |α| times the input's range.
+///
+/// The gain k₀ may have either sign; the inverse needs it positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BoucWenParams {
+    /// Gain k₀ of the part without memory \[y/u\].
+    pub k0: f64,
+    /// α: slope of the memory at zero \[y/u\].
+    pub alpha: f64,
+    /// β: dissipation \[y^(1−n)/u\].
+    pub beta: f64,
+    /// γ: difference between the way out and the way back \[y^(1−n)/u\].
+    pub gamma: f64,
+    /// n: sharpness of the bend.
+    pub n: f64,
+}
+
+impl Params for BoucWenParams {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        const ANY: f64 = f64::INFINITY;
+        f(&Meta { name: "k0", unit: "y/u", lower: 0.0, upper: ANY }, &mut self.k0);
+        f(&Meta { name: "alpha", unit: "y/u", lower: -ANY, upper: ANY }, &mut self.alpha);
+        f(&Meta { name: "beta", unit: "y^(1-n)/u", lower: 0.0, upper: ANY }, &mut self.beta);
+        f(&Meta { name: "gamma", unit: "y^(1-n)/u", lower: -ANY, upper: ANY }, &mut self.gamma);
+        f(&Meta { name: "n", unit: "", lower: 1.0, upper: 20.0 }, &mut self.n);
+    }
+}
+
+impl<T: Real> Build<BoucWen<T>> for BoucWenParams {
+    type Context = ();
+    fn build(&self, (): &()) -> Result<BoucWen<T>, Error> {
+        finite("bouc-wen.k0", self.k0)?;
+        finite("bouc-wen.alpha", self.alpha)?;
+        within("bouc-wen.beta", self.beta, self.beta >= 0.0, "zero or positive")?;
+        within("bouc-wen.gamma", self.gamma, self.gamma.abs() <= self.beta, "from -beta to beta")?;
+        within("bouc-wen.n", self.n, (1.0..=20.0).contains(&self.n), "from 1 to 20")?;
+        BoucWen::new(self)
+    }
+}
+
+/// Parameters of `y = d u − h`, `ḣ = A u̇ − B |u̇| h − Γ u̇ |h|`: the form with n = 1 and the hysteresis subtracted (Zhu et al.,
+/// eq. 18).
+///
+/// With g = −h it is [`BoucWenParams`] with k₀ = d, α = −A, β = B, γ = −Γ, so B ≥ 0 and |Γ| ≤ B.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BoucWenClassicParams {
+    /// Gain d of the part without memory \[y/u\].
+    pub d: f64,
+    /// A: slope of the memory at zero \[y/u\].
+    pub a: f64,
+    /// B: dissipation \[1/u\].
+    pub b: f64,
+    /// Γ: difference between the way out and the way back \[1/u\].
+    pub gamma: f64,
+}
+
+impl BoucWenClassicParams {
+    /// The same operator in the form of Xie et al.
+    pub fn general(&self) -> BoucWenParams {
+        BoucWenParams { k0: self.d, alpha: -self.a, beta: self.b, gamma: -self.gamma, n: 1.0 }
+    }
+}
+
+impl Params for BoucWenClassicParams {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        const ANY: f64 = f64::INFINITY;
+        f(&Meta { name: "d", unit: "y/u", lower: 0.0, upper: ANY }, &mut self.d);
+        f(&Meta { name: "a", unit: "y/u", lower: -ANY, upper: ANY }, &mut self.a);
+        f(&Meta { name: "b", unit: "1/u", lower: 0.0, upper: ANY }, &mut self.b);
+        f(&Meta { name: "gamma", unit: "1/u", lower: -ANY, upper: ANY }, &mut self.gamma);
+    }
+}
+
+impl<T: Real> Build<BoucWen<T>> for BoucWenClassicParams {
+    type Context = ();
+    fn build(&self, (): &()) -> Result<BoucWen<T>, Error> {
+        finite("bouc-wen.d", self.d)?;
+        finite("bouc-wen.a", self.a)?;
+        within("bouc-wen.b", self.b, self.b >= 0.0, "zero or positive")?;
+        within("bouc-wen.gamma", self.gamma, self.gamma.abs() <= self.b, "from -b to b")?;
+        BoucWen::new(&self.general())
+    }
+}
