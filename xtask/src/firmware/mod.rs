@@ -65,7 +65,12 @@ fn steps(write: bool) -> Result<(), Ended> {
 
     let target = target().join("firmware");
     let built = target.join(TARGET).join("release");
-    done(toolchain.cargo("build", &target).args(["--package", "hyst-core", "--all-features"]).current_dir(root()))?;
+    done(
+        toolchain
+            .cargo("build", &target)
+            .args(["--release", "--package", "hyst-core", "--all-features"])
+            .current_dir(root()),
+    )?;
     if toolchain.lints {
         let strict = ["--release", "--locked", "--workspace", "--", "-D", "warnings"];
         done(toolchain.cargo("clippy", &target).args(strict).current_dir(&firmware))?;

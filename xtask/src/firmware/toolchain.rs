@@ -57,8 +57,9 @@ impl Toolchain {
             folder.is_some_and(|folder| Path::new(&folder).is_dir())
         };
         if !installed() {
-            let add = Command::new("rustup").args(["target", "add", TARGET]).stdin(Stdio::null()).spawn();
-            let added = add.ok().and_then(|child| wait(child, Duration::from_secs(180)));
+            let mut add = Command::new("rustup");
+            add.args(["target", "add", TARGET]).stdin(Stdio::null()).env_remove("RUST_BACKTRACE");
+            let added = add.spawn().ok().and_then(|child| wait(child, Duration::from_secs(180)));
             if !added.is_some_and(|status| status.success()) || !installed() {
                 return None;
             }

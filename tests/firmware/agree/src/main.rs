@@ -21,7 +21,7 @@ use core::panic::PanicInfo;
 use cortex_m::asm::wfi;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hio, hprintln};
-use hyst_cases::{Case, Hash, Precision, SAMPLES, State, Visit, each, inputs};
+use hyst_cases::{Case, Fingerprint, Precision, SAMPLES, State, Visit, each, inputs};
 use hyst_core::{Env, Stage};
 use measure::{Counter, stack};
 
@@ -123,7 +123,7 @@ impl Visit for Bench {
             "case {} {} hash={:016x} steps={} instructions={} worst={} stack={} build_stack={} coefficients={} state={}",
             C::NAME,
             T::NAME,
-            Hash::of(&y).0,
+            Fingerprint::of(&y).0,
             STEPS,
             Counter::instructions(all - idle),
             Counter::instructions(worst - idle / STEPS),

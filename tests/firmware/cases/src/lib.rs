@@ -1,7 +1,7 @@
 //! Every model of the core over the same samples: on the host and in firmware, in `f32` and `f64`.
 //!
 //! What a [`Case`] computes is arithmetic alone (no clock, no file, no random device), so two machines that disagree in
-//! one bit of one sample disagree in how they compute. [`run`] gives the bits, [`Hash`] their fingerprint.
+//! one bit of one sample disagree in how they compute. [`run`] gives the bits, [`Fingerprint`] their fingerprint.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -68,15 +68,15 @@ impl Precision for f64 {
 
 /// 64-bit FNV-1a over the bits of numbers, low byte first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Hash(pub u64);
+pub struct Fingerprint(pub u64);
 
-impl Default for Hash {
+impl Default for Fingerprint {
     fn default() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
 }
 
-impl Hash {
+impl Fingerprint {
     /// Takes in one more number.
     pub fn add<T: Precision>(&mut self, x: T) {
         for byte in x.bits().to_le_bytes().iter().take(size_of::<T>()) {

@@ -3,7 +3,7 @@
 //! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU and then this, with the path of what it printed in
 //! `HYST_FIRMWARE`.
 
-use hyst_cases::{Case, Hash, Precision, Visit, each, run};
+use hyst_cases::{Case, Fingerprint, Precision, Visit, each, run};
 use std::collections::BTreeMap;
 use std::{env, fs};
 
@@ -13,6 +13,9 @@ const STEP_STACK: usize = 2048;
 /// Bytes of stack that building coefficients and resetting may use: several copies of the largest coefficients, since a
 /// `Result` is returned by value.
 const BUILD_STACK: usize = 32 * 1024;
+
+/// How far a run in `f32` may be from the same in `f64`, of the span of the outputs.
+const FOLLOWS: f64 = 1e-4;
 
 /// All outputs of all cases, computed here.
 #[derive(Default)]
@@ -77,7 +80,10 @@ fn every_case_moves_and_single_precision_follows_double_precision() {
         let (low, high) = double.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
         assert!(single.iter().chain(double).all(|y| y.is_finite()) && high > low, "{name}: {low} to {high}");
         let worst = single.iter().zip(double).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(worst <= 1e-4 * (high - low), "{name}: f32 is {worst} away from f64, which goes from {low} to {high}");
+        assert!(
+            worst <= FOLLOWS * (high - low),
+            "{name}: f32 is {worst} away from f64, which goes from {low} to {high}"
+        );
     }
 }
 
@@ -103,8 +109,8 @@ fn firmware_and_host_agree_bit_for_bit() {
         }
         // The fingerprint that the firmware took of its own numbers: nothing was lost on the way here.
         let hash = match *precision {
-            "f32" => Hash::of(&theirs.iter().map(|b| f32::from_bits(*b as u32)).collect::<Vec<_>>()),
-            _ => Hash::of(&theirs.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>()),
+            "f32" => Fingerprint::of(&theirs.iter().map(|b| f32::from_bits(*b as u32)).collect::<Vec<_>>()),
+            _ => Fingerprint::of(&theirs.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>()),
         };
         assert_eq!(
             there.figures[&key]["hash"],
