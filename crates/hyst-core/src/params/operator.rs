@@ -2,8 +2,8 @@
 
 use super::Kind;
 use crate::{
-    DpmParams, GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams,
-    TdPiParams, ViscousPiParams,
+    BoucWenOscillatorParams, BoucWenParams, DpmParams, GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta,
+    Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
 };
 
 /// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
@@ -32,6 +32,10 @@ pub enum OperatorParams<L> {
     Ifm(IfmParams),
     /// Dynamic Preisach.
     Dpm(DpmParams<L>),
+    /// Bouc-Wen, static; both papers' forms become this one.
+    BoucWen(BoucWenParams),
+    /// An oscillator with a Bouc-Wen element.
+    BoucWenOscillator(BoucWenOscillatorParams),
 }
 
 impl<L> OperatorParams<L> {
@@ -47,6 +51,8 @@ impl<L> OperatorParams<L> {
             Self::Lfdm(_) => Kind::Lfdm,
             Self::Ifm(_) => Kind::Ifm,
             Self::Dpm(_) => Kind::Dpm,
+            Self::BoucWen(_) => Kind::BoucWen,
+            Self::BoucWenOscillator(_) => Kind::BoucWenOscillator,
         }
     }
 }
@@ -64,6 +70,8 @@ impl<L: AsMut<[f64]>> Params for OperatorParams<L> {
             Self::Lfdm(p) => p.visit(f),
             Self::Ifm(p) => p.visit(f),
             Self::Dpm(p) => p.visit(f),
+            Self::BoucWen(p) => p.visit(f),
+            Self::BoucWenOscillator(p) => p.visit(f),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
 use hyst_core::{
-    Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse, Ifm, IfmInverse, Invert,
-    Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse,
-    ViscousPi, ViscousPiInverse,
+    BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse,
+    Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm, TdEmInverse,
+    TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
 };
 
 /// Plays and elements that the host's operators hold.
@@ -33,6 +33,10 @@ type FullMemory = Exponentials<f64, 40>;
 
 /// Temperature for which the filter of an electromechanical model is made \[°C\]; its gain follows the measured one.
 const ROOM: f64 = 23.0;
+
+const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
+    "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",
+);
 
 /// Declares the operators of the host: type, type of the inverse, how it is made, and its preview.
 macro_rules! operators {
@@ -145,6 +149,9 @@ operators! {
         TdEmInverse::lead;
     Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed, at_once;
     Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed, at_once;
+    BoucWen(BoucWen<f64>) => Search<f64, BoucWen<f64>>,
+        |o: &BoucWen<f64>, [low, high]: [f64; 2]| o.inverse(low, high, 1e-12 * (high - low)), at_once;
+    BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
@@ -168,6 +175,8 @@ impl Operator {
             }
             Base::TdEm(p) => Any::TdEm(Box::new(p.build(cx)?)),
             Base::Preisach(p) => Any::Preisach(Box::new(p.build(&())?)),
+            Base::BoucWen(p) => Any::BoucWen(Box::new(p.build(&())?)),
+            Base::BoucWenOscillator(p) => Any::BoucWenOscillator(Box::new(p.build(cx)?)),
             Base::Dpm(p) => Any::Dpm(Box::new(p.build(cx)?)),
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),

@@ -143,6 +143,8 @@ fn base(name: &str, v: &Value) -> Result<Option<Base>, String> {
         "preisach" => Base::Preisach(fields(name, v)?),
         "maxwell-slip" => Base::MaxwellSlip(fields(name, v)?),
         "td-em" => Base::TdEm(fields(name, v)?),
+        "bouc-wen" => Base::BoucWen(fields(name, v)?),
+        "bouc-wen-oscillator" => Base::BoucWenOscillator(fields(name, v)?),
         "dpm" => Base::Dpm(fields(name, v)?),
         "lfdm" => Base::Lfdm(fields(name, v)?),
         "ifm" => Base::Ifm(fields(name, v)?),

@@ -28,6 +28,12 @@ macro_rules! all_cases {
             lfdm_short_100: Lfdm<T, ShortMemory<T, 100>>, 0.0..120.0 => given(LFDM).build(&PERIOD);
             ifm_24: Ifm<T, Exponentials<T, 24>, 32>, 0.0..120.0 => given(IFM).build(&PERIOD);
             ifm_24_inverse: IfmInverse<T, Exponentials<T, 24>, 32>, 0.0..20.0 => Build::<Ifm<T, Exponentials<T, 24>, 32>>::build(&given(IFM), &PERIOD)?.invert();
+            dpm_24: Dpm<T, 25, 8, 9>, -5.0..125.0 => dpm::<T>();
+            dpm_24_inverse: Search<T, Dpm<T, 25, 8, 9>>, 0.0..15.0 => Search::new(dpm::<T>()?, -100.0, 220.0, 1e-4);
+            bouc_wen: BoucWen<T>, 0.0..120.0 => given(BOUC_WEN).build(&());
+            bouc_wen_n2: BoucWen<T>, 0.0..120.0 => given(BoucWenParams { n: 2.0, ..BOUC_WEN }).build(&());
+            bouc_wen_inverse: Search<T, BoucWen<T>>, 0.0..20.0 => Build::<BoucWen<T>>::build(&given(BOUC_WEN), &())?.inverse(-50.0, 250.0, 1e-4);
+            bouc_wen_oscillator: BoucWenOscillator<T>, -120.0..120.0 => given(BoucWenOscillatorParams::BENCHMARK).build(&PERIOD);
             delay: Delay<T, 16>, 0.0..120.0 => given(DEAD_TIME).build(&PERIOD);
             lag: Lag<T>, 0.0..120.0 => given(LAG).build(&PERIOD);
             creep_4: Creep<T, 4>, 0.0..20.0 => given(CREEP).build(&PERIOD);

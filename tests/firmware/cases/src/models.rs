@@ -10,6 +10,7 @@ pub(crate) const CREEP: CreepParams<[f64; 4]> =
     CreepParams { seconds: [0.02, 0.2, 2.0, 20.0], shares: [0.02, 0.015, 0.01, 0.02] };
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
 pub(crate) const WARMTH: TemperatureParams = TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0 };
+pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
 pub(crate) const LFDM: LfdmParams =
     LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
 pub(crate) const IFM: IfmParams = IfmParams {
@@ -79,6 +80,20 @@ pub(crate) fn chain<T: Real>() -> Result<Chain<T, Pi<T, 10>, 16, 4>, Error> {
         .with_resonance(&given(MODE), &PERIOD)?
         .with_drift(&given(DRIFT))?
         .with_interference(&given(MAINS))
+}
+
+pub(crate) fn dpm<T: Real>() -> Result<Dpm<T, 25, 8, 9>, Error> {
+    let grid = MirrorParams {
+        rate_low: 2e3,
+        rate_high: 16e3,
+        rates: 8,
+        change_low: -80.0,
+        change_high: 80.0,
+        changes: 9,
+        weights: (),
+    };
+    let mirror = Mirror::from_fn(&grid, |d, p| given(1.0 - 8e-6 * d - 2e-6 * p * p))?;
+    Dpm::new(everett::<T, 25>()?, mirror, given(20.0), &PERIOD)
 }
 
 /// A PID that holds a first-order plant at the reference: the drive of a closed loop, as a stage.
