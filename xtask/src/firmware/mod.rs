@@ -9,8 +9,9 @@ mod toolchain;
 
 use crate::command::{Outcome, cargo, output, passes, root};
 use figures::Figures;
-use std::env;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
 use toolchain::{NotRun, TARGET, Toolchain};
 
 /// What the core may depend on: all of it is `no_std`. `libm` always, the others where a feature asks for them.
@@ -58,6 +59,7 @@ impl From<String> for Ended {
 fn steps(write: bool) -> Result<(), Ended> {
     depends_on_no_std()?;
     let firmware = root().join("tests/firmware");
+    same_libm(&firmware)?;
     done(cargo().args(["fmt", "--all", "--check"]).current_dir(&firmware))?;
     let toolchain = Toolchain::find()
         .map_err(|how| Ended::NotRun(format!("no compiler for {TARGET}, only dependencies were checked; {how}")))?;
@@ -83,15 +85,8 @@ fn steps(write: bool) -> Result<(), Ended> {
     let for_size = ["--release", "--locked", "--package", "hyst-bare", "--config", "profile.release.opt-level='s'"];
     done(toolchain.cargo("build", &small).args(for_size).current_dir(&firmware))?;
     let small = small.join(TARGET).join("release/libhyst_bare.a");
-    for (library, level) in [(&library, "3"), (&small, "s")] {
-        let functions = link::functions(library)?;
-        let found = link::can_panic(&toolchain, library, &functions)?;
-        if functions.is_empty() || !found.is_empty() {
-            let (some, all, names) = (found.len(), functions.len(), found.join(" "));
-            return Err(Ended::Failed(format!("{some} of {all} functions can panic at opt-level {level}: {names}")));
-        }
-        eprintln!("{} functions link without a panic at opt-level {level}", functions.len());
-    }
+    cannot_panic(&toolchain, &library, "3")?;
+    cannot_panic(&toolchain, &small, "s")?;
 
     let printed = target.join("agree.txt");
     match toolchain::emulate(&built.join("agree"), &printed) {
@@ -112,6 +107,34 @@ fn steps(write: bool) -> Result<(), Ended> {
     Ok(told?)
 }
 
+/// No function of the library reaches a panic.
+fn cannot_panic(toolchain: &Toolchain, library: &Path, level: &str) -> Result<(), String> {
+    let functions = link::functions(library)?;
+    let found = link::can_panic(toolchain, library, &functions)?;
+    let all = functions.len();
+    if all > 0 && found.is_empty() {
+        eprintln!("{all} functions link without a panic at opt-level {level}");
+        return Ok(());
+    }
+    Err(format!("{} of {all} functions can panic at opt-level {level}: {}", found.len(), found.join(" ")))
+}
+
+/// Host and firmware compute with the same `libm`.
+fn same_libm(firmware: &Path) -> Result<(), String> {
+    let version = |folder: &Path| {
+        let lock = folder.join("Cargo.lock");
+        let text = fs::read_to_string(&lock).map_err(|error| format!("{}: {error}", lock.display()))?;
+        let version = text.split("name = \"libm\"\n").nth(1).and_then(|rest| rest.lines().next().map(str::to_owned));
+        version.ok_or_else(|| format!("{} has no libm", lock.display()))
+    };
+    let (host, device) = (version(&root())?, version(firmware)?);
+    if host == device {
+        Ok(())
+    } else {
+        Err(format!("libm's {host} in Cargo.lock, {device} in that of tests/firmware"))
+    }
+}
+
 /// Every package that the core is built from is a known one without a standard library.
 fn depends_on_no_std() -> Result<(), String> {
     let tree = |features: &str| {
@@ -130,11 +153,11 @@ fn depends_on_no_std() -> Result<(), String> {
         }
     }
     let source = root().join("crates/hyst-core/src/lib.rs");
-    let source = std::fs::read_to_string(&source).map_err(|error| format!("{}: {error}", source.display()))?;
+    let source = fs::read_to_string(&source).map_err(|error| format!("{}: {error}", source.display()))?;
     if source.contains("#![no_std]") { Ok(()) } else { Err("hyst-core does not declare no_std".to_owned()) }
 }
 
-fn done(command: &mut std::process::Command) -> Result<(), Ended> {
+fn done(command: &mut Command) -> Result<(), Ended> {
     match passes(command) {
         Outcome::Passed => Ok(()),
         _ => Err(Ended::Failed(String::new())),
