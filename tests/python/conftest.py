@@ -13,6 +13,7 @@ NOT_IN_THIS_BUILD = {
     "MaxwellSlip",
     "TdEm",
     "BoucWen",
+    "BoucWenClassic",
     "BoucWenOscillator",
     "Lfdm",
     "Ifm",
