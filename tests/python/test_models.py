@@ -17,7 +17,7 @@ def span(x):
     return np.ptp(x)
 
 
-@each_case
+@pytest.mark.parametrize("case", [c for c in CASES if c.reference], ids=lambda c: c.label)
 def test_is_its_reference(case):
     y = case.model().simulate(case.u, **case.surroundings)
     expected = case.reference(case.u)
@@ -63,7 +63,7 @@ def test_inverse(case):
     inverse = model.inverse(**case.inverse)
     assert inverse.of is model and inverse.inverse() is model and inverse.lead == 0
     for u in (model.compensate(y, **case.surroundings, **case.inverse), inverse.simulate(y, **case.surroundings)):
-        assert np.max(np.abs(u - case.u)) <= case.inverse_tolerance * span(case.u)
+        assert case.folds or np.max(np.abs(u - case.u)) <= case.inverse_tolerance * span(case.u)
         again = model.simulate(u, **case.surroundings)
         assert np.max(np.abs(again - y)) <= case.inverse_tolerance * span(y)
 

@@ -44,6 +44,20 @@ impl Options {
             }
         }
     }
+
+    /// Lowest input, highest input and tolerance of a search. The tolerance is a billionth of the range if it is not given.
+    ///
+    /// # Errors
+    /// `TypeError` if an end of the range is missing.
+    pub(crate) fn range(&self) -> PyResult<(f64, f64, f64)> {
+        self.only(&["low", "high", "tolerance"])?;
+        let (Some(low), Some(high)) = (self.low, self.high) else {
+            return Err(PyTypeError::new_err(
+                "this inverse is a search for the input: give low= and high=, the range of inputs",
+            ));
+        };
+        Ok((low, high, self.tolerance.unwrap_or(1e-9 * (high - low))))
+    }
 }
 
 /// An inverse, and what is to be known of it.
@@ -89,20 +103,14 @@ where
     Ok(Inverted::exact(stage.invert().map_err(errors::core)?))
 }
 
-/// By search from `low` to `high` to within `tolerance`, a billionth of that range if not given: [`Search`].
+/// By search from `low` to `high` to within `tolerance`: [`Search`].
 #[allow(dead_code, reason = "for models without a closed form")]
 pub(crate) fn search<P, S>(_: &P, stage: &S, options: &Options) -> PyResult<Inverted>
 where
     S: Probe<f64> + Clone + Send + Sync + 'static,
     S::State: Send,
 {
-    options.only(&["low", "high", "tolerance"])?;
-    let (Some(low), Some(high)) = (options.low, options.high) else {
-        return Err(PyTypeError::new_err(
-            "this inverse is a search for the input: give low= and high=, the range of inputs",
-        ));
-    };
-    let tolerance = options.tolerance.unwrap_or(1e-9 * (high - low));
+    let (low, high, tolerance) = options.range()?;
     Ok(Inverted::exact(Search::new(stage.clone(), low, high, tolerance).map_err(errors::core)?))
 }
 

@@ -6,6 +6,7 @@
 #![allow(rustdoc::broken_intra_doc_links, reason = "documentation of classes is Python's, in which [V] is a unit")]
 
 mod arrays;
+mod control;
 mod either;
 mod errors;
 mod ident;
@@ -23,6 +24,8 @@ use pyo3::prelude::*;
 /// The compiled half of the package `hyst`; import `hyst` instead.
 #[pymodule]
 mod _hyst {
+    #[pymodule_export]
+    use crate::control::{ForceObserver, Pid};
     #[pymodule_export]
     use crate::ident::{Diagnosis, Drive, Model, Simulation, diagnose, fit};
     #[pymodule_export]

@@ -5,8 +5,8 @@
 //! `load` and `time` it cannot do without. Units: `u` is the input's, `y` the output's.
 
 use hyst_core::{
-    Build, CreepParams, DelayParams, DriftParams, Error, Everett, Grid, InterferenceParams, LagParams, PiParams,
-    ResonanceParams, Sampling, TemperatureParams,
+    Build, CreepParams, DelayParams, DriftParams, Error, Everett, InterferenceParams, LagParams, PiParams,
+    PreisachParams, ResonanceParams, Sampling, TemperatureParams,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -19,7 +19,7 @@ use crate::operator::Operator;
 /// Plays that an operator holds.
 pub(crate) const PLAYS: usize = 64;
 /// Nodes along one edge of a Preisach triangle.
-const NODES: usize = 65;
+pub(crate) const NODES: usize = 65;
 /// Samples that a delay holds.
 pub(crate) const DELAY: usize = 8192;
 /// Elements that a creep bank holds.
@@ -28,6 +28,25 @@ const CREEP: usize = 32;
 pub(crate) const TAPS: usize = 4095;
 
 const IN_THE_SENSOR: &str = "this effect is in the sensor, not in the motion; no drive should follow it";
+
+/// Preisach parameters from lists of the caller's.
+pub(crate) fn triangle(
+    low: f64,
+    high: f64,
+    density: &[f64],
+    once: Option<&[f64]>,
+    rest: Option<f64>,
+) -> Result<PreisachParams<Vec<f64>>, Error> {
+    let cells = (0..NODES).find(|n| n * (n + 1) / 2 >= density.len()).unwrap_or(NODES);
+    if density.len() != cells * (cells + 1) / 2 {
+        return Err(Error::OutOfRange { name: "preisach.density", must: "n (n + 1) / 2 values, n at most 64" });
+    }
+    let once = once.map_or_else(|| vec![0.0; cells], <[f64]>::to_vec);
+    if once.len() != cells {
+        return Err(Error::Lengths("preisach.once and the cells along one edge of preisach.density"));
+    }
+    Ok(PreisachParams { low, high, cells, rest: rest.unwrap_or(low), density: density.to_vec(), once })
+}
 
 models! {
     /// Play (backlash) of half-width ``radius``: ``p ← max(u − r, min(u + r, p))``, from 0.
@@ -87,20 +106,7 @@ models! {
         rest: Option<f64> = None,
     }
     stage: Everett<f64, NODES>,
-    build: |p| {
-        let cells = (0..NODES).find(|n| n * (n + 1) / 2 >= p.density.len()).unwrap_or(NODES);
-        let zeros = vec![0.0; cells];
-        let once = p.once.as_ref().unwrap_or(&zeros);
-        if p.density.len() != cells * (cells + 1) / 2 {
-            return Err(Error::OutOfRange { name: "preisach.density", must: "n (n + 1) / 2 values, n at most 64" });
-        }
-        if once.len() != cells {
-            return Err(Error::Lengths("preisach.once and the cells along one edge of preisach.density"));
-        }
-        let grid = Grid { low: p.low, high: p.high, cells };
-        let rest = p.rest.unwrap_or(p.low);
-        Everett::new(grid, rest, |a, b| p.density[a * (a + 1) / 2 + b], |a| once[a])
-    },
+    build: |p| triangle(p.low, p.high, &p.density, p.once.as_deref(), p.rest)?.build(&()),
     inverse: closed,
     needs: [],
 

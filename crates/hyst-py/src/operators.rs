@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use hyst_core::{
-    AsymmetryParams, Build, Curve, Error, Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams,
-    MaxwellSlipParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams, TdPiParams,
-    ViscousPiParams,
+    AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams, BoucWenParams, Build, Curve, DpmParams, Error,
+    Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams, MaxwellSlipParams, MirrorParams, PiParams,
+    Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams, TdPiParams, ViscousPiParams,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,9 +13,9 @@ use pyo3::types::PyDict;
 use crate::arrays::Needs;
 use crate::either::Either;
 use crate::errors;
-use crate::inverse::{Inverted, closed, compensator};
+use crate::inverse::{Inverted, Options, closed, compensator, refused, search};
 use crate::model_macro::{Parameter, arguments, models, repr};
-use crate::models::{DELAY, PLAYS, TAPS};
+use crate::models::{DELAY, NODES, PLAYS, TAPS, triangle};
 use crate::operator::Operator;
 use crate::runner::Runner;
 
@@ -58,6 +58,15 @@ fn reading_of(name: &str) -> Result<SlipReading, Error> {
         "elasto-slip" => Ok(SlipReading::ElastoSlip),
         _ => Err(Error::OutOfRange { name: "reading", must: "'backlash' or 'elasto-slip'" }),
     }
+}
+
+/// The dynamic Preisach model with a mirror of at most 32 × 32 nodes.
+type HostDpm = hyst_core::Dpm<f64, NODES, 32, 32>;
+
+/// By search over the given range, to the given tolerance or a part in 10⁹ of the range.
+fn bouc_wen<P>(_: &P, stage: &hyst_core::BoucWen<f64>, options: &Options) -> PyResult<Inverted> {
+    let (low, high, tolerance) = options.range()?;
+    Ok(Inverted::exact(stage.inverse(low, high, tolerance).map_err(errors::core)?))
 }
 
 models! {
@@ -307,6 +316,137 @@ models! {
         })
     },
     inverse: closed,
+    needs: [],
+
+    /// Dynamic Preisach model: a classical one whose branches are weighted by a mirror function ξ(D, P) of their average rate D
+    /// and change P, bilinear on a uniform grid, 1 at D = 0 and clamped beyond the other edges.
+    ///
+    /// With ``fade = 0`` the stack form as printed, which steps where loops close; with ``fade > 0`` the steps fade with that travel
+    /// of the input, and the output is continuous. ``drifting`` is the recursion of eq. 17, which drifts. Inverse by search
+    /// (``fade > 0``): give ``low`` and ``high``.
+    class Dpm {
+        /// Lowest input of the Preisach grid [u].
+        low: f64,
+        /// Highest input of the Preisach grid [u].
+        high: f64,
+        /// Output gained by each cell, as in ``Preisach`` [y].
+        density: Vec<f64>,
+        /// Lowest rate of the mirror's grid [u/s].
+        rate_low: f64,
+        /// Highest rate of the mirror's grid [u/s].
+        rate_high: f64,
+        /// Nodes along the rate, at most 32.
+        rates: usize,
+        /// Lowest change of the mirror's grid [u].
+        change_low: f64,
+        /// Highest change of the mirror's grid [u].
+        change_high: f64,
+        /// Nodes along the change, at most 32.
+        changes: usize,
+        /// ξ at the nodes, positive, shape (rates·changes,): node (d, p) at d·changes + p.
+        mirror: Vec<f64>,
+        /// Sample period [s].
+        period: f64,
+        /// Output gained once per grid interval by relays that never switch back [y]; zeros if not given.
+        once: Option<Vec<f64>> = None,
+        /// Input at which the virgin memory rests [u]; the lowest if not given.
+        rest: Option<f64> = None,
+        /// Travel over which the step at a closing loop fades to 1/e [u].
+        fade: f64 = 0.0,
+        /// The recursion of eq. 17 instead.
+        drifting: bool = false,
+    }
+    stage: HostDpm,
+    build: |p| {
+        let preisach = triangle(p.low, p.high, &p.density, p.once.as_deref(), p.rest)?;
+        let mirror = MirrorParams {
+            rate_low: p.rate_low,
+            rate_high: p.rate_high,
+            rates: p.rates,
+            change_low: p.change_low,
+            change_high: p.change_high,
+            changes: p.changes,
+            weights: p.mirror.clone(),
+        };
+        let model: HostDpm = DpmParams { preisach, mirror, fade: p.fade }.build(&Sampling { period: p.period })?;
+        Ok(if p.drifting { model.drifting() } else { model })
+    },
+    inverse: search,
+    needs: [],
+
+    /// Bouc-Wen operator ``y = k0·u + g``, ``ġ = α·u̇ − β·|u̇|·|g|ⁿ⁻¹·g − γ·u̇·|g|ⁿ`` (rate-independent).
+    ///
+    /// Exact for n = 1 and 2, else to 5e-6 of the largest g in one sample. Inverse by search: give ``low`` and ``high``. Where the
+    /// slope is negative just after a turn, the drive jumps over the fold.
+    class BoucWen {
+        /// Gain of the part without memory [y/u].
+        k0: f64,
+        /// Slope of the memory at zero [y/u].
+        alpha: f64,
+        /// Dissipation, zero or positive.
+        beta: f64,
+        /// Difference between the way out and the way back, from −beta to beta.
+        gamma: f64,
+        /// Sharpness of the bend, 1 to 20.
+        n: f64 = 1.0,
+    }
+    stage: hyst_core::BoucWen<f64>,
+    build: |p| BoucWenParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma, n: p.n }.build(&()),
+    inverse: |p, stage, options| bouc_wen(p, stage, options),
+    needs: [],
+
+    /// Bouc-Wen operator in the form ``y = d·u − h``, ``ḣ = a·u̇ − b·|u̇|·h − gamma·u̇·|h|``.
+    ///
+    /// ``BoucWen`` with k0 = d, alpha = −a, beta = b, gamma = −gamma, n = 1. Inverse by search: give ``low`` and ``high``.
+    class BoucWenClassic {
+        /// Slope of the memory at zero [y/u].
+        a: f64,
+        /// Dissipation, zero or positive.
+        b: f64,
+        /// Difference between the way out and the way back, from −b to b.
+        gamma: f64,
+        /// Gain of the part without memory [y/u].
+        d: f64,
+    }
+    stage: hyst_core::BoucWen<f64>,
+    build: |p| BoucWenClassicParams { d: p.d, a: p.a, b: p.b, gamma: p.gamma }.build(&()),
+    inverse: |p, stage, options| bouc_wen(p, stage, options),
+    needs: [],
+
+    /// Oscillator with a Bouc-Wen element: ``m·ÿ + c·ẏ + k·y + z = u``,
+    /// ``ż = α·ẏ − β·(γ·|ẏ|·|z|ⁿ⁻¹·z + δ·ẏ·|z|ⁿ)``, u linear between samples.
+    class BoucWenOscillator {
+        /// Mass m [u s²/y].
+        mass: f64,
+        /// Damping c [u s/y].
+        damping: f64,
+        /// Stiffness k [u/y].
+        stiffness: f64,
+        /// Stiffness of the hysteretic force at zero [u/y].
+        alpha: f64,
+        /// Scale of what bends it.
+        beta: f64,
+        /// Dissipation.
+        gamma: f64,
+        /// Difference between the way out and the way back.
+        delta: f64,
+        /// Sample period [s].
+        period: f64,
+        /// Sharpness of the bend, 1 to 20.
+        n: f64 = 1.0,
+    }
+    stage: hyst_core::BoucWenOscillator<f64>,
+    build: |p| BoucWenOscillatorParams {
+        mass: p.mass,
+        damping: p.damping,
+        stiffness: p.stiffness,
+        alpha: p.alpha,
+        beta: p.beta,
+        gamma: p.gamma,
+        delta: p.delta,
+        nu: p.n,
+    }.build(&Sampling { period: p.period }),
+    inverse: refused("the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback"),
     needs: [],
 
     /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,

@@ -103,34 +103,47 @@ def mirror(rates, changes, nodes):
     return lambda d, p: float(inside((np.clip(d, rates[0], rates[-1]), np.clip(p, changes[0], changes[-1])))[()])
 
 
-def dpm(u, classical, xi, period):
+def dpm(u, classical, xi, period, clock=False):
     """Paper 1, eq. 6 and 7: one term, weighted by the mirror function, for each dominating extremum.
 
-    ``classical`` is the output of the classical model on the same samples, and on every branch between dominating extrema
-    its change is what the mirror function weighs. ``xi(D, P)`` takes V/s and V. The input starts at the bottom of its
-    range, settled, so that nothing was weighed before.
+    ``classical`` is the output of the classical model on the same samples; the mirror function weighs its change on every
+    branch between dominating extrema. ``xi(D, P)`` takes V/s and V. The input starts at the bottom of its range, settled,
+    so that nothing was weighed before.
+
+    D is the change over a time: with ``clock`` that from one extremum to the next (eq. 3, 4), otherwise that which the
+    input spent on the branch, as the package counts it: without loops that have closed since, and for a branch that was
+    left with the sample in which it was.
     """
+    histories = [[0, *(i for i in dominating(u[: k + 1]) if i > 0)] for k in range(len(u))]
+    # The samples of the branch that begins at sample a.
+    spent = np.zeros(len(u), dtype=int)
     y = []
-    for k in range(len(u)):
-        places = [0, *(i for i in dominating(u[: k + 1]) if i > 0)]
+    for k, places in enumerate(histories):
+        if k > 0:
+            spent[places[-2]] += 1
         f = classical[0]
         for a, b in zip(places, places[1:]):
-            p = u[b] - u[a]
-            f += xi(abs(p) / ((b - a) * period), p) * (classical[b] - classical[a])
+            p, samples = u[b] - u[a], b - a if clock else spent[a] + (b != k)
+            f += xi(abs(p) / (samples * period), p) * (classical[b] - classical[a])
         y.append(f)
     return np.array(y)
 
 
-def dpm_recursive(u, classical, xi, period):
-    """Paper 1, eq. 17: from the last turn of the input, whether or not it dominates."""
-    y, turn, direction = [classical[0]], 0, 0
+def dpm_recursive(u, classical, xi, period, clock=False):
+    """Paper 1, eq. 17: from the last turn of the input, whether or not it dominates. ``clock`` as in ``dpm``."""
+    y, base, turn, direction = [classical[0]], classical[0], 0, 0
+
+    def after(k, samples):
+        p = u[k] - u[turn]
+        return base + xi(abs(p) / (samples * period), p) * (classical[k] - classical[turn])
+
     for k in range(1, len(u)):
         now = int(np.sign(u[k] - u[k - 1]))
         if now * direction < 0:
+            base = after(k - 1, k - 1 - turn + (not clock))
             turn = k - 1
         direction = now or direction
-        p = u[k] - u[turn]
-        y.append(y[turn] + xi(abs(p) / ((k - turn) * period), p) * (classical[k] - classical[turn]))
+        y.append(after(k, k - turn))
     return np.array(y)
 
 
