@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
-__all__: list[str]
 
 # One-dimensional, contiguous.
 _Signal = NDArray[np.float64]
