@@ -115,7 +115,7 @@ def test_wrong_fits():
         hyst.fit()
     with pytest.raises(TypeError, match="either a record"):
         hyst.fit(record(), inputs=u)
-    with pytest.raises(ValueError, match="no model is called"):
+    with pytest.raises(ValueError, match="no model has this name"):
         hyst.fit(record(), model="polynomial")
     with pytest.raises(ValueError, match="zero is"):
         hyst.fit(record(), zero="some")

@@ -14,12 +14,16 @@ COMPILED = {name for name in vars(hyst._hyst) if not name.startswith("_")}
 
 
 def arguments(node):
-    """Names of positional and of keyword arguments, each with whether it has a default."""
+    """Names of positional and of keyword arguments, each with its default."""
     a = node.args
     positional = a.posonlyargs + a.args
-    defaults = [False] * (len(positional) - len(a.defaults)) + [True] * len(a.defaults)
-    positional = [(p.arg, d) for p, d in zip(positional, defaults) if p.arg not in ("self", "cls")]
-    return positional, [(k.arg, d is not None) for k, d in zip(a.kwonlyargs, a.kw_defaults)]
+    defaults = [None] * (len(positional) - len(a.defaults)) + a.defaults
+
+    def said(default):
+        return inspect.Parameter.empty if default is None else ast.literal_eval(default)
+
+    positional = [(p.arg, said(d)) for p, d in zip(positional, defaults) if p.arg not in ("self", "cls")]
+    return positional, [(k.arg, said(d)) for k, d in zip(a.kwonlyargs, a.kw_defaults)]
 
 
 def signature(thing):
@@ -27,14 +31,14 @@ def signature(thing):
     for p in inspect.signature(thing).parameters.values():
         if p.name not in ("self", "cls"):
             into = keyword if p.kind is p.KEYWORD_ONLY else positional
-            into.append((p.name, p.default is not p.empty))
+            into.append((p.name, p.default))
     return positional, keyword
 
 
 def block(name):
     """What the stub of a class of parameters would look like, to be completed."""
     _, keyword = signature(getattr(hyst, name))
-    head = ", ".join(f"{k}: float{' = ...' if d else ''}" for k, d in keyword)
+    head = ", ".join(f"{k}: float" + ("" if d is inspect.Parameter.empty else f" = {d!r}") for k, d in keyword)
     properties = "".join(f"    @property\n    def {k}(self) -> float: ...\n" for k, _ in keyword)
     return f"class {name}(Operator):\n    def __new__(cls, *, {head}) -> {name}: ...\n{properties}"
 

@@ -5,6 +5,7 @@ Every model is a class with keyword parameters and the methods of ``Operator``: 
 float64.
 """
 
+from . import _hyst
 from ._errors import (
     FitError,
     HystError,
@@ -15,7 +16,6 @@ from ._errors import (
     RecordError,
 )
 from ._hyst import *  # noqa: F403
-from ._hyst import __all__ as _compiled
 from ._hyst import __version__ as __version__
 
 __all__ = [
@@ -26,5 +26,5 @@ __all__ = [
     "ParameterError",
     "ReachError",
     "RecordError",
-    *(name for name in _compiled if not name.startswith("_")),
+    *(name for name in dir(_hyst) if not name.startswith("_")),
 ]
