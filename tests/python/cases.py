@@ -78,7 +78,7 @@ for label, t in [("23 °C", 23.0), ("39 °C", 39.0), ("moving temperature", TEMP
         lambda u, t=t: plays.td_pi(u, t, **plays.TD_PI), surroundings=dict(temperature=t),
     )  # fmt: skip
 case(
-    "maxwell-slip", "MaxwellSlip", dict(widths=R, gains=W, reading="elasto-slip"), SWING,
+    "maxwell-slip", "MaxwellSlip", dict(widths=R, gains=W, elasto_slip=True), SWING,
     lambda u: plays.maxwell_slip(u, R, W),
 )  # fmt: skip
 case(
@@ -181,7 +181,7 @@ for label, stop in [("plays", False), ("stops", True)]:
     case(
         f"td-em, {label}", "TdEm",
         dict(linear.TD_EM, psi=list(reversed(linear.TD_EM_PSI)), widths=linear.TD_EM_WIDTHS, gains=linear.TD_EM_SLOPES,
-             reading="elasto-slip" if stop else "backlash", period=TD_EM_PERIOD),
+             elasto_slip=stop, period=TD_EM_PERIOD),
         2 * SWING + 10,
         lambda u, stop=stop: linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
                                           **linear.TD_EM),

@@ -52,12 +52,8 @@ fn order_of(order: usize) -> Result<GlOrder, Error> {
     }
 }
 
-fn reading_of(name: &str) -> Result<SlipReading, Error> {
-    match name {
-        "backlash" => Ok(SlipReading::Backlash),
-        "elasto-slip" => Ok(SlipReading::ElastoSlip),
-        _ => Err(Error::OutOfRange { name: "reading", must: "'backlash' or 'elasto-slip'" }),
-    }
+fn reading(elasto_slip: bool) -> SlipReading {
+    if elasto_slip { SlipReading::ElastoSlip } else { SlipReading::Backlash }
 }
 
 /// The dynamic Preisach model with a mirror of at most 32 × 32 nodes.
@@ -167,18 +163,18 @@ models! {
 
     /// Bank of Maxwell-slip elements, ``y = Σ gains[i]·element(u, widths[i])``.
     ///
-    /// ``reading='backlash'``: an element is a backlash of that total width; exact inverse, whose drive jumps where the reference turns.
-    /// ``reading='elasto-slip'``: an element is a spring that slips at that deflection; saturates, no inverse.
+    /// An element is a backlash of that total width; exact inverse, whose drive jumps where the reference turns.
+    /// With ``elasto_slip`` it is a spring that slips at that deflection: such a bank saturates and has no inverse.
     class MaxwellSlip {
         /// Widths [u], positive and strictly rising, shape (n,), n ≤ 64.
         widths: Vec<f64>,
         /// Gains [y/u], shape (n,).
         gains: Vec<f64>,
-        /// 'backlash' or 'elasto-slip'.
-        reading: String = "backlash".to_owned(),
+        /// Whether an element is a spring that slips at that deflection; a backlash of that total width if not.
+        elasto_slip: bool = false,
     }
     stage: hyst_core::MaxwellSlip<f64, PLAYS>,
-    build: |p| MaxwellSlipParams { reading: reading_of(&p.reading)?, widths: &p.widths, gains: &p.gains }.build(&()),
+    build: |p| MaxwellSlipParams { reading: reading(p.elasto_slip), widths: &p.widths, gains: &p.gains }.build(&()),
     inverse: closed,
     needs: [],
 
@@ -205,8 +201,8 @@ models! {
         psi: Vec<f64>,
         /// Sample period [s].
         period: f64,
-        /// 'backlash' (the paper's numbers ask for it) or 'elasto-slip'.
-        reading: String = "backlash".to_owned(),
+        /// Whether an element is a spring that slips; a backlash, as the paper's numbers ask for, if not.
+        elasto_slip: bool = false,
         /// Output units in a metre: 1e6 for µm.
         per_metre: f64 = 1.0,
         /// Temperature for which the inverse's filter is made [°C]; its gain follows the given one.
@@ -217,7 +213,7 @@ models! {
         let coupling = <[f64; 3]>::try_from(p.psi.as_slice())
             .map_err(|_| Error::OutOfRange { name: "td-em.psi", must: "three coefficients" })?;
         TdEmParams {
-            slip: MaxwellSlipParams { reading: reading_of(&p.reading)?, widths: &p.widths, gains: &p.gains },
+            slip: MaxwellSlipParams { reading: reading(p.elasto_slip), widths: &p.widths, gains: &p.gains },
             capacitance: p.capacitance,
             resistance: p.resistance,
             mass: p.mass,

@@ -108,7 +108,7 @@ class Preisach(Operator):
 
 class ViscousPi(Operator):
     def __new__(
-        cls, *, gain: float = , thresholds: _List = , weights: _List = , seconds: float = , period: float = 
+        cls, *, gain: float, thresholds: _List, weights: _List, seconds: float, period: float
     ) -> ViscousPi: ...
     @property
     def gain(self) -> float: ...
@@ -123,7 +123,7 @@ class ViscousPi(Operator):
 
 class Gpi(Operator):
     def __new__(
-        cls, *, gain: float = , thresholds: _List = , weights: _List = , left: _List = , right: _List = 
+        cls, *, gain: float, thresholds: _List, weights: _List, left: _List, right: _List
     ) -> Gpi: ...
     @property
     def gain(self) -> float: ...
@@ -140,14 +140,14 @@ class TdPi(Operator):
     def __new__(
         cls,
         *,
-        alpha: float = ,
-        epsilon: float = ,
-        tau: float = ,
-        eta: float = ,
-        a0: float = ,
-        a1: float = ,
-        b0: float = ,
-        b1: float = ,
+        alpha: float,
+        epsilon: float,
+        tau: float,
+        eta: float,
+        a0: float,
+        a1: float,
+        b0: float,
+        b1: float,
         n: int = 9,
         t0: float = 23.0,
     ) -> TdPi: ...
@@ -174,29 +174,29 @@ class TdPi(Operator):
 
 class MaxwellSlip(Operator):
     def __new__(
-        cls, *, widths: _List = , gains: _List = , reading: Literal["backlash", "elasto-slip"] = "backlash"
+        cls, *, widths: _List, gains: _List, elasto_slip: bool = False
     ) -> MaxwellSlip: ...
     @property
     def widths(self) -> _Signal: ...
     @property
     def gains(self) -> _Signal: ...
     @property
-    def reading(self) -> Literal["backlash", "elasto-slip"]: ...
+    def elasto_slip(self) -> bool: ...
 
 class TdEm(Operator):
     def __new__(
         cls,
         *,
-        widths: _List = ,
-        gains: _List = ,
-        capacitance: float = ,
-        resistance: float = ,
-        mass: float = ,
-        stiffness: float = ,
-        damping: float = ,
-        psi: _List = ,
-        period: float = ,
-        reading: Literal["backlash", "elasto-slip"] = "backlash",
+        widths: _List,
+        gains: _List,
+        capacitance: float,
+        resistance: float,
+        mass: float,
+        stiffness: float,
+        damping: float,
+        psi: _List,
+        period: float,
+        elasto_slip: bool = False,
         per_metre: float = 1.0,
         filter_degc: float = 23.0,
     ) -> TdEm: ...
@@ -219,7 +219,7 @@ class TdEm(Operator):
     @property
     def period(self) -> float: ...
     @property
-    def reading(self) -> Literal["backlash", "elasto-slip"]: ...
+    def elasto_slip(self) -> bool: ...
     @property
     def per_metre(self) -> float: ...
     @property
@@ -229,12 +229,12 @@ class Lfdm(Operator):
     def __new__(
         cls,
         *,
-        a: float = ,
-        b: float = ,
-        c: float = ,
-        alpha: float = ,
-        beta: float = ,
-        period: float = ,
+        a: float,
+        b: float,
+        c: float,
+        alpha: float,
+        beta: float,
+        period: float,
         order: int = 1,
         memory: int | None = None,
     ) -> Lfdm: ...
@@ -259,14 +259,14 @@ class Ifm(Operator):
     def __new__(
         cls,
         *,
-        a: float = ,
-        b: float = ,
-        c: float = ,
-        alpha: float = ,
-        beta: float = ,
-        tau: float = ,
-        delta: float = ,
-        period: float = ,
+        a: float,
+        b: float,
+        c: float,
+        alpha: float,
+        beta: float,
+        tau: float,
+        delta: float,
+        period: float,
         order: int = 1,
         memory: int | None = None,
     ) -> Ifm: ...
@@ -295,17 +295,17 @@ class Dpm(Operator):
     def __new__(
         cls,
         *,
-        low: float = ,
-        high: float = ,
-        density: _List = ,
-        rate_low: float = ,
-        rate_high: float = ,
-        rates: int = ,
-        change_low: float = ,
-        change_high: float = ,
-        changes: int = ,
-        mirror: _List = ,
-        period: float = ,
+        low: float,
+        high: float,
+        density: _List,
+        rate_low: float,
+        rate_high: float,
+        rates: int,
+        change_low: float,
+        change_high: float,
+        changes: int,
+        mirror: _List,
+        period: float,
         once: _List | None = None,
         rest: float | None = None,
         fade: float = 0.0,
@@ -343,7 +343,7 @@ class Dpm(Operator):
     def drifting(self) -> bool: ...
 
 class BoucWen(Operator):
-    def __new__(cls, *, k0: float = , alpha: float = , beta: float = , gamma: float = , n: float = 1.0) -> BoucWen: ...
+    def __new__(cls, *, k0: float, alpha: float, beta: float, gamma: float, n: float = 1.0) -> BoucWen: ...
     @property
     def k0(self) -> float: ...
     @property
@@ -356,7 +356,7 @@ class BoucWen(Operator):
     def n(self) -> float: ...
 
 class BoucWenClassic(Operator):
-    def __new__(cls, *, a: float = , b: float = , gamma: float = , d: float = ) -> BoucWenClassic: ...
+    def __new__(cls, *, a: float, b: float, gamma: float, d: float = ) -> BoucWenClassic: ...
     @property
     def a(self) -> float: ...
     @property
@@ -370,14 +370,14 @@ class BoucWenOscillator(Operator):
     def __new__(
         cls,
         *,
-        mass: float = ,
-        damping: float = ,
-        stiffness: float = ,
-        alpha: float = ,
-        beta: float = ,
-        gamma: float = ,
-        delta: float = ,
-        period: float = ,
+        mass: float,
+        damping: float,
+        stiffness: float,
+        alpha: float,
+        beta: float,
+        gamma: float,
+        delta: float,
+        period: float,
         n: float = 1.0,
     ) -> BoucWenOscillator: ...
     @property
@@ -400,7 +400,7 @@ class BoucWenOscillator(Operator):
     def n(self) -> float: ...
 
 class Asymmetry(Operator):
-    def __new__(cls, *, thresholds: _List = , weights: _List = ) -> Asymmetry: ...
+    def __new__(cls, *, thresholds: _List, weights: _List = ) -> Asymmetry: ...
     @property
     def thresholds(self) -> _Signal: ...
     @property
@@ -412,7 +412,7 @@ class Load(Operator):
     def per_newton(self) -> float: ...
 
 class Saturation(Operator):
-    def __new__(cls, *, low: float = , high: float = , knee: float = 0.1) -> Saturation: ...
+    def __new__(cls, *, low: float, high: float, knee: float = 0.1) -> Saturation: ...
     @property
     def low(self) -> float: ...
     @property
