@@ -8,7 +8,8 @@ import hyst
 import numpy as np
 import pytest
 from cases import CASES
-from reference import fractional
+from drives import one_way
+from reference import activation, fractional
 
 each_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.label)
 
@@ -113,6 +114,22 @@ def test_what_has_no_inverse_says_why(name):
         model.inverse()
     with pytest.raises(hyst.NotInvertibleError):
         model.compensate(np.zeros(3))
+
+
+@pytest.mark.parametrize("name", activation.FUNCTIONS)
+def test_activation_inverses(name):
+    """alpha < 0: solved backwards in time, with a preview of ln(1e9) |alpha| / k0 for 1e-9. alpha > 0: a sample at a time."""
+    u, printed = one_way(2000, 5.0, 40.0), activation.PRINTED[name]
+    model = conftest.build(name, **printed, period=1e-4)
+    y = model.simulate(u)
+    lead = model.inverse(tolerance=1e-9).lead
+    assert lead * 1e-4 == pytest.approx(np.log(1e9) * abs(printed["alpha"]) / printed["k0"], rel=0.25)
+    again = model.compensate(y, tolerance=1e-9)
+    # The reference is held after its end, where the drive was still moving.
+    assert np.max(np.abs(again - u)[: -2 * lead]) <= 1e-7 * span(u)
+    model = conftest.build(name, **dict(printed, alpha=-printed["alpha"]), period=1e-4)
+    assert model.inverse().lead == 0
+    assert np.max(np.abs(model.compensate(model.simulate(u)) - u)) <= 1e-9 * span(u)
 
 
 def test_force_observer():

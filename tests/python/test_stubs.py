@@ -35,6 +35,18 @@ def signature(thing):
     return positional, keyword
 
 
+def same(said, real):
+    """Whether two lists of arguments agree; the signature shows a default that is an expression as Ellipsis."""
+    return [name for name, _ in said] == [name for name, _ in real] and all(
+        a == b or (b is Ellipsis and a is not inspect.Parameter.empty) for (_, a), (_, b) in zip(said, real)
+    )
+
+
+def agree(node, thing):
+    (positional, keyword), (real_positional, real_keyword) = arguments(node), signature(thing)
+    return same(positional, real_positional) and same(keyword, real_keyword)
+
+
 def block(name):
     """What the stub of a class of parameters would look like, to be completed."""
     _, keyword = signature(getattr(hyst, name))
@@ -53,7 +65,7 @@ def test_nothing_is_missing():
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 def test_functions(name):
-    assert arguments(FUNCTIONS[name]) == signature(getattr(hyst, name))
+    assert agree(FUNCTIONS[name], getattr(hyst, name))
 
 
 @pytest.mark.parametrize("name", sorted(CLASSES))
@@ -67,6 +79,6 @@ def test_classes(name):
         if any(isinstance(d, ast.Name) and d.id == "property" for d in node.decorator_list):
             assert inspect.isgetsetdescriptor(vars(real)[method])
         elif method == "__new__":
-            assert arguments(node) == signature(real)
+            assert agree(node, real), method
         elif not method.startswith("__"):
-            assert arguments(node) == signature(getattr(real, method))
+            assert agree(node, getattr(real, method)), method

@@ -37,16 +37,16 @@ def paper_4(u, k0, alpha, beta, gamma, n):
 
 
 # Noel and Schoukens, the Bouc-Wen benchmark: kg, N s/m, N/m.
-OSCILLATOR = dict(mass=2.0, damping=10.0, stiffness=5e4, alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1, n=1.0)
+OSCILLATOR = dict(mass=2.0, damping=10.0, stiffness=5e4, alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1, nu=1.0)
 
 
-def oscillator(u, period, *, mass, damping, stiffness, alpha, beta, gamma, delta, n):
-    """``m y'' + c y' + k y + z = u``, ``z' = alpha y' - beta (gamma |y'| |z|^(n-1) z + delta y' |z|^n)``, from rest at
+def oscillator(u, period, *, mass, damping, stiffness, alpha, beta, gamma, delta, nu):
+    """``m y'' + c y' + k y + z = u``, ``z' = alpha y' - beta (gamma |y'| |z|^(nu-1) z + delta y' |z|^nu)``, from rest at
     u = 0; u is linear between samples."""
 
     def rates(t, x, u0, slope):
         y, v, z = x
-        hysteresis = alpha * v - beta * (gamma * abs(v) * abs(z) ** (n - 1) * z + delta * v * abs(z) ** n)
+        hysteresis = alpha * v - beta * (gamma * abs(v) * abs(z) ** (nu - 1) * z + delta * v * abs(z) ** nu)
         return [v, (u0 + slope * t - damping * v - stiffness * y - z) / mass, hysteresis]
 
     assert u[0] == 0.0
