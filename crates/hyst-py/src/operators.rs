@@ -410,7 +410,7 @@ models! {
     needs: [],
 
     /// Oscillator with a Bouc-Wen element: ``m·ÿ + c·ẏ + k·y + z = u``,
-    /// ``ż = α·ẏ − β·(γ·|ẏ|·|z|ⁿ⁻¹·z + δ·ẏ·|z|ⁿ)``, u linear between samples.
+    /// ``ż = α·ẏ − β·(γ·|ẏ|·|z|^(ν−1)·z + δ·ẏ·|z|^ν)``, u linear between samples.
     class BoucWenOscillator {
         /// Mass m [u s²/y].
         mass: f64,
@@ -429,7 +429,7 @@ models! {
         /// Sample period [s].
         period: f64,
         /// Sharpness of the bend, 1 to 20.
-        n: f64 = 1.0,
+        nu: f64 = 1.0,
     }
     stage: hyst_core::BoucWenOscillator<f64>,
     build: |p| BoucWenOscillatorParams {
@@ -440,7 +440,7 @@ models! {
         beta: p.beta,
         gamma: p.gamma,
         delta: p.delta,
-        nu: p.n,
+        nu: p.nu,
     }.build(&Sampling { period: p.period }),
     inverse: refused("the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback"),
     needs: [],
