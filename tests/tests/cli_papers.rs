@@ -1,0 +1,115 @@
+//! Every kind of model as a file with its paper's numbers (`docs/models`): simulated, compensated, exported.
+
+use std::fmt::Write;
+use std::fs;
+
+use hyst_core::{Kind, List, read_block};
+use hyst_tests::{Lab, column, root};
+use serde_json::Value;
+
+struct Paper {
+    lab: Lab,
+    input: String,
+    output: String,
+    predicted: String,
+    /// Lowest and highest input of the file.
+    range: [f64; 2],
+    rate: f64,
+}
+
+const ROWS: usize = 4000;
+
+impl Paper {
+    fn new(kind: Kind) -> Self {
+        let lab = Lab::new();
+        let file = root().join(format!("docs/models/{kind}.json"));
+        let text = fs::read_to_string(&file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+        lab.write("model.json", &text);
+        let model: Value = serde_json::from_str(&text).unwrap();
+        let name = |end: &str| model[end]["column"].as_str().unwrap().to_owned();
+        let number = |v: &Value| v.as_f64().unwrap();
+        let paper = Self {
+            lab,
+            input: name("input"),
+            output: name("output"),
+            predicted: format!("predicted_{}", model["output"]["unit"].as_str().unwrap()),
+            range: [number(&model["input"]["low"]), number(&model["input"]["high"])],
+            rate: number(&model["recorded_at_hz"]),
+        };
+        // A slow swing with smaller ones on it, from the low end, and a ramp of temperature.
+        let [low, high] = paper.range;
+        let swing = |k: usize| {
+            let t = k as f64 / ROWS as f64;
+            let slow = 0.5 - 0.5 * (std::f64::consts::TAU * 2.0 * t).cos();
+            let fast = 0.5 - 0.5 * (std::f64::consts::TAU * 13.0 * t).cos();
+            low + (high - low) * (0.75 * slow + 0.2 * fast)
+        };
+        paper.write("drive.csv", &paper.input, &(0..ROWS).map(swing).collect::<Vec<_>>());
+        paper
+    }
+
+    fn write(&self, file: &str, column: &str, values: &[f64]) {
+        let mut text = format!("time_s,{column},temperature_degc\n");
+        for (k, v) in values.iter().enumerate() {
+            let _ = writeln!(text, "{:.6},{v:?},{:.3}", k as f64 / self.rate, 23.0 + 10.0 * k as f64 / ROWS as f64);
+        }
+        self.lab.write(file, text);
+    }
+
+    fn simulated(&self, drive: &str) -> Vec<f64> {
+        self.lab.ok(&format!("simulate --model model.json {drive} -o out.csv"));
+        column(&self.lab.read("out.csv"), &self.predicted)
+    }
+}
+
+fn span(y: &[f64]) -> f64 {
+    y.iter().copied().fold(f64::NEG_INFINITY, f64::max) - y.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn every_kind_is_simulated_and_exported() {
+    for kind in Kind::ALL {
+        let paper = Paper::new(kind);
+        let y = paper.simulated("drive.csv");
+        assert!(y.len() == ROWS && y.iter().all(|y| y.is_finite()) && span(&y) > 0.1, "{kind}");
+        for format in ["c", "rust", "postcard"] {
+            paper.lab.ok(&format!("export model.json --format {format} -o exported.{format}"));
+        }
+        let block = fs::read(paper.lab.path("exported.postcard")).unwrap();
+        let read = read_block::<List<256>>(&block).unwrap_or_else(|e| panic!("{kind}: {e}"));
+        assert_eq!(read.operator.kind(), kind);
+    }
+}
+
+/// Kinds whose inverse is band-limited or anti-causal, and what of the span it may miss away from the ends.
+const PREVIEWED: &[(Kind, f64)] = &[(Kind::TdEm, 2e-3)];
+
+#[test]
+fn every_kind_with_an_inverse_reaches_what_it_gave() {
+    for kind in Kind::ALL {
+        let paper = Paper::new(kind);
+        let y = paper.simulated("drive.csv");
+        paper.write("reference.csv", &paper.output, &y);
+        let [low, high] = paper.range;
+        let reach = high - low;
+        let command = format!(
+            "compensate --model model.json reference.csv -o found.csv --limit {},{}",
+            low - 2.0 * reach,
+            high + 2.0 * reach
+        );
+        if kind == Kind::BoucWenOscillator {
+            let message = paper.lab.refuses(&command, 2);
+            assert!(message.contains("no inverse"), "{message}");
+            continue;
+        }
+        paper.lab.ok(&command);
+        let again = column(&paper.lab.read("found.csv"), &paper.input);
+        paper.write("again.csv", &paper.input, &again);
+        let reached = paper.simulated("again.csv");
+        let previewed = PREVIEWED.iter().find(|(k, _)| *k == kind);
+        let (edge, tolerance) = previewed.map_or((0, 1e-9), |(_, tolerance)| (200, *tolerance));
+        let misses = y.iter().zip(&reached).map(|(a, b)| (a - b).abs());
+        let worst = misses.skip(edge).take(ROWS - 2 * edge).fold(0.0, f64::max);
+        assert!(worst <= tolerance * span(&y), "{kind}: {worst} of {}", span(&y));
+    }
+}

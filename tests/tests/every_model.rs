@@ -1,0 +1,118 @@
+//! What holds for every model and every inverse of the core, in `f32` and `f64`: over a million samples of bounded input the
+//! output is a number and stays bounded; what is no number leaves no trace; a reset history is a fresh one.
+
+use hyst_cases::{Case, Precision, Visit, each};
+use hyst_core::{Env, Real, Stage};
+
+/// Numbers from 0 to 1, the same on every machine.
+struct Draw(u32);
+
+impl Draw {
+    fn next(&mut self) -> f64 {
+        // Numerical Recipes' generator; the high bits are the good ones.
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(self.0 >> 8) / f64::from(1u32 << 24)
+    }
+
+    /// Input and surroundings of sample `k` for a range of inputs: noise, jumps from end to end, rests, slow swings, by turns.
+    fn sample<T: Real>(&mut self, k: usize, [low, high]: [f64; 2]) -> (Env<T>, T) {
+        let x = match (k / 1000) % 5 {
+            0 => self.next(),
+            1 => f64::from(u8::from(self.next() > 0.5)),
+            2 => 0.37,
+            3 => 0.5 - 0.5 * (0.02 * k as f64).cos(),
+            _ => (0.5 + 0.4 * (0.3 * k as f64).sin() + 0.1 * self.next()).clamp(0.0, 1.0),
+        };
+        let t = 1e-3 * (k % 10_000) as f64;
+        let env = Env { time: t, temperature: 20.0 + 6.0 * (0.7 * t).sin(), load: 5.0 * (1.3 * t).cos() };
+        let env = Env {
+            time: T::from_f64(env.time),
+            temperature: T::from_f64(env.temperature),
+            load: T::from_f64(env.load),
+        };
+        (env, T::from_f64(low + (high - low) * x))
+    }
+}
+
+struct Bounded;
+
+impl Visit for Bounded {
+    fn visit<C: Case, T: Precision>(&mut self) {
+        const SAMPLES: usize = 1_000_000;
+        let name = format!("{} {}", C::NAME, T::NAME);
+        let model = Box::new(C::build::<T>().unwrap_or_else(|e| panic!("{name}: {e}")));
+        let (mut state, mut draw) = (Box::new(model.state()), Draw(7));
+        let (env, u) = draw.sample::<T>(0, C::INPUT);
+        model.reset(&mut state, &env, u);
+        let (mut early, mut late) = (0.0f64, 0.0f64);
+        for k in 1..SAMPLES {
+            let (env, u) = draw.sample::<T>(k, C::INPUT);
+            let y = model.step(&mut state, &env, u).to_f64();
+            assert!(y.is_finite(), "{name}: {y} at sample {k}");
+            let most = if k < SAMPLES / 4 { &mut early } else { &mut late };
+            *most = most.max(y.abs());
+        }
+        // What grew without bound would be three times as large by then.
+        assert!(late <= 1.5 * early + 1e-9, "{name}: at most {early} in the first quarter, {late} later");
+    }
+}
+
+#[test]
+fn output_stays_bounded_over_a_million_samples() {
+    each(&mut Bounded);
+}
+
+struct Fresh;
+
+impl Visit for Fresh {
+    fn visit<C: Case, T: Precision>(&mut self) {
+        let name = format!("{} {}", C::NAME, T::NAME);
+        let model = Box::new(C::build::<T>().unwrap_or_else(|e| panic!("{name}: {e}")));
+        let run = |state: &mut _| {
+            let mut draw = Draw(3);
+            let (env, u) = draw.sample::<T>(0, C::INPUT);
+            let first = model.reset(state, &env, u);
+            let rest = (1..3000).map(|k| {
+                let (env, u) = draw.sample::<T>(k, C::INPUT);
+                model.step(state, &env, u)
+            });
+            std::iter::once(first).chain(rest).map(Precision::bits).collect::<Vec<u64>>()
+        };
+        let mut state = Box::new(model.state());
+        let fresh = run(&mut state);
+        assert!(fresh == run(&mut state), "{name}: a reset history is not a fresh one");
+    }
+}
+
+#[test]
+fn a_reset_history_is_a_fresh_one() {
+    each(&mut Fresh);
+}
+
+struct Dropout;
+
+impl Visit for Dropout {
+    fn visit<C: Case, T: Precision>(&mut self) {
+        let name = format!("{} {}", C::NAME, T::NAME);
+        let model = Box::new(C::build::<T>().unwrap_or_else(|e| panic!("{name}: {e}")));
+        let (mut state, mut draw) = (Box::new(model.state()), Draw(5));
+        let (env, u) = draw.sample::<T>(0, C::INPUT);
+        model.reset(&mut state, &env, u);
+        let not_a_number = T::from_f64(f64::NAN);
+        for k in 1..20_000 {
+            let (env, u) = draw.sample::<T>(k, C::INPUT);
+            if k == 5000 {
+                model.step(&mut state, &env, not_a_number);
+                model.step(&mut state, &env, T::from_f64(f64::INFINITY));
+            }
+            let y = model.step(&mut state, &env, u).to_f64();
+            // Filters of 129 taps have let it pass by then.
+            assert!(y.is_finite() || (5000..5300).contains(&k), "{name}: {y} at sample {k}");
+        }
+    }
+}
+
+#[test]
+fn an_input_that_is_no_number_does_not_stay() {
+    each(&mut Dropout);
+}
