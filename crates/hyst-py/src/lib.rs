@@ -11,6 +11,7 @@ mod ident;
 mod inverse;
 mod metrics;
 mod model_macro;
+#[allow(unused_parens, reason = "a default that is an expression stands in parentheses")]
 mod models;
 mod operator;
 mod record;
