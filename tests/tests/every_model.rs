@@ -25,11 +25,8 @@ impl Draw {
         };
         let t = 1e-3 * (k % 10_000) as f64;
         let env = Env { time: t, temperature: 20.0 + 6.0 * (0.7 * t).sin(), load: 5.0 * (1.3 * t).cos() };
-        let env = Env {
-            time: T::from_f64(env.time),
-            temperature: T::from_f64(env.temperature),
-            load: T::from_f64(env.load),
-        };
+        let env =
+            Env { time: T::from_f64(env.time), temperature: T::from_f64(env.temperature), load: T::from_f64(env.load) };
         (env, T::from_f64(low + (high - low) * x))
     }
 }

@@ -9,10 +9,12 @@ mod arrays;
 mod control;
 mod either;
 mod errors;
-mod ident;
+mod identify;
 mod inverse;
 mod metrics;
+mod model;
 mod model_macro;
+#[allow(unused_parens, reason = "a default that is an expression stands in parentheses")]
 mod models;
 mod operator;
 mod operators;
@@ -27,9 +29,11 @@ mod _hyst {
     #[pymodule_export]
     use crate::control::{ForceObserver, Pid};
     #[pymodule_export]
-    use crate::ident::{Diagnosis, Drive, Model, Simulation, diagnose, fit};
+    use crate::identify::{Diagnosis, diagnose, fit};
     #[pymodule_export]
     use crate::metrics::{mape, max_abs, nrmse, peak_to_valley, rmse, smape};
+    #[pymodule_export]
+    use crate::model::{Drive, Model, Simulation};
     #[pymodule_export]
     use crate::operator::{Inverse, Operator};
     #[pymodule_export]

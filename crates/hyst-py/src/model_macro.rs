@@ -77,7 +77,8 @@ pub(crate) fn arguments<'py>(
 
 /// Python classes of models, each from its parameters (with their documentation and defaults), its stage, how that is
 /// built of them, the way in which it is inverted (`inverse.rs`) and the surroundings that it needs; and `add_to`,
-/// which puts them all into a module. A default is a number, a word or something in parentheses.
+/// which puts them all into a module. A default is a number, a word or an expression
+/// in parentheses.
 macro_rules! models {
     ($(
         $(#[$doc:meta])*

@@ -1,16 +1,14 @@
-//! Models of files, fits, diagnoses and compensations (`hyst_ident`).
+//! Models of files, and what they predict and compensate (`hyst_ident::{model, simulate, compensate}`).
 
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::Arc;
 
 use hyst_core::CompensatorOptions;
 use hyst_ident::compensate::{CompensateOptions, compensate};
-use hyst_ident::diagnose::{self as diagnosis, DiagnoseOptions};
-use hyst_ident::fit::{self as fitting, FitOptions};
 use hyst_ident::model::{self as core, Effect};
 use hyst_ident::simulate::{Zero, simulate};
 use numpy::PyArray1;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -18,11 +16,11 @@ use crate::arrays::Needs;
 use crate::errors;
 use crate::inverse::Inverted;
 use crate::operator::Operator;
-use crate::record::{any_record, of_arrays};
+use crate::record::any_record;
 use crate::runner::Runner;
 
 /// The argument `zero`.
-fn zero_of(word: &str) -> PyResult<Zero> {
+pub(crate) fn zero_of(word: &str) -> PyResult<Zero> {
     match word {
         "none" => Ok(Zero::None),
         "per-record" => Ok(Zero::PerRecord),
@@ -31,7 +29,7 @@ fn zero_of(word: &str) -> PyResult<Zero> {
 }
 
 /// Text of JSON as Python's objects.
-fn parse<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn parse<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }
 
@@ -49,7 +47,7 @@ fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> Py
 ///
 /// From ``fit``, ``diagnose`` or ``Model.load``.
 #[pyclass(frozen, module = "hyst")]
-pub(crate) struct Model(core::Model);
+pub(crate) struct Model(pub(crate) core::Model);
 
 #[pymethods]
 impl Model {
@@ -207,7 +205,7 @@ impl Model {
                 let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
                 let inverse = model.compensator(period, &own).map_err(errors::core)?;
                 let (lead, bandwidth_hz, band_error) = (inverse.lead(), inverse.bandwidth_hz(), inverse.error());
-                Ok(Inverted { engine: std::sync::Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error })
+                Ok(Inverted { engine: Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error })
             },
         )
     }
@@ -334,146 +332,5 @@ impl Drive {
         let d = &self.drive;
         let limited = d.voltage_limited.len() + d.slew_limited.len();
         format!("<Drive: {} rows, lead {}, limited in {limited}>", d.voltage.len(), d.lead)
-    }
-}
-
-/// Fits a model to a record or to arrays: convex, start-up rows left out.
-///
-/// Parameters
-/// ----------
-/// record : Record, path, or list of them
-///     The training record; or give ``timepts``, ``inputs`` and ``outputs``.
-/// model : str
-///     Kind of the hysteresis: ``pi`` or ``preisach``.
-/// timepts, inputs, outputs : ndarray of float64, shape (n,)
-///     Columns in place of a record: time [s], input [V], output in the unit of ``output_column``.
-/// temperature : ndarray of float64, shape (n,), optional
-///     Temperature [°C].
-/// output_column : str
-///     As in ``Record``.
-/// zero : {"none", "per-record"}
-///     One sensor zero for all files, or one for each.
-/// seed : int
-///     Recorded with the model.
-///
-/// Raises
-/// ------
-/// FitError
-///     If the record cannot show a hysteresis: too short, constant, falling.
-/// RecordError
-///     If the record cannot be read or made.
-#[pyfunction]
-#[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", seed=0))]
-#[allow(clippy::too_many_arguments, reason = "keywords of one call")]
-pub(crate) fn fit(
-    py: Python<'_>,
-    record: Option<&Bound<'_, PyAny>>,
-    model: &str,
-    timepts: Option<&Bound<'_, PyAny>>,
-    inputs: Option<&Bound<'_, PyAny>>,
-    outputs: Option<&Bound<'_, PyAny>>,
-    temperature: Option<&Bound<'_, PyAny>>,
-    output_column: &str,
-    zero: &str,
-    seed: u64,
-) -> PyResult<Model> {
-    let kind: core::Kind = model.parse().map_err(|e: hyst_core::UnknownKind| PyValueError::new_err(e.to_string()))?;
-    let record = match (record, timepts, inputs, outputs) {
-        (Some(record), None, None, None) => any_record(py, record, "both")?,
-        (None, Some(t), Some(u), Some(y)) => {
-            of_arrays(t, Some(u), Some(y), temperature, None, None, "voltage_v", output_column, "arrays")?.0
-        }
-        _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
-    };
-    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord };
-    py.detach(|| fitting::fit(&record, kind, &options)).map(Model).map_err(errors::fit)
-}
-
-/// What a diagnosis found.
-#[pyclass(frozen, module = "hyst")]
-pub(crate) struct Diagnosis(diagnosis::Diagnosis);
-
-#[pymethods]
-impl Diagnosis {
-    /// The model with every effect that was found; the same model if none was.
-    #[getter]
-    fn extended(&self) -> Model {
-        Model(self.0.extended.clone())
-    }
-
-    /// The contents of ``findings.json``.
-    #[getter]
-    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let json = serde_json::to_string(&self.0.findings).map_err(|e| PyValueError::new_err(e.to_string()))?;
-        parse(py, &json)
-    }
-
-    /// ``explained``, ``nothing-missing``, ``base-too-coarse`` or ``unexplained``.
-    #[getter]
-    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.findings(py)?.get_item("verdict")
-    }
-
-    /// Names of the effects that were found, in the chain's order.
-    #[getter]
-    fn effects(&self) -> Vec<&'static str> {
-        self.0.findings.effects.iter().map(|f| f.name.name()).collect()
-    }
-
-    fn __repr__(&self) -> String {
-        let effects = self.effects().join(", ");
-        format!("<Diagnosis: {}>", if effects.is_empty() { "no effect found" } else { &effects })
-    }
-}
-
-/// Finds what a model lacks, names it and adds it.
-///
-/// Parameters
-/// ----------
-/// record : Record, path, or list of them
-///     The training record.
-/// model : Model
-///     What was fitted to it.
-/// test : Record, path, or list of them, optional
-///     Only simulated, never fitted.
-/// zero : {"none", "per-record"}
-///     What is done with the sensor's zero.
-/// seed : int
-///     Seed of the bootstrap.
-/// progress : callable, optional
-///     Told in words what is being done. An exception that it raises is raised when the diagnosis is over.
-///
-/// Raises
-/// ------
-/// FitError
-///     If the record is too short for the search.
-#[pyfunction]
-#[pyo3(signature = (record, model, *, test=None, zero="none", seed=1, progress=None))]
-pub(crate) fn diagnose(
-    py: Python<'_>,
-    record: &Bound<'_, PyAny>,
-    model: &Bound<'_, Model>,
-    test: Option<&Bound<'_, PyAny>>,
-    zero: &str,
-    seed: u64,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Diagnosis> {
-    let train = any_record(py, record, "both")?;
-    let test = test.map(|t| any_record(py, t, "both")).transpose()?;
-    let options = DiagnoseOptions { zero: zero_of(zero)?, seed };
-    let model = &model.get().0;
-    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let tell = |doing: &str| {
-        let Some(progress) = &progress else { return };
-        if let Err(error) = Python::attach(|py| progress.call1(py, (doing,)).map(|_| ()))
-            && let Ok(mut raised) = raised.lock()
-        {
-            raised.get_or_insert(error);
-        }
-    };
-    let found = py.detach(|| diagnosis::diagnose(&train, test.as_deref(), model, &options, &tell));
-    match raised.into_inner() {
-        Ok(Some(error)) => Err(error),
-        _ => found.map(Diagnosis).map_err(errors::fit),
     }
 }
