@@ -69,6 +69,7 @@ mod real;
 mod search;
 mod stage;
 
+pub use activation::*;
 pub use bouc_wen::*;
 pub use chain::*;
 pub use complex::Complex;

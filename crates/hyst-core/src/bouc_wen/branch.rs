@@ -170,7 +170,7 @@ impl<T: Real> Branch<T> {
                 }
                 w = runge_kutta(force, w, first, h).at_most(T::ZERO);
             }
-            left = left - h;
+            left -= h;
             if left <= T::ZERO || w >= T::ZERO {
                 return (w, left);
             }
@@ -182,7 +182,7 @@ impl<T: Real> Branch<T> {
 
     /// From `w` ≥ 0 towards the attractor.
     fn go_out(&self, n: T, step: T, w: T, sigma: T) -> T {
-        if !(self.ahead > T::ZERO) {
+        if self.ahead <= T::ZERO {
             return w + sigma;
         }
         let force = |w: T| T::ONE - self.ahead * w.at_least(T::ZERO).powf(n);
@@ -193,7 +193,7 @@ impl<T: Real> Branch<T> {
             // An equal share of the rest, if that is longer: then most of the way is along the attractor.
             let h = h.at_least(left / T::from_f64(f64::from(remaining))).at_most(left);
             w = runge_kutta(force, w, force(w), h).at_most(self.limit);
-            left = left - h;
+            left -= h;
             if left <= T::ZERO {
                 break;
             }

@@ -7,6 +7,8 @@ mod branch;
 mod operator;
 mod oscillator;
 mod params;
+#[cfg(test)]
+mod tests;
 
 pub use operator::{BoucWen, BoucWenState};
 pub use oscillator::{BoucWenOscillator, BoucWenOscillatorParams, BoucWenOscillatorState};

@@ -248,7 +248,7 @@ impl<T: Real> BoucWenOscillator<T> {
             let part = h * first;
             s = self.runge_kutta(s, input, at, part);
             input.u += part * input.slope;
-            h = h - part;
+            h -= part;
             if turn.is_some_and(|t| t <= first) {
                 at.way = -at.way;
             } else {

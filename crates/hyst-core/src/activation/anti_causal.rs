@@ -1,0 +1,278 @@
+//! The inverse backwards in time, for α < 0.
+
+use super::kind::ActivationKind;
+use super::operator::Activation;
+use crate::error::within;
+use crate::stage::hold;
+use crate::{Env, Error, Real, Stage};
+
+/// Inverse of an [`Activation`] with α < 0, with preview: the drive of time k from references up to time k + [`lead`](Self::lead).
+///
+/// With a = |α|/h, `z_k = φ(u_k) − a (u_k − u_(k−1))` gives each drive from the next one,
+///
+/// ```text
+/// u_(k−1) = u_k + (z_k − φ(u_k)) / a,      φ(u) = k₀ u + β f(γ u),
+/// ```
+///
+/// and where |1 − φ′/a| < 1 a wrong drive in the future is forgotten on the way back. Each [`step`](Stage::step) begins at the
+/// far end with the drive at rest for the newest reference, runs back until it meets the plan of the step before, and keeps
+/// that plan from there on: the model driven so misses a reference by a times the difference at the meeting point, and by
+/// nothing elsewhere. [`backward`](Self::backward) does a whole record in one pass.
+///
+/// # The switch
+/// With a steep activation (βγ ≫ k₀) φ′ reaches 2a near u = 0, and the way back does not forget there, nor well within
+/// [`switching`](Self::switching). A drive that passes or touches zero needs a plan that is settled on both sides of it: so
+/// `lead` is then twice what the tolerance needs elsewhere. [`with_lead`](Self::with_lead) shortens it for drives that keep out.
+///
+/// Such a drive is followed to the tolerance if it keeps out for half the lead between two visits.
+///
+/// A *reference* that dwells between the two sides of the switch, z between β min f and β max f, has no drive that dwells in there:
+/// going back in time the drive jumps between the sides instead, up to [`chatter`](Self::chatter) to either side. In one pass
+/// that is a drive which the model turns into the reference exactly. Sample by sample the plans never meet there; they
+/// are joined where they come closest, and the error is a share of |β|.
+///
+/// ```
+/// use hyst_core::{Activation, ActivationKind, ActivationParams, AntiCausal, Build, Env, Sampling, Stage};
+/// let params = ActivationParams { k0: 0.1516, alpha: -1.7e-4, beta: 0.1996, gamma: 1000.0 };
+/// let model: Activation<f64> = (ActivationKind::Atan, params).build(&Sampling { period: 1e-3 })?;
+/// let inverse: AntiCausal<f64, 64> = model.anti_causal(1e-9)?;
+/// let reference = |k: usize| 3.0 + (0.06 * k as f64).sin();
+/// let (mut forward, mut backward, e) = (model.state(), inverse.state(), Env::default());
+/// inverse.reset(&mut backward, &e, reference(0));
+/// for k in 1..500 {
+///     let drive = inverse.step(&mut backward, &e, reference(k));
+///     let Some(now) = k.checked_sub(inverse.lead()) else { continue };
+///     let reached = if now == 0 { model.reset(&mut forward, &e, drive) } else { model.step(&mut forward, &e, drive) };
+///     // The reference starts moving at once; the model starts at rest.
+///     assert!(now < 2 || (reached - reference(now)).abs() < 1e-9);
+/// }
+/// # Ok::<(), hyst_core::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AntiCausal<T, const N: usize> {
+    forward: Activation<T>,
+    /// 1/a
+    scale: T,
+    /// Plans meet when their difference has fallen to this share of what it was at the far end.
+    share: f64,
+    lead: usize,
+    contraction: f64,
+    switching: f64,
+    chatter: f64,
+}
+
+/// History of the inverse. In each ring the place of a time j holds what belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AntiCausalState<T, const N: usize> {
+    /// The reference of time j.
+    references: [T; N],
+    /// The planned drive of time j − 1.
+    plan: [T; N],
+    /// The drive of time j − 1 as the newest reference would have it.
+    trial: [T; N],
+    newest: usize,
+    /// Steps since the reset.
+    age: usize,
+    z: T,
+}
+
+impl<T: Real> Activation<T> {
+    /// The inverse backwards in time. Its `lead` is what keeps the output within `tolerance` times the largest |α u̇| of
+    /// the drive; `N` must be larger than that. Without a switch that is about `ln(1/tolerance) |α|/k₀` at high sample rates.
+    ///
+    /// # Errors
+    /// [`Error::NotInvertible`] if α ≥ 0, or if k₀ (softplus: also k₀ + βγ) is not positive or at least 2|α|/h: there take
+    /// [`Invert`](crate::Invert). [`Error::Capacity`] if `N` is too small, [`Error::OutOfRange`] if the tolerance is not
+    /// between 0 and 1.
+    pub fn anti_causal<const N: usize>(&self, tolerance: f64) -> Result<AntiCausal<T, N>, Error> {
+        within("tolerance", tolerance, tolerance > 0.0 && tolerance < 1.0, "between 0 and 1")?;
+        let a = -self.rate.to_f64();
+        if a.is_nan() || a <= 0.0 {
+            return Err(Error::NotInvertible("activation: alpha is not negative; take the inverse sample by sample"));
+        }
+        let (far, other) = self.far_slopes();
+        let (flattest, steepest) = (far.at_most(other), far.at_least(other));
+        if flattest.is_nan() || flattest <= 0.0 {
+            return Err(Error::NotInvertible("activation: k0 (softplus: and k0 + beta gamma) must be positive"));
+        }
+        if steepest >= 2.0 * a {
+            return Err(Error::NotInvertible(
+                "activation: the sample period is 2 |alpha| / k0 or longer; take the inverse sample by sample",
+            ));
+        }
+        let inverse = |flattest: f64, contraction: f64| AntiCausal {
+            forward: *self,
+            scale: T::from_f64(1.0 / a),
+            // If no drive changes by more than V in a sample, no drive at rest does by more than V (1 + 2a/φ′).
+            share: tolerance * flattest / (flattest + 2.0 * a),
+            lead: 0,
+            contraction,
+            switching: 0.0,
+            chatter: 0.0,
+        };
+        // If the activation's whole slope fits in, the contraction holds everywhere; it may ask for more than fits.
+        let k0 = self.k0.to_f64();
+        let (down, up) = self.bend();
+        let (least, most) = (flattest.at_most(k0 + down), steepest.at_least(k0 + up));
+        let slowest = |least: f64, most: f64| (1.0 - least / a).abs().at_least((1.0 - most / a).abs());
+        let everywhere = inverse(least, slowest(least, most));
+        let settled = everywhere.settled();
+        let switches = self.kind != ActivationKind::Softplus && up > down;
+        if least > 0.0 && most < 2.0 * a && (settled < N || !switches) {
+            return everywhere.with_lead(settled);
+        }
+        // Else outside the switch: as far from it as leaves the contraction a little weaker than far away.
+        let contraction = libm::pow(slowest(flattest, steepest), 0.9).at_least(0.1);
+        let strength = (self.beta.to_f64() * self.gamma.to_f64()).abs();
+        let limit = if up > 0.0 { a * (1.0 + contraction) - k0 } else { k0 - a * (1.0 - contraction) };
+        let switching = self.kind.steep_until(limit / strength) / self.gamma.to_f64().abs();
+        let (low, high) = self.kind.range();
+        let width = self.beta.to_f64().abs() * (high - low) / a;
+        let least = if down < 0.0 { flattest.at_most(a * (1.0 - contraction)) } else { flattest };
+        let outside = inverse(least, contraction);
+        let lead = outside.settled().saturating_mul(2);
+        AntiCausal { switching, chatter: switching + width / (2.0 - k0 / a).at_most(1.0), ..outside }.with_lead(lead)
+    }
+}
+
+impl<T: Real, const N: usize> AntiCausal<T, N> {
+    /// The same with another preview, at least one sample.
+    ///
+    /// # Errors
+    /// [`Error::Capacity`] unless `lead` is less than `N`.
+    pub fn with_lead(self, lead: usize) -> Result<Self, Error> {
+        if lead < N {
+            Ok(Self { lead: lead.max(1), ..self })
+        } else {
+            Err(Error::Capacity { name: "references of the preview", needed: lead.saturating_add(1), holds: N })
+        }
+    }
+
+    /// Samples after which plans have met, outside the switch.
+    fn settled(&self) -> usize {
+        let needed = libm::log(self.share) / libm::log(self.contraction.at_least(f64::MIN_POSITIVE));
+        // NaN and negative where nothing contracts.
+        if (0.0..1e9).contains(&needed) { libm::ceil(needed) as usize + 1 } else { usize::MAX }
+    }
+
+    /// Samples by which the reference must be known ahead.
+    pub fn lead(&self) -> usize {
+        self.lead
+    }
+
+    /// What is left, one sample further back, of an error of the drive; at most, and outside [`switching`](Self::switching).
+    pub fn contraction(&self) -> f64 {
+        self.contraction
+    }
+
+    /// |u| within which it contracts less or not at all \[u\]; 0 if there is no such range.
+    pub fn switching(&self) -> f64 {
+        self.switching
+    }
+
+    /// Largest |u| of a drive whose reference dwells in the switch \[u\]; 0 if there is none. A tall value on a coarse grid:
+    /// it falls with the sample period.
+    pub fn chatter(&self) -> f64 {
+        self.chatter
+    }
+
+    /// The drive for a whole record, in one pass from its end, where the reference is held for ever. Stops at the shorter
+    /// slice. Returns the drive one sample before the first: a model that was at rest there reaches every reference
+    /// exactly, in and out of the switch. A reference that is no finite number is replaced by the one after it.
+    pub fn backward(&self, references: &[T], drive: &mut [T]) -> T {
+        let mut later = None;
+        let mut u = T::ZERO;
+        for (z, slot) in references.iter().zip(drive).rev() {
+            let z = if z.is_finite() { *z } else { later.unwrap_or(T::ZERO) };
+            if later.is_none() {
+                u = self.forward.solve(self.forward.k0, z);
+            }
+            later = Some(z);
+            *slot = u;
+            u = self.before(u, z);
+        }
+        u
+    }
+
+    /// The drive one sample before `u`, whose output is `z`.
+    #[inline]
+    fn before(&self, u: T, z: T) -> T {
+        u + self.scale * (z - self.forward.at_rest(u))
+    }
+}
+
+/// A ring from its newest place backwards.
+fn backwards<T, const N: usize>(ring: &[T; N], newest: usize) -> impl Iterator<Item = &T> {
+    let (new, old) = ring.split_at(newest.saturating_add(1).min(N));
+    new.iter().rev().chain(old.iter().rev())
+}
+
+/// The same, to be changed.
+fn backwards_mut<T, const N: usize>(ring: &mut [T; N], newest: usize) -> impl Iterator<Item = &mut T> {
+    let (new, old) = ring.split_at_mut(newest.saturating_add(1).min(N));
+    new.iter_mut().rev().chain(old.iter_mut().rev())
+}
+
+impl<T: Real, const N: usize> Stage<T> for AntiCausal<T, N> {
+    type State = AntiCausalState<T, N>;
+
+    fn state(&self) -> Self::State {
+        AntiCausalState {
+            references: [T::ZERO; N],
+            plan: [T::ZERO; N],
+            trial: [T::ZERO; N],
+            newest: 0,
+            age: 0,
+            z: T::ZERO,
+        }
+    }
+
+    /// As if the reference had been `u0` for ever.
+    fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        *s = self.state();
+        let z = hold(&mut s.z, u0);
+        let u = self.forward.solve(self.forward.k0, z);
+        s.references = [z; N];
+        s.plan = [u; N];
+        u
+    }
+
+    /// Takes the reference of time k + lead, returns the drive of time k; at most lead + 100 evaluations of f. A reference
+    /// that is no finite number is replaced by the last one that was.
+    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let z = hold(&mut s.z, u);
+        s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
+        // The drive at rest takes the place of the one before it too: at rest nothing changes.
+        let far = self.forward.solve(self.forward.k0, z);
+        for (ring, value) in [(&mut s.references, z), (&mut s.plan, far), (&mut s.trial, far)] {
+            if let Some(slot) = ring.get_mut(s.newest) {
+                *slot = value;
+            }
+        }
+        s.age = s.age.saturating_add(1);
+        // Places of times at and before the reset: where the reference is not followed yet, any difference may stay.
+        let past = if s.age <= self.lead { s.age } else { 1 };
+        let mut drive = far;
+        let (mut close, mut least, mut meeting) = (None, T::ZERO, self.lead);
+        let places = backwards(&s.references, s.newest).zip(backwards(&s.plan, s.newest));
+        let places = places.zip(backwards_mut(&mut s.trial, s.newest)).enumerate();
+        for (place, ((z, planned), trial)) in places.skip(1).take(self.lead) {
+            drive = self.before(drive, *z);
+            *trial = drive;
+            let apart = (drive - *planned).abs();
+            if place == past || (place > past && apart <= least) {
+                (least, meeting) = (apart, place);
+            }
+            // Plans that are equal to rounding meet too.
+            let close = *close.get_or_insert(apart * T::from_f64(self.share));
+            if apart <= close.at_least((T::EPSILON + T::EPSILON) * drive.abs()) {
+                meeting = place;
+                break;
+            }
+        }
+        let plan = backwards_mut(&mut s.plan, s.newest).zip(backwards(&s.trial, s.newest));
+        plan.take(meeting).for_each(|(planned, trial)| *planned = *trial);
+        // Its place is that of time k + 1.
+        backwards(&s.plan, s.newest).nth(self.lead.saturating_sub(1)).map_or(far, |u| *u)
+    }
+}
