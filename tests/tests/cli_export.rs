@@ -15,7 +15,7 @@ fn lab() -> Lab {
     {"stage": "resonance", "hz": 90.0, "damping": 0.03, "gain": 1.0},
     {"stage": "resonance", "hz": 250.0, "damping": 0.01, "gain": 0.2},
     {"stage": "asymmetry", "thresholds": [5.0], "weights": [0.02]},"#;
-    lab.write("model.json", &model.replacen("\"stages\": [", extra, 1));
+    lab.write("model.json", model.replacen("\"stages\": [", extra, 1));
     lab
 }
 
@@ -83,7 +83,7 @@ fn rustc_takes_the_source() {
     let core = root().join("crates/hyst-core");
     lab.write(
         "Cargo.toml",
-        &format!(
+        format!(
             "[package]\nname = \"board\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n\
              [[bin]]\nname = \"board\"\npath = \"main.rs\"\n[dependencies]\nhyst-core = {{ path = {core:?} }}\n"
         ),

@@ -12,6 +12,12 @@ pub(crate) fn hold<T: Real>(held: &mut T, x: T) -> T {
     *held
 }
 
+/// `x`, or what came before it if `x` is no finite number.
+#[inline]
+pub(crate) fn finite_or<T: Real>(x: T, before: T) -> T {
+    if x.is_finite() { x } else { before }
+}
+
 /// Measured surroundings at one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Env<T> {

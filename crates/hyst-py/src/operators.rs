@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use hyst_core::{
-    AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams, BoucWenParams, Build, Curve, DpmParams, Error,
-    Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams, MaxwellSlipParams, MirrorParams, PiParams,
-    Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams, TdPiParams, ViscousPiParams,
+    Activation, ActivationKind, ActivationParams, AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams,
+    BoucWenParams, Build, Curve, DpmParams, Error, Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams,
+    MaxwellSlipParams, MirrorParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams,
+    TdPiParams, ViscousPiParams,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -63,6 +64,19 @@ type HostDpm = hyst_core::Dpm<f64, NODES, 32, 32>;
 fn bouc_wen<P>(_: &P, stage: &hyst_core::BoucWen<f64>, options: &Options) -> PyResult<Inverted> {
     let (low, high, tolerance) = options.range()?;
     Ok(Inverted::exact(stage.inverse(low, high, tolerance).map_err(errors::core)?))
+}
+
+/// Samples that the preview of an activation model holds.
+const AHEAD: usize = 8192;
+
+fn activation(alpha: f64, stage: &Activation<f64>, options: &Options) -> PyResult<Inverted> {
+    if alpha >= 0.0 {
+        return closed(&(), stage, options);
+    }
+    options.only(&["tolerance"])?;
+    let inverse = stage.anti_causal::<AHEAD>(options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
+    let lead = inverse.lead();
+    Ok(Inverted::previewed(inverse, lead))
 }
 
 models! {
@@ -443,6 +457,116 @@ models! {
         nu: p.nu,
     }.build(&Sampling { period: p.period }),
     inverse: refused("the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback"),
+    needs: [],
+
+    /// Activation-function model ``z = k0·u + α u̇ + β·atan(γu)`` (Xie et al., eq. 2), u̇ the backward difference.
+    ///
+    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    class Atan {
+        /// Gain [y/u].
+        k0: f64,
+        /// Share of the input's rate [y s/u].
+        alpha: f64,
+        /// Size of the activation [y].
+        beta: f64,
+        /// Its sharpness [1/u].
+        gamma: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: Activation<f64>,
+    build: |p| (
+        ActivationKind::Atan, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
+    ).build(&Sampling { period: p.period }),
+    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    needs: [],
+
+    /// Activation-function model ``z = k0·u + α u̇ + β·1/(1 + e^(−γu))`` (Xie et al., eq. 2), u̇ the backward difference.
+    ///
+    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    class Sigmoid {
+        /// Gain [y/u].
+        k0: f64,
+        /// Share of the input's rate [y s/u].
+        alpha: f64,
+        /// Size of the activation [y].
+        beta: f64,
+        /// Its sharpness [1/u].
+        gamma: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: Activation<f64>,
+    build: |p| (
+        ActivationKind::Sigmoid, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
+    ).build(&Sampling { period: p.period }),
+    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    needs: [],
+
+    /// Activation-function model ``z = k0·u + α u̇ + β·ln(1 + e^(γu))`` (Xie et al., eq. 2), u̇ the backward difference.
+    ///
+    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    class Softplus {
+        /// Gain [y/u].
+        k0: f64,
+        /// Share of the input's rate [y s/u].
+        alpha: f64,
+        /// Size of the activation [y].
+        beta: f64,
+        /// Its sharpness [1/u].
+        gamma: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: Activation<f64>,
+    build: |p| (
+        ActivationKind::Softplus, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
+    ).build(&Sampling { period: p.period }),
+    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    needs: [],
+
+    /// Activation-function model ``z = k0·u + α u̇ + β·γu/(1 + |γu|)`` (Xie et al., eq. 2), u̇ the backward difference.
+    ///
+    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    class Softsign {
+        /// Gain [y/u].
+        k0: f64,
+        /// Share of the input's rate [y s/u].
+        alpha: f64,
+        /// Size of the activation [y].
+        beta: f64,
+        /// Its sharpness [1/u].
+        gamma: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: Activation<f64>,
+    build: |p| (
+        ActivationKind::Softsign, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
+    ).build(&Sampling { period: p.period }),
+    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    needs: [],
+
+    /// Activation-function model ``z = k0·u + α u̇ + β·tanh(γu)`` (Xie et al., eq. 2), u̇ the backward difference.
+    ///
+    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    class Tanh {
+        /// Gain [y/u].
+        k0: f64,
+        /// Share of the input's rate [y s/u].
+        alpha: f64,
+        /// Size of the activation [y].
+        beta: f64,
+        /// Its sharpness [1/u].
+        gamma: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    stage: Activation<f64>,
+    build: |p| (
+        ActivationKind::Tanh, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
+    ).build(&Sampling { period: p.period }),
+    inverse: |p, stage, options| activation(p.alpha, stage, options),
     needs: [],
 
     /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,

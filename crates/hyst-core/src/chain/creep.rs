@@ -6,6 +6,7 @@
 
 use crate::chain::FirstOrder;
 use crate::error::{finite, within};
+use crate::stage::finite_or;
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
@@ -111,6 +112,7 @@ impl<T: Real, const N: usize> Stage<T> for Creep<T, N> {
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let u = finite_or(u, s.v);
         let mut y = u;
         for ((x, e), c) in s.x.iter_mut().zip(&self.elements).zip(&self.shares).take(self.len) {
             *x = e.step(*x, s.v, u);
@@ -173,7 +175,7 @@ impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
             held += *c * *x;
         }
         // u = v + held + Σ c b (v − s.v), solved for v.
-        let v = s.v + (u - s.v - held) * self.scale;
+        let v = finite_or(s.v + (u - s.v - held) * self.scale, s.v);
         for (x, e) in s.x.iter_mut().zip(&f.elements).take(f.len) {
             *x += e.b * (v - s.v);
         }

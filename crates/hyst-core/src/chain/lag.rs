@@ -1,6 +1,7 @@
 //! First-order lag of the amplifier: `τ ẏ + y = u`.
 
 use crate::chain::FirstOrder;
+use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a first-order lag `τ ẏ + y = u`. Zero is no lag.
@@ -52,6 +53,7 @@ impl<T: Real> Stage<T> for Lag<T> {
 
     #[inline]
     fn step(&self, s: &mut LagState<T>, _: &Env<T>, u: T) -> T {
+        let u = finite_or(u, s.u);
         s.y = self.element.step(s.y, s.u, u);
         s.u = u;
         s.y

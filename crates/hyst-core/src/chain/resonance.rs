@@ -4,6 +4,7 @@
 //! follows at once, as in a modal sum.
 
 use crate::error::{finite, within};
+use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a structural mode. Gain zero is no resonance.
@@ -93,6 +94,7 @@ impl<T: Real> Stage<T> for Resonance<T> {
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let u = finite_or(u, s.v);
         let slope = (u - s.v) * self.slope;
         let bend = self.twice_damping * slope;
         let (dx, dw) = (s.x - s.v + bend, s.w - slope);

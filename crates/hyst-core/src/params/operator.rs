@@ -2,8 +2,8 @@
 
 use super::Kind;
 use crate::{
-    BoucWenOscillatorParams, BoucWenParams, DpmParams, GpiParams, IfmParams, LfdmParams, MaxwellSlipParams, Meta,
-    Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
+    ActivationKind, ActivationParams, BoucWenOscillatorParams, BoucWenParams, DpmParams, GpiParams, IfmParams,
+    LfdmParams, MaxwellSlipParams, Meta, Params, PiParams, PreisachParams, TdEmParams, TdPiParams, ViscousPiParams,
 };
 
 /// The parameters of one operator. `L` is any list of numbers: a vector on a host, an array or a fixed-capacity list in firmware.
@@ -36,6 +36,16 @@ pub enum OperatorParams<L> {
     BoucWen(BoucWenParams),
     /// An oscillator with a Bouc-Wen element.
     BoucWenOscillator(BoucWenOscillatorParams),
+    /// Activation function atan.
+    Atan(ActivationParams),
+    /// Activation function sigmoid.
+    Sigmoid(ActivationParams),
+    /// Activation function softplus.
+    Softplus(ActivationParams),
+    /// Activation function softsign.
+    Softsign(ActivationParams),
+    /// Activation function tanh.
+    Tanh(ActivationParams),
 }
 
 impl<L> OperatorParams<L> {
@@ -53,6 +63,25 @@ impl<L> OperatorParams<L> {
             Self::Dpm(_) => Kind::Dpm,
             Self::BoucWen(_) => Kind::BoucWen,
             Self::BoucWenOscillator(_) => Kind::BoucWenOscillator,
+            Self::Atan(_) => Kind::Atan,
+            Self::Sigmoid(_) => Kind::Sigmoid,
+            Self::Softplus(_) => Kind::Softplus,
+            Self::Softsign(_) => Kind::Softsign,
+            Self::Tanh(_) => Kind::Tanh,
+        }
+    }
+}
+
+impl<L> OperatorParams<L> {
+    /// The parameters as an activation-function model, if they are one.
+    pub fn activation(&self) -> Option<(ActivationKind, ActivationParams)> {
+        match self {
+            Self::Atan(p) => Some((ActivationKind::Atan, *p)),
+            Self::Sigmoid(p) => Some((ActivationKind::Sigmoid, *p)),
+            Self::Softplus(p) => Some((ActivationKind::Softplus, *p)),
+            Self::Softsign(p) => Some((ActivationKind::Softsign, *p)),
+            Self::Tanh(p) => Some((ActivationKind::Tanh, *p)),
+            _ => None,
         }
     }
 }
@@ -72,6 +101,7 @@ impl<L: AsMut<[f64]>> Params for OperatorParams<L> {
             Self::Dpm(p) => p.visit(f),
             Self::BoucWen(p) => p.visit(f),
             Self::BoucWenOscillator(p) => p.visit(f),
+            Self::Atan(p) | Self::Sigmoid(p) | Self::Softplus(p) | Self::Softsign(p) | Self::Tanh(p) => p.visit(f),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! A fitted model: chain stages with parameters and units, independent of the sample period.
 
+mod activation;
 mod effects;
 mod file;
 mod operator;

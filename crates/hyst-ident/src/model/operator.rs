@@ -1,9 +1,10 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
+use super::activation::HostActivationInverse;
 use hyst_core::{
-    BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi, GpiInverse,
-    Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm, TdEmInverse,
-    TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
+    Activation, BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi,
+    GpiInverse, Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm,
+    TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
 };
 
 /// Plays and elements that the host's operators hold.
@@ -153,6 +154,8 @@ operators! {
         |o: &BoucWen<f64>, [low, high]: [f64; 2]| o.inverse(low, high, 1e-12 * (high - low)), at_once;
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
+    Activation(Activation<f64>) => HostActivationInverse,
+        |o: &Activation<f64>, _| HostActivationInverse::of(o), HostActivationInverse::lead;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
 
@@ -177,6 +180,10 @@ impl Operator {
             Base::Preisach(p) => Any::Preisach(Box::new(p.build(&())?)),
             Base::BoucWen(p) => Any::BoucWen(Box::new(p.build(&())?)),
             Base::BoucWenOscillator(p) => Any::BoucWenOscillator(Box::new(p.build(cx)?)),
+            Base::Atan(_) | Base::Sigmoid(_) | Base::Softplus(_) | Base::Softsign(_) | Base::Tanh(_) => {
+                let params = base.activation().ok_or(Error::NotInvertible("no activation function"))?;
+                Any::Activation(Box::new(params.build(cx)?))
+            }
             Base::Dpm(p) => Any::Dpm(Box::new(p.build(cx)?)),
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),

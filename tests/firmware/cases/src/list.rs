@@ -34,6 +34,13 @@ macro_rules! all_cases {
             bouc_wen_n2: BoucWen<T>, 0.0..120.0 => given(BoucWenParams { n: 2.0, ..BOUC_WEN }).build(&());
             bouc_wen_inverse: Search<T, BoucWen<T>>, 0.0..20.0 => Build::<BoucWen<T>>::build(&given(BOUC_WEN), &())?.inverse(-50.0, 250.0, 1e-4);
             bouc_wen_oscillator: BoucWenOscillator<T>, -120.0..120.0 => given(BoucWenOscillatorParams::BENCHMARK).build(&PERIOD);
+            atan: Activation<T>, 0.0..40.0 => given((ActivationKind::Atan, XIE)).build(&PERIOD);
+            sigmoid: Activation<T>, 0.0..40.0 => given((ActivationKind::Sigmoid, XIE)).build(&PERIOD);
+            softplus: Activation<T>, 0.0..40.0 => given((ActivationKind::Softplus, XIE)).build(&PERIOD);
+            softsign: Activation<T>, 0.0..40.0 => given((ActivationKind::Softsign, XIE)).build(&PERIOD);
+            tanh: Activation<T>, 0.0..40.0 => given((ActivationKind::Tanh, XIE)).build(&PERIOD);
+            tanh_inverse: ActivationInverse<T>, 0.0..6.0 => Build::<Activation<T>>::build(&given((ActivationKind::Tanh, ActivationParams { alpha: 1e-4, ..XIE })), &PERIOD)?.invert();
+            tanh_anti_causal: AntiCausal<T, 64>, 0.0..6.0 => Build::<Activation<T>>::build(&given((ActivationKind::Tanh, XIE)), &PERIOD)?.anti_causal(1e-3);
             delay: Delay<T, 16>, 0.0..120.0 => given(DEAD_TIME).build(&PERIOD);
             lag: Lag<T>, 0.0..120.0 => given(LAG).build(&PERIOD);
             creep_4: Creep<T, 4>, 0.0..20.0 => given(CREEP).build(&PERIOD);

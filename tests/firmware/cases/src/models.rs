@@ -11,6 +11,8 @@ pub(crate) const CREEP: CreepParams<[f64; 4]> =
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
 pub(crate) const WARMTH: TemperatureParams = TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0 };
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
+/// Xie et al., tanh at 50 Hz but for γ, which is small enough here to bend.
+pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
 pub(crate) const LFDM: LfdmParams =
     LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
 pub(crate) const IFM: IfmParams = IfmParams {
