@@ -204,18 +204,21 @@ impl Follower {
 }
 
 /// Lowest and highest output: what the training record reached, and what the model itself says of rest and
-/// of full drive.
-fn reach(model: &Model) -> Result<(f64, f64), hyst_core::Error> {
-    // Rest and full drive, settled: the sample period does not matter there.
-    let operator = Operator::new(
-        &model.base,
-        [model.input.low, model.input.high],
-        &Sampling { period: 1.0 / model.recorded_at_hz },
-    )?;
-    let (mut state, env) = (operator.state(), Env::default());
-    let rest = model.zero + operator.reset(&mut state, &env, model.input.low);
-    let full = model.zero + operator.reset(&mut state, &env, model.input.high);
-    Ok((model.output.low.min(rest), model.output.high.max(full)))
+/// of full drive at the temperatures of the reference.
+fn reach(model: &Model, degc: [f64; 2]) -> Result<(f64, f64), hyst_core::Error> {
+    // Settled: the sample period does not matter there.
+    let range = [model.input.low, model.input.high];
+    let operator = Operator::new(&model.base, range, &Sampling { period: 1.0 / model.recorded_at_hz })?;
+    let mut state = operator.state();
+    let mut reach = (model.output.low, model.output.high);
+    for temperature in degc {
+        let env = Env { temperature, ..Env::default() };
+        for u in range {
+            let y = model.zero + operator.reset(&mut state, &env, u);
+            reach = (reach.0.min(y), reach.1.max(y));
+        }
+    }
+    Ok(reach)
 }
 
 fn check(
@@ -239,7 +242,10 @@ fn check(
     if model.needs_load() && reference.load().is_none() {
         return missing("load_n", "the model yields under it");
     }
-    let (low, high) = reach(model)?;
+    let room = options.temperature.unwrap_or(23.0);
+    let (coldest, warmest) =
+        samples.temperature.as_ref().map_or((room, room), |t| crate::samples::range(t.iter().copied()));
+    let (low, high) = reach(model, [coldest, warmest])?;
     let margin = MARGIN * (high - low);
     match samples.output.iter().position(|y| *y < low - margin || *y > high + margin) {
         Some(row) => Err(CompensateError::OutOfReach {

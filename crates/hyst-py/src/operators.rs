@@ -402,7 +402,7 @@ models! {
     }
     stage: hyst_core::BoucWen<f64>,
     build: |p| BoucWenParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma, n: p.n }.build(&()),
-    inverse: |p, stage, options| bouc_wen(p, stage, options),
+    inverse: bouc_wen,
     needs: [],
 
     /// Bouc-Wen operator in the form ``y = d·u − h``, ``ḣ = a·u̇ − b·|u̇|·h − gamma·u̇·|h|``.
@@ -420,7 +420,7 @@ models! {
     }
     stage: hyst_core::BoucWen<f64>,
     build: |p| BoucWenClassicParams { d: p.d, a: p.a, b: p.b, gamma: p.gamma }.build(&()),
-    inverse: |p, stage, options| bouc_wen(p, stage, options),
+    inverse: bouc_wen,
     needs: [],
 
     /// Oscillator with a Bouc-Wen element: ``m·ÿ + c·ẏ + k·y + z = u``,
