@@ -58,8 +58,8 @@ impl<T: Real> BoucWen<T> {
         let larger = ahead.at_least(behind);
         // g where the stronger of the two terms equals |α|; any unit does where there are none, or no memory.
         let unit = if larger > 0.0 && p.alpha != 0.0 { libm::pow(p.alpha.abs() / larger, 1.0 / p.n) } else { 1.0 };
-        let rate = p.alpha.abs() / unit;
-        if !(rate.is_finite() && unit > 0.0 && unit.is_finite()) {
+        let (scale, rate) = (T::from_f64(unit), T::from_f64(p.alpha.abs() / unit));
+        if !(rate.is_finite() && scale > T::ZERO && scale.is_finite()) {
             return Err(Error::OutOfRange {
                 name: "bouc-wen.beta",
                 must: "of the order of |alpha| over a power of the output",
@@ -69,7 +69,7 @@ impl<T: Real> BoucWen<T> {
         Ok(Self {
             k0: T::from_f64(p.k0),
             scale: T::from_f64(if p.alpha == 0.0 { 0.0 } else { sign * unit }),
-            rate: T::from_f64(rate),
+            rate,
             alpha: T::from_f64(p.alpha),
             branch: Branch::new(share(ahead), share(behind), p.n),
         })
