@@ -36,13 +36,14 @@ impl Paper {
             range: [number(&model["input"]["low"]), number(&model["input"]["high"])],
             rate: number(&model["recorded_at_hz"]),
         };
-        // A slow swing with smaller ones on it, from the low end, and a ramp of temperature.
+        // A slow swing with smaller ones on it, from near the low end (activation functions switch at 0), and a ramp of
+        // temperature.
         let [low, high] = paper.range;
         let swing = |k: usize| {
             let t = k as f64 / ROWS as f64;
             let slow = 0.5 - 0.5 * (std::f64::consts::TAU * 2.0 * t).cos();
             let fast = 0.5 - 0.5 * (std::f64::consts::TAU * 13.0 * t).cos();
-            low + (high - low) * (0.75 * slow + 0.2 * fast)
+            low + (high - low) * (0.02 + 0.75 * slow + 0.2 * fast)
         };
         paper.write("drive.csv", &paper.input, &(0..ROWS).map(swing).collect::<Vec<_>>());
         paper
@@ -82,7 +83,14 @@ fn every_kind_is_simulated_and_exported() {
 }
 
 /// Kinds whose inverse is band-limited or anti-causal, and what of the span it may miss away from the ends.
-const PREVIEWED: &[(Kind, f64)] = &[(Kind::TdEm, 2e-3)];
+const PREVIEWED: &[(Kind, f64)] = &[
+    (Kind::TdEm, 2e-3),
+    (Kind::Atan, 1e-9),
+    (Kind::Sigmoid, 1e-9),
+    (Kind::Softplus, 1e-9),
+    (Kind::Softsign, 1e-9),
+    (Kind::Tanh, 1e-9),
+];
 
 #[test]
 fn every_kind_with_an_inverse_reaches_what_it_gave() {
