@@ -20,11 +20,10 @@ use crate::{Env, Error, Real, Stage};
 /// nothing elsewhere. [`backward`](Self::backward) does a whole record in one pass.
 ///
 /// # The switch
-/// With a steep activation (βγ ≫ k₀) φ′ reaches 2a near u = 0, and the way back does not forget there, nor well within
-/// [`switching`](Self::switching). A drive that passes or touches zero needs a plan that is settled on both sides of it: so
-/// `lead` is then twice what the tolerance needs elsewhere. [`with_lead`](Self::with_lead) shortens it for drives that keep out.
-///
-/// Such a drive is followed to the tolerance if it keeps out for half the lead between two visits.
+/// With a steep activation (βγ ≫ k₀) φ′ reaches 2a near u = 0, and the way back forgets less within [`switching`](Self::switching) of
+/// it, or magnifies. A drive that passes or touches zero needs a plan that is settled on both sides: so `lead` is then
+/// twice what the tolerance needs elsewhere, and the tolerance is kept if the drive stays out for half the lead between two
+/// visits. [`with_lead`](Self::with_lead) shortens it for drives that keep out altogether.
 ///
 /// A *reference* that dwells between the two sides of the switch, z between β min f and β max f, has no drive that dwells in there:
 /// going back in time the drive jumps between the sides instead, up to [`chatter`](Self::chatter) to either side. In one pass
@@ -170,8 +169,8 @@ impl<T: Real, const N: usize> AntiCausal<T, N> {
         self.switching
     }
 
-    /// Largest |u| of a drive whose reference dwells in the switch \[u\]; 0 if there is none. A tall value on a coarse grid:
-    /// it falls with the sample period.
+    /// Largest |u| of a drive whose reference dwells in the switch \[u\]; 0 if there is none. For k₀ ≤ a that is
+    /// |β| (max f − min f) h / |α| beyond `switching`.
     pub fn chatter(&self) -> f64 {
         self.chatter
     }

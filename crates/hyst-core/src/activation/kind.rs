@@ -56,7 +56,7 @@ impl ActivationKind {
         }
     }
 
-    /// f′(x), from 0 to [`steepest`](Self::steepest).
+    /// f′(x), from 0 to 1 (sigmoid: 1/4).
     #[inline]
     pub fn slope<T: Real>(self, x: T) -> T {
         match self {
