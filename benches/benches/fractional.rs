@@ -12,19 +12,7 @@ const PERIOD: Sampling = Sampling { period: 1e-4 };
 const ROWS: usize = 100_000;
 
 fn printed() -> (LfdmParams, IfmParams) {
-    (
-        LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, ..Default::default() },
-        IfmParams {
-            a: 5.7342,
-            b: 6.8754,
-            c: 0.8885,
-            alpha: 0.6596,
-            beta: 0.9742,
-            tau: 0.0015,
-            delta: 1.7615,
-            ..Default::default()
-        },
-    )
+    (LfdmParams::PRINTED, IfmParams::PRINTED)
 }
 
 fn drive<T: Real>() -> Vec<T> {

@@ -4,7 +4,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::hint::black_box;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use hyst_cases::{Case, Precision, SAMPLES, Visit, each, inputs};
@@ -118,7 +118,12 @@ fn table(times: &BTreeMap<(String, &'static str), f64>) {
 }
 
 fn main() {
-    let mut criterion = Criterion::default().configure_from_args();
+    // 140 benches: a second each is enough for a minimum over many passes.
+    let mut criterion = Criterion::default()
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_millis(800))
+        .sample_size(20)
+        .configure_from_args();
     let times = Times::default();
     by_hand_f32(&mut criterion, &times);
     by_hand_f64(&mut criterion, &times);

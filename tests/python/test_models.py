@@ -132,11 +132,3 @@ def test_activation_inverses(name):
     model = conftest.build(name, **dict(printed, alpha=-printed["alpha"]), period=1e-4)
     assert model.inverse().lead == 0
     assert np.max(np.abs(model.compensate(model.simulate(u)) - u)) <= 1e-9 * span(u)
-
-
-def test_force_observer():
-    rng = np.random.default_rng(7)
-    x, free = rng.normal(size=50), rng.normal(size=50)
-    observer = conftest.build("ForceObserver", k_out=fractional.K_OUT, kappa=0.98, chi=0.01)
-    expected = fractional.external_force(x, free, fractional.K_OUT, 0.98, 0.01)
-    assert np.allclose(observer.simulate(x, free), expected, rtol=1e-12)

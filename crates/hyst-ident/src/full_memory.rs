@@ -93,7 +93,7 @@ fn held(u: &[f64]) -> Vec<f64> {
 ///
 /// ```
 /// use hyst_core::{LfdmParams, Sampling};
-/// let printed = LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, ..Default::default() };
+/// let printed = LfdmParams::PRINTED;
 /// let step: Vec<f64> = (0..100_000).map(|k| if k == 0 { 0.0 } else { 1.0 }).collect();
 /// let x = hyst_ident::full_memory::lfdm(&printed, &Sampling { period: 1e-4 }, &step)?;
 /// assert!(x[99_999] > 0.9 * printed.a);
@@ -142,18 +142,8 @@ mod tests {
     use super::*;
     use hyst_core::{Env, GlOrder, Ifm, Memory, ShortMemory, Stage};
 
-    const LFDM: LfdmParams =
-        LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
-    const IFM: IfmParams = IfmParams {
-        a: 5.7342,
-        b: 6.8754,
-        c: 0.8885,
-        alpha: 0.6596,
-        beta: 0.9742,
-        tau: 0.0015,
-        delta: 1.7615,
-        order: GlOrder::First,
-    };
+    const LFDM: LfdmParams = LfdmParams::PRINTED;
+    const IFM: IfmParams = IfmParams::PRINTED;
     const TEN_KHZ: Sampling = Sampling { period: 1e-4 };
     const BOTH: [GlOrder; 2] = [GlOrder::First, GlOrder::Second];
 

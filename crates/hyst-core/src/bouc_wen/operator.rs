@@ -189,7 +189,7 @@ mod tests {
     use crate::{BoucWenClassicParams, Build};
     use std::vec::Vec;
 
-    const PRINTED: BoucWenClassicParams = BoucWenClassicParams { d: 1.910, a: 0.971, b: 1.486, gamma: 1.97e-7 };
+    const PRINTED: BoucWenClassicParams = BoucWenClassicParams::PRINTED;
 
     fn env() -> Env<f64> {
         Env::default()

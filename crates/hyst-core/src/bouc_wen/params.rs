@@ -68,6 +68,9 @@ pub struct BoucWenClassicParams {
 }
 
 impl BoucWenClassicParams {
+    /// The numbers that Zhu et al. print (output µm, input V). 2 A > d: branches fold just after a turn.
+    pub const PRINTED: Self = Self { d: 1.910, a: 0.971, b: 1.486, gamma: 1.97e-7 };
+
     /// The same operator in the form of Xie et al.
     pub fn general(&self) -> BoucWenParams {
         BoucWenParams { k0: self.d, alpha: -self.a, beta: self.b, gamma: -self.gamma, n: 1.0 }

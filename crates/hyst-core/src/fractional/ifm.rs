@@ -34,6 +34,18 @@ pub struct IfmParams {
 }
 
 impl IfmParams {
+    /// The numbers that the paper prints (output µm, input V): α, β, τ and Δ as identified, first-order derivatives.
+    pub const PRINTED: Self = Self {
+        a: 5.7342,
+        b: 6.8754,
+        c: 0.8885,
+        alpha: 0.6596,
+        beta: 0.9742,
+        tau: 0.0015,
+        delta: 1.7615,
+        order: GlOrder::First,
+    };
+
     /// The equation from u_d to the hysteresis.
     fn hysteresis(&self) -> LfdmParams {
         let Self { a, b, c, alpha, beta, order, .. } = *self;
@@ -68,9 +80,7 @@ impl Params for IfmParams {
 ///
 /// ```
 /// use hyst_core::{Build, Env, Exponentials, Ifm, IfmParams, Invert, Sampling, Stage};
-/// let printed = IfmParams {
-///     a: 5.7342, b: 6.8754, c: 0.8885, alpha: 0.6596, beta: 0.9742, tau: 0.0015, delta: 1.7615, ..Default::default()
-/// };
+/// let printed = IfmParams::PRINTED;
 /// let model: Ifm<f64, Exponentials<f64, 40>, 32> = printed.build(&Sampling { period: 1e-4 })?;
 /// let inverse = model.invert()?;
 /// let (mut s, mut i, env) = (model.state(), inverse.state(), Env::default());
@@ -241,16 +251,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    const PRINTED: IfmParams = IfmParams {
-        a: 5.7342,
-        b: 6.8754,
-        c: 0.8885,
-        alpha: 0.6596,
-        beta: 0.9742,
-        tau: 0.0015,
-        delta: 1.7615,
-        order: GlOrder::First,
-    };
+    const PRINTED: IfmParams = IfmParams::PRINTED;
     const TEN_KHZ: Sampling = Sampling { period: 1e-4 };
     type Model<T> = Ifm<T, Exponentials<T, 40>, 160>;
 

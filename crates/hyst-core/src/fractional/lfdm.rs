@@ -28,6 +28,9 @@ pub struct LfdmParams {
 }
 
 impl LfdmParams {
+    /// The numbers that the paper prints (output µm, input V), first-order derivatives.
+    pub const PRINTED: Self = Self { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
+
     /// Response of the model in continuous time at `hz` \[y/u\].
     pub fn response(&self, hz: f64) -> Complex {
         let s = Complex { re: 0.0, im: 2.0 * core::f64::consts::PI * hz };
@@ -87,7 +90,7 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
 ///
 /// ```
 /// use hyst_core::{Build, Env, Exponentials, Invert, Lfdm, LfdmParams, Sampling, Stage};
-/// let printed = LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, ..Default::default() };
+/// let printed = LfdmParams::PRINTED;
 /// let model: Lfdm<f64, Exponentials<f64, 40>> = printed.build(&Sampling { period: 1e-4 })?;
 /// let inverse = model.invert()?;
 /// let (mut s, mut i, env) = (model.state(), inverse.state(), Env::default());
@@ -244,8 +247,7 @@ pub(super) mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    const PRINTED: LfdmParams =
-        LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
+    const PRINTED: LfdmParams = LfdmParams::PRINTED;
     const TEN_KHZ: Sampling = Sampling { period: 1e-4 };
     type Model<T> = Lfdm<T, Exponentials<T, 40>>;
 

@@ -150,7 +150,7 @@ impl<T: Real, const N: usize> TdPi<T, N> {
     }
 }
 
-/// History of a TD-PI model (`G` is [`GpiState`](crate::GpiState)) or of its inverse.
+/// History of a TD-PI model (`G` is [`GpiState`]) or of its inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TdPiState<T, G> {
     gpi: G,

@@ -13,18 +13,8 @@ pub(crate) const WARMTH: TemperatureParams = TemperatureParams { per_kelvin: 0.0
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
 /// Xie et al., tanh at 50 Hz but for γ, which is small enough here to bend.
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
-pub(crate) const LFDM: LfdmParams =
-    LfdmParams { a: 6.573, b: 1.459, c: 0.198, alpha: 0.176, beta: 0.466, order: GlOrder::First };
-pub(crate) const IFM: IfmParams = IfmParams {
-    a: 5.7342,
-    b: 6.8754,
-    c: 0.8885,
-    alpha: 0.6596,
-    beta: 0.9742,
-    tau: 0.0015,
-    delta: 1.7615,
-    order: GlOrder::First,
-};
+pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
+pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
 pub(crate) const BENT: AsymmetryParams<[f64; 3]> =
     AsymmetryParams { thresholds: [4.0, 10.0, -3.0], weights: [0.1, -0.05, 0.2] };
 pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
