@@ -63,6 +63,12 @@ pub(crate) fn finite(name: &'static str, x: f64) -> Result<f64, Error> {
     if x.is_finite() { Ok(x) } else { Err(Error::NonFinite(name)) }
 }
 
+/// The coefficient of a parameter in the precision of the signal path; refuses NaN, infinities, and what overflows there.
+pub(crate) fn coefficient<T: crate::Real>(name: &'static str, x: f64) -> Result<T, Error> {
+    let y = T::from_f64(x);
+    if y.is_finite() { Ok(y) } else { Err(Error::NonFinite(name)) }
+}
+
 /// Refuses what is not finite or fails `ok`, naming parameter and range.
 pub(crate) fn within(name: &'static str, x: f64, ok: bool, must: &'static str) -> Result<f64, Error> {
     finite(name, x)?;

@@ -1,6 +1,7 @@
 //! Dead time: `y(t) = u(t − d)`.
 
 use crate::error::within;
+use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a dead time `y(t) = u(t − d)`. Zero is no delay.
@@ -82,6 +83,7 @@ impl<T: Real, const N: usize> Stage<T> for Delay<T, N> {
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let u = finite_or(u, s.ring.get(s.newest).copied().unwrap_or(T::ZERO));
         s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
         if let Some(slot) = s.ring.get_mut(s.newest) {
             *slot = u;

@@ -5,6 +5,7 @@
 //! to a symmetric number of taps and to a band, so it needs `lead` samples of the future reference.
 
 use crate::error::within;
+use crate::stage::finite_or;
 use crate::{Complex, Env, Error, Real, Stage};
 
 /// A two-sided filter `vₖ = Σₙ cₙ yₖ₋ₙ`, n from −lead to +lead, of at most `N` taps.
@@ -140,6 +141,7 @@ impl<T: Real, const N: usize> Stage<T> for Preview<T, N> {
     /// Takes the input of time k + lead and returns the output of time k.
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let u = finite_or(u, s.ring.get(s.newest).copied().unwrap_or(T::ZERO));
         s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
         if let Some(slot) = s.ring.get_mut(s.newest) {
             *slot = u;

@@ -4,7 +4,7 @@ use crate::error::{finite, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of a soft stop: the output is the input up to a knee and approaches the limit beyond,
-/// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. Infinite limits are no saturation.
+/// `y = k + (L − k) tanh((v − k)/(L − k))`, on both sides. Limits that nothing reaches are no saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SaturationParams {

@@ -1,7 +1,7 @@
 //! PID with a filtered derivative and anti-windup.
 
 use crate::error::{finite, within};
-use crate::stage::hold;
+use crate::stage::{finite_or, hold};
 use crate::{Build, Error, Meta, Params, Real, Sampling};
 
 /// Parameters of `u = u_ff + kₚ (b r − y) + kᵢ ∫ (r − y) dt + k_d d/dt (c r − y)`, the derivative through a first-order filter, the whole
@@ -133,12 +133,16 @@ impl<T: Real> Pid<T> {
 
     /// Takes over without a bump: the next drive at reference = measured = `y` and feedforward `feedforward` is `drive`.
     pub fn take_over(&self, s: &mut PidState<T>, drive: T, y: T, feedforward: T) {
+        // A sensor that drops out at this moment counts as what it showed last.
+        let y = finite_or(y, s.measured);
+        let feedforward = finite_or(feedforward, s.feedforward);
         let proportional = self.proportional * (self.weights[0] * y - y);
         *s = PidState {
-            integral: drive - feedforward - proportional,
+            integral: finite_or(drive - feedforward - proportional, T::ZERO),
             last: Some(self.weights[1] * y - y),
             reference: y,
             measured: y,
+            feedforward,
             ..PidState::default()
         };
     }
@@ -153,11 +157,12 @@ impl<T: Real> Pid<T> {
         let differentiated = self.weights[1] * r - y;
         let change = s.last.map_or(T::ZERO, |last| differentiated - last);
         s.last = Some(differentiated);
-        s.derivative = self.filter * s.derivative + self.derivative * change;
+        // An overflow passes; it must not stay.
+        s.derivative = finite_or(self.filter * s.derivative + self.derivative * change, T::ZERO);
         let wanted = ff + self.proportional * (self.weights[0] * r - y) + s.integral + s.derivative;
         let drive = wanted.at_least(self.low).at_most(self.high);
         s.limited = drive != wanted;
-        s.integral += self.integral * (r - y) + self.tracking * (drive - wanted);
+        s.integral = finite_or(s.integral + self.integral * (r - y) + self.tracking * (drive - wanted), s.integral);
         drive
     }
 }
@@ -240,6 +245,21 @@ mod tests {
         pid.take_over(&mut s, 40.0, 4.0, 10.0);
         assert!((pid.step(&mut s, 4.0, 4.0, 10.0) - 40.0).abs() < 1e-12);
         assert!((pid.step(&mut s, f64::NAN, f64::NAN, f64::NAN) - 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_glitch_does_not_stay() {
+        let pid: Pid<f32> = PARAMS.build(&Sampling { period: 1e-3 }).unwrap();
+        let mut s = pid.state();
+        pid.take_over(&mut s, 40.0, f32::NAN, 10.0);
+        let mut y = 4.0;
+        for glitch in [-3e38, 3e38, f32::INFINITY, f32::NAN] {
+            for k in 0..6000 {
+                let u = pid.step(&mut s, 4.0, if k == 0 { glitch } else { y }, 10.0);
+                y += (0.1 * u - y) * 0.2;
+            }
+            assert!((y - 4.0).abs() < 1e-3, "{y} after {glitch}");
+        }
     }
 
     #[test]

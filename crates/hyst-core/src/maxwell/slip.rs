@@ -70,6 +70,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
                 Error::Capacity { needed, holds, .. } => {
                     Error::Capacity { name: "maxwell-slip elements", needed, holds }
                 }
+                Error::NonFinite(_) => Error::NonFinite("maxwell-slip.widths or maxwell-slip.gains"),
                 other => other,
             })
         };

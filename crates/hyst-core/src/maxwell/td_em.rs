@@ -83,7 +83,7 @@ impl<L: AsMut<[f64]>> Params for TdEmParams<L> {
 /// between samples, and is stable at any sample period and for any course of temperature.
 ///
 /// When the temperature changes, the exact step is computed anew (a 3×3 matrix exponential in `f64`); at a constant temperature
-/// it is kept. Range: −273 to 1000 °C. A temperature that is no number is replaced by the last one that was.
+/// it is kept. Temperatures beyond −273 and 1000 °C count as those. One that is no number is replaced by the last one that was.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Sampling, Stage, TdEm, TdEmParams};
@@ -139,6 +139,16 @@ pub struct TdEmState<T, const N: usize> {
     step: Step<T>,
 }
 
+/// Temperatures beyond are a fault of the sensor \[°C\].
+const COLDEST: f64 = -273.0;
+const HOTTEST: f64 = 1000.0;
+
+/// The temperature of a sample, the last one that was a number, within the range of the model.
+#[inline]
+fn sensed<T: Real>(held: &mut T, e: &Env<T>) -> T {
+    hold(held, e.temperature.at_least(T::from_f64(COLDEST)).at_most(T::from_f64(HOTTEST)))
+}
+
 /// Temperature before any was seen \[°C\].
 const ROOM: f64 = 23.0;
 
@@ -156,7 +166,7 @@ impl<T: Real, const N: usize> TdEm<T, N> {
 
     fn at_temperature(&self, s: &mut TdEmState<T, N>, e: &Env<T>) {
         let before = s.degc;
-        if hold(&mut s.degc, e.temperature) != before {
+        if sensed(&mut s.degc, e) != before {
             s.step = self.circuit.step(self.coupling(s.degc.to_f64()));
         }
     }
@@ -273,7 +283,7 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = self.state();
-        let (degc, y) = (hold(&mut s.degc, e.temperature), hold(&mut s.reference, u0));
+        let (degc, y) = (sensed(&mut s.degc, e), hold(&mut s.reference, u0));
         self.late.reset(&mut s.late, e, degc);
         let y = self.filter.reset(&mut s.filter, e, y);
         self.slip.reset(&mut s.slip, e, self.current(y, degc))
@@ -281,7 +291,7 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
 
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let (degc, y) = (hold(&mut s.degc, e.temperature), hold(&mut s.reference, u));
+        let (degc, y) = (sensed(&mut s.degc, e), hold(&mut s.reference, u));
         let y = self.filter.step(&mut s.filter, e, y);
         let then = self.late.step(&mut s.late, e, degc);
         self.slip.step(&mut s.slip, e, self.current(y, then))

@@ -12,7 +12,7 @@ use core::fmt;
 
 use super::ChainParams;
 
-/// Version of the blocks that this version of the library writes, and the newest that it reads.
+/// Version of the blocks that this version of the library writes and reads.
 pub const BLOCK_VERSION: u8 = 1;
 
 /// A list of at most `N` numbers without heap.
@@ -29,8 +29,8 @@ const TAIL: usize = 4;
 pub enum BlockError {
     /// The bytes do not begin with `HYST`.
     NotABlock,
-    /// A newer format.
-    Newer {
+    /// Another version of the format.
+    Version {
         /// Its version.
         version: u8,
     },
@@ -58,8 +58,11 @@ impl fmt::Display for BlockError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotABlock => f.write_str("not a parameter block: it does not begin with HYST"),
-            Self::Newer { version } => {
-                write!(f, "block version {version} is newer than {BLOCK_VERSION}: update the firmware")
+            Self::Version { version } => {
+                write!(
+                    f,
+                    "block version {version}, this build reads {BLOCK_VERSION}: export the model anew, or update it"
+                )
             }
             Self::Truncated { needed, found } => write!(f, "block cut short: {found} of {needed} bytes"),
             Self::Corrupt { stated, computed } => {
@@ -125,8 +128,9 @@ pub fn read_block<'a, L: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Result<Chai
     }
     let short = |needed| BlockError::Truncated { needed, found };
     let version = *bytes.get(MAGIC.len()).ok_or(short(HEAD))?;
-    if version > BLOCK_VERSION || version == 0 {
-        return Err(BlockError::Newer { version });
+    // The payload has no names: another version's would be misread.
+    if version != BLOCK_VERSION {
+        return Err(BlockError::Version { version });
     }
     let length = number(bytes.get(MAGIC.len() + 1..HEAD)).ok_or(short(HEAD))? as usize;
     let end = HEAD.saturating_add(length);
@@ -136,7 +140,11 @@ pub fn read_block<'a, L: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Result<Chai
     if stated != computed {
         return Err(BlockError::Corrupt { stated, computed });
     }
-    postcard::from_bytes(bytes.get(HEAD..end).ok_or(short(needed))?).map_err(|_| BlockError::Malformed)
+    let payload = bytes.get(HEAD..end).ok_or(short(needed))?;
+    match postcard::take_from_bytes(payload) {
+        Ok((chain, [])) => Ok(chain),
+        _ => Err(BlockError::Malformed),
+    }
 }
 
 #[cfg(test)]

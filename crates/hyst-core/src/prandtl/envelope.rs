@@ -178,8 +178,12 @@ impl<T: Real> Stage<T> for EnvelopeInverse<T> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = EnvelopeState::default();
-        // What the play shows at drive 0 is reached by drive 0.
-        s.g = self.forward.reset(&mut EnvelopeState::default(), e, T::ZERO);
+        if u0 == T::ZERO {
+            // Virgin memory shows 0 for every drive between the sides: the one nearest to 0.
+            let Envelope { left, right } = &self.forward;
+            s.u = T::ZERO.at_most(left.inverse(u0)).at_least(right.inverse(u0));
+            return s.u;
+        }
         self.step(s, e, u0)
     }
 
@@ -218,8 +222,10 @@ mod tests {
             let inverse = play.invert().unwrap();
             let e = Env::default();
             let (mut seen, mut reached, mut i) = (play.state(), play.state(), inverse.state());
-            let first = inverse.reset(&mut i, &e, play.reset(&mut seen, &e, 0.0));
-            play.reset(&mut reached, &e, first);
+            // Also where virgin memory is pushed at drive 0.
+            let reference = play.reset(&mut seen, &e, u[0]);
+            let first = inverse.reset(&mut i, &e, reference);
+            prop_assert!((play.reset(&mut reached, &e, first) - reference).abs() < 1e-11);
             for u in &u {
                 let reference = play.step(&mut seen, &e, *u);
                 let drive = inverse.step(&mut i, &e, reference);

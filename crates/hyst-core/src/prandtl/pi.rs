@@ -3,7 +3,7 @@
 //! `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)` (Brokate and Sprekels 1996; Kuhnen 2003). The inverse is an
 //! operator of the same type.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of `y = p₀ u + Σᵢ wᵢ play_{rᵢ}(u)`. `L` is any list of numbers: a vector, an array, a slice.
@@ -54,21 +54,20 @@ impl<T: Real, const N: usize> Pi<T, N> {
     /// If a number is not finite, the lists differ in length or are longer than `N`, or the
     /// thresholds are not positive and strictly rising.
     pub fn new(gain: f64, thresholds: &[f64], weights: &[f64]) -> Result<Self, Error> {
-        finite("pi.gain", gain)?;
+        let gain = coefficient("pi.gain", gain)?;
         if thresholds.len() != weights.len() {
             return Err(Error::Lengths("pi.thresholds and pi.weights"));
         }
         if thresholds.len() > N {
             return Err(Error::Capacity { name: "pi plays", needed: thresholds.len(), holds: N });
         }
-        let mut pi =
-            Self { gain: T::from_f64(gain), thresholds: [T::ZERO; N], weights: [T::ZERO; N], len: thresholds.len() };
+        let mut pi = Self { gain, thresholds: [T::ZERO; N], weights: [T::ZERO; N], len: thresholds.len() };
         let mut last = 0.0;
         let slots = pi.thresholds.iter_mut().zip(&mut pi.weights);
         for ((slot_r, slot_w), (r, w)) in slots.zip(thresholds.iter().zip(weights)) {
             within("pi.thresholds", *r, *r > last, "positive and strictly rising")?;
-            *slot_r = T::from_f64(*r);
-            *slot_w = T::from_f64(finite("pi.weights", *w)?);
+            *slot_r = coefficient("pi.thresholds", *r)?;
+            *slot_w = coefficient("pi.weights", *w)?;
             last = *r;
         }
         Ok(pi)

@@ -52,7 +52,8 @@ struct Axis<T> {
 impl Axis<f64> {
     fn new(low: f64, high: f64, nodes: usize) -> Self {
         let last = nodes.saturating_sub(1);
-        let step = (high - low) / last.max(1) as f64;
+        // One node is a constant, wherever it lies.
+        let step = if last == 0 { 0.0 } else { (high - low) / last as f64 };
         Self { low, step, per_step: if step > 0.0 { 1.0 / step } else { 0.0 }, last }
     }
 
@@ -221,6 +222,23 @@ mod tests {
     fn mirror(weights: &[f64]) -> Mirror<f64, 8, 9> {
         let MirrorParams { rate_low, rate_high, rates, change_low, change_high, changes, .. } = GRID;
         MirrorParams { rate_low, rate_high, rates, change_low, change_high, changes, weights }.build(&()).unwrap()
+    }
+
+    #[test]
+    fn an_axis_with_one_node_is_constant() {
+        let params = MirrorParams {
+            rate_low: 2e3,
+            rate_high: 16e3,
+            rates: 1,
+            change_low: -80.0,
+            change_high: 80.0,
+            changes: 1,
+            weights: [0.8],
+        };
+        let mirror: Mirror<f64, 1, 1> = params.build(&()).unwrap();
+        for (d, p) in [(2e3, -80.0), (2e3, 80.0), (16e3, 80.0), (1e5, 0.0)] {
+            assert_eq!(mirror.weight(d, p), 0.8);
+        }
     }
 
     #[test]
