@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use hyst_core::{Build, List, OperatorParams, Pi, Sampling, read_block};
+use hyst_core::{Build, Kind, List, OperatorParams, Pi, Sampling, read_block};
 use hyst_tests::{Lab, root};
 
 fn lab() -> Lab {
@@ -53,7 +53,7 @@ fn a_c_compiler_takes_the_header() {
         "#include <stdio.h>\n#include \"model.h\"\nint main(void) {\n\
          (void)hyst_zero; (void)hyst_input_low; (void)hyst_input_high;\n\
          printf(\"%s %c%c%c%c %.17g\\n\", HYST_KIND, hyst_block[0], hyst_block[1], hyst_block[2], hyst_block[3], \
-         hyst_4_resonance_hz + hyst_5_resonance_hz);\n return 0;\n}\n",
+         hyst_resonance_hz + hyst_resonance_2_hz);\n return 0;\n}\n",
     );
     let folder = lab.path("");
     run(
@@ -76,10 +76,19 @@ fn a_c_compiler_takes_the_header() {
     assert_eq!(said, "pi HYST 340\n", "{}", lab.read("model.h"));
 }
 
+/// Every kind of model, and one with all that surrounds it, as a program for a board that runs it.
 #[test]
 fn rustc_takes_the_source() {
     let lab = lab();
-    lab.ok("export model.json --format rust -o model.rs");
+    lab.ok("export model.json --format rust -o fitted.rs");
+    let mut modules = vec!["fitted".to_owned()];
+    for kind in Kind::ALL {
+        let module = kind.name().replace('-', "_");
+        let file = root().join(format!("docs/models/{kind}.json"));
+        lab.write("paper.json", std::fs::read(file).unwrap());
+        lab.ok(&format!("export paper.json --format rust -o {module}.rs"));
+        modules.push(module);
+    }
     let core = root().join("crates/hyst-core");
     lab.write(
         "Cargo.toml",
@@ -88,16 +97,20 @@ fn rustc_takes_the_source() {
              [[bin]]\nname = \"board\"\npath = \"main.rs\"\n[dependencies]\nhyst-core = {{ path = {core:?} }}\n"
         ),
     );
-    lab.write(
-        "main.rs",
-        "mod model;\nuse hyst_core::*;\nfn main() -> Result<(), Error> {\n\
-         let cx = Sampling { period: 1e-3 };\n\
-         let pi: Pi<f64, 64> = model::OPERATOR.build(&())?;\n\
-         let chain: Chain<f64, _, 16, 8> = model::EFFECTS.around(pi, &cx)?.with_zero(model::ZERO);\n\
-         let mut s = chain.state();\n\
-         let rest = chain.reset(&mut s, &Env::default(), model::INPUT[0]);\n\
-         println!(\"{} {rest:e}\", chain.resonances.iter().flatten().count());\n Ok(())\n}\n",
-    );
+    let mut main = String::from("use hyst_core::*;\n");
+    for module in &modules {
+        main += &format!("mod {module};\n");
+    }
+    main += "fn main() -> Result<(), Error> {\n    let env = Env { temperature: 23.0, ..Env::default() };\n";
+    for module in &modules {
+        main += &format!(
+            "    let model = Box::new({module}::chain::<f64, 64>(&Sampling {{ period: 1e-3 }})?);\n    \
+             let mut state = Box::new(model.state());\n    \
+             model.reset(&mut state, &env, {module}::INPUT[0]);\n    \
+             println!(\"{module} {{:e}}\", model.step(&mut state, &env, {module}::INPUT[1]));\n"
+        );
+    }
+    lab.write("main.rs", main + "    Ok(())\n}\n");
     // The lock file of the workspace pins what the registry has at hand.
     std::fs::copy(root().join("Cargo.lock"), lab.path("Cargo.lock")).unwrap();
     let target = root().join("target/export");
@@ -106,7 +119,16 @@ fn rustc_takes_the_source() {
         &lab.path(""),
         &["run", "--quiet", "--target-dir", target.to_str().unwrap()],
     );
-    assert!(said.starts_with("2 "), "{said}");
+    let outputs: Vec<&str> = said.lines().collect();
+    assert_eq!(outputs.len(), modules.len(), "{said}");
+    for line in outputs {
+        let (_, y) = line.split_once(' ').unwrap();
+        assert!(y.parse::<f64>().is_ok_and(f64::is_finite), "{line}");
+    }
+    // An exported function is the one of the file.
+    assert!(
+        lab.read("atan.rs").contains("ActivationKind::Atan") && lab.read("tanh.rs").contains("ActivationKind::Tanh")
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use hyst_core::{BlockError, ChainParams, write_block};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::model::Model;
+use crate::model::{Base, FittedOn, Model};
 
 /// The parameter block that firmware reads with [`hyst_core::read_block`].
 ///
@@ -37,53 +37,113 @@ impl fmt::Debug for Slice {
     }
 }
 
+/// Text of the model file for a comment: what could end the comment or its line is left out.
+fn harmless(text: &str) -> String {
+    text.replace("*/", "").chars().filter(|c| !c.is_control()).collect()
+}
+
 fn origin(model: &Model) -> String {
-    let files: Vec<String> = model.fitted_on.iter().map(|f| format!("{} (sha256 {})", f.file, f.sha256)).collect();
-    let from = if files.is_empty() { "a model that names no record".into() } else { files.join(", ") };
-    format!(
-        "Parameters of a {} model, input {} [{}], output {} [{}], fitted on {from}.",
+    let of_file = |f: &FittedOn| match f.sha256.as_str() {
+        "" => f.file.clone(),
+        sum => format!("{} (sha256 {sum})", f.file),
+    };
+    let files: Vec<String> = model.fitted_on.iter().map(of_file).collect();
+    let from = if files.is_empty() { String::new() } else { format!(", fitted on {}", files.join(", ")) };
+    harmless(&format!(
+        "Parameters of the model {}, input {} [{}], output {} [{}]{from}.",
         model.base.kind(),
         model.input.column,
         model.input.unit,
         model.output.column,
         model.output.unit
-    )
+    ))
 }
 
-/// Rust source: constants for `hyst-core`, to be built at any sample period.
+/// The operator's type in Rust source, with room for exactly what the model has, and what it is built for.
+fn operator_type(base: &Base) -> (String, &'static str) {
+    let plays = |list: &[f64]| list.len().max(1);
+    match base {
+        Base::Pi(p) => (format!("Pi<T, {}>", plays(&p.thresholds)), "&()"),
+        Base::ViscousPi(p) => (format!("ViscousPi<T, {}>", plays(&p.pi.thresholds)), "sampling"),
+        Base::Gpi(p) => (format!("Gpi<T, {}>", plays(&p.thresholds)), "&()"),
+        Base::TdPi(p) => (format!("TdPi<T, {}>", p.plays.max(1)), "&()"),
+        Base::MaxwellSlip(p) => (format!("MaxwellSlip<T, {}>", plays(&p.widths)), "&()"),
+        Base::TdEm(p) => (format!("TdEm<T, {}>", plays(&p.slip.widths)), "sampling"),
+        Base::Preisach(p) => (format!("Everett<T, {}>", p.cells + 1), "&()"),
+        Base::Dpm(p) => {
+            (format!("Dpm<T, {}, {}, {}>", p.preisach.cells + 1, p.mirror.rates, p.mirror.changes), "sampling")
+        }
+        Base::Lfdm(_) => ("Lfdm<T, Exponentials<T, 40>>".into(), "sampling"),
+        Base::Ifm(_) => ("Ifm<T, Exponentials<T, 40>, D>".into(), "sampling"),
+        Base::BoucWen(_) => ("BoucWen<T>".into(), "&()"),
+        Base::BoucWenOscillator(_) => ("BoucWenOscillator<T>".into(), "sampling"),
+        Base::Atan(_) | Base::Sigmoid(_) | Base::Softplus(_) | Base::Softsign(_) | Base::Tanh(_) => {
+            ("Activation<T>".into(), "sampling")
+        }
+    }
+}
+
+/// Rust source: constants for `hyst-core`, and the function that builds the chain of them.
 pub fn rust(model: &Model) -> String {
     // Through JSON, because that maps the lists of every kind of parameters at once. It cannot fail: these are the same types.
     let params: Option<ChainParams<Slice>> =
         serde_json::to_value(model.to_params()).ok().and_then(|v| serde_json::from_value(v).ok());
     let Some(params) = params else { return String::new() };
-    let operator = format!("{:?}", params.operator);
-    // `Pi(PiParams { … })`: the type of what is inside is its first word.
-    let inner = operator.find('(').map_or("", |at| &operator[at + 1..operator.len() - 1]);
-    let name = inner.split([' ', '{']).next().unwrap_or_default();
-    let list = if inner.contains("&[") { "<&[f64]>" } else { "" };
+    let operator = match params.operator.activation() {
+        Some((kind, p)) => format!("(ActivationKind, ActivationParams) = (ActivationKind::{kind:?}, {p:?})"),
+        None => {
+            let text = format!("{:?}", params.operator);
+            // `Pi(PiParams { … })`: the type of what is inside is its first word.
+            let inner = text.find('(').map_or("", |at| &text[at + 1..text.len() - 1]);
+            let name = inner.split([' ', '{']).next().unwrap_or_default();
+            let list = if inner.contains("&[") { "<&[f64]>" } else { "" };
+            format!("{name}{list} = {inner}")
+        }
+    };
+    let (operator_type, context) = operator_type(&model.base);
+    let creep = model.effects.creep.as_ref().map_or(1, |c| c.seconds.len().max(1));
+    let mut surroundings = String::new();
+    if model.needs_temperature() {
+        surroundings += "//   The model follows temperature: set env.temperature [degC] at every sample.\n";
+    }
+    if model.needs_load() {
+        surroundings += "//   The model yields under load: set env.load [N] at every sample.\n";
+    }
     format!(
         "// Written by hystctl {version}. {origin}\n\
          //\n\
-         //   let hysteresis = OPERATOR.build(&cx)?; // cx: () or Sampling, as the operator asks for\n\
-         //   let chain = EFFECTS.around(hysteresis, &sampling)?.with_zero(ZERO);\n\
+         //   let model = chain::<f32, 32>(&Sampling {{ period: 1e-3 }})?; // 32: samples of dead time that it has room for, and 2\n\
+         //   let mut state = model.state();\n\
+         //   let mut y = model.reset(&mut state, &env, INPUT[0] as f32); // env: hyst_core::Env\n\
+         //   y = model.step(&mut state, &env, drive);                    // every period\n\
+         {surroundings}\
          #[allow(unused_imports)]\n\
-         use hyst_core::{{*, Curve::*, SlipReading::*}};\n\
+         use hyst_core::{{*, Curve::*, GlOrder::*, SlipReading::*}};\n\
          \n\
          /// The memory operator.\n\
-         pub const OPERATOR: {name}{list} = {inner};\n\
+         pub const OPERATOR: {operator};\n\
          /// The stages around it.\n\
          pub const EFFECTS: EffectParams<&[f64]> = {effects:?};\n\
          /// What the sensor shows at rest [{unit}].\n\
          pub const ZERO: f64 = {zero:?};\n\
          /// Inputs that the model was identified on, lowest and highest [{input}].\n\
-         pub const INPUT: [f64; 2] = {range:?};\n",
+         pub const INPUT: [f64; 2] = {range:?};\n\
+         \n\
+         /// The model at a sample period, in `f32` or `f64`; `D - 2` samples of dead time fit.\n\
+         ///\n\
+         /// # Errors\n\
+         /// If the sample period does not suit the parameters, or the dead time does not fit.\n\
+         pub fn chain<T: Real, const D: usize>(\n    sampling: &Sampling,\n) -> Result<Chain<T, {operator_type}, D, {creep}>, Error> {{\n    \
+         let hysteresis: {operator_type} = OPERATOR.build({context})?;\n    \
+         Ok(EFFECTS.around(hysteresis, sampling)?.with_zero(ZERO))\n\
+         }}\n",
         version = env!("CARGO_PKG_VERSION"),
         origin = origin(model),
         effects = params.effects,
         zero = params.zero,
         range = params.input,
-        unit = model.output.unit,
-        input = model.input.unit,
+        unit = harmless(&model.output.unit),
+        input = harmless(&model.input.unit),
     )
 }
 
@@ -98,7 +158,7 @@ pub fn c(model: &Model) -> Result<String, BlockError> {
          #define HYST_KIND \"{}\"\n\n/* What hyst_core::read_block reads. */\n\
          static const uint8_t hyst_block[{}] = {{",
         env!("CARGO_PKG_VERSION"),
-        origin(model).replace("*/", "* /"),
+        origin(model),
         model.base.kind(),
         bytes.len()
     );
@@ -106,17 +166,21 @@ pub fn c(model: &Model) -> Result<String, BlockError> {
         let _ = write!(text, "{}0x{byte:02x},", if i % 16 == 0 { "\n    " } else { " " });
     }
     text += "\n};\n";
-    let _ = writeln!(text, "\nstatic const double hyst_zero = {:?}; /* {} */", model.zero, model.output.unit);
-    let _ = writeln!(text, "static const double hyst_input_low = {:?}; /* {} */", model.input.low, model.input.unit);
-    let _ = writeln!(text, "static const double hyst_input_high = {:?}; /* {} */", model.input.high, model.input.unit);
-    for (i, stage) in model.stages().into_iter().enumerate() {
+    let (input, output) = (harmless(&model.input.unit), harmless(&model.output.unit));
+    let _ = writeln!(text, "\nstatic const double hyst_zero = {:?}; /* {output} */", model.zero);
+    let _ = writeln!(text, "static const double hyst_input_low = {:?}; /* {input} */", model.input.low);
+    let _ = writeln!(text, "static const double hyst_input_high = {:?}; /* {input} */", model.input.high);
+    let mut modes = 0;
+    for stage in model.stages() {
         let Value::Object(mut stage) = stage else { continue };
         let name = stage.remove("stage").and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
         let units = stage.remove("units").unwrap_or_default();
         stage.remove("std_errors");
-        let _ = writeln!(text, "\n/* Stage {}: {name} */", i + 1);
+        let _ = writeln!(text, "\n/* {name} */");
+        modes += usize::from(name == "resonance");
         // A second mode must not have the names of the first.
-        let prefix = format!("hyst_{}_{}", i + 1, identifier(&name));
+        let second = if name == "resonance" && modes > 1 { format!("_{modes}") } else { String::new() };
+        let prefix = format!("hyst_{}{second}", identifier(&name));
         constants(&mut text, &prefix, "", &Value::Object(stage), &units);
     }
     text += "\n#endif\n";
@@ -130,7 +194,7 @@ fn identifier(name: &str) -> String {
 /// Writes every number and list below `value` as a constant; `path` is its place, for its unit.
 fn constants(text: &mut String, prefix: &str, path: &str, value: &Value, units: &Value) {
     let unit = || match units.get(path).and_then(Value::as_str) {
-        Some(unit) => format!(" /* {unit} */"),
+        Some(unit) => format!(" /* {} */", harmless(unit)),
         None => String::new(),
     };
     let number = |v: &Value| if v.is_f64() { format!("{:?}", v.as_f64().unwrap_or_default()) } else { v.to_string() };
