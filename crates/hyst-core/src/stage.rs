@@ -79,6 +79,11 @@ pub trait Invert<T: Real>: Stage<T> {
     fn lead(_inverse: &Self::Inverse) -> usize {
         0
     }
+
+    /// Band in which an inverse holds \[Hz\], and its largest relative error there; `None` if it holds at all frequencies.
+    fn band(_inverse: &Self::Inverse) -> Option<(f64, f64)> {
+        None
+    }
 }
 
 /// A stage that can tell its next output for a trial input without moving its history. What has no closed-form inverse

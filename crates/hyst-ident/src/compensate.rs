@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Sampling, Stage};
 
-use crate::model::{CREEP, Compensator, InverseState, Model, Operator, TAPS};
+use crate::model::{CREEP, Compensator, Effect, InverseState, Model, TAPS};
 use crate::record::Record;
 use crate::samples::Samples;
 
@@ -43,6 +43,19 @@ pub struct Drive {
     pub voltage_limited: Vec<usize>,
     /// Rows at which the slew limit acted.
     pub slew_limited: Vec<usize>,
+    /// What the model itself misses with this drive.
+    pub missed: Missed,
+}
+
+/// Reference minus what the model does with a drive, sensor effects left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Missed {
+    /// Root mean square \[output unit\].
+    pub rmse: f64,
+    /// Largest \[output unit\].
+    pub largest: f64,
+    /// Its row, from 0.
+    pub row: usize,
 }
 
 /// Why a reference cannot be compensated.
@@ -106,7 +119,37 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
             }
         }
     }
+    drive.missed = missed(model, &follower, &drive.voltage)?;
     Ok(drive)
+}
+
+/// The model driven as it would drive the actuator.
+fn missed(model: &Model, follower: &Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
+    let samples = &follower.samples;
+    let chain = Box::new(without_sensor(model).build(samples.period)?);
+    let mut state = Box::new(chain.state());
+    let mut missed = Missed::default();
+    let mut sum = 0.0;
+    for segment in &samples.segments {
+        for row in segment.clone() {
+            let (env, u) = (follower.env(row, None), drive[row]);
+            let y =
+                if row == segment.start { chain.reset(&mut state, &env, u) } else { chain.step(&mut state, &env, u) };
+            let miss = (samples.output[row] - y).abs();
+            sum += miss * miss;
+            if miss > missed.largest {
+                (missed.largest, missed.row) = (miss, row);
+            }
+        }
+    }
+    missed.rmse = (sum / drive.len().max(1) as f64).sqrt();
+    Ok(missed)
+}
+
+/// The model without what is in the sensor only: a drive does not follow that.
+fn without_sensor(model: &Model) -> Model {
+    let effects = model.effects.without(Effect::Drift).without(Effect::Interference);
+    Model { effects, ..model.clone() }
 }
 
 /// Compensation sample by sample: for a device whose temperature is only known when it runs.
@@ -155,6 +198,7 @@ impl Follower {
             band_error: self.compensator.error(),
             voltage_limited: Vec::new(),
             slew_limited: Vec::new(),
+            missed: Missed::default(),
         }
     }
 
@@ -205,16 +249,15 @@ impl Follower {
 
 /// Lowest and highest output: what the training record reached, and what the model itself says of rest and
 /// of full drive at the temperatures of the reference.
-fn reach(model: &Model, degc: [f64; 2]) -> Result<(f64, f64), hyst_core::Error> {
+fn reach(model: &Model, range: [f64; 2], degc: [f64; 2]) -> Result<(f64, f64), hyst_core::Error> {
     // Settled: the sample period does not matter there.
-    let range = [model.input.low, model.input.high];
-    let operator = Operator::new(&model.base, range, &Sampling { period: 1.0 / model.recorded_at_hz })?;
-    let mut state = operator.state();
+    let chain = Box::new(without_sensor(model).build(1.0 / model.recorded_at_hz)?);
+    let mut state = Box::new(chain.state());
     let mut reach = (model.output.low, model.output.high);
     for temperature in degc {
         let env = Env { temperature, ..Env::default() };
         for u in range {
-            let y = model.zero + operator.reset(&mut state, &env, u);
+            let y = chain.reset(&mut state, &env, u);
             reach = (reach.0.min(y), reach.1.max(y));
         }
     }
@@ -245,7 +288,10 @@ fn check(
     let room = options.temperature.unwrap_or(23.0);
     let (coldest, warmest) =
         samples.temperature.as_ref().map_or((room, room), |t| crate::samples::range(t.iter().copied()));
-    let (low, high) = reach(model, [coldest, warmest])?;
+    // Limits that are wider than the record let the model say what lies there.
+    let range = options.voltage.unwrap_or((model.input.low, model.input.high));
+    let range = [range.0.min(model.input.low), range.1.max(model.input.high)];
+    let (low, high) = reach(model, range, [coldest, warmest])?;
     let margin = MARGIN * (high - low);
     match samples.output.iter().position(|y| *y < low - margin || *y > high + margin) {
         Some(row) => Err(CompensateError::OutOfReach {

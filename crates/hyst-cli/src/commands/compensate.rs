@@ -1,6 +1,6 @@
 //! `compensate`: the drive that makes the actuator follow a reference.
 
-use hyst_ident::compensate::{CompensateOptions, Drive, compensate};
+use hyst_ident::compensate::{CompensateOptions, Drive, Missed, compensate};
 use hyst_ident::model::{Effect, Model};
 use hyst_ident::record::{Extra, Need, Record};
 use serde::Serialize;
@@ -28,8 +28,12 @@ pub(super) struct Compensation {
     slew_limited_rows: usize,
     /// Effects that are in the sensor.
     not_compensated: Vec<&'static str>,
+    /// What the model itself misses with this drive; none where it runs live.
+    missed: Option<Missed>,
     #[serde(skip)]
     unit: String,
+    #[serde(skip)]
+    output_unit: String,
 }
 
 /// Runs the command.
@@ -53,7 +57,8 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
             args.output
         ));
     }
-    let compensation = Compensation::new(&model, &reference, &drive);
+    let mut compensation = Compensation::new(&model, &reference, &drive);
+    compensation.missed = Some(drive.missed);
     report.print(&compensation.text(), &compensation)
 }
 
@@ -85,6 +90,8 @@ impl Compensation {
             slew_limited_rows: drive.slew_limited.len(),
             not_compensated: in_the_sensor.map(Effect::name).collect(),
             unit: model.input.unit.clone(),
+            output_unit: model.output.unit.clone(),
+            missed: None,
         }
     }
 
@@ -114,8 +121,17 @@ impl Compensation {
                 short(hz),
                 text::percent(100.0 * self.band_error)
             ),
-            None => format!("{lead}; no dynamics to invert"),
+            None => lead,
         });
+        if let Some(missed) = &self.missed {
+            lines.push(format!(
+                "with this drive the model itself misses the reference by {} {} RMS, {} at most (row {})",
+                short(missed.rmse),
+                text::symbol(&self.output_unit),
+                short(missed.largest),
+                missed.row + 1
+            ));
+        }
         if self.first.abs() > 0.01 * (self.highest - self.lowest) {
             lines.push(format!(
                 "the drive starts at {} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value",

@@ -39,6 +39,8 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     input_side: Option<Preview<T, N>>,
     /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
     whole_samples: usize,
+    /// Band \[Hz\] and error of the inverse hysteresis, if it has dynamics of its own.
+    hysteresis_band: Option<(f64, f64)>,
     surroundings: Delay<T, N>,
     sample_rate: f64,
 }
@@ -110,6 +112,7 @@ impl<T: Real, H: Invert<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
             temperature: self.temperature,
             asymmetry: self.asymmetry.as_ref().map(Invert::invert).transpose()?,
             whole_samples: self.delay.as_ref().map_or(0, Delay::whole_samples) + H::lead(&hysteresis),
+            hysteresis_band: H::band(&hysteresis),
             hysteresis,
             input_side,
             sample_rate: 1.0 / h,
@@ -131,12 +134,14 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Comp
             .into_iter()
             .flatten()
             .map(|p| p.bandwidth() * self.sample_rate)
+            .chain(self.hysteresis_band.map(|(hz, _)| hz))
             .reduce(|a, b| a.at_most(b))
     }
 
     /// Largest relative error of the band-limited inversion inside its band.
     pub fn error(&self) -> f64 {
-        [&self.output_side, &self.input_side].into_iter().flatten().fold(0.0, |sum, p| sum + p.error())
+        let own = self.hysteresis_band.map_or(0.0, |(_, error)| error);
+        [&self.output_side, &self.input_side].into_iter().flatten().fold(own, |sum, p| sum + p.error())
     }
 
     /// The inverse hysteresis.

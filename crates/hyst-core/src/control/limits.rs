@@ -45,9 +45,11 @@ impl<T: Real> Limits<T> {
         let slewed = inside.at_least(last - self.step).at_most(last + self.step);
         // Should `last` lie outside the range, voltage comes before slew.
         let drive = slewed.at_least(self.low).at_most(self.high);
+        // A drive that a limit moves by rounding alone is not limited.
+        let rounding = T::EPSILON * T::from_f64(64.0) * (self.high - self.low).at_least(wanted.abs());
         Limited {
             drive: if drive.is_finite() { drive } else { last },
-            voltage: inside != wanted,
+            voltage: (inside - wanted).abs() > rounding,
             slew: drive != inside,
         }
     }

@@ -38,6 +38,7 @@ pub struct FittedOn {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct File<S> {
     schema: String,
     kind: Kind,
@@ -161,7 +162,9 @@ impl Model {
     /// # Errors
     /// As [`build`](Self::build), and if the chain has no inverse.
     pub fn compensator(&self, period: f64, options: &CompensatorOptions) -> Result<Compensator, Error> {
-        self.build(period)?.compensator(&Sampling { period }, options)
+        let mut chain = self.build(period)?;
+        chain.hysteresis = chain.hysteresis.with_bandwidth(options.bandwidth_hz);
+        chain.compensator(&Sampling { period }, options)
     }
 
     /// Whether the model needs a temperature.
@@ -242,6 +245,11 @@ impl Model {
         let stages::Stages { base, effects, std_errors } = stages::read(file.stages)?;
         if base.kind() != file.kind {
             return Err(format!("the kind is {}, but the hysteresis stage is {}", file.kind, base.kind()));
+        }
+        for (name, channel) in [("input", &file.input), ("output", &file.output)] {
+            if channel.low > channel.high {
+                return Err(format!("{name}.low {} is above {name}.high {}", channel.low, channel.high));
+            }
         }
         if !(file.recorded_at_hz > 0.0 && file.recorded_at_hz.is_finite()) {
             return Err("recorded_at_hz must be positive".into());

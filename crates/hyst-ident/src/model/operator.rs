@@ -68,15 +68,20 @@ macro_rules! operators {
         impl Invert<f64> for Operator {
             type Inverse = OperatorInverse;
             fn invert(&self) -> Result<OperatorInverse, Error> {
-                let range = self.range;
                 let any = match &self.any {
-                    $(Any::$name(o) => AnyInverse::$name(Box::new($invert(&**o, range)?)),)+
+                    $(Any::$name(o) => AnyInverse::$name(Box::new($invert(&**o, self.inversion)?)),)+
                 };
                 Ok(OperatorInverse { any })
             }
             fn lead(inverse: &OperatorInverse) -> usize {
                 match &inverse.any {
                     $(AnyInverse::$name(i) => $lead(&**i),)+
+                }
+            }
+            fn band(inverse: &OperatorInverse) -> Option<(f64, f64)> {
+                match &inverse.any {
+                    AnyInverse::TdEm(i) => Some((i.bandwidth_hz(), i.error())),
+                    _ => None,
                 }
             }
         }
@@ -113,8 +118,16 @@ macro_rules! operators {
 #[derive(Clone, Debug)]
 pub struct Operator {
     any: Any,
-    /// Inputs among which an inverse may have to search.
+    inversion: Inversion,
+}
+
+/// What inverses take besides the operator.
+#[derive(Clone, Copy, Debug)]
+struct Inversion {
+    /// Inputs among which one may have to search.
     range: [f64; 2],
+    /// Band of one with dynamics of its own \[Hz\]; chosen if not given.
+    bandwidth_hz: Option<f64>,
 }
 /// The inverse of a hysteresis operator of the host.
 #[derive(Clone, Debug)]
@@ -128,12 +141,13 @@ pub struct OperatorState(AnyState);
 #[derive(Clone, Debug)]
 pub struct InverseState(AnyInverseState);
 
-fn closed<O: Invert<f64>>(operator: &O, _: [f64; 2]) -> Result<O::Inverse, Error> {
+fn closed<O: Invert<f64>>(operator: &O, _: Inversion) -> Result<O::Inverse, Error> {
     operator.invert()
 }
 
 /// By search, to within a part in 10¹² of the range.
-fn searched<O: Probe<f64> + Clone>(operator: &O, [low, high]: [f64; 2]) -> Result<Search<f64, O>, Error> {
+fn searched<O: Probe<f64> + Clone>(operator: &O, how: Inversion) -> Result<Search<f64, O>, Error> {
+    let [low, high] = how.range;
     Search::new(operator.clone(), low, high, 1e-12 * (high - low))
 }
 
@@ -146,12 +160,12 @@ operators! {
     ViscousPi(ViscousPi<f64, PLAYS>) => ViscousPiInverse<f64, PLAYS>, closed, at_once;
     Gpi(Gpi<f64, PLAYS>) => GpiInverse<f64, PLAYS>, closed, at_once;
     TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, closed, at_once;
-    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>, _| o.band_limited(ROOM, None),
+    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>, how: Inversion| o.band_limited(ROOM, how.bandwidth_hz),
         TdEmInverse::lead;
     Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed, at_once;
     Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed, at_once;
     BoucWen(BoucWen<f64>) => Search<f64, BoucWen<f64>>,
-        |o: &BoucWen<f64>, [low, high]: [f64; 2]| o.inverse(low, high, 1e-12 * (high - low)), at_once;
+        |o: &BoucWen<f64>, Inversion { range: [low, high], .. }| o.inverse(low, high, 1e-12 * (high - low)), at_once;
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Activation(Activation<f64>) => HostActivationInverse,
@@ -188,6 +202,12 @@ impl Operator {
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),
         };
-        Ok(Self { any, range: [low - reach, high + reach] })
+        Ok(Self { any, inversion: Inversion { range: [low - reach, high + reach], bandwidth_hz: None } })
+    }
+
+    /// The same, whose inverse holds in this band if it has dynamics of its own \[Hz\].
+    pub fn with_bandwidth(mut self, bandwidth_hz: Option<f64>) -> Self {
+        self.inversion.bandwidth_hz = bandwidth_hz;
+        self
     }
 }

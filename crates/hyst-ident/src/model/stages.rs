@@ -122,15 +122,34 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
 }
 
 /// Reads the parameters of the stage `name`, so that an error names the stage and the field.
-fn fields<S: DeserializeOwned>(name: &str, value: &Value) -> Result<S, String> {
-    serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
+///
+/// A field that the stage does not have is refused: a misspelt one would mean its default.
+fn fields<S: DeserializeOwned + Serialize>(name: &str, value: &Value) -> Result<S, String> {
+    let read: S = serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
         path if path == "." => format!("stage {name}: {}", e.inner()),
         path => format!("stage {name}, field {path}: {}", e.inner()),
+    })?;
+    match serde_json::to_value(&read).ok().and_then(|known| unknown(value, &known, "")) {
+        Some(field) => Err(format!("stage {name} has no field {field:?}")),
+        None => Ok(read),
+    }
+}
+
+/// The path of a field that `known` does not have.
+fn unknown(given: &Value, known: &Value, path: &str) -> Option<String> {
+    let (Value::Object(given), Value::Object(known)) = (given, known) else { return None };
+    given.iter().find_map(|(key, value)| {
+        let here = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match known.get(key) {
+            Some(known) => unknown(value, known, &here),
+            None if path.is_empty() && ["stage", "units", "std_errors"].contains(&key.as_str()) => None,
+            None => Some(here),
+        }
     })
 }
 
 /// Puts a stage where none may be yet.
-fn only<S: DeserializeOwned>(slot: &mut Option<S>, name: &str, value: &Value) -> Result<(), String> {
+fn only<S: DeserializeOwned + Serialize>(slot: &mut Option<S>, name: &str, value: &Value) -> Result<(), String> {
     if slot.replace(fields(name, value)?).is_some() { Err(format!("there are two stages {name:?}")) } else { Ok(()) }
 }
 
@@ -221,6 +240,18 @@ mod tests {
         assert_eq!(unit("1/u", "V", "um"), "1/V");
         assert_eq!(unit("", "V", "um"), "1");
         assert_eq!(unit("Hz", "V", "um"), "Hz");
+    }
+
+    #[test]
+    fn a_misspelt_field_is_named() {
+        let stage = |text: &str| read(vec![serde_json::from_str::<Value>(text).unwrap()]).map(|_| ());
+        let numbers = r#""a":1.0,"b":1.0,"c":1.0,"alpha":0.5,"beta":0.5"#;
+        assert_eq!(stage(&format!(r#"{{"stage":"lfdm",{numbers},"order":"second"}}"#)), Ok(()));
+        let refused = stage(&format!(r#"{{"stage":"lfdm",{numbers},"ordr":"second"}}"#));
+        assert_eq!(refused, Err("stage lfdm has no field \"ordr\"".into()));
+        let slip = r#"{"stage":"td-em","slip":{"reading":"backlash","widths":[1.0],"gains":[1.0],"width":2.0},"capacitance":1.0,
+            "resistance":1.0,"mass":1.0,"stiffness":1.0,"damping":1.0,"coupling":[1.0,0.0,0.0],"per_metre":1.0}"#;
+        assert_eq!(stage(slip), Err("stage td-em has no field \"slip.width\"".into()));
     }
 
     #[test]
