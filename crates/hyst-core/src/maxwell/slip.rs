@@ -97,6 +97,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
 mod tests {
     use super::*;
     use crate::{Env, Invert, Stage, play, stop};
+    use proptest::prelude::*;
 
     const WIDTHS: [f64; 3] = [4.0, 10.0, 25.0];
     const GAINS: [f64; 3] = [0.3, 0.1, 0.05];
@@ -142,6 +143,28 @@ mod tests {
             assert!((bank.step(&mut a, &e, u) - reference).abs() < 1e-12 * 48.0);
         }
         assert!(matches!(of(SlipReading::ElastoSlip).invert(), Err(Error::NotInvertible(_))));
+    }
+
+    proptest! {
+        #[test]
+        fn inverse_reaches_every_reference(
+            steps in prop::collection::vec((0.1..10.0f64, 0.01..1.0f64), 8),
+            references in prop::collection::vec(-40.0..40.0f64, 20..200),
+        ) {
+            let (mut widths, mut gains, mut at) = ([0.0; 8], [0.0; 8], 0.0);
+            for ((d, g), (step, gain)) in widths.iter_mut().zip(&mut gains).zip(&steps) {
+                at += step;
+                (*d, *g) = (at, *gain);
+            }
+            let bank: MaxwellSlip<f64, 8> =
+                MaxwellSlipParams { reading: SlipReading::Backlash, widths, gains }.build(&()).unwrap();
+            let inverse = bank.invert().unwrap();
+            let (mut a, mut b, e) = (bank.state(), inverse.state(), Env::default());
+            for y in &references {
+                let u = inverse.step(&mut b, &e, *y);
+                prop_assert!((bank.step(&mut a, &e, u) - y).abs() <= 1e-12 * 80.0 * (1.0 + 1.0 / gains[0]));
+            }
+        }
     }
 
     #[test]

@@ -302,6 +302,7 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
 mod tests {
     use super::*;
     use core::f64::consts::PI;
+    use proptest::prelude::*;
     use std::boxed::Box;
     use std::vec::Vec;
 
@@ -385,6 +386,64 @@ mod tests {
             // The jumps of the bank's drive make the current exactly what the filter asks for, sample by sample.
             assert!(worst < 30.0 * (inverse.error() + 2e-4), "{worst} {}", inverse.error());
         }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        /// Random circuits and references in the band: the stated error times the reference's tones.
+        #[test]
+        fn inverse_keeps_its_stated_error(
+            hz in 300.0..1200.0f64, damping in 0.02..0.3f64, rc in 2e-4..5e-3f64, psi in 1e-4..2e-3f64,
+            tones in prop::collection::vec((1.0..60.0f64, 0.1..1.0f64), 3),
+        ) {
+            let (mass, printed) = (0.0026442, TdEmParams::PRINTED);
+            let stiffness = mass * (2.0 * PI * hz) * (2.0 * PI * hz);
+            let params = TdEmParams {
+                capacitance: rc / printed.resistance,
+                stiffness,
+                damping: 2.0 * damping * libm::sqrt(stiffness * mass),
+                coupling: [psi, 0.0, 0.0],
+                ..printed
+            };
+            let period = 2e-4;
+            let model: TdEm<f64, 10> = params.build(&Sampling { period }).unwrap();
+            let inverse: Box<TdEmInverse<f64, 10, 255>> = Box::new(model.band_limited(23.0, None).unwrap());
+            let (lead, rows) = (inverse.lead(), 3000usize);
+            let total: f64 = tones.iter().map(|(_, a)| a).sum();
+            // Tones that begin smoothly, so that nothing lies outside the band.
+            let reference = |k: usize| {
+                let t = period * k as f64;
+                let fade = 0.5 - 0.5 * libm::cos(PI * (t / 0.2).min(1.0));
+                fade * tones.iter().map(|(f, a)| a * (1.0 - libm::cos(2.0 * PI * f * t))).sum::<f64>()
+            };
+            let (mut s, mut i, e) = (model.state(), inverse.state(), at(23.0));
+            inverse.reset(&mut i, &e, 0.0);
+            model.reset(&mut s, &e, 0.0);
+            let mut worst = 0.0f64;
+            for k in 1..rows {
+                let drive = inverse.step(&mut i, &e, reference(k));
+                if let Some(now) = k.checked_sub(lead) {
+                    let y = model.step(&mut s, &e, drive);
+                    worst = worst.max((y - reference(now)).abs());
+                }
+            }
+            prop_assert!(worst <= 2.0 * total * (inverse.error() + 1e-3), "{worst} {} {total}", inverse.error());
+        }
+    }
+
+    #[test]
+    fn an_absurd_temperature_passes() {
+        let model: TdEm<f32, 10> = TdEmParams::PRINTED.build(&Sampling { period: 1e-3 }).unwrap();
+        let mut s = model.state();
+        let at = |degc: f32| Env { temperature: degc, ..Env::default() };
+        model.reset(&mut s, &at(23.0), 0.0);
+        model.step(&mut s, &at(1e10), 100.0);
+        let mut y = 0.0;
+        for _ in 0..2000 {
+            y = model.step(&mut s, &at(23.0), 100.0);
+        }
+        let mut fresh = model.state();
+        assert!((y - model.reset(&mut fresh, &at(23.0), 100.0)).abs() < 1e-3, "{y}");
     }
 
     #[test]

@@ -220,6 +220,7 @@ impl<T: Real, const N: usize> Stage<T> for TdPiInverse<T, N> {
 mod tests {
     use super::*;
     use core::f64::consts::PI;
+    use proptest::prelude::*;
     use std::vec::Vec;
 
     const DEGC: [f64; 5] = [23.0, 29.0, 33.0, 35.0, 39.0];
@@ -270,8 +271,14 @@ mod tests {
     fn weights_at_r_0_are_those_of_the_formula() {
         // The printed list swaps two entries; by the formula: 0.977, 1.032, 1.070, 1.090, 1.130.
         for (degc, p0) in DEGC.iter().zip([0.977, 1.032, 1.070, 1.090, 1.130]) {
-            let factor = libm::exp(TdPiParams::PRINTED.eta * (degc - 23.0));
-            assert!((TdPiParams::PRINTED.epsilon * factor - p0).abs() < 5e-4);
+            // A rise within the first threshold moves the r = 0 play alone: its slope is p₀ a₀.
+            let model: TdPi<f64, 9> = TdPiParams::PRINTED.build(&()).unwrap();
+            let mut s = model.state();
+            model.reset(&mut s, &at(*degc), 4.0);
+            let rise = model.step(&mut s, &at(*degc), 6.0);
+            let mut s = model.state();
+            let rise = rise - model.reset(&mut s, &at(*degc), 4.0);
+            assert!((rise / (2.0 * TdPiParams::PRINTED.a0) - p0).abs() < 5e-4, "{degc}: {rise}");
         }
     }
 
@@ -300,6 +307,43 @@ mod tests {
                 let drive = inverse.step(&mut b, &e, reference);
                 let y = model.step(&mut a, &e, drive);
                 assert!((y - reference).abs() < 1e-9 * 60.0, "{k}: {y} {reference}");
+            }
+        }
+    }
+
+    proptest! {
+        /// Over random models, references with turns at every scale, and a temperature that moves at every sample.
+        #[test]
+        fn inverse_reaches_every_reference(
+            alpha in 0.1..3.0f64,
+            epsilon in 0.05..3.0f64,
+            tau in 0.0..1.0f64,
+            eta in -0.03..0.03f64,
+            slope in 0.03..2.0f64,
+            gap in 0.0..2.0f64,
+            offset in -1.0..1.0f64,
+            plays in 0u16..=12,
+            turns in prop::collection::vec((-1.0..1.0f64, -10.0..40.0f64), 20..120),
+        ) {
+            let params = TdPiParams {
+                alpha, epsilon, tau, eta, a0: slope, a1: offset - gap, b0: slope, b1: offset + gap, plays, reference_degc: 23.0,
+            };
+            let model: TdPi<f64, 12> = params.build(&()).unwrap();
+            let inverse = model.invert().unwrap();
+            let (mut a, mut b) = (model.state(), inverse.state());
+            let span = 60.0;
+            for (k, (y, degc)) in turns.iter().enumerate() {
+                let e = at(*degc);
+                let reference = 0.5 * span * y;
+                let (drive, reached);
+                if k == 0 {
+                    drive = inverse.reset(&mut b, &e, reference);
+                    reached = model.reset(&mut a, &e, drive);
+                } else {
+                    drive = inverse.step(&mut b, &e, reference);
+                    reached = model.step(&mut a, &e, drive);
+                }
+                prop_assert!((reached - reference).abs() <= 1e-9 * span, "{k}: {reached} {reference}");
             }
         }
     }
