@@ -82,7 +82,6 @@ impl Inverted {
     }
 
     /// An inverse that has to know `lead` samples of the reference ahead.
-    #[allow(dead_code, reason = "for models whose own inverse has a preview")]
     pub(crate) fn previewed<I>(inverse: I, lead: usize) -> Self
     where
         I: Stage<f64> + Send + Sync + 'static,
@@ -104,7 +103,6 @@ where
 }
 
 /// By search from `low` to `high` to within `tolerance`: [`Search`].
-#[allow(dead_code, reason = "for models without a closed form")]
 pub(crate) fn search<P, S>(_: &P, stage: &S, options: &Options) -> PyResult<Inverted>
 where
     S: Probe<f64> + Clone + Send + Sync + 'static,

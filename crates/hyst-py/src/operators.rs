@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use hyst_core::{
     Activation, ActivationKind, ActivationParams, AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams,
-    BoucWenParams, Build, Curve, DpmParams, Error, Exponentials, GlOrder, GpiParams, IfmParams, LfdmParams, LoadParams,
-    MaxwellSlipParams, MirrorParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading, TdEmParams,
-    TdPiParams, ViscousPiParams,
+    BoucWenParams, Build, Curve, DpmParams, Error, Exponentials, GlOrder, GpiParams, IfmParams, Invert, LfdmParams,
+    LoadParams, MaxwellSlipParams, MirrorParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading,
+    TdEmParams, TdPiParams, ViscousPiParams,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -69,11 +69,12 @@ fn bouc_wen<P>(_: &P, stage: &hyst_core::BoucWen<f64>, options: &Options) -> PyR
 /// Samples that the preview of an activation model holds.
 const AHEAD: usize = 8192;
 
-fn activation(alpha: f64, stage: &Activation<f64>, options: &Options) -> PyResult<Inverted> {
-    if alpha >= 0.0 {
-        return closed(&(), stage, options);
-    }
+/// A sample at a time where that is stable, else backwards in time.
+fn activation<P>(_: &P, stage: &Activation<f64>, options: &Options) -> PyResult<Inverted> {
     options.only(&["tolerance"])?;
+    if stage.invert().is_ok() {
+        return closed(&(), stage, &Options::default());
+    }
     let inverse = stage.anti_causal::<AHEAD>(options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
     let lead = inverse.lead();
     Ok(Inverted::previewed(inverse, lead))
@@ -386,7 +387,7 @@ models! {
 
     /// Bouc-Wen operator ``y = k0·u + g``, ``ġ = α·u̇ − β·|u̇|·|g|ⁿ⁻¹·g − γ·u̇·|g|ⁿ`` (rate-independent).
     ///
-    /// Exact for n = 1 and 2, else to 5e-6 of the largest g in one sample. Inverse by search: give ``low`` and ``high``. Where the
+    /// Exact for n = 1 and 2, else to 1e-5 of the largest g in one sample (n ≤ 10). Inverse by search: give ``low`` and ``high``. Where the
     /// slope is negative just after a turn, the drive jumps over the fold.
     class BoucWen {
         /// Gain of the part without memory [y/u].
@@ -461,7 +462,8 @@ models! {
 
     /// Activation-function model ``z = k0·u + α u̇ + β·atan(γu)`` (Xie et al., eq. 2), u̇ the backward difference.
     ///
-    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
+    /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
     class Atan {
         /// Gain [y/u].
         k0: f64,
@@ -478,12 +480,13 @@ models! {
     build: |p| (
         ActivationKind::Atan, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
     ).build(&Sampling { period: p.period }),
-    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    inverse: activation,
     needs: [],
 
     /// Activation-function model ``z = k0·u + α u̇ + β·1/(1 + e^(−γu))`` (Xie et al., eq. 2), u̇ the backward difference.
     ///
-    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
+    /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
     class Sigmoid {
         /// Gain [y/u].
         k0: f64,
@@ -500,12 +503,13 @@ models! {
     build: |p| (
         ActivationKind::Sigmoid, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
     ).build(&Sampling { period: p.period }),
-    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    inverse: activation,
     needs: [],
 
     /// Activation-function model ``z = k0·u + α u̇ + β·ln(1 + e^(γu))`` (Xie et al., eq. 2), u̇ the backward difference.
     ///
-    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
+    /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
     class Softplus {
         /// Gain [y/u].
         k0: f64,
@@ -522,12 +526,13 @@ models! {
     build: |p| (
         ActivationKind::Softplus, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
     ).build(&Sampling { period: p.period }),
-    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    inverse: activation,
     needs: [],
 
     /// Activation-function model ``z = k0·u + α u̇ + β·γu/(1 + |γu|)`` (Xie et al., eq. 2), u̇ the backward difference.
     ///
-    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
+    /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
     class Softsign {
         /// Gain [y/u].
         k0: f64,
@@ -544,12 +549,13 @@ models! {
     build: |p| (
         ActivationKind::Softsign, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
     ).build(&Sampling { period: p.period }),
-    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    inverse: activation,
     needs: [],
 
     /// Activation-function model ``z = k0·u + α u̇ + β·tanh(γu)`` (Xie et al., eq. 2), u̇ the backward difference.
     ///
-    /// Inverse: for α ≥ 0 a sample at a time; for α < 0 backwards in time with a preview, to within ``tolerance``.
+    /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
+    /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
     class Tanh {
         /// Gain [y/u].
         k0: f64,
@@ -566,7 +572,7 @@ models! {
     build: |p| (
         ActivationKind::Tanh, ActivationParams { k0: p.k0, alpha: p.alpha, beta: p.beta, gamma: p.gamma },
     ).build(&Sampling { period: p.period }),
-    inverse: |p, stage, options| activation(p.alpha, stage, options),
+    inverse: activation,
     needs: [],
 
     /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,

@@ -170,12 +170,13 @@ mod tests {
     const PSI: f64 = 7.2971e-4;
 
     fn circuit(period: f64) -> Circuit {
+        let p = crate::TdEmParams::PRINTED;
         Circuit {
-            capacitance: 48.65e-6,
-            resistance: 21.6879,
-            mass: 0.0026442,
-            stiffness: 6.62107e4,
-            damping: 0.9453015,
+            capacitance: p.capacitance,
+            resistance: p.resistance,
+            mass: p.mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
             period,
         }
     }
