@@ -32,7 +32,7 @@ fn firmware_reads_the_block() {
     let lab = lab();
     lab.ok("export model.json --format postcard -o model.bin");
     let bytes = std::fs::read(lab.path("model.bin")).unwrap();
-    let chain = read_block::<List<64>>(&bytes).unwrap();
+    let chain = read_block::<List<64>, List<8>>(&bytes).unwrap();
     let OperatorParams::Pi(p) = &chain.operator else { panic!("{chain:?}") };
     let pi: Pi<f32, 64> = p.build(&()).unwrap();
     let model: serde_json::Value = serde_json::from_str(&lab.read("model.json")).unwrap();

@@ -77,7 +77,7 @@ fn every_kind_is_simulated_and_exported() {
             paper.lab.ok(&format!("export model.json --format {format} -o exported.{format}"));
         }
         let block = fs::read(paper.lab.path("exported.postcard")).unwrap();
-        let read = read_block::<List<256>>(&block).unwrap_or_else(|e| panic!("{kind}: {e}"));
+        let read = read_block::<List<256>, List<8>>(&block).unwrap_or_else(|e| panic!("{kind}: {e}"));
         assert_eq!(read.operator.kind(), kind);
     }
 }

@@ -86,8 +86,8 @@ fn number(bytes: Option<&[u8]>) -> Option<u32> {
 ///
 /// # Errors
 /// [`BlockError::NoRoom`].
-pub fn write_block<'a, L: serde::Serialize>(
-    chain: &ChainParams<L>,
+pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
+    chain: &ChainParams<L, E>,
     buffer: &'a mut [u8],
 ) -> Result<&'a [u8], BlockError> {
     let room = buffer.get_mut(HEAD..).ok_or(BlockError::NoRoom)?;
@@ -105,12 +105,13 @@ pub fn write_block<'a, L: serde::Serialize>(
 
 /// Reads a block. Bytes after it are ignored, so a whole flash page may be given.
 ///
-/// The parameters are not checked beyond their form: `build` does that.
+/// The parameters are not checked beyond their form: `build` does that. They are returned by value: with lists of 300 numbers (a
+/// Preisach triangle of 24 × 24) and of 8 they take 8 KB (dpm has three such lists), besides what building needs (`docs/firmware.md`).
 ///
 /// ```
 /// use hyst_core::{Build, Chain, List, OperatorParams, Pi, Sampling, read_block};
 /// fn load(flash: &[u8]) -> Result<Chain<f32, Pi<f32, 16>, 32, 8>, &'static str> {
-///     let chain = read_block::<List<16>>(flash).map_err(|_| "bad block")?;
+///     let chain = read_block::<List<16>, List<8>>(flash).map_err(|_| "bad block")?;
 ///     let OperatorParams::Pi(pi) = &chain.operator else { return Err("this firmware runs pi only") };
 ///     let pi: Pi<f32, 16> = pi.build(&()).map_err(|_| "bad parameters")?;
 ///     let chain = chain.effects.around(pi, &Sampling { period: 1e-3 }).map_err(|_| "bad parameters")?;
@@ -121,7 +122,11 @@ pub fn write_block<'a, L: serde::Serialize>(
 ///
 /// # Errors
 /// See [`BlockError`].
-pub fn read_block<'a, L: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Result<ChainParams<L>, BlockError> {
+pub fn read_block<'a, L, E>(bytes: &'a [u8]) -> Result<ChainParams<L, E>, BlockError>
+where
+    L: serde::Deserialize<'a>,
+    E: serde::Deserialize<'a>,
+{
     let found = bytes.len();
     if bytes.get(..MAGIC.len()) != Some(&MAGIC[..]) {
         return Err(BlockError::NotABlock);
@@ -179,7 +184,7 @@ mod tests {
         let bytes = write_block(&host, &mut buffer).unwrap();
         // 20 numbers of the operator, 4 of the bank, 7 others: 8 bytes each, and little else.
         assert!(bytes.len() < 8 * 31 + 40, "{}", bytes.len());
-        let firmware: ChainParams<List<16>> = read_block(bytes).unwrap();
+        let firmware: ChainParams<List<16>, List<8>> = read_block(bytes).unwrap();
         let OperatorParams::Pi(pi) = &firmware.operator else { panic!("{firmware:?}") };
         assert_eq!(pi.weights.as_slice(), (1..=10).map(|i| 0.1 / f64::from(i)).collect::<Vec<_>>());
         assert_eq!(firmware.effects.creep.unwrap().shares.as_slice(), [0.01, 0.02]);
@@ -187,11 +192,17 @@ mod tests {
         assert_eq!(again, host);
     }
 
+    /// What the documentation says of a triangle of 24 × 24.
+    #[test]
+    fn a_triangle_fits_in_little_memory() {
+        assert!(size_of::<ChainParams<List<300>, List<8>>>() <= 8192);
+    }
+
     #[test]
     fn a_list_that_is_too_long_is_refused() {
         let mut buffer = [0; 512];
         let bytes = write_block(&chain(10), &mut buffer).unwrap();
-        assert_eq!(read_block::<List<8>>(bytes), Err(BlockError::Malformed));
+        assert_eq!(read_block::<List<8>, List<8>>(bytes), Err(BlockError::Malformed));
     }
 
     #[test]
@@ -199,11 +210,11 @@ mod tests {
         let mut buffer = [0; 512];
         let bytes = write_block(&chain(3), &mut buffer).unwrap().to_vec();
         for i in 0..bytes.len() {
-            assert!(read_block::<List<16>>(&bytes[..i]).is_err());
+            assert!(read_block::<List<16>, List<8>>(&bytes[..i]).is_err());
             for bit in 0..8 {
                 let mut broken = bytes.clone();
                 broken[i] ^= 1 << bit;
-                assert!(read_block::<List<16>>(&broken).is_err(), "byte {i}, bit {bit}");
+                assert!(read_block::<List<16>, List<8>>(&broken).is_err(), "byte {i}, bit {bit}");
             }
         }
         assert_eq!(write_block(&chain(3), &mut [0; 60]), Err(BlockError::NoRoom));
@@ -216,7 +227,7 @@ mod tests {
             if honest {
                 bytes.extend(CRC.checksum(&bytes).to_le_bytes());
             }
-            let _ = read_block::<List<16>>(&bytes);
+            let _ = read_block::<List<16>, List<8>>(&bytes);
         }
     }
 }

@@ -77,14 +77,15 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
     }
 }
 
-/// A whole actuator: what firmware has to know of a model.
+/// A whole actuator: what firmware has to know of a model. `L` is the list of the operator (plays, cells of a triangle), `E` that
+/// of the stages around it (creep elements, dead zones), which is much shorter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ChainParams<L> {
+pub struct ChainParams<L, E = L> {
     /// The memory operator.
     pub operator: OperatorParams<L>,
     /// The stages around it.
-    pub effects: EffectParams<L>,
+    pub effects: EffectParams<E>,
     /// What the sensor shows at rest \[y\].
     pub zero: f64,
     /// Inputs that the model was identified on, lowest and highest \[u\].

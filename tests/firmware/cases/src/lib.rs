@@ -11,7 +11,7 @@ mod samples;
 
 use core::hint::black_box;
 use hyst_core::{Env, Error, Real, Stage};
-pub use models::Limiter;
+pub use models::{Limiter, Steady};
 pub use samples::{PERIOD, SAMPLES, Sample, samples};
 
 /// A model with its parameters and the range of its input.

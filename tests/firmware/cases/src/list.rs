@@ -20,6 +20,7 @@ macro_rules! all_cases {
             td_pi_9_inverse: TdPiInverse<T, 9>, -30.0..30.0 => Build::<TdPi<T, 9>>::build(&given(TdPiParams::PRINTED), &())?.invert();
             maxwell_slip_10: MaxwellSlip<T, 10>, -200.0..200.0 => given(TdEmParams::PRINTED.slip).build(&());
             td_em_10: TdEm<T, 10>, -200.0..200.0 => given(TdEmParams::PRINTED).build(&PERIOD);
+            td_em_10_steady: Steady<TdEm<T, 10>>, -200.0..200.0 => Ok(Steady(given(TdEmParams::PRINTED).build(&PERIOD)?));
             td_em_10_inverse: TdEmInverse<T, 10, 129>, -30.0..30.0 => Build::<TdEm<T, 10>>::build(&given(TdEmParams::PRINTED), &PERIOD)?.band_limited(23.0, None);
             everett_24: Everett<T, 25>, -5.0..125.0 => everett::<T, 25>();
             everett_24_inverse: EverettInverse<T, 25>, 0.0..20.0 => everett::<T, 25>()?.invert();

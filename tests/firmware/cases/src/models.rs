@@ -88,6 +88,23 @@ pub(crate) fn dpm<T: Real>() -> Result<Dpm<T, 25, 8, 9>, Error> {
     Dpm::new(everett::<T, 25>()?, mirror, given(20.0), &PERIOD)
 }
 
+/// A stage at a constant temperature.
+#[derive(Clone, Debug)]
+pub struct Steady<S>(pub(crate) S);
+
+impl<T: Real, S: Stage<T>> Stage<T> for Steady<S> {
+    type State = S::State;
+    fn state(&self) -> S::State {
+        self.0.state()
+    }
+    fn reset(&self, s: &mut S::State, e: &Env<T>, u0: T) -> T {
+        self.0.reset(s, &Env { temperature: T::from_f64(23.0), ..*e }, u0)
+    }
+    fn step(&self, s: &mut S::State, e: &Env<T>, u: T) -> T {
+        self.0.step(s, &Env { temperature: T::from_f64(23.0), ..*e }, u)
+    }
+}
+
 /// A PID that holds a first-order plant at the reference: the drive of a closed loop, as a stage.
 #[derive(Clone, Debug)]
 pub struct Loop<T>(Pid<T>);
