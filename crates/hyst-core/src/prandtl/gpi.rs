@@ -96,7 +96,17 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Gpi<T, N>> for GpiParams<L>
     type Context = ();
     fn build(&self, (): &()) -> Result<Gpi<T, N>, Error> {
         let envelope = Envelope::new(self.left, self.right)?;
-        Ok(Gpi { envelope, pi: Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref())? })
+        // The operator's own checks, in the words of this model.
+        let pi = Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref()).map_err(|e| match e {
+            Error::NonFinite("pi.gain") => Error::NonFinite("gpi.gain"),
+            Error::NonFinite("pi.thresholds") => Error::NonFinite("gpi.thresholds"),
+            Error::NonFinite(_) => Error::NonFinite("gpi.weights"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "gpi.thresholds", must },
+            Error::Lengths(_) => Error::Lengths("gpi.thresholds and gpi.weights"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "gpi plays", needed, holds },
+            other => other,
+        })?;
+        Ok(Gpi { envelope, pi })
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::envelope::Curve;
 use super::gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::stage::hold;
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
@@ -118,6 +118,11 @@ impl<T: Real, const N: usize> Build<TdPi<T, N>> for TdPiParams {
         within("td-pi.alpha", self.alpha, self.alpha > 0.0, "positive")?;
         within("td-pi.epsilon", self.epsilon, self.epsilon > 0.0, "positive")?;
         finite("td-pi.tau", self.tau)?;
+        // The envelope's own checks, in the words of this model.
+        within("td-pi.a0", self.a0, self.a0 > 0.0, "positive")?;
+        within("td-pi.b0", self.b0, self.b0 > 0.0, "positive")?;
+        finite("td-pi.a1", self.a1)?;
+        finite("td-pi.b1", self.b1)?;
         let (mut thresholds, mut weights) = ([0.0; N], [0.0; N]);
         let n = usize::from(self.plays);
         if n > N {
@@ -126,6 +131,9 @@ impl<T: Real, const N: usize> Build<TdPi<T, N>> for TdPiParams {
         for (i, (r, p)) in thresholds.iter_mut().zip(&mut weights).enumerate() {
             *r = self.alpha * (i as f64 + 1.0);
             *p = self.epsilon * libm::exp(-self.tau * *r);
+            if i < n {
+                let _: T = coefficient("td-pi.tau", *p)?;
+            }
         }
         let at_reference = GpiParams {
             left: Curve::Linear { slope: self.a0, offset: self.a1 },
@@ -370,6 +378,19 @@ mod tests {
         model.step(&mut b, &at(35.0), 100.0);
         assert_eq!(model.step(&mut a, &at(f64::NAN), 120.0), model.step(&mut b, &at(35.0), 120.0));
         assert_eq!(model.step(&mut a, &at(35.0), f64::NAN), model.step(&mut b, &at(35.0), 120.0));
+    }
+
+    #[test]
+    fn bad_parameters_are_named() {
+        let named = |p: TdPiParams| match Build::<TdPi<f32, 9>>::build(&p, &()) {
+            Err(Error::NonFinite(name) | Error::OutOfRange { name, .. }) => name,
+            other => panic!("{other:?}"),
+        };
+        let p = TdPiParams::PRINTED;
+        assert_eq!(named(TdPiParams { a0: -1.0, ..p }), "td-pi.a0");
+        assert_eq!(named(TdPiParams { b1: f64::NAN, ..p }), "td-pi.b1");
+        assert_eq!(named(TdPiParams { tau: -20.0, ..p }), "td-pi.tau");
+        assert_eq!(named(TdPiParams { alpha: 0.0, ..p }), "td-pi.alpha");
     }
 
     #[test]
