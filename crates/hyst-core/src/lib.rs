@@ -66,6 +66,7 @@ mod play;
 mod prandtl;
 mod preisach;
 mod real;
+mod ring;
 mod search;
 mod stage;
 

@@ -1,6 +1,7 @@
 //! Dead time: `y(t) = u(t − d)`.
 
 use crate::error::within;
+use crate::ring::Ring;
 use crate::stage::finite_or;
 use crate::{Build, Complex, Env, Error, Meta, Params, Real, Sampling, Stage};
 
@@ -49,23 +50,15 @@ impl<T: Real, const N: usize> Build<Delay<T, N>> for DelayParams {
     }
 }
 
-/// History of a delay: the last `N` inputs in a ring.
+/// History of a delay: the last `N` inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DelayState<T, const N: usize> {
-    ring: [T; N],
-    newest: usize,
+    inputs: Ring<T, N>,
 }
 
 impl<T: Real, const N: usize> DelayState<T, N> {
     pub(crate) fn new() -> Self {
-        Self { ring: [T::ZERO; N], newest: 0 }
-    }
-
-    /// The input `k` samples before the newest; `other` if the ring is shorter.
-    #[inline]
-    fn back(&self, k: usize, other: T) -> T {
-        let at = if self.newest >= k { self.newest - k } else { (self.newest + N).saturating_sub(k) };
-        self.ring.get(at).copied().unwrap_or(other)
+        Self { inputs: Ring::filled(T::ZERO) }
     }
 }
 
@@ -77,18 +70,16 @@ impl<T: Real, const N: usize> Stage<T> for Delay<T, N> {
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        s.ring = [u0; N];
+        let u0 = finite_or(u0, T::ZERO);
+        s.inputs = Ring::filled(u0);
         u0
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
-        let u = finite_or(u, s.ring.get(s.newest).copied().unwrap_or(T::ZERO));
-        s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
-        if let Some(slot) = s.ring.get_mut(s.newest) {
-            *slot = u;
-        }
-        self.between(s.back(self.whole, u), s.back(self.whole + 1, u))
+        let u = finite_or(u, s.inputs.back(0, T::ZERO));
+        s.inputs.push(u);
+        self.between(s.inputs.back(self.whole, u), s.inputs.back(self.whole + 1, u))
     }
 }
 
@@ -101,8 +92,8 @@ impl<T: Real, const N: usize> Delay<T, N> {
     /// What [`step`](Stage::step) would return for the input `u`.
     #[inline]
     pub(crate) fn ahead(&self, s: &DelayState<T, N>, u: T) -> T {
-        let near = self.whole.checked_sub(1).map_or(u, |k| s.back(k, u));
-        self.between(near, s.back(self.whole, u))
+        let near = self.whole.checked_sub(1).map_or(u, |k| s.inputs.back(k, u));
+        self.between(near, s.inputs.back(self.whole, u))
     }
 
     /// Share of the present input in the present output.

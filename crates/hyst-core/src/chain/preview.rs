@@ -5,6 +5,7 @@
 //! to a symmetric number of taps and to a band, so it needs `lead` samples of the future reference.
 
 use crate::error::within;
+use crate::ring::Ring;
 use crate::stage::finite_or;
 use crate::{Complex, Env, Error, Real, Stage};
 
@@ -17,16 +18,15 @@ pub struct Preview<T, const N: usize> {
     error: f64,
 }
 
-/// History of a preview filter: the last `N` inputs in a ring.
+/// History of a preview filter: the last `N` inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreviewState<T, const N: usize> {
-    ring: [T; N],
-    newest: usize,
+    inputs: Ring<T, N>,
 }
 
 impl<T: Real, const N: usize> PreviewState<T, N> {
     pub(crate) fn new() -> Self {
-        Self { ring: [T::ZERO; N], newest: 0 }
+        Self { inputs: Ring::filled(T::ZERO) }
     }
 }
 
@@ -134,22 +134,19 @@ impl<T: Real, const N: usize> Stage<T> for Preview<T, N> {
 
     /// As if the input had been `u0` for ever.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        s.ring = [u0; N];
+        let u0 = finite_or(u0, T::ZERO);
+        s.inputs = Ring::filled(u0);
         u0
     }
 
     /// Takes the input of time k + lead and returns the output of time k.
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
-        let u = finite_or(u, s.ring.get(s.newest).copied().unwrap_or(T::ZERO));
-        s.newest = if s.newest + 1 < N { s.newest + 1 } else { 0 };
-        if let Some(slot) = s.ring.get_mut(s.newest) {
-            *slot = u;
-        }
-        // The first tap (n = −lead) meets the newest sample; older ones lie before it in the ring.
-        let (new, old) = s.ring.split_at_checked(s.newest + 1).unwrap_or_default();
+        s.inputs.push(finite_or(u, s.inputs.back(0, T::ZERO)));
+        // The first tap (n = −lead) meets the newest sample.
+        let (recent, wrapped) = s.inputs.newest_first();
         let mut y = T::ZERO;
-        for (x, c) in new.iter().rev().chain(old.iter().rev()).zip(&self.taps).take(2 * self.half + 1) {
+        for (x, c) in recent.iter().chain(wrapped).zip(&self.taps).take(2 * self.half + 1) {
             y += *c * *x;
         }
         y

@@ -1,9 +1,10 @@
 //! All of the memory of a fractional derivative, in a fixed number of states.
 
-use super::memory::{Ring, derivative, sealed};
+use super::memory::{derivative, differences, sealed};
 use super::weights::{RECURSION, checked, decay};
 use super::{GlOrder, GlWeights, Memory};
 use crate::error::within;
+use crate::ring::Ring;
 use crate::{Complex, Error, Real};
 use core::f64::consts::PI;
 
@@ -227,7 +228,7 @@ impl<T: Real, const J: usize> Memory<T> for Exponentials<T, J> {
     }
 
     fn state(&self) -> Self::State {
-        ExponentialsState { ring: Ring::at_rest(), low_passes: [T::ZERO; J], lost: [T::ZERO; J] }
+        ExponentialsState { ring: Ring::filled(T::ZERO), low_passes: [T::ZERO; J], lost: [T::ZERO; J] }
     }
 
     fn first(&self) -> T {
@@ -237,7 +238,7 @@ impl<T: Real, const J: usize> Memory<T> for Exponentials<T, J> {
     #[inline]
     fn advance(&self, s: &mut Self::State, g: T) -> T {
         let old = s.ring.push(g);
-        let mut held = s.ring.differences(&self.head, g);
+        let mut held = differences(&s.ring, &self.head, g);
         let nodes = s.low_passes.iter_mut().zip(&mut s.lost).zip(self.rates.iter().zip(&self.shares));
         for ((q, lost), (rate, share)) in nodes {
             let rise = *rate * (old - *q) + *lost;

@@ -2,6 +2,7 @@
 
 use super::weights::checked;
 use super::{GlOrder, GlWeights};
+use crate::ring::Ring;
 use crate::{Complex, Error, Real};
 
 pub(super) mod sealed {
@@ -51,40 +52,19 @@ pub(super) fn derivative(first: f64, held: Complex, z1: Complex) -> Complex {
     (Complex::from(1.0) - z1) * first + z1 * held
 }
 
-/// The last `N` samples, newest at `newest`, older ones behind it and, wrapped, before it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ring<T, const N: usize> {
-    samples: [T; N],
-    newest: usize,
-}
-
-impl<T: Real, const N: usize> Ring<T, N> {
-    pub(super) fn at_rest() -> Self {
-        Self { samples: [T::ZERO; N], newest: 0 }
+/// Σ wₖ (g − gₖ) over a ring, newest sample first.
+#[inline]
+pub(super) fn differences<T: Real, const N: usize>(ring: &Ring<T, N>, weights: &[T; N], g: T) -> T {
+    let (recent, wrapped) = ring.newest_first();
+    let (near, far) = weights.split_at(recent.len().min(N));
+    let mut sum = T::ZERO;
+    for (w, x) in near.iter().zip(recent) {
+        sum += *w * (g - *x);
     }
-
-    /// Takes the newest sample and returns the one that it drives out.
-    #[inline]
-    pub(super) fn push(&mut self, g: T) -> T {
-        self.newest = if self.newest > 0 { self.newest - 1 } else { N.saturating_sub(1) };
-        self.samples.get_mut(self.newest).map_or(g, |slot| core::mem::replace(slot, g))
+    for (w, x) in far.iter().zip(wrapped) {
+        sum += *w * (g - *x);
     }
-
-    /// Σ wₖ (g − gₖ), newest sample first.
-    #[inline]
-    pub(super) fn differences(&self, weights: &[T; N], g: T) -> T {
-        let at = self.newest.min(N);
-        let (wrapped, recent) = self.samples.split_at(at);
-        let (near, far) = weights.split_at(N - at);
-        let mut sum = T::ZERO;
-        for (w, x) in near.iter().zip(recent) {
-            sum += *w * (g - *x);
-        }
-        for (w, x) in far.iter().zip(wrapped) {
-            sum += *w * (g - *x);
-        }
-        sum
-    }
+    sum
 }
 
 /// The paper's short memory (Zhu et al., below eq. 15): the sum of Eq. 12 cut after `M` samples.
@@ -133,7 +113,7 @@ impl<T: Real, const M: usize> Memory<T> for ShortMemory<T, M> {
     }
 
     fn state(&self) -> Self::State {
-        ShortMemoryState { ring: Ring::at_rest() }
+        ShortMemoryState { ring: Ring::filled(T::ZERO) }
     }
 
     fn first(&self) -> T {
@@ -143,7 +123,7 @@ impl<T: Real, const M: usize> Memory<T> for ShortMemory<T, M> {
     #[inline]
     fn advance(&self, s: &mut Self::State, g: T) -> T {
         s.ring.push(g);
-        s.ring.differences(&self.weights, g) + self.rest * g
+        differences(&s.ring, &self.weights, g) + self.rest * g
     }
 
     fn response(&self, z1: Complex) -> Complex {
