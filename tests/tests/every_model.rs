@@ -86,30 +86,70 @@ fn a_reset_history_is_a_fresh_one() {
     each(&mut Fresh);
 }
 
-struct Dropout;
+/// Collects what a missed sample does to each case.
+#[derive(Default)]
+struct Dropout {
+    failures: Vec<String>,
+}
+
+impl Dropout {
+    /// Two copies of a case: one misses samples, where the other gets the last one again.
+    fn twins<C: Case, T: Precision>() -> Result<(), String> {
+        let model = Box::new(C::build::<T>().map_err(|e| e.to_string())?);
+        let (mut missed, mut repeated) = (Box::new(model.state()), Box::new(model.state()));
+        // A stage without history has nothing to repeat: what is no number comes out, once.
+        let remembers = size_of_val(&*missed) > 0;
+        let mut draw = Draw(5);
+        let (env, mut last) = (draw.sample::<T>(0, C::INPUT).0, T::ZERO);
+        model.reset(&mut missed, &env, T::from_f64(f64::NAN));
+        model.reset(&mut repeated, &env, last);
+        for k in 1..20_000 {
+            let (env, u) = draw.sample::<T>(k, C::INPUT);
+            if k == 1 || k % 4000 == 500 {
+                for dropped in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let y = model.step(&mut missed, &env, T::from_f64(dropped)).to_f64();
+                    let same = model.step(&mut repeated, &env, last).to_f64();
+                    if remembers && y.to_bits() != same.to_bits() {
+                        return Err(format!("{y} for {dropped} at sample {k}, {same} expected"));
+                    }
+                }
+            }
+            let y = model.step(&mut missed, &env, u).to_f64();
+            let same = model.step(&mut repeated, &env, u).to_f64();
+            if !y.is_finite() || y.to_bits() != same.to_bits() {
+                return Err(format!("{y} at sample {k}, {same} expected"));
+            }
+            last = u;
+        }
+        // Nor is what came before a reset.
+        let env = draw.sample::<T>(0, C::INPUT).0;
+        let (mut fresh, zero) = (Box::new(model.state()), T::ZERO);
+        let y = model.reset(&mut missed, &env, T::from_f64(f64::NAN)).to_f64();
+        let same = model.reset(&mut fresh, &env, zero).to_f64();
+        let (later, as_fresh) =
+            (model.step(&mut missed, &env, zero).to_f64(), model.step(&mut fresh, &env, zero).to_f64());
+        if remembers && (y.to_bits() != same.to_bits() || later.to_bits() != as_fresh.to_bits()) {
+            return Err(format!("{y} and {later} after a reset, {same} and {as_fresh} expected"));
+        }
+        Ok(())
+    }
+}
 
 impl Visit for Dropout {
     fn visit<C: Case, T: Precision>(&mut self) {
-        let name = format!("{} {}", C::NAME, T::NAME);
-        let model = Box::new(C::build::<T>().unwrap_or_else(|e| panic!("{name}: {e}")));
-        let (mut state, mut draw) = (Box::new(model.state()), Draw(5));
-        let (env, u) = draw.sample::<T>(0, C::INPUT);
-        model.reset(&mut state, &env, u);
-        let not_a_number = T::from_f64(f64::NAN);
-        for k in 1..20_000 {
-            let (env, u) = draw.sample::<T>(k, C::INPUT);
-            if k == 5000 {
-                model.step(&mut state, &env, not_a_number);
-                model.step(&mut state, &env, T::from_f64(f64::INFINITY));
-            }
-            let y = model.step(&mut state, &env, u).to_f64();
-            // Filters of 129 taps have let it pass by then.
-            assert!(y.is_finite() || (5000..5300).contains(&k), "{name}: {y} at sample {k}");
+        // The limiter is no model: for a command that is no number it stops the drive where it is.
+        if C::NAME == "limits" {
+            return;
+        }
+        if let Err(what) = Self::twins::<C, T>() {
+            self.failures.push(format!("{} {}: {what}", C::NAME, T::NAME));
         }
     }
 }
 
 #[test]
-fn an_input_that_is_no_number_does_not_stay() {
-    each(&mut Dropout);
+fn a_sample_that_is_no_number_is_the_last_one_again() {
+    let mut dropout = Dropout::default();
+    each(&mut dropout);
+    assert!(dropout.failures.is_empty(), "{}", dropout.failures.join("\n"));
 }

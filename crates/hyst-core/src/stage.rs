@@ -12,6 +12,13 @@ pub(crate) fn hold<T: Real>(held: &mut T, x: T) -> T {
     *held
 }
 
+/// The input to rest at: `x`, or zero if `x` is no finite number.
+#[inline]
+pub(crate) fn rest<T: Real>(held: &mut T, x: T) -> T {
+    *held = finite_or(x, T::ZERO);
+    *held
+}
+
 /// `x`, or what came before it if `x` is no finite number.
 #[inline]
 pub(crate) fn finite_or<T: Real>(x: T, before: T) -> T {
@@ -45,10 +52,11 @@ pub trait Stage<T: Real> {
     /// Sets the history to rest at the input `u0` and returns the output there.
     ///
     /// Linear stages are settled at `u0`. Memory operators start from virgin memory and then see
-    /// `u0`.
+    /// `u0`. An input that is no finite number counts as zero.
     fn reset(&self, state: &mut Self::State, env: &Env<T>, u0: T) -> T;
 
-    /// The output one sample period later, at input `u`.
+    /// The output one sample period later, at input `u`. A stage with a history takes an input that is no finite number
+    /// for the last one again; one without returns what its equation gives.
     fn step(&self, state: &mut Self::State, env: &Env<T>, u: T) -> T;
 
     /// [`step`](Self::step) over slices; stops at the shortest of the three.

@@ -7,7 +7,6 @@
 
 mod arrays;
 mod control;
-mod either;
 mod errors;
 mod identify;
 mod inverse;

@@ -12,13 +12,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::Needs;
-use crate::either::Either;
 use crate::errors;
 use crate::inverse::{Inverted, Options, closed, compensator, refused, search};
 use crate::model_macro::{Parameter, arguments, models, repr};
 use crate::models::{DELAY, NODES, PLAYS, TAPS, triangle};
 use crate::operator::Operator;
 use crate::runner::Runner;
+use hyst_core::Either;
 
 /// All of a fractional model's memory, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;

@@ -3,7 +3,7 @@
 use super::kind::ActivationKind;
 use super::operator::Activation;
 use crate::error::within;
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Env, Error, Real, Stage};
 
 /// Inverse of an [`Activation`] with α < 0, with preview: the drive of time k from references up to time k + [`lead`](Self::lead).
@@ -229,7 +229,7 @@ impl<T: Real, const N: usize> Stage<T> for AntiCausal<T, N> {
     /// As if the reference had been `u0` for ever.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = self.state();
-        let z = hold(&mut s.z, u0);
+        let z = rest(&mut s.z, u0);
         let u = self.forward.solve(self.forward.k0, z);
         s.references = [z; N];
         s.plan = [u; N];

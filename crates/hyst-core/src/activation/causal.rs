@@ -1,7 +1,7 @@
 //! The inverse sample by sample, for α ≥ 0.
 
 use super::operator::Activation;
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Env, Error, Invert, Real, Stage};
 
 /// Inverse of an [`Activation`] sample by sample: the input with `(k₀ + α/h) u + β f(γ u) = z + (α/h) u_last`.
@@ -61,7 +61,7 @@ impl<T: Real> Stage<T> for ActivationInverse<T> {
     /// At rest where the model's output at rest is `u0`.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = self.state();
-        let z = hold(&mut s.z, u0);
+        let z = rest(&mut s.z, u0);
         s.u = self.forward.solve(self.forward.k0, z);
         s.u
     }

@@ -2,7 +2,7 @@
 
 use super::kind::ActivationKind;
 use crate::error::finite;
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of `z = k₀ u + α u̇ + β f(γ u)` (Xie et al., eq. 2); together with an [`ActivationKind`] they build.
@@ -172,7 +172,7 @@ impl<T: Real> Stage<T> for Activation<T> {
     /// At rest at `u0`: no rate.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
         *s = self.state();
-        self.at_rest(hold(&mut s.u, u0))
+        self.at_rest(rest(&mut s.u, u0))
     }
 
     #[inline]

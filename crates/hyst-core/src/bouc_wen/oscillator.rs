@@ -1,7 +1,7 @@
 //! The Bouc-Wen oscillator: a mass, a damper, a spring, and a hysteretic force beside it.
 
 use crate::error::within;
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
 /// Longest substep, in radians of the fastest motion √((k + α)/m).
@@ -291,7 +291,7 @@ impl<T: Real> Stage<T> for BoucWenOscillator<T> {
 
     /// At rest under the load `u0`, which virgin memory has seen rise from zero.
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        let u = hold(&mut s.u, u0);
+        let u = rest(&mut s.u, u0);
         let z = self.virgin(u);
         *s = BoucWenOscillatorState { u, motion: Motion { y: (u - z) / self.stiffness, v: T::ZERO, z } };
         s.motion.y

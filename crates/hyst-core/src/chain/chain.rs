@@ -1,6 +1,6 @@
 //! The actuator: a hysteresis operator and the optional stages around it, in physical order.
 
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{
     Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift,
     DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Real,
@@ -206,10 +206,12 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         }
     }
 
+    /// A temperature that is no finite number counts as T₀ of the temperature stage (0 °C without one), a load as zero.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let (temperature, load) = (hold(&mut s.temperature, e.temperature), hold(&mut s.load, e.load));
+        s.temperature = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
+        let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
         let e = &Env { temperature, load, ..*e };
-        let u0 = hold(&mut s.input, u0);
+        let u0 = rest(&mut s.input, u0);
         let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);

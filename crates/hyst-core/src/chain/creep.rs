@@ -6,7 +6,7 @@
 
 use crate::chain::FirstOrder;
 use crate::error::{finite, within};
-use crate::stage::finite_or;
+use crate::stage::{finite_or, hold, rest};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
@@ -106,6 +106,7 @@ impl<T: Real, const N: usize> Stage<T> for Creep<T, N> {
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        let u0 = finite_or(u0, T::ZERO);
         self.rest(s, u0);
         u0 + self.total() * u0
     }
@@ -152,21 +153,36 @@ impl<T: Real, const N: usize> Invert<T> for Creep<T, N> {
     }
 }
 
+/// History of the inverse: that of the bank, and the last reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepInverseState<T, const N: usize> {
+    bank: CreepState<T, N>,
+    reference: T,
+}
+
+impl<T: Real, const N: usize> CreepInverseState<T, N> {
+    pub(crate) fn new() -> Self {
+        Self { bank: CreepState::new(), reference: T::ZERO }
+    }
+}
+
 impl<T: Real, const N: usize> Stage<T> for CreepInverse<T, N> {
-    type State = CreepState<T, N>;
+    type State = CreepInverseState<T, N>;
 
     fn state(&self) -> Self::State {
-        self.forward.state()
+        CreepInverseState::new()
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        let v = u0 * self.at_rest;
-        self.forward.rest(s, v);
+        let v = rest(&mut s.reference, u0) * self.at_rest;
+        self.forward.rest(&mut s.bank, v);
         v
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
+        let u = hold(&mut s.reference, u);
+        let s = &mut s.bank;
         // What the elements would be if the input stood still; the rest is proportional to v − s.v.
         let mut held = T::ZERO;
         let f = &self.forward;

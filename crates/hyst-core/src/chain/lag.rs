@@ -47,6 +47,7 @@ impl<T: Real> Stage<T> for Lag<T> {
 
     #[inline]
     fn reset(&self, s: &mut LagState<T>, _: &Env<T>, u0: T) -> T {
+        let u0 = finite_or(u0, T::ZERO);
         *s = LagState { u: u0, y: u0 };
         u0
     }

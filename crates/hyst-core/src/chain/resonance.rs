@@ -88,6 +88,7 @@ impl<T: Real> Stage<T> for Resonance<T> {
 
     #[inline]
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
+        let u0 = finite_or(u0, T::ZERO);
         *s = ResonanceState { v: u0, x: u0, w: T::ZERO };
         u0
     }

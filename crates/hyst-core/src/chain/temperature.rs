@@ -38,6 +38,11 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
 }
 
 impl<T: Real> Temperature<T> {
+    /// Temperature T₀ at which the factor is one \[°C\].
+    pub fn reference(&self) -> T {
+        self.reference
+    }
+
     /// The factor `1 + α (T − T₀)`.
     #[inline]
     pub fn factor(&self, env: &Env<T>) -> T {

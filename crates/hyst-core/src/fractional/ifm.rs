@@ -4,7 +4,7 @@
 use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory, zeros};
 use crate::chain::{Delay, DelayParams, DelayState};
 use crate::error::{finite, within};
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 use core::f64::consts::PI;
 
@@ -152,7 +152,7 @@ impl<T: Real, W: Memory<T>, const D: usize> Stage<T> for Ifm<T, W, D> {
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let u0 = hold(&mut s.u, u0);
+        let u0 = rest(&mut s.u, u0);
         self.delay.reset(&mut s.delay, e, u0);
         self.hysteresis.reset(&mut s.hysteresis, e, T::ZERO) + self.delta * u0
     }
@@ -226,7 +226,7 @@ impl<T: Real, W: Memory<T>, const D: usize> Stage<T> for IfmInverse<T, W, D> {
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let u = hold(&mut s.reference, u0) * self.at_rest;
+        let u = rest(&mut s.reference, u0) * self.at_rest;
         self.forward.reset(&mut s.forward, e, u);
         u
     }

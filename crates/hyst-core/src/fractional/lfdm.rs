@@ -2,7 +2,7 @@
 
 use super::{GlOrder, Memory, ShortMemory};
 use crate::error::{finite, within};
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 
 /// Parameters of the LFDM `X(s) = (a + b s^α) / (1 + c s^β) U(s)` (Zhu et al., eq. 5, 6).
@@ -196,7 +196,7 @@ impl<T: Real, W: Memory<T>> Stage<T> for Lfdm<T, W> {
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        let u0 = hold(&mut s.last, u0);
+        let u0 = rest(&mut s.last, u0);
         *s = LfdmState { rest: (u0, u0 * self.at_rest), last: u0, ..self.state() };
         s.rest.1
     }

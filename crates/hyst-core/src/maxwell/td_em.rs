@@ -5,7 +5,7 @@
 use super::circuit::{Circuit, Step};
 use super::slip::{MaxwellSlip, MaxwellSlipParams, SlipReading};
 use crate::error::{finite, within};
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{
     Build, Delay, DelayParams, DelayState, Env, Error, GpiInverse, GpiInverseState, GpiState, Invert, Meta, Params,
     Preview, PreviewState, Real, Sampling, Stage,
@@ -283,7 +283,7 @@ impl<T: Real, const N: usize, const P: usize> Stage<T> for TdEmInverse<T, N, P> 
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = self.state();
-        let (degc, y) = (sensed(&mut s.degc, e), hold(&mut s.reference, u0));
+        let (degc, y) = (sensed(&mut s.degc, e), rest(&mut s.reference, u0));
         self.late.reset(&mut s.late, e, degc);
         let y = self.filter.reset(&mut s.filter, e, y);
         self.slip.reset(&mut s.slip, e, self.current(y, degc))

@@ -11,4 +11,4 @@ pub use gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
 
 pub use pi::{Pi, PiParams, PiState};
 pub use td_pi::{TdPi, TdPiInverse, TdPiParams, TdPiState};
-pub use viscous::{ViscousPi, ViscousPiInverse, ViscousPiParams, ViscousPiState};
+pub use viscous::{ViscousPi, ViscousPiInverse, ViscousPiInverseState, ViscousPiParams, ViscousPiState};

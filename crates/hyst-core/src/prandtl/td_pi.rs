@@ -6,7 +6,7 @@
 use super::envelope::Curve;
 use super::gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
 use crate::error::{coefficient, finite, within};
-use crate::stage::hold;
+use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of the TD-PI model: thresholds `rᵢ = α i`, weights `pᵢ(T) = ε e^(η (T − T₀)) e^(−τ rᵢ)`, i = 0 … n, linear
@@ -158,15 +158,15 @@ impl<T: Real, const N: usize> TdPi<T, N> {
     }
 }
 
-/// History of a TD-PI model (`G` is [`GpiState`]) or of its inverse.
+/// History of a TD-PI model: that of the operator at T₀, and the last temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TdPiState<T, G> {
-    gpi: G,
+pub struct TdPiState<T, const N: usize> {
+    gpi: GpiState<T, N>,
     degc: T,
 }
 
 impl<T: Real, const N: usize> Stage<T> for TdPi<T, N> {
-    type State = TdPiState<T, GpiState<T, N>>;
+    type State = TdPiState<T, N>;
 
     fn state(&self) -> Self::State {
         TdPiState { gpi: self.at_reference.state(), degc: self.factor.reference }
@@ -204,22 +204,30 @@ impl<T: Real, const N: usize> Invert<T> for TdPi<T, N> {
     }
 }
 
+/// History of the inverse: that of the inverse at T₀, the last temperature and reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TdPiInverseState<T, const N: usize> {
+    gpi: GpiInverseState<T, N>,
+    degc: T,
+    reference: T,
+}
+
 impl<T: Real, const N: usize> Stage<T> for TdPiInverse<T, N> {
-    type State = TdPiState<T, GpiInverseState<T, N>>;
+    type State = TdPiInverseState<T, N>;
 
     fn state(&self) -> Self::State {
-        TdPiState { gpi: self.at_reference.state(), degc: self.factor.reference }
+        TdPiInverseState { gpi: self.at_reference.state(), degc: self.factor.reference, reference: T::ZERO }
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         s.degc = self.factor.reference;
-        let y = u0 / self.factor.at(&mut s.degc, e);
+        let y = rest(&mut s.reference, u0) / self.factor.at(&mut s.degc, e);
         self.at_reference.reset(&mut s.gpi, e, y)
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let y = u / self.factor.at(&mut s.degc, e);
+        let y = hold(&mut s.reference, u) / self.factor.at(&mut s.degc, e);
         self.at_reference.step(&mut s.gpi, e, y)
     }
 }

@@ -6,6 +6,7 @@
 //! acts only while the play slides, which is monotone in the present input and has an exact inverse.
 
 use crate::error::within;
+use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Invert, Meta, Params, PiParams, Real, Sampling, Stage};
 
 /// Parameters of `y = p₀ u + Σᵢ wᵢ pᵢ`, `λ ṗᵢ = dead_{rᵢ}(u − pᵢ)`, where `dead_r(x)` is 0 for |x| ≤ r and `x ∓ r` beyond. λ = 0 is the
@@ -156,12 +157,16 @@ impl<T: Real, const N: usize> Invert<T> for ViscousPi<T, N> {
     }
 }
 
+/// History of the inverse: that of the operator, and the last reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViscousPiInverseState<T, const N: usize> {
+    forward: ViscousPiState<T, N>,
+    reference: T,
+}
+
 impl<T: Real, const N: usize> ViscousPiInverse<T, N> {
     fn solve(&self, s: &mut ViscousPiState<T, N>, y: T, slide: T) -> T {
         let f = &self.forward;
-        if !y.is_finite() {
-            return s.u;
-        }
         let plays = || s.plays.iter().zip(&f.thresholds).zip(&f.weights).take(f.len);
         // With the plays at rest; then each that slides adds its slope.
         let mut rest = y;
@@ -188,20 +193,22 @@ impl<T: Real, const N: usize> ViscousPiInverse<T, N> {
 }
 
 impl<T: Real, const N: usize> Stage<T> for ViscousPiInverse<T, N> {
-    type State = ViscousPiState<T, N>;
+    type State = ViscousPiInverseState<T, N>;
 
     fn state(&self) -> Self::State {
-        ViscousPiState::virgin()
+        ViscousPiInverseState { forward: ViscousPiState::virgin(), reference: T::ZERO }
     }
 
     fn reset(&self, s: &mut Self::State, _: &Env<T>, u0: T) -> T {
-        *s = ViscousPiState::virgin();
-        self.solve(s, u0, T::ONE)
+        s.forward = ViscousPiState::virgin();
+        let y = rest(&mut s.reference, u0);
+        self.solve(&mut s.forward, y, T::ONE)
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
-        self.solve(s, u, self.forward.slide)
+        let y = hold(&mut s.reference, u);
+        self.solve(&mut s.forward, y, self.forward.slide)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The Preisach operator and its exact inverse.
 
 use super::{Everett, Reversals};
+use crate::stage::finite_or;
 use crate::{Env, Error, Invert, Real, Stage};
 
 /// History of a Preisach operator: the dominating reversals.
@@ -181,7 +182,7 @@ impl<T: Real, const N: usize> Stage<T> for EverettInverse<T, N> {
                 break;
             }
         }
-        let input = self.solve(memory, y);
+        let input = finite_or(self.solve(memory, y), memory.now());
         // The output is `y` by construction; storing it keeps rounding from piling up.
         memory.set(input, y);
         input

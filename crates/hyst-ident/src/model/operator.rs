@@ -1,6 +1,6 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
-use super::activation::HostActivationInverse;
+use super::activation::{self, HostActivationInverse};
 use hyst_core::{
     Activation, BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi,
     GpiInverse, Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm,
@@ -169,7 +169,7 @@ operators! {
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Activation(Activation<f64>) => HostActivationInverse,
-        |o: &Activation<f64>, _| HostActivationInverse::of(o), HostActivationInverse::lead;
+        |o: &Activation<f64>, _| activation::inverse(o), activation::lead;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
 
