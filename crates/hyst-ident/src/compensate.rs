@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Sampling, Stage};
 
-use crate::model::{CREEP, Compensator, Effect, InverseState, Model, TAPS};
+use crate::model::capacity::{CREEP, TAPS};
+use crate::model::{Compensator, Effect, InverseState, Model};
 use crate::record::Record;
 use crate::samples::Samples;
 

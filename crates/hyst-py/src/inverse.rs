@@ -7,8 +7,8 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::models::{DELAY, TAPS};
 use crate::runner::{Engine, Runner};
+use hyst_ident::model::capacity::{DELAY, TAPS};
 
 /// What the caller asked of an inverse; each way takes some of it and refuses the rest.
 #[derive(Clone, Copy, Debug, Default)]

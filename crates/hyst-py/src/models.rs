@@ -8,6 +8,7 @@ use hyst_core::{
     Build, CreepParams, DelayParams, DriftParams, Error, Everett, InterferenceParams, LagParams, PiParams,
     PreisachParams, ResonanceParams, Sampling, TemperatureParams,
 };
+use hyst_ident::model::capacity::{CREEP, DELAY, NODES, PLAYS};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -15,17 +16,6 @@ use crate::arrays::Needs;
 use crate::inverse::{closed, compensator, refused};
 use crate::model_macro::{Parameter, arguments, models, repr};
 use crate::operator::Operator;
-
-/// Plays that an operator holds.
-pub(crate) const PLAYS: usize = 64;
-/// Nodes along one edge of a Preisach triangle.
-pub(crate) const NODES: usize = 65;
-/// Samples that a delay holds.
-pub(crate) const DELAY: usize = 8192;
-/// Elements that a creep bank holds.
-const CREEP: usize = 32;
-/// Taps that a preview filter holds.
-pub(crate) const TAPS: usize = 4095;
 
 const IN_THE_SENSOR: &str = "this effect is in the sensor, not in the motion; no drive should follow it";
 

@@ -8,6 +8,7 @@ use hyst_core::{
     LoadParams, MaxwellSlipParams, MirrorParams, PiParams, Sampling, SaturationParams, ShortMemory, SlipReading,
     TdEmParams, TdPiParams, ViscousPiParams,
 };
+use hyst_ident::model::capacity::{DELAY, MIRROR, NODES, PLAYS, REFERENCES, TAPS};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -15,7 +16,7 @@ use crate::arrays::Needs;
 use crate::errors;
 use crate::inverse::{Inverted, Options, closed, compensator, refused, search};
 use crate::model_macro::{Parameter, arguments, models, repr};
-use crate::models::{DELAY, NODES, PLAYS, TAPS, triangle};
+use crate::models::triangle;
 use crate::operator::Operator;
 use crate::runner::Runner;
 use hyst_core::Either;
@@ -57,8 +58,8 @@ fn reading(elasto_slip: bool) -> SlipReading {
     if elasto_slip { SlipReading::ElastoSlip } else { SlipReading::Backlash }
 }
 
-/// The dynamic Preisach model with a mirror of at most 32 × 32 nodes.
-type HostDpm = hyst_core::Dpm<f64, NODES, 32, 32>;
+/// The dynamic Preisach model with a mirror of at most [`MIRROR`]² nodes.
+type HostDpm = hyst_core::Dpm<f64, NODES, MIRROR, MIRROR>;
 
 /// By search over the given range, to the given tolerance or a part in 10⁹ of the range.
 fn bouc_wen<P>(_: &P, stage: &hyst_core::BoucWen<f64>, options: &Options) -> PyResult<Inverted> {
@@ -66,16 +67,13 @@ fn bouc_wen<P>(_: &P, stage: &hyst_core::BoucWen<f64>, options: &Options) -> PyR
     Ok(Inverted::exact(stage.inverse(low, high, tolerance).map_err(errors::core)?))
 }
 
-/// Samples that the preview of an activation model holds.
-const AHEAD: usize = 8192;
-
 /// A sample at a time where that is stable, else backwards in time.
 fn activation<P>(_: &P, stage: &Activation<f64>, options: &Options) -> PyResult<Inverted> {
     options.only(&["tolerance"])?;
     if stage.invert().is_ok() {
         return closed(&(), stage, &Options::default());
     }
-    let inverse = stage.anti_causal::<AHEAD>(options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
+    let inverse = stage.anti_causal::<REFERENCES>(options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
     let lead = inverse.lead();
     Ok(Inverted::previewed(inverse, lead))
 }

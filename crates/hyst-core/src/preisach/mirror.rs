@@ -5,8 +5,8 @@ use crate::{Build, Error, Meta, Params, Real};
 
 /// Parameters of a mirror function ξ(D, P): its values at the nodes of a uniform grid. `L` is any list of numbers.
 ///
-/// Chen et al. use D = 2…16 V/ms in steps of 2 and P = −80…80 V in steps of 20; here D is in input units per *second*,
-/// so that is `rate_low: 2e3, rate_high: 16e3, rates: 8, change_low: -80.0, change_high: 80.0, changes: 9`.
+/// Chen et al. use D = 2…16 V/ms in steps of 2 and P = −80…80 V in steps of 20
+/// ([`on_printed_grid`](Self::on_printed_grid)); here D is in input units per *second*.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MirrorParams<L> {
@@ -24,6 +24,13 @@ pub struct MirrorParams<L> {
     pub changes: usize,
     /// ξ at the nodes \[ratio\], positive: node (d, p) at place `d * changes + p`.
     pub weights: L,
+}
+
+impl<L> MirrorParams<L> {
+    /// The grid of Chen et al.: D = 2000, 4000 … 16000 V/s, P = −80, −60 … 80 V, with these `weights`.
+    pub const fn on_printed_grid(weights: L) -> Self {
+        Self { rate_low: 2e3, rate_high: 16e3, rates: 8, change_low: -80.0, change_high: 80.0, changes: 9, weights }
+    }
 }
 
 impl<L: AsMut<[f64]>> Params for MirrorParams<L> {
@@ -209,19 +216,10 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    const GRID: MirrorParams<()> = MirrorParams {
-        rate_low: 2e3,
-        rate_high: 16e3,
-        rates: 8,
-        change_low: -80.0,
-        change_high: 80.0,
-        changes: 9,
-        weights: (),
-    };
+    const GRID: MirrorParams<()> = MirrorParams::on_printed_grid(());
 
     fn mirror(weights: &[f64]) -> Mirror<f64, 8, 9> {
-        let MirrorParams { rate_low, rate_high, rates, change_low, change_high, changes, .. } = GRID;
-        MirrorParams { rate_low, rate_high, rates, change_low, change_high, changes, weights }.build(&()).unwrap()
+        MirrorParams::on_printed_grid(weights).build(&()).unwrap()
     }
 
     #[test]

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::Basis;
 use crate::Samples;
 use crate::lsq::Bounds;
-use crate::model::NODES;
+use crate::model::capacity::NODES;
 
 /// Reversible slope of each diagonal cell is at least this share of the mean gain.
 const FLOOR: f64 = 0.05;

@@ -1,9 +1,8 @@
 //! The inverse of an activation-function model on the host: a sample at a time where that is stable, else backwards in time.
 
+use super::capacity::REFERENCES;
 use hyst_core::{Activation, ActivationInverse, AntiCausal, Either, Error, Invert};
 
-/// References that a preview of the host holds.
-const REFERENCES: usize = 8192;
 /// What the preview may miss, of the largest |α u̇|.
 const TOLERANCE: f64 = 1e-10;
 

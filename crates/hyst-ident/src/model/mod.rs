@@ -1,6 +1,7 @@
 //! A fitted model: chain stages with parameters and units, independent of the sample period.
 
 mod activation;
+pub mod capacity;
 mod effects;
 mod file;
 mod operator;
@@ -9,7 +10,6 @@ mod stages;
 pub use effects::{CreepBank, Effect, Effects};
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use hyst_core::Kind;
-pub use operator::{Base, Compensator, HostChain, InverseState, NODES, Operator, OperatorInverse, OperatorState};
+pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState};
 
 pub(crate) use effects::Parameter;
-pub(crate) use operator::{CREEP, TAPS};

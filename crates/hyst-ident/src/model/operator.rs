@@ -1,22 +1,12 @@
 //! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
 
 use super::activation::{self, HostActivationInverse};
+use super::capacity::{CREEP, DELAY, MIRROR, NODES, PLAYS, TAPS};
 use hyst_core::{
     Activation, BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi,
     GpiInverse, Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm,
     TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
 };
-
-/// Plays and elements that the host's operators hold.
-const PLAYS: usize = 64;
-/// Nodes along one edge of the host's Preisach triangle.
-pub const NODES: usize = 65;
-/// Samples that the host's delay holds.
-const DELAY: usize = 8192;
-/// Creep elements that the host's chain holds.
-pub(crate) const CREEP: usize = 32;
-/// Taps that one of the host's preview filters holds.
-pub(crate) const TAPS: usize = 4095;
 
 /// The hysteresis of a model, as parameters.
 pub type Base = OperatorParams<Vec<f64>>;
@@ -26,8 +16,8 @@ pub type HostChain = Chain<f64, Operator, DELAY, CREEP>;
 /// The compensator as the host runs it.
 pub type Compensator = hyst_core::Compensator<f64, OperatorInverse, DELAY, CREEP, TAPS>;
 
-/// The dynamic Preisach model with a mirror of at most 32 × 32 nodes.
-type HostDpm = Dpm<f64, NODES, 32, 32>;
+/// The dynamic Preisach model with a mirror of at most [`MIRROR`]² nodes.
+type HostDpm = Dpm<f64, NODES, MIRROR, MIRROR>;
 
 /// Memory of the host's fractional models: all of it, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;

@@ -4,11 +4,7 @@ use hyst_core::{Build, Creep, Delay, Env, Error, Lag, Resonance, Sampling, Stage
 
 use crate::Samples;
 use crate::model::Effects;
-
-/// Samples that a delay may hold here.
-const DELAY: usize = 8192;
-/// Elements that a creep bank may hold here.
-const CREEP: usize = 32;
+use crate::model::capacity::{CREEP, DELAY};
 
 /// What leads to the hysteresis and what follows it, for one set of effects.
 pub(crate) struct SignalPath<'a> {

@@ -75,15 +75,7 @@ pub(crate) fn chain<T: Real>() -> Result<Chain<T, Pi<T, 10>, 16, 4>, Error> {
 }
 
 pub(crate) fn dpm<T: Real>() -> Result<Dpm<T, 25, 8, 9>, Error> {
-    let grid = MirrorParams {
-        rate_low: 2e3,
-        rate_high: 16e3,
-        rates: 8,
-        change_low: -80.0,
-        change_high: 80.0,
-        changes: 9,
-        weights: (),
-    };
+    let grid = MirrorParams::on_printed_grid(());
     let mirror = Mirror::from_fn(&grid, |d, p| given(1.0 - 8e-6 * d - 2e-6 * p * p))?;
     Dpm::new(everett::<T, 25>()?, mirror, given(20.0), &PERIOD)
 }

@@ -27,15 +27,7 @@ pub(super) fn map(rest: f64) -> Everett<f64, 17> {
 }
 
 /// That of the paper.
-const GRID: MirrorParams<()> = MirrorParams {
-    rate_low: 2e3,
-    rate_high: 16e3,
-    rates: 8,
-    change_low: -80.0,
-    change_high: 80.0,
-    changes: 9,
-    weights: (),
-};
+const GRID: MirrorParams<()> = MirrorParams::on_printed_grid(());
 
 pub(super) fn model(rest: f64, fade: f64, xi: impl Fn(f64, f64) -> f64) -> Box<Model> {
     Box::new(Dpm::new(map(rest), Mirror::from_fn(&GRID, xi).unwrap(), fade, &PERIOD).unwrap())
@@ -359,15 +351,7 @@ fn single_precision(double: &Model) -> Dpm<f32, 17, 8, 9> {
 fn single_precision_follows_double() {
     let double = model(0.0, 20.0, soft);
     let nodes: Vec<f64> = (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect();
-    let grid = MirrorParams {
-        rate_low: 2e3,
-        rate_high: 16e3,
-        rates: 8,
-        change_low: -80.0,
-        change_high: 80.0,
-        changes: 9,
-        weights: nodes,
-    };
+    let grid = MirrorParams::on_printed_grid(nodes);
     let map = Everett::<f32, 17>::from_surface(
         Grid { low: 0.0, high: HIGH, cells: CELLS },
         0.0,
@@ -423,15 +407,9 @@ fn parameters_build_the_model() {
     preisach.set_surface(|i, j| classical.value(volts(i), volts(j)), |i| classical.virgin(volts(i))).unwrap();
     let mut params = DpmParams {
         preisach,
-        mirror: MirrorParams {
-            rate_low: GRID.rate_low,
-            rate_high: GRID.rate_high,
-            rates: GRID.rates,
-            change_low: GRID.change_low,
-            change_high: GRID.change_high,
-            changes: GRID.changes,
-            weights: (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect(),
-        },
+        mirror: MirrorParams::on_printed_grid(
+            (0..72).map(|k| soft(2e3 * f64::from(k / 9 + 1), -80.0 + 20.0 * f64::from(k % 9))).collect(),
+        ),
         fade: 20.0,
     };
     let built: Model = params.build(&PERIOD).unwrap();
