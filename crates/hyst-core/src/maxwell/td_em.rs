@@ -69,12 +69,8 @@ impl<L: AsMut<[f64]>> Params for TdEmParams<L> {
         one("mass", "kg", 0.0, &mut self.mass);
         one("stiffness", "N/m", 0.0, &mut self.stiffness);
         one("damping", "N s/m", 0.0, &mut self.damping);
-        for (name, unit, x) in
-            [("coupling_0", "N/V", 0usize), ("coupling_1", "N/(V K)", 1), ("coupling_2", "N/(V K^2)", 2)]
-        {
-            if let Some(x) = self.coupling.get_mut(x) {
-                one(name, unit, -INF, x);
-            }
+        for (x, unit) in self.coupling.iter_mut().zip(["N/V", "N/(V K)", "N/(V K^2)"]) {
+            one("coupling", unit, -INF, x);
         }
     }
 }
@@ -103,6 +99,14 @@ pub struct TdEm<T, const N: usize> {
     per_metre: f64,
 }
 
+/// What the slip bank's errors are called here.
+const SLIP: [(&str, &str); 4] = [
+    ("maxwell-slip.widths", "td-em.slip.widths"),
+    ("maxwell-slip.gains", "td-em.slip.gains"),
+    ("maxwell-slip.widths and maxwell-slip.gains", "td-em.slip.widths and td-em.slip.gains"),
+    ("maxwell-slip elements", "td-em.slip elements"),
+];
+
 impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<L> {
     type Context = Sampling;
     fn build(&self, cx: &Sampling) -> Result<TdEm<T, N>, Error> {
@@ -120,7 +124,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<
         }
         let per_metre = positive("td-em.per_metre", self.per_metre)?;
         Ok(TdEm {
-            slip: self.slip.build(&())?,
+            slip: self.slip.build(&()).map_err(|e| e.in_words(&SLIP))?,
             coupling: self.coupling,
             output: circuit.displacement::<T>() * T::from_f64(per_metre),
             circuit,
@@ -464,5 +468,11 @@ mod tests {
         let bad = TdEmParams { mass: -1.0, ..TdEmParams::PRINTED };
         let built: Result<TdEm<f64, 10>, _> = bad.build(&Sampling { period: 1e-3 });
         assert!(matches!(built, Err(Error::OutOfRange { name: "td-em.mass", .. })));
+        let mut bad = TdEmParams::PRINTED;
+        bad.slip.widths[3] = 0.0;
+        let built: Result<TdEm<f64, 10>, _> = bad.build(&Sampling { period: 1e-3 });
+        assert!(matches!(built, Err(Error::OutOfRange { name: "td-em.slip.widths", .. })));
+        let built: Result<TdEm<f64, 4>, _> = TdEmParams::PRINTED.build(&Sampling { period: 1e-3 });
+        assert_eq!(built, Err(Error::Capacity { name: "td-em.slip elements", needed: 10, holds: 4 }));
     }
 }
