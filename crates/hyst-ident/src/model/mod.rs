@@ -5,6 +5,7 @@ mod effects;
 mod file;
 mod operator;
 mod stages;
+mod units;
 
 pub use effects::{CreepBank, Effect, Effects};
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
