@@ -109,9 +109,10 @@ impl<T: Real, W: Memory<T>, const D: usize> Build<Ifm<T, W, D>> for IfmParams {
         finite("ifm.delta", self.delta)?;
         Ok(Ifm {
             hysteresis: self.hysteresis().build(cx)?,
-            delay: DelayParams { seconds: self.tau }
-                .build(cx)
-                .map_err(|e| e.in_words(&[("delay samples", "ifm.tau samples")]))?,
+            delay: DelayParams { seconds: self.tau }.build(cx).map_err(|e| match e {
+                Error::Capacity { needed, holds, .. } => Error::Capacity { name: "ifm.tau samples", needed, holds },
+                other => other,
+            })?,
             delta: T::from_f64(self.delta),
         })
     }

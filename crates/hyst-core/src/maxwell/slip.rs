@@ -57,22 +57,20 @@ impl<L: AsMut<[f64]>> Params for MaxwellSlipParams<L> {
 /// ```
 pub type MaxwellSlip<T, const N: usize> = Gpi<T, N>;
 
-/// What the checks of the operator behind it are called here.
-const WORDS: [(&str, &str); 5] = [
-    ("pi.thresholds", "maxwell-slip.widths"),
-    ("pi.weights", "maxwell-slip.gains"),
-    // The first of the gains, or their sum.
-    ("pi.gain", "maxwell-slip.gains"),
-    ("pi.thresholds and pi.weights", "maxwell-slip.widths and maxwell-slip.gains"),
-    ("pi plays", "maxwell-slip elements"),
-];
-
 impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for MaxwellSlipParams<L> {
     type Context = ();
     fn build(&self, (): &()) -> Result<MaxwellSlip<T, N>, Error> {
         let (widths, gains) = (self.widths.as_ref(), self.gains.as_ref());
         let identity = Envelope::new(Curve::IDENTITY, Curve::IDENTITY)?;
-        let own = |e: Error| e.in_words(&WORDS);
+        // The operator's own checks, in the words of this model; its gain is the first of the gains, or their sum.
+        let own = |e| match e {
+            Error::NonFinite("pi.thresholds") => Error::NonFinite("maxwell-slip.widths"),
+            Error::NonFinite(_) => Error::NonFinite("maxwell-slip.gains"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "maxwell-slip.widths", must },
+            Error::Lengths(_) => Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "maxwell-slip elements", needed, holds },
+            other => other,
+        };
         let checked = |gain: f64, r: &[f64], w: &[f64]| Pi::new(gain, r, w).map_err(own);
         let whole: Pi<T, N> = checked(0.0, widths, gains)?;
         if self.reading == SlipReading::ElastoSlip {

@@ -99,14 +99,6 @@ pub struct TdEm<T, const N: usize> {
     per_metre: f64,
 }
 
-/// What the slip bank's errors are called here.
-const SLIP: [(&str, &str); 4] = [
-    ("maxwell-slip.widths", "td-em.slip.widths"),
-    ("maxwell-slip.gains", "td-em.slip.gains"),
-    ("maxwell-slip.widths and maxwell-slip.gains", "td-em.slip.widths and td-em.slip.gains"),
-    ("maxwell-slip elements", "td-em.slip elements"),
-];
-
 impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<L> {
     type Context = Sampling;
     fn build(&self, cx: &Sampling) -> Result<TdEm<T, N>, Error> {
@@ -123,8 +115,17 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<
             finite("td-em.coupling", c)?;
         }
         let per_metre = positive("td-em.per_metre", self.per_metre)?;
+        // The bank's own checks, in the words of this model.
+        let slip = self.slip.build(&()).map_err(|e| match e {
+            Error::NonFinite("maxwell-slip.widths") => Error::NonFinite("td-em.slip.widths"),
+            Error::NonFinite(_) => Error::NonFinite("td-em.slip.gains"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "td-em.slip.widths", must },
+            Error::Lengths(_) => Error::Lengths("td-em.slip.widths and td-em.slip.gains"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "td-em.slip elements", needed, holds },
+            other => other,
+        })?;
         Ok(TdEm {
-            slip: self.slip.build(&()).map_err(|e| e.in_words(&SLIP))?,
+            slip,
             coupling: self.coupling,
             output: circuit.displacement::<T>() * T::from_f64(per_metre),
             circuit,

@@ -78,14 +78,14 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Gpi<T, N>> for GpiParams<L>
     fn build(&self, (): &()) -> Result<Gpi<T, N>, Error> {
         let envelope = Envelope::new(self.left, self.right)?;
         // The operator's own checks, in the words of this model.
-        let pi = Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref()).map_err(|e| {
-            e.in_words(&[
-                ("pi.gain", "gpi.gain"),
-                ("pi.thresholds", "gpi.thresholds"),
-                ("pi.weights", "gpi.weights"),
-                ("pi.thresholds and pi.weights", "gpi.thresholds and gpi.weights"),
-                ("pi plays", "gpi plays"),
-            ])
+        let pi = Pi::new(self.gain, self.thresholds.as_ref(), self.weights.as_ref()).map_err(|e| match e {
+            Error::NonFinite("pi.gain") => Error::NonFinite("gpi.gain"),
+            Error::NonFinite("pi.thresholds") => Error::NonFinite("gpi.thresholds"),
+            Error::NonFinite(_) => Error::NonFinite("gpi.weights"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "gpi.thresholds", must },
+            Error::Lengths(_) => Error::Lengths("gpi.thresholds and gpi.weights"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "gpi plays", needed, holds },
+            other => other,
         })?;
         Ok(Gpi { envelope, pi })
     }
