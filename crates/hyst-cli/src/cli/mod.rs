@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use hyst_ident::export::CName;
 use hyst_ident::fit::FITTED;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
@@ -92,13 +93,17 @@ pub(crate) struct FitArgs {
 /// is source with constants for `hyst-core`; c is a C99 header with the block and every parameter with its unit. None of
 /// them depends on a sample period.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  hystctl export extended.json --format postcard -o model.bin")]
+#[command(after_help = "Examples:\n  hystctl export extended.json --format postcard -o model.bin\n  \
+    hystctl export extended.json --format c --name x_axis -o x_axis.h")]
 pub(crate) struct ExportArgs {
     /// Model file
     pub(crate) model: PathBuf,
     /// What to write
     #[arg(long, value_enum)]
     pub(crate) format: ExportFormat,
+    /// What the symbols of a C header begin with, so that a program can have two models; hyst if not given
+    #[arg(long)]
+    pub(crate) name: Option<CName>,
     /// File to write; stdout if not given
     #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub(crate) output: Target,

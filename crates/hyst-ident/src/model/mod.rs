@@ -6,6 +6,7 @@ mod effects;
 mod file;
 mod operator;
 mod stages;
+mod units;
 
 pub use effects::{CreepBank, Effect, Effects};
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
