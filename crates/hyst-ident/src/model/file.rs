@@ -7,6 +7,7 @@ use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
 
 use super::{Base, Compensator, Effects, HostChain, Operator, stages};
+use crate::samples::Samples;
 
 /// Schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
@@ -175,6 +176,17 @@ impl Model {
     /// Whether the model needs a load.
     pub fn needs_load(&self) -> bool {
         self.effects.load.is_some()
+    }
+
+    /// The surroundings that the model cannot do without and these rows lack: the column, and why.
+    pub(crate) fn lacking(&self, samples: &Samples) -> Option<(&'static str, &'static str)> {
+        if self.needs_temperature() && samples.temperature.is_none() {
+            return Some((
+                "temperature_degc",
+                "the model's gain depends on it; if it was constant, give --temperature",
+            ));
+        }
+        (self.needs_load() && samples.load.is_none()).then_some(("load_n", "the model yields under it"))
     }
 
     /// The file's text.

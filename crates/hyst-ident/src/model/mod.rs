@@ -2,11 +2,13 @@
 
 mod activation;
 mod effects;
+mod elsewhere;
 mod file;
 mod operator;
 mod stages;
 
 pub use effects::{CreepBank, Effect, Effects};
+pub use elsewhere::Ends;
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use hyst_core::Kind;
 pub use operator::{Base, Compensator, HostChain, InverseState, NODES, Operator, OperatorInverse, OperatorState};

@@ -32,8 +32,8 @@ type HostDpm = Dpm<f64, NODES, 32, 32>;
 /// Memory of the host's fractional models: all of it, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;
 
-/// Temperature for which the filter of an electromechanical model is made \[°C\]; its gain follows the measured one.
-const ROOM: f64 = 23.0;
+/// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
+pub(super) const ROOM: f64 = 23.0;
 
 const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
     "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",

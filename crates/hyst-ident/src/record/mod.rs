@@ -23,7 +23,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
-pub use columns::{ColumnMap, MapError, Need};
+pub use columns::{ColumnMap, MapError, Need, is_input_column};
 pub use error::{Place, RecordError};
 pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
