@@ -6,6 +6,7 @@ use std::path::Path;
 use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
 
+use super::operator::inverse_ends;
 use super::{Base, Compensator, Effects, HostChain, Operator, stages};
 use crate::samples::Samples;
 
@@ -166,6 +167,12 @@ impl Model {
         let mut chain = self.build(period)?;
         chain.hysteresis = chain.hysteresis.with_bandwidth(options.bandwidth_hz);
         chain.compensator(&Sampling { period }, options)
+    }
+
+    /// Inputs that the compensator's memory operator does not leave, if there are such, lowest and highest, and how near it comes
+    /// to the exact one \[input unit\]: for outputs beyond what they reach it takes the nearer end.
+    pub fn inverse_ends(&self) -> Option<([f64; 2], f64)> {
+        inverse_ends(&self.base, [self.input.low, self.input.high])
     }
 
     /// Whether the model needs a temperature.
