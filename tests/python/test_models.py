@@ -116,6 +116,16 @@ def test_what_has_no_inverse_says_why(name):
         model.compensate(np.zeros(3))
 
 
+@pytest.mark.parametrize("label, way_out", [("dpm", "set fade above 0"), ("dpm, drifting", "leave drifting= out")])
+def test_what_steps_has_no_inverse(label, way_out):
+    model = next(c for c in CASES if c.label == label).model()
+    with pytest.raises(hyst.NotInvertibleError, match=f"no inverse: .*{way_out}"):
+        model.inverse(low=model.low, high=model.high)
+    if not model.drifting:
+        with pytest.raises(hyst.NotInvertibleError, match=way_out):
+            model.to_model().operator(model.period).inverse()
+
+
 @pytest.mark.parametrize("name", activation.FUNCTIONS)
 def test_activation_inverses(name):
     """alpha < 0: solved backwards in time, with a preview of ln(1e9) |alpha| / k0 for 1e-9, twice that where the activation

@@ -13,6 +13,6 @@ pub use effects::{CreepBank, Effect, Effects};
 pub use elsewhere::Ends;
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use hyst_core::Kind;
-pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState};
+pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState, searchable};
 
 pub(crate) use effects::Parameter;
