@@ -183,8 +183,8 @@ for label, stop in [("plays", False), ("stops", True)]:
         dict(linear.TD_EM, psi=list(reversed(linear.TD_EM_PSI)), widths=linear.TD_EM_WIDTHS, gains=linear.TD_EM_SLOPES,
              elasto_slip=stop, period=TD_EM_PERIOD),
         2 * SWING + 10,
-        lambda u, stop=stop: linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
-                                          **linear.TD_EM),
+        lambda u, stop=stop: 1e6 * linear.td_em(u, 33.0, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, stop=stop,
+                                                **linear.TD_EM),
         surroundings=dict(temperature=33.0),
     )  # fmt: skip
 
@@ -194,7 +194,7 @@ case(
     dict(linear.TD_EM, psi=list(reversed(linear.TD_EM_PSI)), widths=linear.TD_EM_WIDTHS, gains=linear.TD_EM_SLOPES,
          period=TD_EM_PERIOD),
     2 * SWING,
-    lambda u: linear.td_em(u, TD_EM_WARMING, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, **linear.TD_EM),
+    lambda u: 1e6 * linear.td_em(u, TD_EM_WARMING, TD_EM_PERIOD, linear.TD_EM_WIDTHS, linear.TD_EM_SLOPES, **linear.TD_EM),
     surroundings=dict(temperature=TD_EM_WARMING),
 )  # fmt: skip
 

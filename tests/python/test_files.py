@@ -114,6 +114,29 @@ def test_ends_that_make_no_file(said, error, message, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_electromechanical_model_gives_the_unit_that_its_file_states():
+    case = next(c for c in CASES if c.label == "td-em, plays")
+    metres = np.ptp(hyst.TdEm(**case.parameters, per_metre=1.0).simulate(case.u, **case.surroundings))
+    # Unless told otherwise both are in micrometres.
+    assert case.model().per_metre == 1e6 and case.model().to_model(**ends(case)).output_column == "displacement_um"
+    for per_metre, unit in ((1e6, "um"), (1e9, "nm"), (1e3, "mm")):
+        model, column = hyst.TdEm(**case.parameters, per_metre=per_metre), f"displacement_{unit}"
+        assert np.ptp(model.simulate(case.u, **case.surroundings)) == pytest.approx(per_metre * metres, rel=1e-12)
+        text = model.to_json(**ends(case), output_column=column)
+        assert hyst.Model.loads(text).output_column == column
+        wrong = json.loads(text)
+        wrong["stages"][0]["per_metre"] = 1.0
+        for other in ("um", "nm", "mm"):
+            wrong["output"]["column"] = f"displacement_{other}"
+            with pytest.raises(hyst.ModelFileError, match=r"per_metre must be 1e\d, because the output is in " + other):
+                hyst.Model.loads(json.dumps(wrong))
+            if other != unit:
+                with pytest.raises(hyst.ParameterError, match=f"per_metre must be .* in {other}"):
+                    model.to_model(**ends(case), output_column=f"displacement_{other}")
+        with pytest.raises(hyst.ParameterError, match="output.column must be displacement_um"):
+            model.to_model(**ends(case), output_column="force_n")
+
+
 def test_what_is_no_operator_of_a_class():
     pi = hyst.Pi(**PI)
     with pytest.raises(TypeError, match="its model in `of`"):

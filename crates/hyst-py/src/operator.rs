@@ -285,7 +285,8 @@ impl Operator {
     /// ModelFileError
     ///     If files do not hold such a variant: a short ``memory``, a ``drifting`` model.
     /// ParameterError
-    ///     If a range is not finite or not in order, or ``input_column`` is no name of an input.
+    ///     If a range is not finite or not in order, ``input_column`` is no name of an input, or ``output_column`` not the
+    ///     unit in which ``TdEm`` gives its output (``per_metre``).
     /// ValueError
     ///     If ``output_column`` is none of those.
     #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]
