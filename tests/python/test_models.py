@@ -142,3 +142,20 @@ def test_activation_inverses(name):
     model = conftest.build(name, **dict(printed, alpha=-printed["alpha"]), period=1e-4)
     assert model.inverse().lead == 0
     assert np.max(np.abs(model.compensate(model.simulate(u)) - u)) <= 1e-9 * span(u)
+    with pytest.raises(TypeError, match="tolerance is of no use here: this inverse takes no options"):
+        model.inverse(tolerance=1e-9)
+
+
+def test_an_activation_inverse_is_that_of_its_file_and_says_why_there_is_none():
+    given = dict(k0=1.0, alpha=-0.01, beta=0.5, gamma=0.1, period=1e-3)
+    model = hyst.Tanh(**given)
+    operator = model.to_model(input_range=(0.0, 10.0)).operator(1e-3)
+    assert operator.inverse().lead == model.inverse(tolerance=1e-10).lead > model.inverse().lead > 0
+    for tolerance in (0.0, 1.0, np.nan):
+        with pytest.raises(hyst.ParameterError, match="tolerance"):
+            model.inverse(tolerance=tolerance)
+    # It falls within a sample, whatever the sign of alpha.
+    for alpha in (0.01, -0.001):
+        falling = hyst.Tanh(**dict(given, alpha=alpha, beta=-30.0, gamma=1.0, period=1e-2))
+        with pytest.raises(hyst.NotInvertibleError, match="must rise with the input within a sample"):
+            falling.inverse()

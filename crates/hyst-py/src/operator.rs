@@ -176,7 +176,8 @@ impl Operator {
     /// low, high : float, optional
     ///     Range of inputs, for a model that is inverted by search (needed there).
     /// tolerance : float, optional
-    ///     How near the search comes to the input; a billionth of the range if not given.
+    ///     How near the search comes to the input; a billionth of the range if not given. Of an activation-function model that is
+    ///     inverted backwards in time: what the preview may miss, of the largest |α u̇|; 1e-9 if not given.
     /// bandwidth_hz : float, optional
     ///     Band in which a model with dynamics is inverted [Hz]; chosen if not given.
     ///

@@ -1,6 +1,6 @@
 //! A fitted model: chain stages with parameters and units, independent of the sample period.
 
-mod activation;
+pub mod activation;
 pub mod capacity;
 mod effects;
 mod elsewhere;

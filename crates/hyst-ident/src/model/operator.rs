@@ -25,6 +25,9 @@ type FullMemory = Exponentials<f64, 40>;
 /// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
 pub(super) const ROOM: f64 = 23.0;
 
+/// What the preview of an activation-function model's inverse may miss, of the largest |α u̇|.
+const PREVIEW_TOLERANCE: f64 = 1e-10;
+
 const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
     "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",
 );
@@ -194,7 +197,7 @@ operators! {
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Activation(Activation<f64>) => HostActivationInverse,
-        |o: &Activation<f64>, _| activation::inverse(o), activation::lead;
+        |o: &Activation<f64>, _| activation::inverse(o, PREVIEW_TOLERANCE), activation::lead;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
 
