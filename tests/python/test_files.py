@@ -34,12 +34,16 @@ def test_an_operator_comes_back_from_its_file(case, tmp_path):
     assert operator.to_json() == path.read_text()
 
 
-@pytest.mark.parametrize("case", [c for c in FILED if c.inverse == {}], ids=lambda c: c.label)
+@pytest.mark.parametrize("case", [c for c in FILED if c.inverse is not None], ids=lambda c: c.label)
 def test_its_inverse_comes_back_too(case):
     model = case.model()
     y = model.simulate(case.u, **case.surroundings)
     operator = model.to_model(**ends(case)).operator(getattr(model, "period", PERIOD))
-    assert np.allclose(operator.compensate(y, **case.surroundings), case.u, rtol=0, atol=1e-9 * np.ptp(case.u))
+    # What a file's inverse leaves to the file and to itself: the inputs of a search and how near it comes.
+    options = {name: x for name, x in case.inverse.items() if name == "bandwidth_hz"}
+    u, own = (x.compensate(y, **case.surroundings, **o) for x, o in ((operator, options), (model, case.inverse)))
+    assert operator.inverse(**options).bandwidth_hz == model.inverse(**case.inverse).bandwidth_hz
+    assert np.allclose(u, own, rtol=0, atol=case.inverse_tolerance * np.ptp(case.u))
 
 
 def test_every_kind_of_file_is_tried():
@@ -112,6 +116,29 @@ def test_ends_that_make_no_file(said, error, message, tmp_path):
         with pytest.raises(error, match=message):
             call(**said)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_electromechanical_model_gives_the_unit_that_its_file_states():
+    case = next(c for c in CASES if c.label == "td-em, plays")
+    metres = np.ptp(hyst.TdEm(**case.parameters, per_metre=1.0).simulate(case.u, **case.surroundings))
+    # Unless told otherwise both are in micrometres.
+    assert case.model().per_metre == 1e6 and case.model().to_model(**ends(case)).output_column == "displacement_um"
+    for per_metre, unit in ((1e6, "um"), (1e9, "nm"), (1e3, "mm")):
+        model, column = hyst.TdEm(**case.parameters, per_metre=per_metre), f"displacement_{unit}"
+        assert np.ptp(model.simulate(case.u, **case.surroundings)) == pytest.approx(per_metre * metres, rel=1e-12)
+        text = model.to_json(**ends(case), output_column=column)
+        assert hyst.Model.loads(text).output_column == column
+        wrong = json.loads(text)
+        wrong["stages"][0]["per_metre"] = 1.0
+        for other in ("um", "nm", "mm"):
+            wrong["output"]["column"] = f"displacement_{other}"
+            with pytest.raises(hyst.ModelFileError, match=r"per_metre must be 1e\d, because the output is in " + other):
+                hyst.Model.loads(json.dumps(wrong))
+            if other != unit:
+                with pytest.raises(hyst.ParameterError, match=f"per_metre must be .* in {other}"):
+                    model.to_model(**ends(case), output_column=f"displacement_{other}")
+        with pytest.raises(hyst.ParameterError, match="output.column must be displacement_um"):
+            model.to_model(**ends(case), output_column="force_n")
 
 
 def test_what_is_no_operator_of_a_class():

@@ -176,7 +176,8 @@ impl Operator {
     /// low, high : float, optional
     ///     Range of inputs, for a model that is inverted by search (needed there).
     /// tolerance : float, optional
-    ///     How near the search comes to the input; a billionth of the range if not given.
+    ///     How near the search comes to the input; a billionth of the range if not given. Of an activation-function model that is
+    ///     inverted backwards in time: what the preview may miss, of the largest |α u̇|; 1e-9 if not given.
     /// bandwidth_hz : float, optional
     ///     Band in which a model with dynamics is inverted [Hz]; chosen if not given.
     ///
@@ -285,7 +286,8 @@ impl Operator {
     /// ModelFileError
     ///     If files do not hold such a variant: a short ``memory``, a ``drifting`` model.
     /// ParameterError
-    ///     If a range is not finite or not in order, or ``input_column`` is no name of an input.
+    ///     If a range is not finite or not in order, ``input_column`` is no name of an input, or ``output_column`` not the
+    ///     unit in which ``TdEm`` gives its output (``per_metre``).
     /// ValueError
     ///     If ``output_column`` is none of those.
     #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]

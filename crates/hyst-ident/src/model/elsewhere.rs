@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hyst_core::{Env, Error, Stage};
 
 use super::operator::ROOM;
-use super::{Base, Channel, Effect, Effects, Model};
+use super::{Base, Channel, Effect, Effects, Model, units};
 use crate::record::{OutputUnit, is_input_column};
 
 /// The two ends of an actuator whose parameters come from elsewhere.
@@ -27,7 +27,8 @@ impl Model {
     /// A model of given parameters, fitted on nothing.
     ///
     /// # Errors
-    /// Names what is no number, out of order or out of range: an end of the actuator, or a parameter of a stage.
+    /// Names what is no number, out of order, out of range or in another unit than the output: an end of the actuator, or a
+    /// parameter of a stage.
     pub fn from_parameters(base: Base, effects: Effects, ends: &Ends) -> Result<Self, Error> {
         let Ends { input: (low, high), output, .. } = *ends;
         if !is_input_column(&ends.input_column) {
@@ -57,6 +58,7 @@ impl Model {
             seed: 0,
             version: env!("CARGO_PKG_VERSION").into(),
         };
+        units::agree(&model.base, &model.output)?;
         let stated = model.stated_degc();
         let (least, most) = match ends.output_range {
             Some(range) => range,

@@ -7,7 +7,7 @@ use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
 
 use super::operator::inverse_ends;
-use super::{Base, Compensator, Effects, HostChain, Operator, stages};
+use super::{Base, Compensator, Effects, HostChain, Operator, stages, units};
 use crate::samples::Samples;
 
 /// Schema of the files that this version writes.
@@ -251,7 +251,8 @@ impl Model {
         let model = Self::from_file(file).map_err(|message| ModelError::Stages { path: path.clone(), message })?;
         // Whatever the sample period, a chain must come of it and every number must be finite.
         let period = 1.0 / model.recorded_at_hz;
-        model.build(period).map_err(|source| ModelError::Parameter { path: path.clone(), source })?;
+        let usable = units::agree(&model.base, &model.output).and_then(|()| model.build(period).map(|_| ()));
+        usable.map_err(|source| ModelError::Parameter { path: path.clone(), source })?;
         for (name, x) in [("zero", model.zero), ("input.low", model.input.low), ("input.high", model.input.high)] {
             if !x.is_finite() {
                 return Err(ModelError::Parameter { path, source: Error::NonFinite(name) });

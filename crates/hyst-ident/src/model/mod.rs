@@ -1,6 +1,6 @@
 //! A fitted model: chain stages with parameters and units, independent of the sample period.
 
-mod activation;
+pub mod activation;
 pub mod capacity;
 mod effects;
 mod elsewhere;
@@ -13,6 +13,6 @@ pub use effects::{CreepBank, Effect, Effects};
 pub use elsewhere::Ends;
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use hyst_core::Kind;
-pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState};
+pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState, searchable};
 
 pub(crate) use effects::Parameter;

@@ -3,9 +3,9 @@
 use super::activation::{self, HostActivationInverse};
 use super::capacity::{CREEP, DELAY, MIRROR, NODES, PLAYS, TAPS};
 use hyst_core::{
-    Activation, BoucWen, BoucWenOscillator, Build, Chain, Dpm, Env, Error, Everett, EverettInverse, Exponentials, Gpi,
-    GpiInverse, Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling, Search, Stage, TdEm,
-    TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
+    Activation, BoucWen, BoucWenOscillator, Build, Chain, Dpm, DpmParams, Env, Error, Everett, EverettInverse,
+    Exponentials, Gpi, GpiInverse, Ifm, IfmInverse, Invert, Lfdm, MaxwellSlip, OperatorParams, Pi, Probe, Sampling,
+    Search, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
 };
 
 /// The hysteresis of a model, as parameters.
@@ -24,6 +24,9 @@ type FullMemory = Exponentials<f64, 40>;
 
 /// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
 pub(super) const ROOM: f64 = 23.0;
+
+/// What the preview of an activation-function model's inverse may miss, of the largest |α u̇|.
+const PREVIEW_TOLERANCE: f64 = 1e-10;
 
 const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
     "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",
@@ -118,6 +121,8 @@ struct Inversion {
     range: [f64; 2],
     /// Band of one with dynamics of its own \[Hz\]; chosen if not given.
     bandwidth_hz: Option<f64>,
+    /// Why a search could end at an output that is not the reference, if it could.
+    searchable: Result<(), Error>,
 }
 /// The inverse of a hysteresis operator of the host.
 #[derive(Clone, Debug)]
@@ -138,7 +143,22 @@ fn closed<O: Invert<f64>>(operator: &O, _: Inversion) -> Result<O::Inverse, Erro
 /// Share of the range to which a search finds the input.
 const TOLERANCE: f64 = 1e-12;
 
+/// Whether a search finds the inverse of a dynamic Preisach model: only where its output is continuous in the input.
+///
+/// # Errors
+/// [`Error::NotInvertible`] for `fade` = 0: no input reaches what lies inside a step, and a search ends beside it without a word.
+pub fn searchable<L>(params: &DpmParams<L>) -> Result<(), Error> {
+    if params.fade > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::NotInvertible(
+            "with dpm.fade = 0 the output steps where loops close, and no input reaches what lies inside a step; set fade above 0",
+        ))
+    }
+}
+
 fn searched<O: Probe<f64> + Clone>(operator: &O, how: Inversion) -> Result<Search<f64, O>, Error> {
+    how.searchable?;
     let [low, high] = how.range;
     Search::new(operator.clone(), low, high, TOLERANCE * (high - low))
 }
@@ -177,7 +197,7 @@ operators! {
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Activation(Activation<f64>) => HostActivationInverse,
-        |o: &Activation<f64>, _| activation::inverse(o), activation::lead;
+        |o: &Activation<f64>, _| activation::inverse(o, PREVIEW_TOLERANCE), activation::lead;
     Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
 }
 
@@ -208,12 +228,35 @@ impl Operator {
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),
         };
-        Ok(Self { any, inversion: Inversion { range: searched_range([low, high]), bandwidth_hz: None } })
+        let searchable = match base {
+            Base::Dpm(p) => searchable(p),
+            _ => Ok(()),
+        };
+        Ok(Self { any, inversion: Inversion { range: searched_range([low, high]), bandwidth_hz: None, searchable } })
     }
 
     /// The same, whose inverse holds in this band if it has dynamics of its own \[Hz\].
     pub fn with_bandwidth(mut self, bandwidth_hz: Option<f64>) -> Self {
         self.inversion.bandwidth_hz = bandwidth_hz;
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use hyst_core::CompensatorOptions;
+
+    #[test]
+    fn a_model_whose_output_steps_has_no_inverse() {
+        let mut model = Model::parse("dpm", include_str!("../../../../docs/models/dpm.json")).unwrap();
+        let inverse = |model: &Model| model.compensator(1e-4, &CompensatorOptions::default()).map(|_| ());
+        assert_eq!(inverse(&model), Ok(()));
+        let Base::Dpm(params) = &mut model.base else { panic!("{:?}", model.base) };
+        params.fade = 0.0;
+        model.build(1e-4).unwrap();
+        let why = inverse(&model).unwrap_err();
+        assert!(matches!(why, Error::NotInvertible(_)) && why.to_string().contains("set fade above 0"), "{why}");
     }
 }

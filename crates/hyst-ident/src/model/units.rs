@@ -1,9 +1,12 @@
-//! The units of a stage's numbers, by their paths in the file.
+//! The units of a stage's numbers, by their paths in the file, and whether they are the model's.
 
 use std::collections::BTreeMap;
 
-use hyst_core::Params;
+use hyst_core::{Error, Params};
 use serde_json::{Map, Value};
+
+use super::{Base, Channel};
+use crate::record::OutputUnit;
 
 /// `unit` with `u` and `y` replaced by the model's own units.
 fn unit(unit: &str, input: &str, output: &str) -> String {
@@ -70,9 +73,28 @@ pub(super) fn of(fields: &Value, params: &mut dyn Params, input: &str, output: &
     units
 }
 
+/// Refuses a base that says itself what unit its output has, if that is not the output's.
+///
+/// # Errors
+/// [`Error::OutOfRange`] with the field and what it must be.
+pub(super) fn agree(base: &Base, output: &Channel) -> Result<(), Error> {
+    let Base::TdEm(p) = base else { return Ok(()) };
+    let (per_metre, must) = match OutputUnit::of_column(&output.column) {
+        Some(OutputUnit::Micrometre) => (1e6, "1e6, because the output is in um"),
+        Some(OutputUnit::Nanometre) => (1e9, "1e9, because the output is in nm"),
+        Some(OutputUnit::Millimetre) => (1e3, "1e3, because the output is in mm"),
+        Some(OutputUnit::Newton) | None => {
+            let must = "displacement_um, displacement_nm or displacement_mm, because td-em gives a displacement";
+            return Err(Error::OutOfRange { name: "output.column", must });
+        }
+    };
+    if p.per_metre == per_metre { Ok(()) } else { Err(Error::OutOfRange { name: "td-em.per_metre", must }) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Effects, Ends, Model};
     use hyst_core::TdEmParams;
     use serde_json::json;
 
@@ -95,5 +117,42 @@ mod tests {
             "damping": "N s/m", "coupling": "N/V, N/(V K), N/(V K^2)", "per_metre": "um/m",
         });
         assert_eq!(units, expected);
+    }
+
+    #[test]
+    fn an_output_in_another_unit_is_named() {
+        let text = include_str!("../../../../docs/models/td-em.json");
+        let Base::TdEm(printed) = Model::parse("td-em", text).unwrap().base else { panic!("{text}") };
+        let model = |per_metre, output| {
+            let ends = Ends {
+                input_column: "voltage_v".into(),
+                input: (-200.0, 200.0),
+                output,
+                output_range: None,
+                rate_hz: 5000.0,
+            };
+            Model::from_parameters(Base::TdEm(TdEmParams { per_metre, ..printed.clone() }), Effects::default(), &ends)
+        };
+        let units = [OutputUnit::Micrometre, OutputUnit::Nanometre, OutputUnit::Millimetre];
+        let sizes = [1e6, 1e9, 1e3];
+        for (unit, size) in units.into_iter().zip(sizes) {
+            let file = model(size, unit).unwrap();
+            assert_eq!(Model::parse("file", &file.to_json()).unwrap(), file);
+            // Metres among them.
+            for other in [1.0, 1e3, 1e6, 1e9, f64::NAN].into_iter().filter(|other| *other != size) {
+                let why = model(other, unit).unwrap_err();
+                assert!(matches!(why, Error::OutOfRange { name: "td-em.per_metre", .. }), "{why}");
+                let Base::TdEm(p) = &file.base else { panic!("{file:?}") };
+                let wrong = Model { base: Base::TdEm(TdEmParams { per_metre: other, ..p.clone() }), ..file.clone() };
+                if other.is_finite() {
+                    let said = Model::parse("file", &wrong.to_json()).unwrap_err().to_string();
+                    let expected =
+                        format!("td-em.per_metre must be {size:e}, because the output is in {}", unit.suffix());
+                    assert!(said.contains(&expected), "{said}");
+                }
+            }
+        }
+        let force = model(1e6, OutputUnit::Newton).unwrap_err();
+        assert!(matches!(force, Error::OutOfRange { name: "output.column", .. }), "{force}");
     }
 }

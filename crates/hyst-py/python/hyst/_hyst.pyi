@@ -225,7 +225,7 @@ class TdEm(Operator):
         psi: _List,
         period: float,
         elasto_slip: bool = False,
-        per_metre: float = 1.0,
+        per_metre: float = 1e6,
         filter_degc: float = 23.0,
     ) -> TdEm: ...
     @property

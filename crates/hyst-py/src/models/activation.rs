@@ -1,21 +1,21 @@
 //! Activation-function models: five functions, one set of parameters.
 
-use hyst_core::{Activation, ActivationKind, ActivationParams, Invert};
-use hyst_ident::model::capacity::REFERENCES;
+use hyst_core::{Activation, ActivationKind, ActivationParams, Either};
+use hyst_ident::model::activation::{inverse, lead};
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::inversion::{Built, Inverted, Options, closed};
+use crate::inversion::{Built, Inverted, Options};
 use crate::model_macro::models;
 
 /// A sample at a time where that is stable, else backwards in time.
 fn activation<P, Q>(built: &Built<'_, P, Q, Activation<f64>>, options: &Options) -> PyResult<Inverted> {
     options.only(&["tolerance"])?;
-    if built.stage.invert().is_ok() {
-        return closed(built, &Options::default());
+    let inverse = inverse(built.stage, options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
+    if let Either::First(_) = inverse {
+        options.only(&[])?;
     }
-    let inverse = built.stage.anti_causal::<REFERENCES>(options.tolerance.unwrap_or(1e-9)).map_err(errors::core)?;
-    let lead = inverse.lead();
+    let lead = lead(&inverse);
     Ok(Inverted::in_band(inverse, lead, None))
 }
 
@@ -25,8 +25,8 @@ macro_rules! activations {
         models! { $(
             #[doc = concat!("Activation-function model ``z = k0·u + α u̇ + β·", $formula, "`` (Xie et al., eq. 2), u̇ the backward difference.")]
             ///
-            /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` of the
-            /// largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
+            /// Inverse: a sample at a time where that is stable; for α < 0 backwards in time with a preview, to within ``tolerance`` (1e-9 if
+            /// not given; only for this one) of the largest |α u̇| while the drive keeps out of the switch at 0 V that a large γ makes.
             class $name {
                 /// Gain [y/u].
                 k0: f64,

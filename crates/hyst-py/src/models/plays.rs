@@ -85,7 +85,8 @@ models! {
     /// ``y = gain·F₀ + Σ weights[i]·Fᵢ``, ``Fᵢ ← max(left(u) − rᵢ, min(right(u) + rᵢ, Fᵢ))``.
     ///
     /// An envelope is ``[slope, offset]`` for ``slope·u + offset`` or ``[height, rate, shift, offset]`` for
-    /// ``height·tanh(rate·u + shift) + offset``. Exact inverse; its drive jumps where the reference turns.
+    /// ``height·tanh(rate·u + shift) + offset``. The inverse is exact along drives with ``left(u) ≤ right(u)``, and misses its
+    /// reference where the envelopes cross; its drive jumps where the reference turns.
     class Gpi {
         /// Weight of the play of radius 0 [y per unit of the envelope].
         gain: f64,
@@ -113,7 +114,8 @@ models! {
     /// ``epsilon·exp(eta·(T − t0))·exp(−tau·alpha·i)``, i = 0 … n, plays between the envelopes ``a0·u + a1`` (rising) and
     /// ``b0·u + b1`` (falling). Needs ``temperature`` [°C].
     ///
-    /// Exact inverse, also while the temperature changes; its drive jumps where the reference turns.
+    /// Exact inverse, also while the temperature changes, along drives with ``a0·u + a1 ≤ b0·u + b1``; its drive jumps where the
+    /// reference turns.
     class TdPi {
         /// Spacing of the thresholds [unit of the envelope].
         alpha: f64,

@@ -2,7 +2,9 @@
 
 use hyst_core::{Build, DpmParams, Error, Everett, MirrorParams, PreisachParams, Sampling};
 use hyst_ident::model::capacity::{MIRROR, NODES};
+use hyst_ident::model::searchable;
 
+use crate::errors;
 use crate::inversion::{closed, search};
 use crate::keep::{Keep, Kept};
 use crate::model_macro::models;
@@ -40,6 +42,18 @@ impl Build<HostDpm> for EitherForm {
     fn build(&self, cx: &Sampling) -> Result<HostDpm, Error> {
         let model: HostDpm = self.params.build(cx)?;
         Ok(if self.drifting { model.drifting() } else { model })
+    }
+}
+
+impl EitherForm {
+    /// Whether a search finds the inverse.
+    fn searchable(&self) -> Result<(), Error> {
+        if self.drifting {
+            return Err(Error::NotInvertible(
+                "the drifting recursion jumps where the input turns; leave drifting= out and set fade above 0",
+            ));
+        }
+        searchable(&self.params)
     }
 }
 
@@ -82,8 +96,8 @@ models! {
     /// and change P, bilinear on a uniform grid, 1 at D = 0 and clamped beyond the other edges.
     ///
     /// With ``fade = 0`` the stack form as printed, which steps where loops close; with ``fade > 0`` the steps fade with that travel
-    /// of the input, and the output is continuous. ``drifting`` is the recursion of eq. 17, which drifts. Inverse by search
-    /// (``fade > 0``): give ``low`` and ``high``.
+    /// of the input, and the output is continuous. ``drifting`` is the recursion of eq. 17, which drifts. Inverse by search: give
+    /// ``low`` and ``high``. Only with ``fade > 0`` and without ``drifting``: inside a step there is nothing to find.
     class Dpm {
         /// Lowest input of the Preisach grid [u].
         low: f64,
@@ -131,6 +145,9 @@ models! {
     },
     stage: HostDpm,
     period: |p| p.period,
-    inverse: search,
+    inverse: |built, options| {
+        built.params.searchable().map_err(errors::core)?;
+        search(built, options)
+    },
     needs: [],
 }

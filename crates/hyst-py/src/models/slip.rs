@@ -33,7 +33,8 @@ models! {
     /// Temperature-dependent electromechanical model: a Maxwell-slip bank gives the current that charges C ∥ R; the voltage
     /// drives a mass on a spring through the coupling ``ψ(T)``. Needs ``temperature`` [°C].
     ///
-    /// The linear part is exact for a current that is linear between samples. Inverse: band-limited with preview, then exact.
+    /// The output is in µm unless ``per_metre`` says otherwise, in the unit that ``save`` states too. The linear part is exact
+    /// for a current that is linear between samples. Inverse: band-limited with preview, then exact.
     class TdEm {
         /// Widths of the slip elements [u], shape (n,), n ≤ 64.
         widths: Vec<f64>,
@@ -55,8 +56,8 @@ models! {
         period: f64,
         /// Whether an element is a spring that slips; a backlash, as the paper's numbers ask for, if not.
         elasto_slip: bool = false,
-        /// Output units in a metre: 1e6 for µm.
-        per_metre: f64 = 1.0,
+        /// Output units in a metre: 1e6 for µm, 1e9 for nm, 1e3 for mm, 1 for m (of which there are no files).
+        per_metre: f64 = 1e6,
         /// Temperature for which the inverse's filter is made [°C]; its gain follows the given one.
         filter_degc: f64 = 23.0,
     }
