@@ -20,6 +20,7 @@ pub mod metrics;
 pub mod model;
 mod nested;
 mod noise;
+pub mod optimize;
 pub mod record;
 mod samples;
 mod settle;
