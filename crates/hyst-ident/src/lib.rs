@@ -9,6 +9,7 @@
 
 pub mod atomic_file;
 mod base;
+pub mod batch;
 pub mod compensate;
 pub mod diagnose;
 pub mod excite;
