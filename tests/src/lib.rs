@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 /// A simulated actuator with hysteresis and a lag, quick to simulate: 0 to 100 V, about 20 µm.
@@ -281,4 +281,28 @@ pub fn experiment(plant: &mut hyst_hw::Plant, seed: u64, name: &str) -> hyst_ide
         ..Columns::default()
     };
     Record::from_samples(columns).expect("a recording is a sound record")
+}
+
+/// The text of a model file with every stage that there is around its hysteresis, in the chain's order.
+///
+/// # Panics
+/// When it is no model file.
+pub fn every_stage(model: &str) -> String {
+    let mut model: Value = serde_json::from_str(model).expect("a model file is JSON");
+    let stages = model["stages"].as_array_mut().expect("a model file has stages");
+    let before = [json!({ "stage": "delay", "seconds": 0.002 }), json!({ "stage": "lag", "seconds": 0.001 })];
+    let after = [
+        json!({ "stage": "asymmetry", "thresholds": [5.0], "weights": [0.02] }),
+        json!({ "stage": "temperature", "per_kelvin": 0.004, "reference_degc": 23.0 }),
+        json!({ "stage": "creep", "seconds": [0.1, 1.0], "shares": [0.01, 0.02] }),
+        json!({ "stage": "load", "per_newton": 0.05 }),
+        json!({ "stage": "resonance", "hz": 90.0, "damping": 0.03, "gain": 1.0 }),
+        json!({ "stage": "resonance", "hz": 250.0, "damping": 0.01, "gain": 0.2 }),
+        json!({ "stage": "saturation", "low": -100.0, "high": 100.0, "knee": 0.1 }),
+        json!({ "stage": "drift", "per_second": 0.01 }),
+        json!({ "stage": "interference", "hz": 50.0, "amplitude": 0.02, "phase": 0.5 }),
+    ];
+    stages.splice(0..0, before);
+    stages.extend(after);
+    model.to_string()
 }

@@ -1,22 +1,33 @@
 //! `export`: what it writes is read by firmware, by a C compiler and by rustc.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use hyst_core::{Build, Kind, List, OperatorParams, Pi, Sampling, read_block};
-use hyst_tests::{Lab, root};
+use hyst_tests::{Lab, every_stage, root};
 
+/// A fitted model with every stage around it.
 fn lab() -> Lab {
     let lab = Lab::with_model();
-    let model = lab.read("model.json");
-    // Stages that no fit adds: a list, an option, a second mode.
-    let extra = r#""stages": [
-    {"stage": "creep", "seconds": [0.1, 1.0], "shares": [0.01, 0.02]},
-    {"stage": "resonance", "hz": 90.0, "damping": 0.03, "gain": 1.0},
-    {"stage": "resonance", "hz": 250.0, "damping": 0.01, "gain": 0.2},
-    {"stage": "asymmetry", "thresholds": [5.0], "weights": [0.02]},"#;
-    lab.write("model.json", model.replacen("\"stages\": [", extra, 1));
+    lab.write("model.json", every_stage(&lab.read("model.json")));
     lab
+}
+
+/// The file of a paper's numbers.
+fn paper(kind: Kind) -> Vec<u8> {
+    std::fs::read(root().join(format!("docs/models/{kind}.json"))).unwrap()
+}
+
+/// Compiles C files of the folder as strictly as the headers promise; `None` where there is no compiler.
+fn cc(lab: &Lab, arguments: &[&str]) -> Option<Output> {
+    let strict = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"];
+    match Command::new("cc").args(strict).args(arguments).current_dir(lab.path("")).output() {
+        Ok(out) => Some(out),
+        Err(error) => {
+            println!("skipped: cc cannot be run: {error}");
+            None
+        }
+    }
 }
 
 fn run(program: &str, folder: &Path, arguments: &[&str]) -> String {
@@ -55,25 +66,102 @@ fn a_c_compiler_takes_the_header() {
          printf(\"%s %c%c%c%c %.17g\\n\", HYST_KIND, hyst_block[0], hyst_block[1], hyst_block[2], hyst_block[3], \
          hyst_resonance_hz + hyst_resonance_2_hz);\n return 0;\n}\n",
     );
-    let folder = lab.path("");
-    run(
-        "cc",
-        &folder,
+    // Nobody uses every constant.
+    let unused = ["-Wno-unused-const-variable", "-Wno-unused-variable"];
+    let Some(out) = cc(&lab, &[&unused[..], &["main.c", "-o", "main"]].concat()) else { return };
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let said = run(lab.path("main").to_str().unwrap(), &lab.path(""), &[]);
+    assert_eq!(said, "pi HYST 340\n", "{}", lab.read("model.h"));
+}
+
+/// Every constant says its unit, of a fitted model with every stage and of every kind.
+#[test]
+fn constants_in_c_have_their_units() {
+    let lab = lab();
+    let mut seen = 0;
+    let mut look = |model: &str, some: &[&str]| {
+        lab.ok(&format!("export {model} --format c -o {model}.h"));
+        let header = lab.read(&format!("{model}.h"));
+        for line in header.lines() {
+            let number = line.starts_with("static const double")
+                || line.strip_prefix("#define hyst_").is_some_and(|rest| {
+                    let (name, value) = rest.split_once(' ').unwrap();
+                    !name.ends_with("_length") && !value.starts_with('"')
+                });
+            if number {
+                let unit = line.split_once(" /* ").and_then(|(_, unit)| unit.strip_suffix(" */"));
+                assert!(unit.is_some_and(|unit| !unit.is_empty()), "{model}: {line}");
+                seen += 1;
+            }
+        }
+        for line in some {
+            assert!(header.lines().any(|l| l == *line), "{model}: no {line:?} in\n{header}");
+        }
+    };
+    look(
+        "model.json",
         &[
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-pedantic",
-            "-Wno-unused-const-variable",
-            "-Wno-unused-variable",
-            "-Werror",
-            "main.c",
-            "-o",
-            "main",
+            "static const double hyst_lag_seconds = 0.001; /* s */",
+            "static const double hyst_creep_shares[2] = {0.01, 0.02}; /* 1 */",
+            "static const double hyst_resonance_2_hz = 250.0; /* Hz */",
+            "static const double hyst_temperature_reference_degc = 23.0; /* degC */",
+            "static const double hyst_load_per_newton = 0.05; /* um/N */",
         ],
     );
-    let said = run(lab.path("main").to_str().unwrap(), &folder, &[]);
-    assert_eq!(said, "pi HYST 340\n", "{}", lab.read("model.h"));
+    for kind in Kind::ALL {
+        let some = match kind {
+            Kind::Gpi => "static const double hyst_gpi_left_linear_slope = 1.0; /* 1/V */",
+            Kind::Dpm => "#define hyst_dpm_preisach_cells 8 /* 1 */",
+            Kind::TdEm => {
+                "static const double hyst_td_em_coupling[3] = {0.000883, -1.466e-5, 3.477e-7}; /* N/V, N/(V K), N/(V K^2) */"
+            }
+            Kind::TdPi => "static const double hyst_td_pi_eta = 0.0091; /* 1/K */",
+            _ => "/* What hyst_core::read_block reads. */",
+        };
+        lab.write(kind.name(), paper(kind));
+        look(kind.name(), &[some]);
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+#[test]
+fn a_c_program_can_have_two_models() {
+    let lab = lab();
+    lab.write("tube.json", paper(Kind::TdEm));
+    lab.ok("export model.json --format c -o model.h");
+    lab.ok("export tube.json --format c --name x-axis -o tube.h");
+    let header = lab.read("tube.h");
+    assert!(!header.replace("hyst_core", "").to_lowercase().contains("hyst_"), "{header}");
+    let main = "int main(void) { return x_axis_block[0] == hyst_block[0] && sizeof X_AXIS_KIND == 6 \
+                && x_axis_td_em_coupling_length == 3 && hyst_input_low <= x_axis_input_high ? 0 : 1; }\n";
+    let program = |headers: &[&str]| {
+        let lines: String = headers.iter().map(|name| format!("#include \"{name}\"\n")).collect();
+        lab.write("main.c", lines + main);
+        cc(&lab, &["main.c", "-o", "main"])
+    };
+    // A header that comes twice is nothing new.
+    let Some(out) = program(&["model.h", "tube.h", "model.h"]) else { return };
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    run(lab.path("main").to_str().unwrap(), &lab.path(""), &[]);
+    // Two models with one name would be the first of them, twice.
+    lab.ok("export tube.json --format c -o other.h");
+    let out = program(&["model.h", "tube.h", "other.h"]).unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(!out.status.success() && said.contains("two models are called hyst"), "{said}");
+}
+
+#[test]
+fn a_name_that_means_nothing_is_refused() {
+    let lab = Lab::new();
+    lab.write("tube.json", paper(Kind::TdEm));
+    for name in ["2nd", "_x", "é", "--"] {
+        let message = lab.refuses(&format!("export tube.json --format c --name={name} -o tube.h"), 2);
+        assert!(message.contains("--name") && message.contains("letter"), "{message}");
+    }
+    for format in ["rust", "postcard"] {
+        let message = lab.refuses(&format!("export tube.json --format {format} --name tube -o tube.out"), 2);
+        assert!(message.contains("--name") && message.contains("--format c"), "{message}");
+    }
 }
 
 /// Every kind of model, and one with all that surrounds it, as a program for a board that runs it.
@@ -84,8 +172,7 @@ fn rustc_takes_the_source() {
     let mut modules = vec!["fitted".to_owned()];
     for kind in Kind::ALL {
         let module = kind.name().replace('-', "_");
-        let file = root().join(format!("docs/models/{kind}.json"));
-        lab.write("paper.json", std::fs::read(file).unwrap());
+        lab.write("paper.json", paper(kind));
         lab.ok(&format!("export paper.json --format rust -o {module}.rs"));
         modules.push(module);
     }

@@ -44,6 +44,8 @@ fn from_a_drive_to_a_record_that_is_fitted() {
     assert_eq!(record.lines().next(), Some("segment,time_s,voltage_v,displacement_um"));
     assert_eq!(column(&drive, "voltage_v"), column(&record, "voltage_v"));
     assert_eq!(column(&drive, "segment"), column(&record, "segment"));
+    // What was sent at time 0 is reached and measured one period later; no row is lost over that.
+    assert_eq!((column(&drive, "time_s")[0], column(&record, "time_s")[0]), (0.0, 0.002));
     lab.ok("fit train.csv --model preisach -o model.json");
 
     let samples = log(&lab, "run.mcap");
@@ -116,6 +118,24 @@ fn a_measured_temperature_is_followed() {
     assert!(lab.read("out.csv").lines().next().unwrap().contains("temperature_degc"));
     let rmse = |report: &Value| report["tracking"]["rmse"].as_f64().unwrap();
     assert!(rmse(&warm) < 0.7 * rmse(&plain), "{} {}", rmse(&warm), rmse(&plain));
+}
+
+#[test]
+fn a_constant_temperature_serves_where_none_is_measured() {
+    let lab = Lab::with_train(WARM);
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    lab.reference("reference.csv", 1.0, 12.0);
+    lab.write("blind.toml", hyst_tests::PLANT);
+    let follow = "run --daq sim:blind.toml --model extended.json --reference reference.csv --record out.csv";
+    let message = lab.refuses(follow, 2);
+    assert!(message.contains("temperature_degc") && message.contains("--temperature"), "{message}");
+    let report = lab.ok(&format!("{follow} --temperature 19.5 --json")).json();
+    assert_eq!(report["temperature_followed"], false);
+    lab.ok("compensate --model extended.json reference.csv --temperature 19.5 -o drive.csv --limit 0,100");
+    assert_eq!(column(&lab.read("out.csv"), "voltage_v"), column(&lab.read("drive.csv"), "voltage_v"));
+    let message = lab.refuses("run --daq sim:blind.toml --drive u.csv --record out.csv --temperature 20", 2);
+    assert!(message.contains("--temperature needs --model"), "{message}");
 }
 
 #[test]

@@ -114,11 +114,67 @@ fn a_model_with_temperature_needs_one() {
     lab.ok("simulate --model extended.json train.csv -o out.csv");
     lab.write("cold.csv", without_last_column(&lab.read("train.csv")));
     let message = lab.refuses("simulate --model extended.json cold.csv -o cold-out.csv", 2);
-    assert!(message.contains("temperature_degc") && message.contains("cold.csv"), "{message}");
+    for part in ["temperature_degc", "cold.csv", "--temperature"] {
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
     lab.reference("reference.csv", 1.0, 12.0);
     let message = lab.refuses("compensate --model extended.json reference.csv -o drive.csv", 2);
     assert!(message.contains("temperature_degc"), "{message}");
     lab.ok("compensate --model extended.json reference.csv --temperature 23.5 -o drive.csv");
+}
+
+#[test]
+fn a_constant_temperature_stands_for_a_column() {
+    let lab = Lab::with_train(WARM);
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    let cold = without_last_column(&lab.read("train.csv"));
+    let with = |degc: &str| {
+        let column = |(k, line): (usize, &str)| format!("{line},{}", if k == 0 { "temperature_degc" } else { degc });
+        cold.lines().enumerate().map(column).collect::<Vec<_>>().join("\n")
+    };
+    lab.write("cold.csv", &cold);
+    lab.write("column.csv", with("19.5"));
+    let predicted = |line: &str| {
+        lab.ok(&format!("simulate --model extended.json {line} -o out.csv"));
+        column(&lab.read("out.csv"), "predicted_um")
+    };
+    let given = predicted("cold.csv --temperature 19.5");
+    assert_eq!(
+        lab.read("out.csv").lines().next(),
+        Some("segment,time_s,voltage_v,displacement_um,predicted_um,settling")
+    );
+    assert_eq!(given, predicted("column.csv"));
+    assert_ne!(given, predicted("cold.csv --temperature -3"));
+    // What has a column of its own keeps it, and that is said.
+    let ran = lab.ok("simulate --model extended.json column.csv --temperature 30 -o out.csv");
+    assert!(ran.stderr.contains("column.csv has temperature_degc"), "{}", ran.stderr);
+    assert_eq!(column(&lab.read("out.csv"), "predicted_um"), given);
+    let ran = lab.ok("simulate --model model.json cold.csv --temperature 30 -o out.csv");
+    assert!(ran.stderr.contains("does not depend on temperature"), "{}", ran.stderr);
+    lab.refuses("simulate --model extended.json cold.csv -o out2.csv --temperature warm", 2);
+}
+
+#[test]
+fn inputs_beyond_the_models_range_are_reported() {
+    let lab = Lab::with_model();
+    let within = lab.ok("simulate --model model.json train.csv -o out.csv");
+    assert!(!within.stderr.contains("warning"), "{}", within.stderr);
+    lab.ok("excite sine --rate 500 --low -20 --high 130 --cycles 1 -o far.csv");
+    let model: serde_json::Value = serde_json::from_str(&lab.read("model.json")).unwrap();
+    let end = |end: &str| model["input"][end].as_f64().unwrap();
+    let beyond: Vec<f64> = column(&lab.read("far.csv"), "voltage_v")
+        .iter()
+        .map(|u| (u - end("high")).max(end("low") - u))
+        .filter(|beyond| *beyond > 0.0)
+        .collect();
+    let largest = beyond.iter().copied().fold(0.0, f64::max);
+    assert!(largest > 29.0 && beyond.len() > 100, "{largest} {}", beyond.len());
+    let ran = lab.ok("simulate --model model.json far.csv -o out.csv --json");
+    let said = format!("warning: in {} rows the input lies beyond 0 to 100.0 V", beyond.len());
+    assert!(ran.stderr.contains(&said), "{}", ran.stderr);
+    let report = &ran.json()["extrapolated"];
+    assert_eq!((report["rows"].as_u64(), report["largest"].as_f64()), (Some(beyond.len() as u64), Some(largest)));
 }
 
 fn without_last_column(csv: &str) -> String {

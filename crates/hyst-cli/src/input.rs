@@ -7,7 +7,9 @@ use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
 
+use crate::cli::TemperatureArg;
 use crate::exit::{CommandError, CommandResult, Exit};
+use crate::output::say;
 
 /// The records of all files, joined to one.
 pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Record> {
@@ -37,6 +39,17 @@ pub(crate) fn output_unit(model: &Model) -> CommandResult<OutputUnit> {
         );
         CommandError::bad_input(message)
     })
+}
+
+/// The constant temperature of the command line \[°C\]; says so where it has no effect.
+pub(crate) fn temperature(given: TemperatureArg, model: &Model, record: &Record) -> Option<f64> {
+    let degc = given.degc?;
+    if !model.needs_temperature() {
+        say("note: the model does not depend on temperature; --temperature has no effect");
+    } else if record.temperature().is_some() {
+        say(&format!("note: {} has temperature_degc; --temperature has no effect", record.name()));
+    }
+    Some(degc)
 }
 
 /// The simulated plant that a file describes.

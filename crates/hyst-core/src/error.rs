@@ -58,6 +58,26 @@ impl fmt::Display for Error {
 
 impl core::error::Error for Error {}
 
+impl Error {
+    /// The error of a part in the words of the model that has the part: every pair is the part's own word and what the
+    /// model's file calls it, `("preisach.low", "dpm.preisach.low")`. What is in no pair stays.
+    ///
+    /// For a part with many words: comparing them costs flash. Of few, a `match` where the part is built costs none, because the compiler
+    /// knows there which errors can come.
+    #[cold]
+    pub(crate) fn in_words(self, words: &[(&'static str, &'static str)]) -> Self {
+        let say = |own| words.iter().find(|(part, _)| *part == own).map_or(own, |(_, whole)| *whole);
+        match self {
+            Self::NonFinite(name) => Self::NonFinite(say(name)),
+            Self::OutOfRange { name, must } => Self::OutOfRange { name: say(name), must: say(must) },
+            Self::Capacity { name, needed, holds } => Self::Capacity { name: say(name), needed, holds },
+            Self::Node { name, alpha, beta, must } => Self::Node { name: say(name), alpha, beta, must },
+            Self::Lengths(names) => Self::Lengths(say(names)),
+            Self::NotInvertible(why) => Self::NotInvertible(why),
+        }
+    }
+}
+
 /// Refuses NaN and infinities, naming the parameter.
 pub(crate) fn finite(name: &'static str, x: f64) -> Result<f64, Error> {
     if x.is_finite() { Ok(x) } else { Err(Error::NonFinite(name)) }

@@ -132,7 +132,7 @@ pub trait Build<C> {
 /// What an optimiser, a report or a form has to know of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
-    /// Name within its stage.
+    /// Path within its stage, as the files have it: `gain`, `slip.widths`. All elements of a list have the list's.
     pub name: &'static str,
     /// Unit; `u` stands for the input's unit, `y` for the output's, the empty string for a ratio: `y/u`, `u s`, `1/K`.
     pub unit: &'static str,

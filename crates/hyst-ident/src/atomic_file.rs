@@ -29,10 +29,33 @@ pub fn write_atomic(
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), AtomicFileError> {
     let path = path.as_ref();
-    replace(path, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path, Older::Replaced, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
 }
 
-fn replace(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+/// As [`write_atomic`], but nothing that is there already is replaced.
+///
+/// # Errors
+/// As [`write_atomic`], and with [`AlreadyExists`](io::ErrorKind::AlreadyExists) when there is something at `path`.
+pub fn create_atomic(
+    path: impl AsRef<Path>,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), AtomicFileError> {
+    let path = path.as_ref();
+    put(path, Older::Kept, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
+/// What becomes of an older file.
+#[derive(Clone, Copy, PartialEq)]
+enum Older {
+    Replaced,
+    Kept,
+}
+
+fn put(path: &Path, older: Older, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    // A link that leads nowhere is something, too.
+    if older == Older::Kept && path.symlink_metadata().is_ok() {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
     // Of the target, if there is one: the temporary file has to lie beside what it replaces.
     let target = match path.canonicalize() {
         Ok(target) => target,
@@ -69,7 +92,12 @@ fn replace(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
         temporary.as_file().set_permissions(metadata.permissions())?;
     }
     temporary.as_file().sync_all()?;
-    temporary.persist(&target).map_err(|error| error.error)?;
+    let named = match older {
+        Older::Replaced => temporary.persist(&target),
+        // Somebody else may have made one meanwhile.
+        Older::Kept => temporary.persist_noclobber(&target),
+    };
+    named.map_err(|error| error.error)?;
     Ok(())
 }
 
@@ -129,6 +157,23 @@ mod tests {
         assert!(message.contains("out.csv") && message.contains("the model diverged"), "{message}");
         assert_eq!(fs::read_to_string(&path).unwrap(), "older");
         assert_eq!(names(folder.path()), ["out.csv"]);
+    }
+
+    #[test]
+    fn what_is_created_replaces_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.json");
+        create_atomic(&path, |out| out.write_all(b"first")).unwrap();
+        let refused = |path: &Path| create_atomic(path, |out| out.write_all(b"second")).unwrap_err().source.kind();
+        assert_eq!(refused(&path), io::ErrorKind::AlreadyExists);
+        assert_eq!(refused(folder.path()), io::ErrorKind::AlreadyExists);
+        // One that appears while the content is written is kept as well.
+        let late = folder.path().join("late.json");
+        let error = create_atomic(&late, |_| fs::write(&late, "theirs")).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "first");
+        assert_eq!(fs::read_to_string(&late).unwrap(), "theirs");
+        assert_eq!(names(folder.path()), ["late.json", "model.json"]);
     }
 
     #[test]

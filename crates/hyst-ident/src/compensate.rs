@@ -6,7 +6,7 @@ use std::ops::Range;
 use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Sampling, Stage};
 
 use crate::model::capacity::{CREEP, TAPS};
-use crate::model::{Compensator, Effect, InverseState, Model};
+use crate::model::{Compensator, InverseState, Model};
 use crate::record::Record;
 use crate::samples::Samples;
 
@@ -127,7 +127,7 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
 /// The model driven as it would drive the actuator.
 fn missed(model: &Model, follower: &Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
     let samples = &follower.samples;
-    let chain = Box::new(without_sensor(model).build(samples.period)?);
+    let chain = Box::new(model.without_sensor().build(samples.period)?);
     let mut state = Box::new(chain.state());
     let mut missed = Missed::default();
     let mut sum = 0.0;
@@ -147,12 +147,6 @@ fn missed(model: &Model, follower: &Follower, drive: &[f64]) -> Result<Missed, C
     Ok(missed)
 }
 
-/// The model without what is in the sensor only: a drive does not follow that.
-fn without_sensor(model: &Model) -> Model {
-    let effects = model.effects.without(Effect::Drift).without(Effect::Interference);
-    Model { effects, ..model.clone() }
-}
-
 /// Compensation sample by sample: for a device whose temperature is only known when it runs.
 #[derive(Debug)]
 pub struct Follower {
@@ -160,7 +154,6 @@ pub struct Follower {
     state: Box<State>,
     limits: Limits<f64>,
     samples: Samples,
-    temperature: Option<f64>,
     row: usize,
     segment: usize,
     before: f64,
@@ -174,15 +167,14 @@ impl Follower {
     /// # Errors
     /// See [`CompensateError`].
     pub fn new(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Self, CompensateError> {
-        let samples = Samples::from_record(reference);
+        let samples = Samples::from_record(reference).at_temperature(options.temperature);
         check(model, reference, &samples, options)?;
         let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
         let compensator = Box::new(model.compensator(samples.period, &own)?);
         let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
         let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
         let state = Box::new(compensator.state());
-        let temperature = options.temperature;
-        Ok(Self { compensator, state, limits, samples, temperature, row: 0, segment: 0, before: 0.0 })
+        Ok(Self { compensator, state, limits, samples, row: 0, segment: 0, before: 0.0 })
     }
 
     /// Segments of the reference.
@@ -208,8 +200,6 @@ impl Follower {
         let mut env = self.samples.env(row);
         if let Some(t) = temperature {
             env.temperature = t;
-        } else if self.samples.temperature.is_none() {
-            env.temperature = self.temperature.unwrap_or_default();
         }
         env
     }
@@ -248,23 +238,6 @@ impl Follower {
     }
 }
 
-/// Lowest and highest output: what the training record reached, and what the model itself says of rest and
-/// of full drive at the temperatures of the reference.
-fn reach(model: &Model, range: [f64; 2], degc: [f64; 2]) -> Result<(f64, f64), hyst_core::Error> {
-    // Settled: the sample period does not matter there.
-    let chain = Box::new(without_sensor(model).build(1.0 / model.recorded_at_hz)?);
-    let mut state = Box::new(chain.state());
-    let mut reach = (model.output.low, model.output.high);
-    for temperature in degc {
-        let env = Env { temperature, ..Env::default() };
-        for u in range {
-            let y = chain.reset(&mut state, &env, u);
-            reach = (reach.0.min(y), reach.1.max(y));
-        }
-    }
-    Ok(reach)
-}
-
 fn check(
     model: &Model,
     reference: &Record,
@@ -280,19 +253,18 @@ fn check(
             "the reference must be in the output that the model was fitted to; use --map if it has another name",
         );
     }
-    if model.needs_temperature() && reference.temperature().is_none() && options.temperature.is_none() {
-        return missing("temperature_degc", "the model's gain depends on it");
+    if let Some((column, why)) = model.lacking(samples) {
+        return missing(column, why);
     }
-    if model.needs_load() && reference.load().is_none() {
-        return missing("load_n", "the model yields under it");
-    }
-    let room = options.temperature.unwrap_or(23.0);
+    // A model that needs none is not moved by it.
     let (coldest, warmest) =
-        samples.temperature.as_ref().map_or((room, room), |t| crate::samples::range(t.iter().copied()));
+        samples.temperature.as_ref().map_or((0.0, 0.0), |t| crate::samples::range(t.iter().copied()));
     // Limits that are wider than the record let the model say what lies there.
     let range = options.voltage.unwrap_or((model.input.low, model.input.high));
     let range = [range.0.min(model.input.low), range.1.max(model.input.high)];
-    let (low, high) = reach(model, range, [coldest, warmest])?;
+    // What the training record reached, and what the model itself says of rest and of full drive.
+    let (least, most) = model.at_rest(range, [coldest, warmest])?;
+    let (low, high) = (least.min(model.output.low), most.max(model.output.high));
     let margin = MARGIN * (high - low);
     match samples.output.iter().position(|y| *y < low - margin || *y > high + margin) {
         Some(row) => Err(CompensateError::OutOfReach {

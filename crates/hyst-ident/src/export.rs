@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::fmt::Write as _;
+use std::str::FromStr;
 
 use hyst_core::{BlockError, ChainParams, write_block};
 use serde::{Deserialize, Serialize};
@@ -147,16 +148,44 @@ pub fn rust(model: &Model) -> String {
     )
 }
 
-/// A C99 header: the block of bytes, and every parameter as a constant with its unit.
+/// What the symbols of a C header begin with; its macros have it in capitals.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CName(String);
+
+impl Default for CName {
+    /// `hyst`.
+    fn default() -> Self {
+        Self("hyst".into())
+    }
+}
+
+impl FromStr for CName {
+    type Err = String;
+
+    /// What no C identifier may have becomes `_`.
+    fn from_str(name: &str) -> Result<Self, String> {
+        // The language keeps identifiers that begin with `_` for itself.
+        if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            return Err("symbols in C begin with it: begin with a letter from a to z, as in x_axis".into());
+        }
+        Ok(Self(identifier(name)))
+    }
+}
+
+/// A C99 header: the block of bytes, and every parameter as a constant with its unit. A program can have the headers of many models,
+/// each with a name of its own; of two with the same name the compiler refuses the second.
 ///
 /// # Errors
 /// As [`block`].
-pub fn c(model: &Model) -> Result<String, BlockError> {
+pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     let bytes = block(model)?;
+    let macros = name.to_ascii_uppercase();
+    // The block's own check sum tells two models apart.
+    let sum: String = bytes.iter().rev().take(4).map(|byte| format!("{byte:02x}")).collect();
     let mut text = format!(
-        "/* Written by hystctl {}. {} */\n#ifndef HYST_MODEL_H\n#define HYST_MODEL_H\n\n#include <stdint.h>\n\n\
-         #define HYST_KIND \"{}\"\n\n/* What hyst_core::read_block reads. */\n\
-         static const uint8_t hyst_block[{}] = {{",
+        "/* Written by hystctl {}. {} */\n#ifndef {macros}_MODEL_H\n#define {macros}_MODEL_H\n#define {macros}_MODEL_SUM 0x{sum}u\n\n\
+         #include <stdint.h>\n\n#define {macros}_KIND \"{}\"\n\n/* What hyst_core::read_block reads. */\n\
+         static const uint8_t {name}_block[{}] = {{",
         env!("CARGO_PKG_VERSION"),
         origin(model),
         model.base.kind(),
@@ -167,23 +196,26 @@ pub fn c(model: &Model) -> Result<String, BlockError> {
     }
     text += "\n};\n";
     let (input, output) = (harmless(&model.input.unit), harmless(&model.output.unit));
-    let _ = writeln!(text, "\nstatic const double hyst_zero = {:?}; /* {output} */", model.zero);
-    let _ = writeln!(text, "static const double hyst_input_low = {:?}; /* {input} */", model.input.low);
-    let _ = writeln!(text, "static const double hyst_input_high = {:?}; /* {input} */", model.input.high);
+    let _ = writeln!(text, "\nstatic const double {name}_zero = {:?}; /* {output} */", model.zero);
+    let _ = writeln!(text, "static const double {name}_input_low = {:?}; /* {input} */", model.input.low);
+    let _ = writeln!(text, "static const double {name}_input_high = {:?}; /* {input} */", model.input.high);
     let mut modes = 0;
     for stage in model.stages() {
         let Value::Object(mut stage) = stage else { continue };
-        let name = stage.remove("stage").and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+        let title = stage.remove("stage").and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
         let units = stage.remove("units").unwrap_or_default();
         stage.remove("std_errors");
-        let _ = writeln!(text, "\n/* {name} */");
-        modes += usize::from(name == "resonance");
+        let _ = writeln!(text, "\n/* {title} */");
+        modes += usize::from(title == "resonance");
         // A second mode must not have the names of the first.
-        let second = if name == "resonance" && modes > 1 { format!("_{modes}") } else { String::new() };
-        let prefix = format!("hyst_{}{second}", identifier(&name));
+        let second = if title == "resonance" && modes > 1 { format!("_{modes}") } else { String::new() };
+        let prefix = format!("{name}_{}{second}", identifier(&title));
         constants(&mut text, &prefix, "", &Value::Object(stage), &units);
     }
-    text += "\n#endif\n";
+    let _ = write!(
+        text,
+        "\n#elif {macros}_MODEL_SUM != 0x{sum}u\n#error \"two models are called {name}: export one of them with --name\"\n#endif\n"
+    );
     Ok(text)
 }
 
@@ -221,7 +253,7 @@ fn constants(text: &mut String, prefix: &str, path: &str, value: &Value, units: 
             let _ = writeln!(text, "static const double {prefix} = {};{}", number(value), unit());
         }
         Value::Number(n) => {
-            let _ = writeln!(text, "#define {prefix} {n}");
+            let _ = writeln!(text, "#define {prefix} {n}{}", unit());
         }
         Value::Bool(_) | Value::Null => {}
     }

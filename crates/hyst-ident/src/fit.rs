@@ -335,7 +335,7 @@ fn fitted_on(record: &Record, samples: &Samples) -> Vec<FittedOn> {
 }
 
 /// The unit at the end of a column's name, as a person writes it.
-fn unit_of(column: &str) -> String {
+pub(crate) fn unit_of(column: &str) -> String {
     match column.rsplit('_').next() {
         Some("v") => "V".into(),
         Some("n") => "N".into(),

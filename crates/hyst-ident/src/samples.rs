@@ -45,6 +45,14 @@ impl Samples {
         }
     }
 
+    /// The same, at a constant temperature \[°C\] where none was recorded.
+    pub fn at_temperature(mut self, degc: Option<f64>) -> Self {
+        if let (None, Some(degc)) = (&self.temperature, degc) {
+            self.temperature = Some(vec![degc; self.len()]);
+        }
+        self
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time.len()

@@ -21,6 +21,42 @@ pub enum Zero {
     PerRecord,
 }
 
+/// What a simulation may be told.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SimulateOptions {
+    /// What is done with the sensor's zero.
+    pub zero: Zero,
+    /// Temperature \[°C\] where the record has no column of it.
+    pub temperature: Option<f64>,
+}
+
+/// Inputs beyond those that a model was fitted to: what it says of them, its record did not show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Extrapolated {
+    /// Rows with such an input.
+    pub rows: usize,
+    /// How far the farthest lies beyond \[input unit\].
+    pub largest: f64,
+    /// Its row, from 0.
+    pub row: usize,
+}
+
+impl Extrapolated {
+    fn of(model: &Model, input: &[f64]) -> Self {
+        let mut found = Self::default();
+        for (row, u) in input.iter().enumerate() {
+            let beyond = (u - model.input.high).max(model.input.low - u);
+            if beyond > 0.0 {
+                found.rows += 1;
+                if beyond > found.largest {
+                    (found.largest, found.row) = (beyond, row);
+                }
+            }
+        }
+        found
+    }
+}
+
 /// What a model says about a record.
 #[derive(Clone, Debug)]
 pub struct Simulation {
@@ -32,15 +68,25 @@ pub struct Simulation {
     pub zeros: Vec<f64>,
     /// Errors against the measured output, where there is one.
     pub errors: Option<Errors>,
+    /// Inputs beyond the model's own range.
+    pub extrapolated: Extrapolated,
+}
+
+/// Runs a model over a record at the temperatures that it holds, as [`simulate_with`].
+///
+/// # Errors
+/// As [`simulate_with`].
+pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation, FitError> {
+    simulate_with(model, record, &SimulateOptions { zero, temperature: None })
 }
 
 /// Runs a model over a record. Memory starts virgin in each segment.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
-pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation, FitError> {
-    check_units(model, record)?;
-    let mut samples = Samples::from_record(record);
+pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) -> Result<Simulation, FitError> {
+    let mut samples = Samples::from_record(record).at_temperature(options.temperature);
+    check(model, record, &samples)?;
     let chain = model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
     let chain = Box::new(chain);
     let mut state = Box::new(chain.state());
@@ -60,7 +106,7 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
     if record.output().is_some() {
         let residual: Vec<f64> = samples.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
         samples.settling = start_up_rows(&samples, &residual);
-        if zero == Zero::PerRecord {
+        if options.zero == Zero::PerRecord {
             for rows in record.rows_of_files() {
                 let settled = || rows.clone().filter(|k| !samples.settling[*k]);
                 let mean = settled().map(|k| residual[k]).sum::<f64>() / settled().count().max(1) as f64;
@@ -73,10 +119,11 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
                 .map_err(|source| FitError::Compare { record: record.name(), source })?,
         );
     }
-    Ok(Simulation { predicted, settling: samples.settling, zeros, errors })
+    let extrapolated = Extrapolated::of(model, &samples.input);
+    Ok(Simulation { predicted, settling: samples.settling, zeros, errors, extrapolated })
 }
 
-fn check_units(model: &Model, record: &Record) -> Result<(), FitError> {
+fn check(model: &Model, record: &Record, samples: &Samples) -> Result<(), FitError> {
     let missing =
         |column: &str, advice: String| Err(FitError::Missing { record: record.name(), column: column.into(), advice });
     if record.input().is_empty() || record.input_column() != model.input.column {
@@ -85,11 +132,8 @@ fn check_units(model: &Model, record: &Record) -> Result<(), FitError> {
     if let Some(unit) = record.output_unit().filter(|u| u.column() != model.output.column) {
         return missing(&model.output.column, format!("the record's output is {}, the model's is not", unit.column()));
     }
-    if model.needs_temperature() && record.temperature().is_none() {
-        return missing("temperature_degc", "the model's gain depends on it".into());
+    match model.lacking(samples) {
+        Some((column, why)) => missing(column, why.into()),
+        None => Ok(()),
     }
-    if model.needs_load() && record.load().is_none() {
-        return missing("load_n", "the model yields under it".into());
-    }
-    Ok(())
 }

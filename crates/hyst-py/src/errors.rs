@@ -1,10 +1,15 @@
 //! Errors of the crates below as Python's exceptions (`python/hyst/_errors.py`).
 
+use std::ffi::CString;
+use std::io::ErrorKind;
+
+use hyst_ident::atomic_file::AtomicFileError;
 use hyst_ident::compensate::CompensateError;
 use hyst_ident::fit::FitError;
 use hyst_ident::metrics::MetricsError;
 use hyst_ident::model::ModelError;
-use pyo3::PyErr;
+use pyo3::exceptions::PyFileExistsError;
+use pyo3::prelude::*;
 
 mod python {
     #![allow(missing_docs, unreachable_pub, reason = "declarations of Python's classes, documented there")]
@@ -12,6 +17,7 @@ mod python {
     pyo3::import_exception!(hyst._errors, ModelFileError);
     pyo3::import_exception!(hyst._errors, NotInvertibleError);
     pyo3::import_exception!(hyst._errors, ParameterError);
+    pyo3::import_exception!(hyst._errors, RangeWarning);
     pyo3::import_exception!(hyst._errors, ReachError);
     pyo3::import_exception!(hyst._errors, RecordError);
 }
@@ -32,17 +38,44 @@ pub(crate) fn not_invertible(message: String) -> PyErr {
     python::NotInvertibleError::new_err(message)
 }
 
-/// Anything that is wrong with a record. What its message says of the command line's `--map` is said for Python too.
+/// Anything that is wrong with a record. What its message says of the command line's options is said for Python too.
 pub(crate) fn record(error: impl std::error::Error) -> PyErr {
     let mut message = error.to_string();
     if message.contains("--map ") {
         message.push_str(" (in Python --map NAME=COLUMN is map={\"NAME\": \"COLUMN\"})");
     }
+    if message.ends_with("--temperature") {
+        message.push_str(" (in Python temperature=)");
+    }
     python::RecordError::new_err(message)
 }
 
 pub(crate) fn model_file(error: impl std::error::Error) -> PyErr {
-    python::ModelFileError::new_err(error.to_string())
+    no_model_file(error.to_string())
+}
+
+pub(crate) fn no_model_file(message: String) -> PyErr {
+    python::ModelFileError::new_err(message)
+}
+
+/// A file that could not be written, or that is there already and was not to be replaced.
+pub(crate) fn written(error: AtomicFileError) -> PyErr {
+    match error.source.kind() {
+        ErrorKind::AlreadyExists => {
+            let path = error.path.display();
+            PyFileExistsError::new_err(format!("{path}: there is such a file; give overwrite=True to replace it"))
+        }
+        _ => model_file(error),
+    }
+}
+
+/// Warns the caller's own line.
+///
+/// # Errors
+/// If the caller turns warnings into exceptions.
+pub(crate) fn out_of_range(py: Python<'_>, message: &str) -> PyResult<()> {
+    let message = CString::new(message)?;
+    PyErr::warn(py, &py.get_type::<python::RangeWarning>(), &message, 1)
 }
 
 pub(crate) fn fit(error: FitError) -> PyErr {

@@ -1,23 +1,27 @@
 //! The Python package `hyst`: models of `hyst-core` and the identification of `hyst-ident` on numpy arrays.
 //!
 //! Nothing is computed here. A signal comes in as a view of a numpy array, runs through a stage while Python's lock is
-//! released, and goes out as a new array. `models.rs` is the table of models; a new one is an entry there, a class in the stub
+//! released, and goes out as a new array. `models/` is the table of models; a new one is an entry there, a class in the stub
 //! `python/hyst/_hyst.pyi` and a case in `tests/python/cases.py`.
 #![allow(rustdoc::broken_intra_doc_links, reason = "documentation of classes is Python's, in which [V] is a unit")]
 
 mod arrays;
+mod channels;
+mod clamp;
 mod control;
 mod errors;
 mod identify;
 mod inverse;
+mod inversion;
+mod keep;
 mod metrics;
 mod model;
 mod model_macro;
-#[allow(unused_parens, reason = "a default that is an expression stands in parentheses")]
 mod models;
+mod of_class;
 mod operator;
-mod operators;
 mod record;
+mod results;
 mod runner;
 
 use pyo3::prelude::*;
@@ -30,19 +34,22 @@ mod _hyst {
     #[pymodule_export]
     use crate::identify::{Diagnosis, diagnose, fit};
     #[pymodule_export]
+    use crate::inverse::Inverse;
+    #[pymodule_export]
     use crate::metrics::{mape, max_abs, nrmse, peak_to_valley, rmse, smape};
     #[pymodule_export]
-    use crate::model::{Drive, Model, Simulation};
+    use crate::model::Model;
     #[pymodule_export]
-    use crate::operator::{Inverse, Operator};
+    use crate::operator::Operator;
     #[pymodule_export]
     use crate::record::{Record, read_record};
+    #[pymodule_export]
+    use crate::results::{Drive, Simulation};
 
     #[pymodule_init]
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {
         use super::PyModuleMethods;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        crate::models::add_to(module)?;
-        crate::operators::add_to(module)
+        crate::models::add_to(module)
     }
 }

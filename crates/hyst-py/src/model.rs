@@ -1,22 +1,23 @@
 //! Models of files, and what they predict and compensate (`hyst_ident::{model, simulate, compensate}`).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use hyst_core::CompensatorOptions;
+use hyst_ident::atomic_file::{create_atomic, write_atomic};
 use hyst_ident::compensate::{CompensateOptions, compensate};
 use hyst_ident::model::{self as core, Effect};
-use hyst_ident::simulate::{Zero, simulate};
-use numpy::PyArray1;
-use pyo3::exceptions::PyValueError;
+use hyst_ident::simulate::{SimulateOptions, Zero, simulate_with};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::arrays::Needs;
+use crate::channels::Channels;
 use crate::errors;
-use crate::inverse::Inverted;
+use crate::inversion::{Inverted, Options};
 use crate::operator::Operator;
 use crate::record::any_record;
+use crate::results::{Drive, Simulation};
 use crate::runner::Runner;
 
 /// The argument `zero`.
@@ -28,24 +29,28 @@ pub(crate) fn zero_of(word: &str) -> PyResult<Zero> {
     }
 }
 
+/// A number that may be left out.
+fn finite(name: &str, x: Option<f64>) -> PyResult<Option<f64>> {
+    match x {
+        Some(x) if !x.is_finite() => Err(PyValueError::new_err(format!("{name} is {x}; it must be finite"))),
+        x => Ok(x),
+    }
+}
+
 /// Text of JSON as Python's objects.
 pub(crate) fn parse<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }
 
-/// Errors against a measurement as a dict.
-fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("rmse", errors.rmse)?;
-    dict.set_item("nrmse_percent", errors.nrmse_percent)?;
-    dict.set_item("max_abs", errors.max_abs)?;
-    dict.set_item("rmse_all_rows", errors.rmse_all_rows)?;
-    Ok(dict)
+/// Writes a model file, whole or not at all.
+pub(crate) fn save(model: &core::Model, path: &Path, overwrite: bool) -> PyResult<()> {
+    let write = |out: &mut dyn std::io::Write| out.write_all(model.to_json().as_bytes());
+    if overwrite { write_atomic(path, write) } else { create_atomic(path, write) }.map_err(errors::written)
 }
 
-/// A fitted model, as in ``model.json``: hysteresis and the effects around it, independent of the sample period.
+/// A model, as in ``model.json``: hysteresis and the effects around it, independent of the sample period.
 ///
-/// From ``fit``, ``diagnose`` or ``Model.load``.
+/// From ``fit``, ``diagnose``, ``Model.load``, or ``to_model`` of an operator.
 #[pyclass(frozen, module = "hyst")]
 pub(crate) struct Model(pub(crate) core::Model);
 
@@ -69,9 +74,23 @@ impl Model {
     }
 
     /// Writes a ``model.json``; an interrupted write leaves no half of one.
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        let write = |out: &mut dyn std::io::Write| out.write_all(self.0.to_json().as_bytes());
-        hyst_ident::atomic_file::write_atomic(&path, write).map_err(errors::model_file)
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path-like
+    ///     The file.
+    /// overwrite : bool
+    ///     Whether a file that is there already is replaced, as ``hystctl fit -o`` does.
+    ///
+    /// Raises
+    /// ------
+    /// FileExistsError
+    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    /// ModelFileError
+    ///     If the file cannot be written.
+    #[pyo3(signature = (path, *, overwrite=true))]
+    fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
+        save(&self.0, &path, overwrite)
     }
 
     /// The text of the file.
@@ -133,15 +152,40 @@ impl Model {
     /// record : Record, path, or list of them
     /// zero : {"none", "per-record"}
     ///     Whether one constant per file is taken from its measured output.
+    /// temperature : float, optional
+    ///     Temperature [°C], where the record has no column of it.
     ///
     /// Raises
     /// ------
     /// RecordError
     ///     If the record lacks a column that the model uses, or has other units.
-    #[pyo3(signature = (record, *, zero="none"))]
-    fn simulate(&self, py: Python<'_>, record: &Bound<'_, PyAny>, zero: &str) -> PyResult<Simulation> {
+    ///
+    /// Warns
+    /// -----
+    /// RangeWarning
+    ///     If the input leaves ``input_range``: in how many rows, and by how much.
+    #[pyo3(signature = (record, *, zero="none", temperature=None))]
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        record: &Bound<'_, PyAny>,
+        zero: &str,
+        temperature: Option<f64>,
+    ) -> PyResult<Simulation> {
         let (record, zero) = (any_record(py, record, "input")?, zero_of(zero)?);
-        let simulated = py.detach(|| simulate(&self.0, &record, zero)).map_err(errors::fit)?;
+        let options = SimulateOptions { zero, temperature: finite("temperature", temperature)? };
+        let simulated = py.detach(|| simulate_with(&self.0, &record, &options)).map_err(errors::fit)?;
+        let (beyond, (low, high)) = (simulated.extrapolated, self.input_range());
+        if beyond.rows > 0 {
+            let message = format!(
+                "in {} of {} rows the input lies beyond input_range, {low:?} to {high:?}, by {:.4e} at most (row {}); the prediction is extrapolated there",
+                beyond.rows,
+                record.rows(),
+                beyond.largest,
+                beyond.row
+            );
+            errors::out_of_range(py, &message)?;
+        }
         Ok(Simulation { timepts: record.time().to_vec(), inputs: record.input().to_vec(), simulated })
     }
 
@@ -177,6 +221,7 @@ impl Model {
         temperature: Option<f64>,
     ) -> PyResult<Drive> {
         let record = any_record(py, reference, "output")?;
+        let temperature = finite("temperature", temperature)?;
         let slew = slew.unwrap_or(f64::INFINITY);
         let options = CompensateOptions { voltage: limit, slew, bandwidth_hz, temperature };
         let drive = py.detach(|| compensate(&self.0, &record, &options)).map_err(errors::compensate)?;
@@ -188,26 +233,34 @@ impl Model {
         let effects = &self.0.effects;
         let needs = Needs {
             temperature: self.0.needs_temperature(),
-            load: false,
+            load: self.0.needs_load(),
             time: effects.drift.is_some() || effects.interference.is_some(),
         };
         let mut name = self.0.base.kind().name().to_owned();
         for effect in effects.names() {
             name = format!("{name} + {effect}");
         }
-        Operator::new(
-            name,
-            needs,
-            &self.0,
-            |model| model.build(period),
-            move |model, _, options| {
-                options.only(&["bandwidth_hz"])?;
-                let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
-                let inverse = model.compensator(period, &own).map_err(errors::core)?;
-                let (lead, bandwidth_hz, band_error) = (inverse.lead(), inverse.bandwidth_hz(), inverse.error());
-                Ok(Inverted { engine: Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error })
-            },
-        )
+        let (runner, model) = (Runner::new(self.0.build(period).map_err(errors::core)?), self.0.clone());
+        let inversion = move |options: &Options| {
+            options.only(&["bandwidth_hz"])?;
+            let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
+            let inverse = model.compensator(period, &own).map_err(errors::core)?;
+            let (lead, band) = (inverse.lead(), inverse.bandwidth_hz().map(|hz| (hz, inverse.error())));
+            let inverted = Inverted::in_band(inverse, lead, band);
+            Ok(match model.inverse_ends() {
+                // A drive that is filtered on its way stays at no end.
+                Some(([low, high], tolerance)) if lead == 0 => inverted.between(low, high, tolerance),
+                _ => inverted,
+            })
+        };
+        let model = self.0.clone();
+        let filing = move |channels: &Channels| {
+            if channels.is_empty() {
+                return Ok(model.clone());
+            }
+            Err(PyTypeError::new_err("this is the operator of a Model, which has its ranges and columns"))
+        };
+        Ok(Operator::new(name, needs, Arc::new(runner), inversion, filing))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -222,115 +275,5 @@ impl Model {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         Ok((slf.get_type().getattr("loads")?, (slf.get().dumps(),)))
-    }
-}
-
-/// What a model says about a record.
-#[pyclass(frozen, module = "hyst")]
-pub(crate) struct Simulation {
-    timepts: Vec<f64>,
-    inputs: Vec<f64>,
-    simulated: hyst_ident::simulate::Simulation,
-}
-
-#[pymethods]
-impl Simulation {
-    /// Time [s], shape (n,).
-    #[getter]
-    fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.timepts)
-    }
-
-    /// Input, shape (n,).
-    #[getter]
-    fn inputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.inputs)
-    }
-
-    /// Predicted output, shape (n,).
-    #[getter]
-    fn outputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.simulated.predicted)
-    }
-
-    /// Start-up rows: a transient from before the record, shape (n,), bool.
-    #[getter]
-    fn settling<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_slice(py, &self.simulated.settling)
-    }
-
-    /// Constant that was added per file; empty with ``zero="none"``.
-    #[getter]
-    fn zeros(&self) -> Vec<f64> {
-        self.simulated.zeros.clone()
-    }
-
-    /// ``rmse``, ``nrmse_percent``, ``max_abs`` and ``rmse_all_rows`` against the measured output; None without one.
-    #[getter]
-    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        self.simulated.errors.as_ref().map(|e| errors_dict(py, e)).transpose()
-    }
-
-    fn __repr__(&self) -> String {
-        let errors = self.simulated.errors.as_ref().map_or(String::new(), |e| format!(", rmse {:?}", e.rmse));
-        format!("<Simulation: {} rows{errors}>", self.timepts.len())
-    }
-}
-
-/// A drive, and what it took to get it.
-#[pyclass(frozen, module = "hyst")]
-pub(crate) struct Drive {
-    timepts: Vec<f64>,
-    drive: hyst_ident::compensate::Drive,
-}
-
-#[pymethods]
-impl Drive {
-    /// Time [s], shape (n,).
-    #[getter]
-    fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.timepts)
-    }
-
-    /// Input of the actuator at the reference's rows [V], shape (n,).
-    #[getter]
-    fn inputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.drive.voltage)
-    }
-
-    /// Samples of preview that were used.
-    #[getter]
-    fn lead(&self) -> usize {
-        self.drive.lead
-    }
-
-    /// Band in which the dynamic stages are inverted [Hz]; None if there are none.
-    #[getter]
-    fn bandwidth_hz(&self) -> Option<f64> {
-        self.drive.bandwidth_hz
-    }
-
-    /// Largest relative error of that inversion inside its band.
-    #[getter]
-    fn band_error(&self) -> f64 {
-        self.drive.band_error
-    }
-
-    /// Rows at which the voltage limit acted.
-    #[getter]
-    fn voltage_limited(&self) -> Vec<usize> {
-        self.drive.voltage_limited.clone()
-    }
-
-    /// Rows at which the slew limit acted.
-    #[getter]
-    fn slew_limited(&self) -> Vec<usize> {
-        self.drive.slew_limited.clone()
-    }
-
-    fn __repr__(&self) -> String {
-        let d = &self.drive;
-        let limited = d.voltage_limited.len() + d.slew_limited.len();
-        format!("<Drive: {} rows, lead {}, limited in {limited}>", d.voltage.len(), d.lead)
     }
 }

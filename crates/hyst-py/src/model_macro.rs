@@ -1,4 +1,4 @@
-//! The Python class of a model, from one entry of the table in `models.rs`.
+//! The Python class of a model, from one entry of the table in `models/`.
 
 use numpy::PyArray1;
 use pyo3::IntoPyObjectExt;
@@ -75,68 +75,75 @@ pub(crate) fn arguments<'py>(
     Ok(((), keywords))
 }
 
-/// Python classes of models, each from its parameters (with their documentation and defaults), its stage, how that is
-/// built of them, the way in which it is inverted (`inverse.rs`) and the surroundings that it needs; and `add_to`,
-/// which puts them all into a module. A default is a number, a word or an expression
-/// in parentheses.
+/// Python classes of models, each from its keywords (with their documentation and defaults), the core's parameters that they
+/// are, the stage that is built of these (at a sample period, if there is one), the way in which it is inverted
+/// (`inversion.rs`) and the surroundings that it needs; and `add_to`, which puts them all into a module.
 macro_rules! models {
     ($(
         $(#[$doc:meta])*
         class $name:ident {
             $( $(#[$field_doc:meta])* $field:ident : $type:ty $(= $default:tt)?, )*
         }
+        params: $params:expr,
         stage: $stage:ty,
-        build: $build:expr,
+        $(period: $period:expr,)?
         inverse: $inverse:expr,
         needs: [$($need:ident),*],
     )*) => {
         $(
             $(#[$doc])*
-            #[pyclass(extends = Operator, frozen, module = "hyst")]
+            #[pyo3::pyclass(extends = $crate::operator::Operator, frozen, module = "hyst")]
             #[derive(Clone)]
             struct $name {
                 $($field: $type,)*
             }
 
             impl $name {
-                fn list(&self) -> Vec<(&'static str, &dyn Parameter)> {
-                    vec![$((stringify!($field), &self.$field as &dyn Parameter)),*]
+                fn list(&self) -> Vec<(&'static str, &dyn $crate::model_macro::Parameter)> {
+                    vec![$((stringify!($field), &self.$field as &dyn $crate::model_macro::Parameter)),*]
                 }
             }
 
-            #[pymethods]
+            #[pyo3::pymethods]
             impl $name {
                 #[new]
                 #[pyo3(signature = (*, $($field $(= $default)?),*))]
                 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
-                fn new($($field: $type),*) -> PyResult<PyClassInitializer<Self>> {
-                    let parameters = Self { $($field),* };
-                    let needs = Needs { $($need: true,)* ..Needs::default() };
-                    let build: fn(&Self) -> Result<$stage, Error> = $build;
-                    let base = Operator::new(stringify!($name), needs, &parameters, build, $inverse)?;
-                    Ok(PyClassInitializer::from(base).add_subclass(parameters))
+                fn new($($field: $type),*) -> pyo3::PyResult<pyo3::PyClassInitializer<Self>> {
+                    let given = Self { $($field),* };
+                    let needs = $crate::arrays::Needs { $($need: true,)* ..Default::default() };
+                    let periods: &[fn(&Self) -> f64] = &[$($period)?];
+                    let period = periods.first().map(|period| period(&given));
+                    let base = $crate::operator::Operator::of_class::<_, _, $stage>(
+                        stringify!($name), needs, &given, $params, period, $inverse,
+                    )?;
+                    Ok(pyo3::PyClassInitializer::from(base).add_subclass(given))
                 }
 
                 $(
                     $(#[$field_doc])*
                     #[getter]
-                    fn $field(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-                        Parameter::to_python(&self.$field, py)
+                    fn $field(&self, py: pyo3::Python<'_>) -> pyo3::PyResult<pyo3::Py<pyo3::PyAny>> {
+                        $crate::model_macro::Parameter::to_python(&self.$field, py)
                     }
                 )*
 
                 fn __repr__(&self) -> String {
-                    repr(stringify!($name), &self.list())
+                    $crate::model_macro::repr(stringify!($name), &self.list())
                 }
 
-                fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((), Bound<'py, PyDict>)> {
-                    arguments(py, &self.list())
+                fn __getnewargs_ex__<'py>(
+                    &self,
+                    py: pyo3::Python<'py>,
+                ) -> pyo3::PyResult<((), pyo3::Bound<'py, pyo3::types::PyDict>)> {
+                    $crate::model_macro::arguments(py, &self.list())
                 }
             }
         )*
 
-        /// Adds the class of every model to a module.
-        pub(crate) fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        /// Adds the classes of this file to a module.
+        pub(super) fn add_to(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+            use pyo3::types::PyModuleMethods;
             $(module.add_class::<$name>()?;)*
             Ok(())
         }

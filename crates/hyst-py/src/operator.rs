@@ -1,18 +1,23 @@
-//! What all models have in common: the Python classes `Operator` and `Inverse`.
+//! What all models have in common: the Python class `Operator`.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use hyst_core::{Error, Stage};
+use hyst_ident::model as core;
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{GivenSurroundings, Needs, Signal, array};
-use crate::errors;
-use crate::inverse::{Inverted, Options};
-use crate::runner::{Engine, Runner};
+use crate::channels::Channels;
+use crate::clamp::Clamp;
+use crate::inverse::Inverse;
+use crate::inversion::{Inverted, Options};
+use crate::model::{Model, save};
+use crate::runner::Engine;
 
 type Inversion = dyn Fn(&Options) -> PyResult<Inverted> + Send + Sync;
+type Filing = dyn Fn(&Channels) -> PyResult<core::Model> + Send + Sync;
 
 /// A model: maps an input sample and a history to an output sample.
 ///
@@ -24,29 +29,28 @@ pub(crate) struct Operator {
     needs: Needs,
     engine: Arc<dyn Engine>,
     inversion: Box<Inversion>,
+    /// How a model file comes of it.
+    filing: Box<Filing>,
+    /// Where it stays for references that are out of reach, if it is an inverse that does.
+    clamp: Option<Clamp>,
 }
 
 impl Operator {
-    /// Builds the stage of `parameters`; `inverse` is how it will be inverted.
-    ///
-    /// # Errors
-    /// `ParameterError`, as the core says.
-    pub(crate) fn new<P, S>(
+    /// Of an engine, how it is inverted and how a file comes of it.
+    pub(crate) fn new(
         name: impl Into<String>,
         needs: Needs,
-        parameters: &P,
-        build: impl FnOnce(&P) -> Result<S, Error>,
-        inverse: impl Fn(&P, &S, &Options) -> PyResult<Inverted> + Send + Sync + 'static,
-    ) -> PyResult<Self>
-    where
-        P: Clone + Send + Sync + 'static,
-        S: Stage<f64> + Send + Sync + 'static,
-        S::State: Send,
-    {
-        let runner = Arc::new(Runner::new(build(parameters).map_err(errors::core)?));
-        let (engine, parameters) = (Arc::clone(&runner), parameters.clone());
-        let inversion = Box::new(move |options: &Options| inverse(&parameters, &runner.stage, options));
-        Ok(Self { name: name.into(), needs, engine, inversion })
+        engine: Arc<dyn Engine>,
+        inversion: impl Fn(&Options) -> PyResult<Inverted> + Send + Sync + 'static,
+        filing: impl Fn(&Channels) -> PyResult<core::Model> + Send + Sync + 'static,
+    ) -> Self {
+        let (inversion, filing) = (Box::new(inversion), Box::new(filing));
+        Self { name: name.into(), needs, engine, inversion, filing, clamp: None }
+    }
+
+    /// Where an inverse of this stays for references that are out of reach.
+    fn clamp(&self, inverted: &Inverted) -> Option<Clamp> {
+        inverted.ends.map(|ends| Clamp { ends, model: Arc::clone(&self.engine) })
     }
 
     /// The output for `u`, in the order that `run` asks of the stage.
@@ -56,12 +60,16 @@ impl Operator {
         (name, u): (&str, &Bound<'py, PyAny>),
         given: [Option<&Bound<'py, PyAny>>; 3],
         (engine, lead): (&dyn Engine, usize),
+        clamp: Option<&Clamp>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let signal = Signal::new(name, u)?;
         let u = signal.values()?;
         let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(u.len())?;
         let y = py.detach(|| engine.follow(&env, u, lead));
+        if let Some(clamp) = clamp {
+            clamp.warn(py, &env, (name, u), &y)?;
+        }
         Ok(array(py, y))
     }
 
@@ -109,7 +117,7 @@ impl Operator {
     /// ValueError
     ///     If ``u`` has not one dimension, is not contiguous or not finite, or lengths differ.
     #[pyo3(signature = (u, *, temperature=None, load=None, time=None))]
-    fn simulate<'py>(
+    pub(crate) fn simulate<'py>(
         &self,
         py: Python<'py>,
         u: &Bound<'py, PyAny>,
@@ -117,7 +125,7 @@ impl Operator {
         load: Option<&Bound<'py, PyAny>>,
         time: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        self.over(py, ("u", u), [temperature, load, time], (&*self.engine, 0))
+        self.over(py, ("u", u), [temperature, load, time], (&*self.engine, 0), self.clamp.as_ref())
     }
 
     /// Sets the object's own history to rest at ``u0`` and returns the output there.
@@ -178,6 +186,12 @@ impl Operator {
     ///     If there is no inverse; the message says why.
     /// TypeError
     ///     If an option is given that this model's inverse does not take.
+    ///
+    /// Warns
+    /// -----
+    /// RangeWarning
+    ///     By ``simulate`` of the inverse, if it cannot reach all samples within its range of inputs: how many, and by how
+    ///     much. ``step`` takes the nearer end without a word.
     #[pyo3(signature = (*, low=None, high=None, tolerance=None, bandwidth_hz=None))]
     fn inverse(
         slf: &Bound<'_, Self>,
@@ -188,12 +202,11 @@ impl Operator {
     ) -> PyResult<Py<Inverse>> {
         let this = slf.get();
         let inverted = (this.inversion)(&Options { low, high, tolerance, bandwidth_hz })?;
-        let base = Self {
-            name: format!("the inverse of {}", this.name),
-            needs: this.needs,
-            engine: inverted.engine,
-            inversion: Box::new(|_| Err(PyTypeError::new_err("an inverse has its model in `of`"))),
-        };
+        let none = || PyTypeError::new_err("an inverse has its model in `of`");
+        let clamp = this.clamp(&inverted);
+        let name = format!("the inverse of {}", this.name);
+        let base = Self::new(name, this.needs, inverted.engine, move |_| Err(none()), move |_| Err(none()));
+        let base = Self { clamp, ..base };
         let inverse = Inverse {
             of: slf.clone().unbind(),
             lead: inverted.lead,
@@ -220,6 +233,12 @@ impl Operator {
     /// -------
     /// ndarray of float64, shape (n,)
     ///     Input, a new array.
+    ///
+    /// Warns
+    /// -----
+    /// RangeWarning
+    ///     If no input from ``low`` to ``high`` (of ``Saturation``: none at all) reaches some samples: how many, and by how
+    ///     much they are missed. The input is the nearer end there.
     #[pyo3(signature = (y_ref, *, temperature=None, load=None, time=None, low=None, high=None, tolerance=None, bandwidth_hz=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
     fn compensate<'py>(
@@ -235,7 +254,90 @@ impl Operator {
         bandwidth_hz: Option<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inverted = (self.inversion)(&Options { low, high, tolerance, bandwidth_hz })?;
-        self.over(py, ("y_ref", y_ref), [temperature, load, time], (&*inverted.engine, inverted.lead))
+        let clamp = self.clamp(&inverted);
+        let run = (&*inverted.engine, inverted.lead);
+        self.over(py, ("y_ref", y_ref), [temperature, load, time], run, clamp.as_ref())
+    }
+
+    /// The model that a file holds: what ``Model.load`` and hystctl read.
+    ///
+    /// It has the parameters alone: no history, no sample period, and nothing that only an inverse takes (``filter_degc``
+    /// of ``TdEm``). A stage that is no hysteresis stands beside one that does nothing, ``Pi(gain=1, ...)``.
+    ///
+    /// Parameters
+    /// ----------
+    /// input_range : (float, float), optional
+    ///     Lowest and highest input for which the parameters hold [u]: drives that the model computes keep to them, predictions
+    ///     beyond them are warned of. Needed, but for ``Preisach`` and ``Dpm``, which have a grid.
+    /// output_range : (float, float), optional
+    ///     Lowest and highest output [y]; those at rest at the ends of ``input_range`` if not given.
+    /// input_column : str, optional
+    ///     ``voltage_v`` (if not given), or ``QUANTITY_in_UNIT``.
+    /// output_column : str, optional
+    ///     ``displacement_um`` (if not given), ``displacement_nm``, ``displacement_mm`` or ``force_n``. Parameters are not
+    ///     converted: they are in these units.
+    ///
+    /// Raises
+    /// ------
+    /// TypeError
+    ///     If ``input_range`` is needed; or given where the operator is that of a ``Model``, which has one; or if this is
+    ///     an inverse.
+    /// ModelFileError
+    ///     If files do not hold such a variant: a short ``memory``, a ``drifting`` model.
+    /// ParameterError
+    ///     If a range is not finite or not in order, or ``input_column`` is no name of an input.
+    /// ValueError
+    ///     If ``output_column`` is none of those.
+    #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]
+    fn to_model(
+        &self,
+        input_range: Option<(f64, f64)>,
+        output_range: Option<(f64, f64)>,
+        input_column: Option<String>,
+        output_column: Option<String>,
+    ) -> PyResult<Model> {
+        (self.filing)(&Channels { input_range, output_range, input_column, output_column }).map(Model)
+    }
+
+    /// The text of a ``model.json``: that of ``to_model``, whose arguments and errors it has.
+    #[pyo3(signature = (*, input_range=None, output_range=None, input_column=None, output_column=None))]
+    fn to_json(
+        &self,
+        input_range: Option<(f64, f64)>,
+        output_range: Option<(f64, f64)>,
+        input_column: Option<String>,
+        output_column: Option<String>,
+    ) -> PyResult<String> {
+        Ok(self.to_model(input_range, output_range, input_column, output_column)?.0.to_json())
+    }
+
+    /// Writes a ``model.json``: that of ``to_model``, whose other arguments and errors it has. An interrupted write leaves no
+    /// half of one.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path-like
+    ///     The file.
+    /// overwrite : bool
+    ///     Whether a file that is there already is replaced.
+    ///
+    /// Raises
+    /// ------
+    /// FileExistsError
+    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    /// ModelFileError
+    ///     If the file cannot be written.
+    #[pyo3(signature = (path, *, overwrite=false, input_range=None, output_range=None, input_column=None, output_column=None))]
+    fn save(
+        &self,
+        path: PathBuf,
+        overwrite: bool,
+        input_range: Option<(f64, f64)>,
+        output_range: Option<(f64, f64)>,
+        input_column: Option<String>,
+        output_column: Option<String>,
+    ) -> PyResult<()> {
+        save(&self.to_model(input_range, output_range, input_column, output_column)?.0, &path, overwrite)
     }
 
     /// Samples by which an input must be known ahead of its output: 0 for a model.
@@ -246,54 +348,5 @@ impl Operator {
 
     fn __repr__(&self) -> String {
         format!("Operator({})", self.name)
-    }
-}
-
-/// The inverse of a model: maps a reference to the model's input.
-///
-/// With a ``lead``, the output of ``simulate`` and ``step`` belongs to ``lead`` samples before the reference that it was
-/// given; the model's ``compensate`` aligns them.
-#[pyclass(extends = Operator, frozen, module = "hyst")]
-pub(crate) struct Inverse {
-    of: Py<Operator>,
-    /// Samples by which the reference must be known ahead.
-    #[pyo3(get)]
-    lead: usize,
-    /// Band in which the inverse holds [Hz]; None if it holds at all frequencies.
-    #[pyo3(get)]
-    bandwidth_hz: Option<f64>,
-    /// Largest relative error inside that band.
-    #[pyo3(get)]
-    band_error: f64,
-}
-
-#[pymethods]
-impl Inverse {
-    /// The model that is inverted.
-    #[getter]
-    fn of(&self, py: Python<'_>) -> Py<Operator> {
-        self.of.clone_ref(py)
-    }
-
-    /// The model that is inverted: the inverse of the inverse.
-    fn inverse(&self, py: Python<'_>) -> Py<Operator> {
-        self.of.clone_ref(py)
-    }
-
-    /// The reference whose inverse is ``y_ref``: what the model answers to it.
-    #[pyo3(signature = (y_ref, *, temperature=None, load=None, time=None))]
-    fn compensate<'py>(
-        &self,
-        py: Python<'py>,
-        y_ref: &Bound<'py, PyAny>,
-        temperature: Option<&Bound<'py, PyAny>>,
-        load: Option<&Bound<'py, PyAny>>,
-        time: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        self.of.get().simulate(py, y_ref, temperature, load, time)
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("{}.inverse()", self.of.bind(py).repr()?))
     }
 }

@@ -47,6 +47,14 @@ impl Record {
     }
 }
 
+/// The argument `output_column`.
+pub(crate) fn output_unit(column: &str) -> PyResult<OutputUnit> {
+    OutputUnit::of_column(column).ok_or_else(|| {
+        let known = OutputUnit::ALL.map(OutputUnit::column).join(", ");
+        PyValueError::new_err(format!("output_column is {column:?}; it must be one of {known}"))
+    })
+}
+
 /// The columns of a call as a record.
 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
 pub(crate) fn of_arrays(
@@ -62,10 +70,7 @@ pub(crate) fn of_arrays(
 ) -> PyResult<Record> {
     let column = |name: &str, x: &Bound<'_, PyAny>| Ok::<_, PyErr>(Signal::new(name, x)?.values()?.to_vec());
     let optional = |name: &str, x: Option<&Bound<'_, PyAny>>| x.map(|x| column(name, x)).transpose();
-    let unit = OutputUnit::of_column(output_column).ok_or_else(|| {
-        let known = OutputUnit::ALL.map(OutputUnit::column).join(", ");
-        PyValueError::new_err(format!("output_column is {output_column:?}; it must be one of {known}"))
-    })?;
+    let unit = output_unit(output_column)?;
     let columns = Columns {
         name: name.to_owned(),
         segment,

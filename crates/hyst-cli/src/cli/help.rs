@@ -33,7 +33,10 @@ Example:
 pub(super) const RUN: &str = "\
 Examples:
   hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
-  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap";
+  hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
+
+The record has a row for each of the drive's. Its time is the device's clock: each value is reached and measured one sample \
+period after it was sent, and ramps and rests take time too, so its first row stands at one period or later.";
 
 pub(super) const RUN_USAGE: &str = "\
 hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use hyst_ident::export::CName;
 use hyst_ident::fit::FITTED;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
@@ -92,13 +93,17 @@ pub(crate) struct FitArgs {
 /// is source with constants for `hyst-core`; c is a C99 header with the block and every parameter with its unit. None of
 /// them depends on a sample period.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  hystctl export extended.json --format postcard -o model.bin")]
+#[command(after_help = "Examples:\n  hystctl export extended.json --format postcard -o model.bin\n  \
+    hystctl export extended.json --format c --name x_axis -o x_axis.h")]
 pub(crate) struct ExportArgs {
     /// Model file
     pub(crate) model: PathBuf,
     /// What to write
     #[arg(long, value_enum)]
     pub(crate) format: ExportFormat,
+    /// What the symbols of a C header begin with, so that a program can have two models; hyst if not given
+    #[arg(long)]
+    pub(crate) name: Option<CName>,
     /// File to write; stdout if not given
     #[arg(short, long, value_name = "FILE", default_value = "-", hide_default_value = true)]
     pub(crate) output: Target,
@@ -127,6 +132,8 @@ pub(crate) struct SimulateArgs {
     pub(crate) model: PathBuf,
     /// Record with the input; its output is compared, if it has one
     pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) temperature: TemperatureArg,
     /// CSV file to write; stdout if not given
     #[arg(short, long, value_name = "CSV", default_value = "-", hide_default_value = true)]
     pub(crate) output: Target,
@@ -182,9 +189,8 @@ pub(crate) struct CompensateArgs {
     pub(crate) model: PathBuf,
     /// Record of the wanted output
     pub(crate) reference: PathBuf,
-    /// Temperature, where the model needs it and the reference has no column of it
-    #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = finite)]
-    pub(crate) temperature: Option<f64>,
+    #[command(flatten)]
+    pub(crate) temperature: TemperatureArg,
     /// Drive file to write (CSV); - for stdout
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Target,
@@ -217,6 +223,8 @@ pub(crate) struct RunArgs {
     /// Record of the voltages to play, as excite or compensate writes it
     #[arg(long)]
     pub(crate) drive: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) temperature: TemperatureArg,
     /// Log to write while the device runs (MCAP): all samples, ramps included
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
@@ -246,6 +254,13 @@ pub(crate) struct LimitArgs {
     /// Band in which lag, delay and resonances are inverted; chosen if not given
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) bandwidth: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct TemperatureArg {
+    /// Temperature, where the model needs it and the record or reference has no column of it
+    #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = finite)]
+    pub(crate) degc: Option<f64>,
 }
 
 #[derive(Debug, Args)]

@@ -42,7 +42,8 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (model, _) = input::model(&args.model)?;
     let reference = input::record(&args.reference, &args.map.map, Need::Output)?;
-    let options = CompensateOptions { temperature: args.temperature, ..options(&args.limits) };
+    let temperature = input::temperature(args.temperature, &model, &reference);
+    let options = CompensateOptions { temperature, ..options(&args.limits) };
     let drive = compensate(&model, &reference, &options)?;
 
     // The reference file keeps its own input, if it has one: no output is an input's file.

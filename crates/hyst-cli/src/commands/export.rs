@@ -3,17 +3,21 @@
 use hyst_ident::export;
 
 use crate::cli::{ExportArgs, ExportFormat};
-use crate::exit::CommandResult;
+use crate::exit::{CommandError, CommandResult};
 use crate::{input, output};
 
 /// Runs the command.
 pub(super) fn run(args: &ExportArgs) -> CommandResult {
+    if args.name.is_some() && !matches!(args.format, ExportFormat::C) {
+        let message = "--name is for --format c; Rust source is called as its file, and a block has no name";
+        return Err(CommandError::bad_input(message));
+    }
     output::check(&[&args.model], &[&args.output])?;
     let (model, _) = input::model(&args.model)?;
     let bytes = match args.format {
         ExportFormat::Postcard => export::block(&model)?,
         ExportFormat::Rust => export::rust(&model).into_bytes(),
-        ExportFormat::C => export::c(&model)?.into_bytes(),
+        ExportFormat::C => export::c(&model, &args.name.clone().unwrap_or_default())?.into_bytes(),
     };
     args.output.write(|out| out.write_all(&bytes))
 }

@@ -1,8 +1,9 @@
 //! `simulate`: what a model says about a record.
 
 use hyst_ident::metrics::Errors;
+use hyst_ident::model::Channel;
 use hyst_ident::record::{Extra, Need};
-use hyst_ident::simulate::{Zero, simulate};
+use hyst_ident::simulate::{Extrapolated, SimulateOptions, Zero, simulate_with};
 use serde::Serialize;
 
 use crate::cli::SimulateArgs;
@@ -23,6 +24,8 @@ struct Summary {
     zeros: Vec<f64>,
     /// None without a measured output.
     errors: Option<Errors>,
+    /// Inputs beyond the range of the record that the model was fitted to.
+    extrapolated: Extrapolated,
 }
 
 /// Runs the command.
@@ -33,7 +36,8 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     let predicted_column = input::output_unit(&model)?.predicted_column();
     let record = input::record(&args.input, &args.map.map, Need::Input)?;
     let zero = args.zero.get();
-    let simulated = simulate(&model, &record, zero)?;
+    let temperature = input::temperature(args.temperature, &model, &record);
+    let simulated = simulate_with(&model, &record, &SimulateOptions { zero, temperature })?;
 
     let replaced = input::present(&args.input, &[&predicted_column, "settling"])?;
     let extra =
@@ -49,6 +53,9 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     if zero == Zero::PerRecord && simulated.errors.is_none() {
         say("note: without a measured output --zero per-record has no effect");
     }
+    if simulated.extrapolated.rows > 0 {
+        say(&extrapolation(&simulated.extrapolated, &model.input));
+    }
     let summary = Summary {
         record: args.input.display().to_string(),
         output: args.output.to_string(),
@@ -58,8 +65,21 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         zero,
         zeros: simulated.zeros,
         errors: simulated.errors,
+        extrapolated: simulated.extrapolated,
     };
     report.print(&summary.text(), &summary)
+}
+
+fn extrapolation(found: &Extrapolated, input: &Channel) -> String {
+    let Channel { low, high, unit, .. } = input;
+    format!(
+        "warning: in {} the input lies beyond {} to {} {unit}, the range that the model was identified on, by {} {unit} at most (row {}); the prediction is extrapolated there",
+        text::count(found.rows, "row"),
+        text::short(*low),
+        text::short(*high),
+        text::short(found.largest),
+        found.row + 1
+    )
 }
 
 impl Summary {

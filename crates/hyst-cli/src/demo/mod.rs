@@ -64,8 +64,8 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let train = experiment(&mut plant, &design(args.seed)?, "train.csv")?;
     progress.say("driving a second experiment, for the test");
     let test = experiment(&mut plant, &design(args.seed.wrapping_add(TEST_SEED))?, "test.csv")?;
-    write_record(out, "train.csv", &train)?;
-    write_record(out, "test.csv", &test)?;
+    let train = write_record(out, "train.csv", train)?;
+    let test = write_record(out, "test.csv", test)?;
 
     progress.say("fitting Prandtl-Ishlinskii");
     let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, zero_per_record: false })?;
@@ -108,8 +108,12 @@ fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
     Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_bytes()))?)
 }
 
-fn write_record(folder: &Path, name: &str, record: &Record) -> CommandResult {
-    Ok(write_atomic(folder.join(name), |out| record.write_csv(out).map_err(output::io_error))?)
+/// Writes a record, which knows its file from then on.
+fn write_record(folder: &Path, name: &str, record: Record) -> CommandResult<Record> {
+    let mut file = Vec::new();
+    record.write_csv(&mut file).map_err(output::io_error)?;
+    write_atomic(folder.join(name), |out| out.write_all(&file))?;
+    Ok(record.kept_as(&file))
 }
 
 /// What is told at the end.
@@ -208,5 +212,24 @@ fn verdict(v: Verdict) -> &'static str {
         Verdict::NothingMissing => "the model is at the noise floor",
         Verdict::BaseTooCoarse => "the base is too coarse",
         Verdict::Unexplained => "something is left that nothing on the list explains",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hyst_ident::record::{ColumnMap, Columns, Need};
+
+    #[test]
+    fn a_record_that_is_fitted_knows_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let columns =
+            Columns { time: vec![0.0, 0.1, 0.2], input: Some(vec![0.0, 1.0, 0.1 + 0.2]), ..Columns::default() };
+        let record = Record::from_samples(columns).unwrap();
+        assert_eq!(record.sources()[0].sha256, None);
+        let kept = write_record(folder.path(), "train.csv", record).unwrap();
+        let read = Record::read(folder.path().join("train.csv"), &ColumnMap::default(), Need::Input).unwrap();
+        assert!(kept.sources()[0].sha256.is_some());
+        assert_eq!((&kept.sources()[0].sha256, kept.input()), (&read.sources()[0].sha256, read.input()));
     }
 }

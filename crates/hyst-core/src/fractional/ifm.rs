@@ -109,7 +109,10 @@ impl<T: Real, W: Memory<T>, const D: usize> Build<Ifm<T, W, D>> for IfmParams {
         finite("ifm.delta", self.delta)?;
         Ok(Ifm {
             hysteresis: self.hysteresis().build(cx)?,
-            delay: DelayParams { seconds: self.tau }.build(cx)?,
+            delay: DelayParams { seconds: self.tau }.build(cx).map_err(|e| match e {
+                Error::Capacity { needed, holds, .. } => Error::Capacity { name: "ifm.tau samples", needed, holds },
+                other => other,
+            })?,
             delta: T::from_f64(self.delta),
         })
     }
@@ -514,7 +517,7 @@ mod tests {
         assert_eq!(named(IfmParams { alpha: 1.01, ..PRINTED }), "ifm.alpha");
         assert_eq!(named(IfmParams { beta: -0.01, ..PRINTED }), "ifm.beta");
         assert_eq!(named(IfmParams { tau: -1e-3, ..PRINTED }), "ifm.tau");
-        assert_eq!(named(IfmParams { tau: 1.0, ..PRINTED }), "delay samples");
+        assert_eq!(named(IfmParams { tau: 1.0, ..PRINTED }), "ifm.tau samples");
         assert_eq!(named(IfmParams { delta: f64::INFINITY, ..PRINTED }), "ifm.delta");
     }
 }

@@ -62,21 +62,19 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<MaxwellSlip<T, N>> for Maxw
     fn build(&self, (): &()) -> Result<MaxwellSlip<T, N>, Error> {
         let (widths, gains) = (self.widths.as_ref(), self.gains.as_ref());
         let identity = Envelope::new(Curve::IDENTITY, Curve::IDENTITY)?;
-        // The operator's own checks, in the words of this model.
-        let checked = |gain: f64, r: &[f64], w: &[f64]| {
-            Pi::new(gain, r, w).map_err(|e| match e {
-                Error::OutOfRange { must, .. } => Error::OutOfRange { name: "maxwell-slip.widths", must },
-                Error::Lengths(_) => Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"),
-                Error::Capacity { needed, holds, .. } => {
-                    Error::Capacity { name: "maxwell-slip elements", needed, holds }
-                }
-                Error::NonFinite(_) => Error::NonFinite("maxwell-slip.widths or maxwell-slip.gains"),
-                other => other,
-            })
+        // The operator's own checks, in the words of this model; its gain is the first of the gains, or their sum.
+        let own = |e| match e {
+            Error::NonFinite("pi.thresholds") => Error::NonFinite("maxwell-slip.widths"),
+            Error::NonFinite(_) => Error::NonFinite("maxwell-slip.gains"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "maxwell-slip.widths", must },
+            Error::Lengths(_) => Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "maxwell-slip elements", needed, holds },
+            other => other,
         };
+        let checked = |gain: f64, r: &[f64], w: &[f64]| Pi::new(gain, r, w).map_err(own);
         let whole: Pi<T, N> = checked(0.0, widths, gains)?;
         if self.reading == SlipReading::ElastoSlip {
-            return Ok(Gpi::new(identity, Pi::from_stops(0.0, widths, gains)?));
+            return Ok(Gpi::new(identity, Pi::from_stops(0.0, widths, gains).map_err(own)?));
         }
         let (Some((narrowest, wider)), Some((first, others))) = (widths.split_first(), gains.split_first()) else {
             return Ok(Gpi::new(identity, whole));
@@ -169,8 +167,24 @@ mod tests {
 
     #[test]
     fn errors_speak_of_this_model() {
-        let slip = MaxwellSlipParams { reading: SlipReading::Backlash, widths: [4.0, 3.0], gains: [1.0, 1.0] };
-        let built: Result<MaxwellSlip<f64, 2>, _> = slip.build(&());
-        assert!(matches!(built, Err(Error::OutOfRange { name: "maxwell-slip.widths", .. })));
+        for reading in [SlipReading::Backlash, SlipReading::ElastoSlip] {
+            let refused = |widths: &[f64], gains: &[f64]| {
+                let built: Result<MaxwellSlip<f64, 2>, _> = MaxwellSlipParams { reading, widths, gains }.build(&());
+                built.unwrap_err()
+            };
+            let gains = Error::NonFinite("maxwell-slip.gains");
+            assert!(matches!(refused(&[4.0, 3.0], &[1.0; 2]), Error::OutOfRange { name: "maxwell-slip.widths", .. }));
+            assert_eq!(refused(&[4.0, f64::NAN], &[1.0; 2]), Error::NonFinite("maxwell-slip.widths"));
+            assert_eq!(refused(&[4.0, 5.0], &[f64::NAN, 1.0]), gains);
+            assert_eq!(refused(&[4.0, 5.0], &[1.0]), Error::Lengths("maxwell-slip.widths and maxwell-slip.gains"));
+            assert!(matches!(
+                refused(&[4.0, 5.0, 6.0], &[1.0; 3]),
+                Error::Capacity { name: "maxwell-slip elements", .. }
+            ));
+            // Each gain is a number, their sum is none.
+            if reading == SlipReading::ElastoSlip {
+                assert_eq!(refused(&[4.0, 5.0], &[f64::MAX; 2]), gains);
+            }
+        }
     }
 }

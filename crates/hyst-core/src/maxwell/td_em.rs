@@ -69,12 +69,8 @@ impl<L: AsMut<[f64]>> Params for TdEmParams<L> {
         one("mass", "kg", 0.0, &mut self.mass);
         one("stiffness", "N/m", 0.0, &mut self.stiffness);
         one("damping", "N s/m", 0.0, &mut self.damping);
-        for (name, unit, x) in
-            [("coupling_0", "N/V", 0usize), ("coupling_1", "N/(V K)", 1), ("coupling_2", "N/(V K^2)", 2)]
-        {
-            if let Some(x) = self.coupling.get_mut(x) {
-                one(name, unit, -INF, x);
-            }
+        for (x, unit) in self.coupling.iter_mut().zip(["N/V", "N/(V K)", "N/(V K^2)"]) {
+            one("coupling", unit, -INF, x);
         }
     }
 }
@@ -119,8 +115,17 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<TdEm<T, N>> for TdEmParams<
             finite("td-em.coupling", c)?;
         }
         let per_metre = positive("td-em.per_metre", self.per_metre)?;
+        // The bank's own checks, in the words of this model.
+        let slip = self.slip.build(&()).map_err(|e| match e {
+            Error::NonFinite("maxwell-slip.widths") => Error::NonFinite("td-em.slip.widths"),
+            Error::NonFinite(_) => Error::NonFinite("td-em.slip.gains"),
+            Error::OutOfRange { must, .. } => Error::OutOfRange { name: "td-em.slip.widths", must },
+            Error::Lengths(_) => Error::Lengths("td-em.slip.widths and td-em.slip.gains"),
+            Error::Capacity { needed, holds, .. } => Error::Capacity { name: "td-em.slip elements", needed, holds },
+            other => other,
+        })?;
         Ok(TdEm {
-            slip: self.slip.build(&())?,
+            slip,
             coupling: self.coupling,
             output: circuit.displacement::<T>() * T::from_f64(per_metre),
             circuit,
@@ -464,5 +469,11 @@ mod tests {
         let bad = TdEmParams { mass: -1.0, ..TdEmParams::PRINTED };
         let built: Result<TdEm<f64, 10>, _> = bad.build(&Sampling { period: 1e-3 });
         assert!(matches!(built, Err(Error::OutOfRange { name: "td-em.mass", .. })));
+        let mut bad = TdEmParams::PRINTED;
+        bad.slip.widths[3] = 0.0;
+        let built: Result<TdEm<f64, 10>, _> = bad.build(&Sampling { period: 1e-3 });
+        assert!(matches!(built, Err(Error::OutOfRange { name: "td-em.slip.widths", .. })));
+        let built: Result<TdEm<f64, 4>, _> = TdEmParams::PRINTED.build(&Sampling { period: 1e-3 });
+        assert_eq!(built, Err(Error::Capacity { name: "td-em.slip elements", needed: 10, holds: 4 }));
     }
 }

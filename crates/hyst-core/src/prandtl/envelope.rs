@@ -5,7 +5,7 @@
 //! generalised Prandtl-Ishlinskii operator is an ordinary one behind `G`, and its inverse is the ordinary inverse before `G⁻¹`.
 
 use crate::error::{finite, within};
-use crate::{Env, Error, Invert, Real, Stage};
+use crate::{Env, Error, Invert, Meta, Real, Stage};
 
 /// A rising envelope function γ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,22 +35,59 @@ impl Curve {
     /// `γ(u) = u`.
     pub const IDENTITY: Self = Self::Linear { slope: 1.0, offset: 0.0 };
 
-    fn checked<T: Real>(self, name: &'static str) -> Result<Shape<T>, Error> {
-        const MUST: &str = "positive: an envelope rises";
+    fn checked<T: Real>(self, names: &SideNames) -> Result<Shape<T>, Error> {
+        let rising = |name, x: f64| Ok(T::from_f64(within(name, x, x > 0.0, "positive: an envelope rises")?));
+        let any = |name, x: f64| Ok(T::from_f64(finite(name, x)?));
+        let SideNames { linear, tanh } = names;
         Ok(match self {
-            Self::Linear { slope, offset } => Shape::Linear {
-                slope: T::from_f64(within(name, slope, slope > 0.0, MUST)?),
-                offset: T::from_f64(finite(name, offset)?),
-            },
+            Self::Linear { slope, offset } => {
+                Shape::Linear { slope: rising(linear[0], slope)?, offset: any(linear[1], offset)? }
+            }
             Self::Tanh { height, rate, shift, offset } => Shape::Tanh {
-                height: T::from_f64(within(name, height, height > 0.0, MUST)?),
-                rate: T::from_f64(within(name, rate, rate > 0.0, MUST)?),
-                shift: T::from_f64(finite(name, shift)?),
-                offset: T::from_f64(finite(name, offset)?),
+                height: rising(tanh[0], height)?,
+                rate: rising(tanh[1], rate)?,
+                shift: any(tanh[2], shift)?,
+                offset: any(tanh[3], offset)?,
             },
         })
     }
+
+    /// Visits the numbers in the order of their names, whose first word is the operator's and not part of a path.
+    pub(super) fn visit(&mut self, names: &SideNames, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        const INF: f64 = f64::INFINITY;
+        let mut one = |name: &'static str, unit, lower, x: &mut f64| {
+            f(&Meta { name: name.split_once('.').map_or(name, |(_, path)| path), unit, lower, upper: INF }, x);
+        };
+        let SideNames { linear, tanh } = names;
+        match self {
+            Self::Linear { slope, offset } => {
+                one(linear[0], "1/u", 0.0, slope);
+                one(linear[1], "", -INF, offset);
+            }
+            Self::Tanh { height, rate, shift, offset } => {
+                one(tanh[0], "", 0.0, height);
+                one(tanh[1], "1/u", 0.0, rate);
+                one(tanh[2], "", -INF, shift);
+                one(tanh[3], "", -INF, offset);
+            }
+        }
+    }
 }
+
+/// What the numbers of one side are called: slope and offset; height, rate, shift and offset.
+pub(super) struct SideNames {
+    linear: [&'static str; 2],
+    tanh: [&'static str; 4],
+}
+
+pub(super) const LEFT: SideNames = SideNames {
+    linear: ["gpi.left.linear.slope", "gpi.left.linear.offset"],
+    tanh: ["gpi.left.tanh.height", "gpi.left.tanh.rate", "gpi.left.tanh.shift", "gpi.left.tanh.offset"],
+};
+pub(super) const RIGHT: SideNames = SideNames {
+    linear: ["gpi.right.linear.slope", "gpi.right.linear.offset"],
+    tanh: ["gpi.right.tanh.height", "gpi.right.tanh.rate", "gpi.right.tanh.shift", "gpi.right.tanh.offset"],
+};
 
 /// A curve in the precision of the signal path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,9 +135,9 @@ impl<T: Real> Envelope<T> {
     /// From the two sides.
     ///
     /// # Errors
-    /// If a number is not finite, or a curve does not rise.
+    /// If a number is not finite, or a curve does not rise; names it as the generalised operator does.
     pub fn new(left: Curve, right: Curve) -> Result<Self, Error> {
-        Ok(Self { left: left.checked("envelope.left")?, right: right.checked("envelope.right")? })
+        Ok(Self { left: left.checked(&LEFT)?, right: right.checked(&RIGHT)? })
     }
 
     /// The two sides at an input: γₗ(u), γᵣ(u).
@@ -250,9 +287,14 @@ mod tests {
     #[test]
     fn a_curve_that_does_not_rise_is_refused() {
         let flat = Curve::Linear { slope: 0.0, offset: 1.0 };
-        assert!(matches!(
-            Envelope::<f64>::new(flat, Curve::IDENTITY),
-            Err(Error::OutOfRange { name: "envelope.left", .. })
-        ));
+        let refused = |left, right| match Envelope::<f64>::new(left, right) {
+            Err(Error::OutOfRange { name, .. } | Error::NonFinite(name)) => name,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(refused(flat, Curve::IDENTITY), "gpi.left.linear.slope");
+        assert_eq!(refused(Curve::IDENTITY, flat), "gpi.right.linear.slope");
+        let tanh = |rate, shift| Curve::Tanh { height: 1.0, rate, shift, offset: 0.0 };
+        assert_eq!(refused(Curve::IDENTITY, tanh(-1.0, 0.0)), "gpi.right.tanh.rate");
+        assert_eq!(refused(tanh(1.0, f64::NAN), Curve::IDENTITY), "gpi.left.tanh.shift");
     }
 }

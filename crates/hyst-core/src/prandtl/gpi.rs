@@ -1,6 +1,6 @@
 //! The generalised Prandtl-Ishlinskii operator: envelope functions on each side, so loops need not be symmetric.
 
-use super::envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState};
+use super::envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState, LEFT, RIGHT};
 use crate::{Build, Env, Error, Invert, Meta, Params, Pi, PiState, Real, Stage};
 
 /// Parameters of `y = p₀ F₀(u) + Σᵢ wᵢ F_{rᵢ}(u)` with the generalised plays
@@ -20,29 +20,10 @@ pub struct GpiParams<L> {
     pub weights: L,
 }
 
-impl Curve {
-    pub(super) fn visit(&mut self, names: [&'static str; 4], f: &mut dyn FnMut(&Meta, &mut f64)) {
-        const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-        let mut one = |name, unit, (lower, upper), x: &mut f64| f(&Meta { name, unit, lower, upper }, x);
-        match self {
-            Self::Linear { slope, offset } => {
-                one(names[0], "1/u", (0.0, f64::INFINITY), slope);
-                one(names[1], "", ANY, offset);
-            }
-            Self::Tanh { height, rate, shift, offset } => {
-                one(names[0], "", (0.0, f64::INFINITY), height);
-                one(names[1], "", ANY, offset);
-                one(names[2], "1/u", (0.0, f64::INFINITY), rate);
-                one(names[3], "", ANY, shift);
-            }
-        }
-    }
-}
-
 impl<L: AsMut<[f64]>> Params for GpiParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        self.left.visit(["left.slope", "left.offset", "left.rate", "left.shift"], f);
-        self.right.visit(["right.slope", "right.offset", "right.rate", "right.shift"], f);
+        self.left.visit(&LEFT, f);
+        self.right.visit(&RIGHT, f);
         f(&Meta { name: "gain", unit: "y", lower: 0.0, upper: f64::INFINITY }, &mut self.gain);
         for r in self.thresholds.as_mut() {
             f(&Meta { name: "thresholds", unit: "", lower: 0.0, upper: f64::INFINITY }, r);

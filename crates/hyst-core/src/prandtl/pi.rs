@@ -20,12 +20,23 @@ pub struct PiParams<L> {
 
 impl<L: AsMut<[f64]>> Params for PiParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        f(&Meta { name: "gain", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, &mut self.gain);
+        self.visit_as(["gain", "thresholds", "weights"], f);
+    }
+}
+
+impl<L: AsMut<[f64]>> PiParams<L> {
+    /// Visits the parameters under the paths that they have in a larger model.
+    pub(super) fn visit_as(
+        &mut self,
+        [gain, thresholds, weights]: [&'static str; 3],
+        f: &mut dyn FnMut(&Meta, &mut f64),
+    ) {
+        f(&Meta { name: gain, unit: "y/u", lower: 0.0, upper: f64::INFINITY }, &mut self.gain);
         for r in self.thresholds.as_mut() {
-            f(&Meta { name: "thresholds", unit: "u", lower: 0.0, upper: f64::INFINITY }, r);
+            f(&Meta { name: thresholds, unit: "u", lower: 0.0, upper: f64::INFINITY }, r);
         }
         for w in self.weights.as_mut() {
-            f(&Meta { name: "weights", unit: "y/u", lower: 0.0, upper: f64::INFINITY }, w);
+            f(&Meta { name: weights, unit: "y/u", lower: 0.0, upper: f64::INFINITY }, w);
         }
     }
 }

@@ -22,7 +22,7 @@ pub struct ViscousPiParams<L> {
 
 impl<L: AsMut<[f64]>> Params for ViscousPiParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        self.pi.visit(f);
+        self.pi.visit_as(["pi.gain", "pi.thresholds", "pi.weights"], f);
         f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: 1.0 }, &mut self.seconds);
     }
 }

@@ -35,14 +35,25 @@ impl<L> MirrorParams<L> {
 
 impl<L: AsMut<[f64]>> Params for MirrorParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        self.visit_as(["rate_low", "rate_high", "change_low", "change_high", "weights"], f);
+    }
+}
+
+impl<L: AsMut<[f64]>> MirrorParams<L> {
+    /// Visits the parameters under the paths that they have in a larger model.
+    pub(super) fn visit_as(
+        &mut self,
+        [rate_low, rate_high, change_low, change_high, weights]: [&'static str; 5],
+        f: &mut dyn FnMut(&Meta, &mut f64),
+    ) {
         let rate = |name| Meta { name, unit: "u/s", lower: 0.0, upper: f64::INFINITY };
         let change = |name| Meta { name, unit: "u", lower: f64::NEG_INFINITY, upper: f64::INFINITY };
-        f(&rate("rate_low"), &mut self.rate_low);
-        f(&rate("rate_high"), &mut self.rate_high);
-        f(&change("change_low"), &mut self.change_low);
-        f(&change("change_high"), &mut self.change_high);
+        f(&rate(rate_low), &mut self.rate_low);
+        f(&rate(rate_high), &mut self.rate_high);
+        f(&change(change_low), &mut self.change_low);
+        f(&change(change_high), &mut self.change_high);
         for w in self.weights.as_mut() {
-            f(&Meta { name: "weights", unit: "", lower: 0.0, upper: f64::INFINITY }, w);
+            f(&Meta { name: weights, unit: "", lower: 0.0, upper: f64::INFINITY }, w);
         }
     }
 }

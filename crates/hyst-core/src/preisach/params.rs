@@ -42,15 +42,26 @@ pub fn preisach_cell(a: usize, b: usize) -> usize {
 
 impl<L: AsMut<[f64]>> Params for PreisachParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        self.visit_as(["low", "high", "rest", "density", "once"], f);
+    }
+}
+
+impl<L: AsMut<[f64]>> PreisachParams<L> {
+    /// Visits the parameters under the paths that they have in a larger model.
+    pub(super) fn visit_as(
+        &mut self,
+        [low, high, rest, density, once]: [&'static str; 5],
+        f: &mut dyn FnMut(&Meta, &mut f64),
+    ) {
         let input = |name| Meta { name, unit: "u", lower: f64::NEG_INFINITY, upper: f64::INFINITY };
-        f(&input("low"), &mut self.low);
-        f(&input("high"), &mut self.high);
-        f(&input("rest"), &mut self.rest);
+        f(&input(low), &mut self.low);
+        f(&input(high), &mut self.high);
+        f(&input(rest), &mut self.rest);
         for d in self.density.as_mut() {
-            f(&Meta { name: "density", unit: "y", lower: 0.0, upper: f64::INFINITY }, d);
+            f(&Meta { name: density, unit: "y", lower: 0.0, upper: f64::INFINITY }, d);
         }
         for d in self.once.as_mut() {
-            f(&Meta { name: "once", unit: "y", lower: 0.0, upper: f64::INFINITY }, d);
+            f(&Meta { name: once, unit: "y", lower: 0.0, upper: f64::INFINITY }, d);
         }
     }
 }

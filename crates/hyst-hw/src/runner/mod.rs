@@ -65,7 +65,8 @@ pub struct Progress<'a> {
 /// One segment as measured.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SegmentRecord {
-    /// One sample per drive sample, time on the device's clock.
+    /// One sample per drive sample, time on the device's clock: the first one period after what came before it, because the
+    /// drive moves to a sample within one period and is measured there.
     pub samples: Vec<Sample>,
     /// Ramp and settling before the record; the device's history, but not part of the record.
     pub approach: Vec<Sample>,

@@ -6,7 +6,9 @@ use std::path::Path;
 use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
 
+use super::operator::inverse_ends;
 use super::{Base, Compensator, Effects, HostChain, Operator, stages};
+use crate::samples::Samples;
 
 /// Schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
@@ -167,6 +169,12 @@ impl Model {
         chain.compensator(&Sampling { period }, options)
     }
 
+    /// Inputs that the compensator's memory operator does not leave, if there are such, lowest and highest, and how near it comes
+    /// to the exact one \[input unit\]: for outputs beyond what they reach it takes the nearer end.
+    pub fn inverse_ends(&self) -> Option<([f64; 2], f64)> {
+        inverse_ends(&self.base, [self.input.low, self.input.high])
+    }
+
     /// Whether the model needs a temperature.
     pub fn needs_temperature(&self) -> bool {
         self.effects.temperature.is_some() || matches!(self.base, Base::TdPi(_) | Base::TdEm(_))
@@ -175,6 +183,17 @@ impl Model {
     /// Whether the model needs a load.
     pub fn needs_load(&self) -> bool {
         self.effects.load.is_some()
+    }
+
+    /// The surroundings that the model cannot do without and these rows lack: the column, and why.
+    pub(crate) fn lacking(&self, samples: &Samples) -> Option<(&'static str, &'static str)> {
+        if self.needs_temperature() && samples.temperature.is_none() {
+            return Some((
+                "temperature_degc",
+                "the model's gain depends on it; if it was constant, give --temperature",
+            ));
+        }
+        (self.needs_load() && samples.load.is_none()).then_some(("load_n", "the model yields under it"))
     }
 
     /// The file's text.

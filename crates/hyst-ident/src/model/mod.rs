@@ -3,11 +3,14 @@
 mod activation;
 pub mod capacity;
 mod effects;
+mod elsewhere;
 mod file;
 mod operator;
 mod stages;
+mod units;
 
 pub use effects::{CreepBank, Effect, Effects};
+pub use elsewhere::Ends;
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
 pub use hyst_core::Kind;
 pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState};

@@ -22,8 +22,8 @@ type HostDpm = Dpm<f64, NODES, MIRROR, MIRROR>;
 /// Memory of the host's fractional models: all of it, to 3e-7.
 type FullMemory = Exponentials<f64, 40>;
 
-/// Temperature for which the filter of an electromechanical model is made \[°C\]; its gain follows the measured one.
-const ROOM: f64 = 23.0;
+/// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
+pub(super) const ROOM: f64 = 23.0;
 
 const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
     "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",
@@ -135,10 +135,28 @@ fn closed<O: Invert<f64>>(operator: &O, _: Inversion) -> Result<O::Inverse, Erro
     operator.invert()
 }
 
-/// By search, to within a part in 10¹² of the range.
+/// Share of the range to which a search finds the input.
+const TOLERANCE: f64 = 1e-12;
+
 fn searched<O: Probe<f64> + Clone>(operator: &O, how: Inversion) -> Result<Search<f64, O>, Error> {
     let [low, high] = how.range;
-    Search::new(operator.clone(), low, high, 1e-12 * (high - low))
+    Search::new(operator.clone(), low, high, TOLERANCE * (high - low))
+}
+
+/// What was never driven may have to be reached by an inverse: as much again on either side.
+fn searched_range([low, high]: [f64; 2]) -> [f64; 2] {
+    let reach = (high - low).abs().max(f64::MIN_POSITIVE);
+    [low - reach, high + reach]
+}
+
+/// Inputs that the inverse of a model identified on `range` does not leave, if there are such, and how near it comes to the exact
+/// one: for outputs beyond what they reach it takes the nearer end.
+pub(super) fn inverse_ends(base: &Base, range: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let [low, high] = searched_range(range);
+    match base {
+        Base::BoucWen(_) | Base::Dpm(_) => Some(([low, high], TOLERANCE * (high - low))),
+        _ => None,
+    }
 }
 
 fn at_once<I>(_: &I) -> usize {
@@ -155,7 +173,7 @@ operators! {
     Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed, at_once;
     Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed, at_once;
     BoucWen(BoucWen<f64>) => Search<f64, BoucWen<f64>>,
-        |o: &BoucWen<f64>, Inversion { range: [low, high], .. }| o.inverse(low, high, 1e-12 * (high - low)), at_once;
+        |o: &BoucWen<f64>, Inversion { range: [low, high], .. }| o.inverse(low, high, TOLERANCE * (high - low)), at_once;
     BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
     Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
     Activation(Activation<f64>) => HostActivationInverse,
@@ -169,8 +187,6 @@ impl Operator {
     /// # Errors
     /// Names the parameter that is not finite, out of range or too long.
     pub fn new(base: &Base, [low, high]: [f64; 2], cx: &Sampling) -> Result<Self, Error> {
-        // What was never driven may have to be reached by an inverse: as much again on either side.
-        let reach = (high - low).abs().max(f64::MIN_POSITIVE);
         let any = match base {
             Base::Pi(p) => Any::Pi(Box::new(p.build(&())?)),
             Base::ViscousPi(p) => Any::ViscousPi(Box::new(p.build(cx)?)),
@@ -192,7 +208,7 @@ impl Operator {
             Base::Lfdm(p) => Any::Lfdm(Box::new(p.build(cx)?)),
             Base::Ifm(p) => Any::Ifm(Box::new(p.build(cx)?)),
         };
-        Ok(Self { any, inversion: Inversion { range: [low - reach, high + reach], bandwidth_hz: None } })
+        Ok(Self { any, inversion: Inversion { range: searched_range([low, high]), bandwidth_hz: None } })
     }
 
     /// The same, whose inverse holds in this band if it has dynamics of its own \[Hz\].

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::{Base, Effects, Model};
+use super::{Base, Effects, Model, units};
 
 /// What the stages of a file say.
 pub(super) struct Stages {
@@ -22,46 +22,21 @@ struct RateDependence {
     seconds: f64,
 }
 
-/// `unit` with `u` and `y` replaced by the model's own units.
-fn unit(unit: &str, input: &str, output: &str) -> String {
-    if unit.is_empty() {
-        return "1".into();
-    }
-    let words = unit.split_inclusive(|c: char| !c.is_alphanumeric());
-    let mut text = String::new();
-    for word in words {
-        let (name, rest) = word.split_at(word.trim_end_matches(|c: char| !c.is_alphanumeric()).len());
-        text += match name {
-            "u" => input,
-            "y" => output,
-            other => other,
-        };
-        text += rest;
-    }
-    text
-}
-
 /// The stages of a model, in the chain's order.
 pub(super) fn write(model: &Model) -> Vec<Value> {
     let (u, y) = (&model.input.unit, &model.output.unit);
     let mut list = Vec::new();
     let mut push = |name: &str, key: &str, fields: Value, params: &mut dyn Params| {
-        let mut units = BTreeMap::new();
-        params.visit(&mut |meta, _| {
-            units.entry(meta.name).or_insert_with(|| unit(meta.unit, u, y));
-        });
+        let units = units::of(&fields, params, u, y);
         let mut entry = Map::new();
         entry.insert("stage".into(), name.into());
         if let Value::Object(fields) = fields {
-            if fields.contains_key("reference_degc") {
-                units.insert("reference_degc", "degC".into());
-            }
             entry.extend(fields);
         }
         let own = |k: &String| k.strip_prefix(key).and_then(|k| k.strip_prefix('.')).map(str::to_owned);
         let errors: Map<String, Value> =
             model.std_errors.iter().filter_map(|(k, v)| Some((own(k)?, Value::from(*v)))).collect();
-        entry.insert("units".into(), units.into_iter().map(|(k, v)| (k.to_owned(), Value::from(v))).collect());
+        entry.insert("units".into(), Value::Object(units));
         if !errors.is_empty() {
             entry.insert("std_errors".into(), Value::Object(errors));
         }
@@ -232,15 +207,6 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
 mod tests {
     use super::*;
     use hyst_core::PiParams;
-
-    #[test]
-    fn units_are_the_models_own() {
-        assert_eq!(unit("y/u", "V", "um"), "um/V");
-        assert_eq!(unit("u s/y", "V", "um"), "V s/um");
-        assert_eq!(unit("1/u", "V", "um"), "1/V");
-        assert_eq!(unit("", "V", "um"), "1");
-        assert_eq!(unit("Hz", "V", "um"), "Hz");
-    }
 
     #[test]
     fn a_misspelt_field_is_named() {

@@ -113,6 +113,11 @@ pub(crate) enum Role {
     Load,
 }
 
+/// Whether an input's column may have this name: `voltage_v`, or `<quantity>_in_<unit>`.
+pub fn is_input_column(name: &str) -> bool {
+    Role::of_column(name) == Some(Role::Input)
+}
+
 impl Role {
     /// The role that a name of the record format has. Inputs other than a voltage are named `<quantity>_in_<unit>`.
     pub(crate) fn of_column(name: &str) -> Option<Self> {

@@ -23,12 +23,13 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
-pub use columns::{ColumnMap, MapError, Need};
+pub use columns::{ColumnMap, MapError, Need, is_input_column};
 pub use error::{Place, RecordError};
 pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
 
 use grid::{Fault, Printed};
+use sha2::{Digest, Sha256};
 
 /// Where rows come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -190,6 +191,14 @@ impl Record {
             load,
             text: None,
         })
+    }
+
+    /// The same record, with the sum of the file in which it is kept: models that are fitted to it state the sum.
+    pub fn kept_as(mut self, file: &[u8]) -> Self {
+        if let [source] = self.sources.as_mut_slice() {
+            source.sha256 = Some(format!("{:x}", Sha256::digest(file)));
+        }
+        self
     }
 
     /// The files that the rows come from, in order: one, unless records were [joined](Self::join).

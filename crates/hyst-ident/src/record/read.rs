@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use csv::ByteRecord;
-use sha2::{Digest, Sha256};
 
 use super::columns::{ColumnMap, Layout, Need};
 use super::error::{Place, RecordError};
@@ -50,8 +49,7 @@ impl Record {
             segment_column: layout.segment.map_or("", column),
             place: &place,
         };
-        let mut record = Self::assemble(samples, printed, &origin)?;
-        record.sources[0].sha256 = Some(format!("{:x}", Sha256::digest(bytes)));
+        let mut record = Self::assemble(samples, printed, &origin)?.kept_as(bytes);
         record.text = Some(Arc::from(text));
         Ok(record)
     }

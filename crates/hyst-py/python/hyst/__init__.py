@@ -12,6 +12,7 @@ from ._errors import (
     ModelFileError,
     NotInvertibleError,
     ParameterError,
+    RangeWarning,
     ReachError,
     RecordError,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "ModelFileError",
     "NotInvertibleError",
     "ParameterError",
+    "RangeWarning",
     "ReachError",
     "RecordError",
     *(name for name in dir(_hyst) if not name.startswith("_")),

@@ -1,4 +1,4 @@
-"""Exceptions of the package."""
+"""Exceptions and warnings of the package."""
 
 
 class HystError(Exception):
@@ -23,6 +23,11 @@ class ModelFileError(HystError, ValueError):
 
 class FitError(HystError):
     """A record cannot be fitted or diagnosed."""
+
+
+class RangeWarning(UserWarning):
+    """Something was asked beyond the range in which a model or its inverse holds; the message says in how many samples, and by
+    how much."""
 
 
 class ReachError(HystError, ValueError):

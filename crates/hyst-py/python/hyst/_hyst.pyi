@@ -13,6 +13,8 @@ _Signal = NDArray[np.float64]
 _Surrounding = float | NDArray[np.float64]
 _List = Sequence[float] | NDArray[np.float64]
 _Path = str | os.PathLike[str]
+# Lowest and highest.
+_Range = tuple[float, float]
 _Zero = Literal["none", "per-record"]
 
 class Operator:
@@ -50,6 +52,32 @@ class Operator:
         tolerance: float | None = None,
         bandwidth_hz: float | None = None,
     ) -> _Signal: ...
+    def to_model(
+        self,
+        *,
+        input_range: _Range | None = None,
+        output_range: _Range | None = None,
+        input_column: str | None = None,
+        output_column: str | None = None,
+    ) -> Model: ...
+    def to_json(
+        self,
+        *,
+        input_range: _Range | None = None,
+        output_range: _Range | None = None,
+        input_column: str | None = None,
+        output_column: str | None = None,
+    ) -> str: ...
+    def save(
+        self,
+        path: _Path,
+        *,
+        overwrite: bool = False,
+        input_range: _Range | None = None,
+        output_range: _Range | None = None,
+        input_column: str | None = None,
+        output_column: str | None = None,
+    ) -> None: ...
     @property
     def lead(self) -> int: ...
 
@@ -625,7 +653,7 @@ class Model:
     def load(path: _Path) -> Model: ...
     @staticmethod
     def loads(text: str) -> Model: ...
-    def save(self, path: _Path) -> None: ...
+    def save(self, path: _Path, *, overwrite: bool = True) -> None: ...
     def dumps(self) -> str: ...
     def to_dict(self) -> dict[str, Any]: ...
     @property
@@ -642,7 +670,9 @@ class Model:
     def output_column(self) -> str: ...
     @property
     def output_range(self) -> tuple[float, float]: ...
-    def simulate(self, record: _AnyRecord, *, zero: _Zero = "none") -> Simulation: ...
+    def simulate(
+        self, record: _AnyRecord, *, zero: _Zero = "none", temperature: float | None = None
+    ) -> Simulation: ...
     def compensate(
         self,
         reference: _AnyRecord,
@@ -665,6 +695,8 @@ class Simulation:
     def settling(self) -> NDArray[np.bool_]: ...
     @property
     def zeros(self) -> list[float]: ...
+    @property
+    def extrapolated(self) -> dict[str, float]: ...
     @property
     def errors(self) -> dict[str, float] | None: ...
 

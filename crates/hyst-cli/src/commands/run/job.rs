@@ -89,11 +89,12 @@ impl Job {
             Some(limit) => (limit.low, limit.high),
             None => (limits.low.max(model.input.low), limits.high.min(model.input.high)),
         });
+        options.temperature = input::temperature(args.temperature, &model, &reference);
         let mut play = play_options(args, &reference);
-        // A temperature that is measured is followed; the plan starts from the one that the gain is stated for.
+        // A temperature that is measured is followed; the plan starts from the given one, or the one that the gain is stated for.
         let measured = model.effects.temperature.filter(|_| device.temperature);
         if let Some(gain) = measured {
-            options.temperature = Some(gain.reference_degc);
+            options.temperature = options.temperature.or(Some(gain.reference_degc));
             play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
         }
         let drive = compensate(&model, &reference, &options)?;
@@ -109,6 +110,11 @@ impl Job {
         if args.limits.bandwidth.is_some() {
             return Err(CommandError::bad_input(
                 "--bandwidth needs --model and --reference: a drive is played as it stands",
+            ));
+        }
+        if args.temperature.degc.is_some() {
+            return Err(CommandError::bad_input(
+                "--temperature needs --model and --reference: a drive is played as it stands",
             ));
         }
         let drive = input::record(path, &args.map.map, Need::Input)?;

@@ -27,11 +27,47 @@ pub struct DpmParams<L> {
 
 impl<L: AsMut<[f64]>> Params for DpmParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        self.preisach.visit(f);
-        self.mirror.visit(f);
+        let classical = ["preisach.low", "preisach.high", "preisach.rest", "preisach.density", "preisach.once"];
+        self.preisach.visit_as(classical, f);
+        let mirror =
+            ["mirror.rate_low", "mirror.rate_high", "mirror.change_low", "mirror.change_high", "mirror.weights"];
+        self.mirror.visit_as(mirror, f);
         f(&Meta { name: "fade", unit: "u", lower: 0.0, upper: f64::INFINITY }, &mut self.fade);
     }
 }
+
+/// What the classical model's errors are called here.
+const PREISACH: [(&str, &str); 9] = [
+    ("preisach.low", "dpm.preisach.low"),
+    ("preisach.high", "dpm.preisach.high"),
+    ("above preisach.low", "above dpm.preisach.low"),
+    ("preisach.rest", "dpm.preisach.rest"),
+    ("preisach.cells", "dpm.preisach.cells"),
+    ("preisach nodes", "dpm.preisach nodes"),
+    ("preisach surface", "dpm.preisach surface"),
+    ("preisach virgin curve", "dpm.preisach virgin curve"),
+    (
+        "preisach.density and preisach.once, and what preisach.cells asks for,",
+        "dpm.preisach.density and dpm.preisach.once, and what dpm.preisach.cells asks for,",
+    ),
+];
+
+/// What the mirror function's errors are called here.
+const MIRROR: [(&str, &str); 10] = [
+    ("mirror.rate_low", "dpm.mirror.rate_low"),
+    ("mirror.rate_high", "dpm.mirror.rate_high"),
+    ("above mirror.rate_low", "above dpm.mirror.rate_low"),
+    ("mirror.rates", "dpm.mirror.rates"),
+    ("mirror.change_low", "dpm.mirror.change_low"),
+    ("mirror.change_high", "dpm.mirror.change_high"),
+    ("above mirror.change_low", "above dpm.mirror.change_low"),
+    ("mirror.changes", "dpm.mirror.changes"),
+    ("mirror.weights", "dpm.mirror.weights"),
+    (
+        "mirror.weights and mirror.rates × mirror.changes",
+        "dpm.mirror.weights and dpm.mirror.rates × dpm.mirror.changes",
+    ),
+];
 
 impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> Build<Dpm<T, N, R, C>> for DpmParams<L> {
     type Context = Sampling;
@@ -39,7 +75,9 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize, const R: usize, const C: usize> B
     /// # Errors
     /// As the two parts, or if the fade is negative or not finite.
     fn build(&self, cx: &Sampling) -> Result<Dpm<T, N, R, C>, Error> {
-        Dpm::new(self.preisach.build(&())?, self.mirror.build(&())?, self.fade, cx)
+        let map = self.preisach.build(&()).map_err(|e| e.in_words(&PREISACH))?;
+        let mirror = self.mirror.build(&()).map_err(|e| e.in_words(&MIRROR))?;
+        Dpm::new(map, mirror, self.fade, cx)
     }
 }
 

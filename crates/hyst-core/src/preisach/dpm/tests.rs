@@ -426,3 +426,58 @@ fn parameters_build_the_model() {
     let built: Result<Model, _> = params.build(&PERIOD);
     assert!(matches!(built, Err(Error::OutOfRange { name: "dpm.fade", .. })));
 }
+
+/// Whatever the parts refuse is named by its place in this model's file.
+#[test]
+fn errors_of_the_parts_are_in_the_words_of_the_whole() {
+    let good = DpmParams {
+        preisach: PreisachParams {
+            low: 0.0,
+            high: 80.0,
+            cells: 1,
+            rest: 0.0,
+            density: [1.0].to_vec(),
+            once: [0.0].to_vec(),
+        },
+        mirror: MirrorParams {
+            rate_low: 1.0,
+            rate_high: 2.0,
+            rates: 2,
+            change_low: -1.0,
+            change_high: 1.0,
+            changes: 1,
+            weights: [1.0; 2].to_vec(),
+        },
+        fade: 20.0,
+    };
+    let built: Result<Model, _> = good.build(&PERIOD);
+    assert!(built.is_ok());
+    let changes: [fn(&mut DpmParams<Vec<f64>>); 17] = [
+        |p| p.preisach.low = f64::NAN,
+        |p| p.preisach.high = -1.0,
+        |p| p.preisach.rest = f64::NAN,
+        |p| (p.preisach.cells, p.preisach.density, p.preisach.once) = (0, Vec::new(), Vec::new()),
+        |p| (p.preisach.cells, p.preisach.density, p.preisach.once) = (99, vec![1.0; 4950], vec![0.0; 99]),
+        |p| p.preisach.cells = 2,
+        |p| p.preisach.density[0] = -1.0,
+        |p| p.preisach.once[0] = -2.0,
+        |p| p.mirror.rate_low = 0.0,
+        |p| p.mirror.rate_high = 0.5,
+        |p| (p.mirror.rates, p.mirror.weights) = (99, vec![1.0; 99]),
+        |p| (p.mirror.changes, p.mirror.weights) = (0, Vec::new()),
+        |p| p.mirror.changes = 2,
+        |p| p.mirror.change_low = f64::NAN,
+        |p| p.mirror.change_high = -2.0,
+        |p| p.mirror.weights[0] = 0.0,
+        |p| p.mirror.weights[0] = f64::NAN,
+    ];
+    for (k, change) in changes.into_iter().enumerate() {
+        let mut params = good.clone();
+        change(&mut params);
+        let built: Result<Model, _> = params.build(&PERIOD);
+        let message = std::format!("{}", built.unwrap_err());
+        let part = if k < 8 { "preisach" } else { "mirror" };
+        let words = message.matches(part).count();
+        assert!(words > 0 && words == message.matches(&std::format!("dpm.{part}")).count(), "{message}");
+    }
+}

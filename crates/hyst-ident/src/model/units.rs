@@ -1,0 +1,99 @@
+//! The units of a stage's numbers, by their paths in the file.
+
+use std::collections::BTreeMap;
+
+use hyst_core::Params;
+use serde_json::{Map, Value};
+
+/// `unit` with `u` and `y` replaced by the model's own units.
+fn unit(unit: &str, input: &str, output: &str) -> String {
+    if unit.is_empty() {
+        return "1".into();
+    }
+    let words = unit.split_inclusive(|c: char| !c.is_alphanumeric());
+    let mut text = String::new();
+    for word in words {
+        let (name, rest) = word.split_at(word.trim_end_matches(|c: char| !c.is_alphanumeric()).len());
+        text += match name {
+            "u" => input,
+            "y" => output,
+            other => other,
+        };
+        text += rest;
+    }
+    text
+}
+
+/// The unit of a number that is given and never searched, so that no visit shows it.
+fn of_given(field: &str) -> Option<&'static str> {
+    Some(match field {
+        "reference_degc" => "degC",
+        "per_metre" => "y/m",
+        "cells" | "plays" | "rates" | "changes" => "",
+        _ => return None,
+    })
+}
+
+/// Calls `f` with the path of every number and of every list with numbers in it.
+fn paths(fields: &Value, path: &str, f: &mut dyn FnMut(&str)) {
+    match fields {
+        Value::Object(fields) => {
+            for (key, value) in fields {
+                paths(value, &if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, f);
+            }
+        }
+        Value::Array(list) if list.iter().any(Value::is_number) => f(path),
+        Value::Number(_) => f(path),
+        _ => {}
+    }
+}
+
+/// The unit of every number of a stage by its path, of a list as a whole; where its elements have units of their own, these in
+/// the elements' order with commas between them.
+pub(super) fn of(fields: &Value, params: &mut dyn Params, input: &str, output: &str) -> Map<String, Value> {
+    let mut visited: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    params.visit(&mut |meta, _| visited.entry(meta.name).or_default().push(meta.unit));
+    let mut units = Map::new();
+    for (path, each) in &mut visited {
+        if each.iter().all(|unit| Some(unit) == each.first()) {
+            each.truncate(1);
+        }
+        let words: Vec<String> = each.iter().map(|of| unit(of, input, output)).collect();
+        units.insert((*path).to_owned(), words.join(", ").into());
+    }
+    paths(fields, "", &mut |path| {
+        let field = path.rsplit('.').next().unwrap_or(path);
+        if let Some(given) = of_given(field) {
+            units.insert(path.to_owned(), unit(given, input, output).into());
+        }
+    });
+    units
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hyst_core::TdEmParams;
+    use serde_json::json;
+
+    #[test]
+    fn units_are_the_models_own() {
+        assert_eq!(unit("y/u", "V", "um"), "um/V");
+        assert_eq!(unit("u s/y", "V", "um"), "V s/um");
+        assert_eq!(unit("1/u", "V", "um"), "1/V");
+        assert_eq!(unit("", "V", "um"), "1");
+        assert_eq!(unit("Hz", "V", "um"), "Hz");
+    }
+
+    #[test]
+    fn a_list_has_one_unit_or_one_for_each_element() {
+        let mut params = TdEmParams::PRINTED;
+        let fields = json!({ "slip": { "widths": [1.0], "gains": [1.0], "reading": "backlash" }, "per_metre": 1e6, "empty": [] });
+        let units = Value::Object(of(&fields, &mut params, "V", "um"));
+        let expected = json!({
+            "slip.widths": "V", "slip.gains": "A/V", "capacitance": "F", "resistance": "Ohm", "mass": "kg", "stiffness": "N/m",
+            "damping": "N s/m", "coupling": "N/V, N/(V K), N/(V K^2)", "per_metre": "um/m",
+        });
+        assert_eq!(units, expected);
+    }
+}

@@ -1,0 +1,98 @@
+//! What a model file keeps of the parameters of a class.
+
+use hyst_core::{
+    ActivationKind, ActivationParams, AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams, BoucWenParams,
+    CreepParams, DelayParams, DpmParams, DriftParams, GpiParams, IfmParams, InterferenceParams, LagParams, LfdmParams,
+    LoadParams, MaxwellSlipParams, PiParams, PreisachParams, ResonanceParams, SaturationParams, TdEmParams, TdPiParams,
+    TemperatureParams, ViscousPiParams,
+};
+use hyst_ident::model::{Base, Effects};
+
+/// A hysteresis and the stages around it.
+pub(crate) struct Kept {
+    pub(crate) base: Base,
+    pub(crate) effects: Effects,
+}
+
+/// Parameters of which a file can be made.
+pub(crate) trait Keep {
+    /// The parameters in a file, or why files cannot hold them.
+    fn keep(&self) -> Result<Kept, &'static str>;
+}
+
+impl Kept {
+    /// A hysteresis with nothing around it.
+    fn hysteresis(base: Base) -> Self {
+        Self { base, effects: Effects::default() }
+    }
+
+    /// Stages around a hysteresis that does nothing.
+    fn around_nothing(effects: Effects) -> Self {
+        Self { base: Base::Pi(PiParams { gain: 1.0, thresholds: Vec::new(), weights: Vec::new() }), effects }
+    }
+}
+
+macro_rules! hystereses {
+    ($($params:ty => $kind:ident,)*) => { $(
+        impl Keep for $params {
+            fn keep(&self) -> Result<Kept, &'static str> {
+                Ok(Kept::hysteresis(Base::$kind(self.clone())))
+            }
+        }
+    )* };
+}
+hystereses! {
+    PiParams<Vec<f64>> => Pi,
+    ViscousPiParams<Vec<f64>> => ViscousPi,
+    GpiParams<Vec<f64>> => Gpi,
+    TdPiParams => TdPi,
+    MaxwellSlipParams<Vec<f64>> => MaxwellSlip,
+    TdEmParams<Vec<f64>> => TdEm,
+    PreisachParams<Vec<f64>> => Preisach,
+    DpmParams<Vec<f64>> => Dpm,
+    LfdmParams => Lfdm,
+    IfmParams => Ifm,
+    BoucWenParams => BoucWen,
+    BoucWenOscillatorParams => BoucWenOscillator,
+}
+
+impl Keep for BoucWenClassicParams {
+    fn keep(&self) -> Result<Kept, &'static str> {
+        self.general().keep()
+    }
+}
+
+impl Keep for (ActivationKind, ActivationParams) {
+    fn keep(&self) -> Result<Kept, &'static str> {
+        let kind = match self.0 {
+            ActivationKind::Atan => Base::Atan,
+            ActivationKind::Sigmoid => Base::Sigmoid,
+            ActivationKind::Softplus => Base::Softplus,
+            ActivationKind::Softsign => Base::Softsign,
+            ActivationKind::Tanh => Base::Tanh,
+        };
+        Ok(Kept::hysteresis(kind(self.1)))
+    }
+}
+
+macro_rules! stages {
+    ($($params:ty => $field:ident: $present:expr,)*) => { $(
+        impl Keep for $params {
+            fn keep(&self) -> Result<Kept, &'static str> {
+                Ok(Kept::around_nothing(Effects { $field: $present(self.clone()), ..Effects::default() }))
+            }
+        }
+    )* };
+}
+stages! {
+    DelayParams => delay: Some,
+    LagParams => lag: Some,
+    AsymmetryParams<Vec<f64>> => asymmetry: Some,
+    TemperatureParams => temperature: Some,
+    CreepParams<Vec<f64>> => creep: Some,
+    LoadParams => load: Some,
+    ResonanceParams => resonances: |mode| vec![mode],
+    SaturationParams => saturation: Some,
+    DriftParams => drift: Some,
+    InterferenceParams => interference: Some,
+}

@@ -1,0 +1,154 @@
+//! Plays and what is made of them.
+
+use hyst_core::{Curve, Error, GpiParams, PiParams, TdPiParams, ViscousPiParams};
+
+use crate::inversion::{closed, refused};
+use crate::model_macro::models;
+use hyst_ident::model::capacity::PLAYS;
+
+fn pi(gain: f64, thresholds: &[f64], weights: &[f64]) -> PiParams<Vec<f64>> {
+    PiParams { gain, thresholds: thresholds.to_vec(), weights: weights.to_vec() }
+}
+
+/// An envelope from its two or four numbers.
+fn curve(name: &'static str, numbers: &[f64]) -> Result<Curve, Error> {
+    match numbers {
+        [slope, offset] => Ok(Curve::Linear { slope: *slope, offset: *offset }),
+        [height, rate, shift, offset] => {
+            Ok(Curve::Tanh { height: *height, rate: *rate, shift: *shift, offset: *offset })
+        }
+        _ => Err(Error::OutOfRange { name, must: "[slope, offset] or [height, rate, shift, offset]" }),
+    }
+}
+
+models! {
+    /// Play (backlash) of half-width ``radius``: ``p ← max(u − r, min(u + r, p))``, from 0.
+    class Play {
+        /// Half-width r [u], positive.
+        radius: f64,
+    }
+    params: |p| Ok(pi(0.0, &[p.radius], &[1.0])),
+    stage: hyst_core::Pi<f64, 1>,
+    inverse: refused("a play does not move while the input crosses its width"),
+    needs: [],
+
+    /// Stop (elasto-slip element) with yield ``limit``: ``s ← clamp(s + Δu, −r, r)``, from 0. Play and stop of one
+    /// half-width add up to the input.
+    class Stop {
+        /// Yield r [u], positive.
+        limit: f64,
+    }
+    params: |p| Ok(pi(1.0, &[p.limit], &[-1.0])),
+    stage: hyst_core::Pi<f64, 1>,
+    inverse: refused("a stop does not move while it slips"),
+    needs: [],
+
+    /// Prandtl-Ishlinskii operator ``y = gain·u + Σ weights[i]·play(u, thresholds[i])``.
+    ///
+    /// Closed-form inverse, if gain and initial slopes are positive.
+    class Pi {
+        /// Gain of the identity [y/u].
+        gain: f64,
+        /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
+        thresholds: Vec<f64>,
+        /// Weights of the plays [y/u], shape (n,).
+        weights: Vec<f64>,
+    }
+    params: |p| Ok(pi(p.gain, &p.thresholds, &p.weights)),
+    stage: hyst_core::Pi<f64, PLAYS>,
+    inverse: closed,
+    needs: [],
+
+    /// Prandtl-Ishlinskii operator whose plays slide with viscous drag (rate-dependence):
+    /// ``y = gain·u + Σ weights[i]·pᵢ``, ``seconds·ṗᵢ = dead(u − pᵢ, thresholds[i])``.
+    ///
+    /// ``seconds = 0`` is ``Pi``. Exact inverse.
+    class ViscousPi {
+        /// Gain of the identity [y/u].
+        gain: f64,
+        /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
+        thresholds: Vec<f64>,
+        /// Weights of the plays [y/u], shape (n,).
+        weights: Vec<f64>,
+        /// Drag [s].
+        seconds: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(ViscousPiParams { pi: pi(p.gain, &p.thresholds, &p.weights), seconds: p.seconds }),
+    stage: hyst_core::ViscousPi<f64, PLAYS>,
+    period: |p| p.period,
+    inverse: closed,
+    needs: [],
+
+    /// Generalised Prandtl-Ishlinskii operator: plays between two envelope functions,
+    /// ``y = gain·F₀ + Σ weights[i]·Fᵢ``, ``Fᵢ ← max(left(u) − rᵢ, min(right(u) + rᵢ, Fᵢ))``.
+    ///
+    /// An envelope is ``[slope, offset]`` for ``slope·u + offset`` or ``[height, rate, shift, offset]`` for
+    /// ``height·tanh(rate·u + shift) + offset``. Exact inverse; its drive jumps where the reference turns.
+    class Gpi {
+        /// Weight of the play of radius 0 [y per unit of the envelope].
+        gain: f64,
+        /// Radii [unit of the envelope], positive and strictly rising, shape (n,), n ≤ 64.
+        thresholds: Vec<f64>,
+        /// Weights [y per unit of the envelope], shape (n,).
+        weights: Vec<f64>,
+        /// Envelope of the rising side, shape (2,) or (4,).
+        left: Vec<f64>,
+        /// Envelope of the falling side, shape (2,) or (4,).
+        right: Vec<f64>,
+    }
+    params: |p| Ok(GpiParams {
+        left: curve("gpi.left", &p.left)?,
+        right: curve("gpi.right", &p.right)?,
+        gain: p.gain,
+        thresholds: p.thresholds.clone(),
+        weights: p.weights.clone(),
+    }),
+    stage: hyst_core::Gpi<f64, PLAYS>,
+    inverse: closed,
+    needs: [],
+
+    /// Temperature-dependent Prandtl-Ishlinskii model: thresholds ``alpha·i`` and weights
+    /// ``epsilon·exp(eta·(T − t0))·exp(−tau·alpha·i)``, i = 0 … n, plays between the envelopes ``a0·u + a1`` (rising) and
+    /// ``b0·u + b1`` (falling). Needs ``temperature`` [°C].
+    ///
+    /// Exact inverse, also while the temperature changes; its drive jumps where the reference turns.
+    class TdPi {
+        /// Spacing of the thresholds [unit of the envelope].
+        alpha: f64,
+        /// Weight at r = 0 and t0 [y per unit of the envelope].
+        epsilon: f64,
+        /// Decay of the weights with the threshold.
+        tau: f64,
+        /// Relative change of the weights with temperature [1/K].
+        eta: f64,
+        /// Slope of the rising side's envelope.
+        a0: f64,
+        /// Offset of the rising side's envelope.
+        a1: f64,
+        /// Slope of the falling side's envelope.
+        b0: f64,
+        /// Offset of the falling side's envelope.
+        b1: f64,
+        /// Number of thresholds besides 0, at most 64.
+        n: u16 = 9,
+        /// Reference temperature [°C].
+        t0: f64 = 23.0,
+    }
+    params: |p| Ok(TdPiParams {
+        alpha: p.alpha,
+        epsilon: p.epsilon,
+        tau: p.tau,
+        eta: p.eta,
+        a0: p.a0,
+        a1: p.a1,
+        b0: p.b0,
+        b1: p.b1,
+        plays: p.n,
+        reference_degc: p.t0,
+    }),
+    stage: hyst_core::TdPi<f64, PLAYS>,
+    inverse: closed,
+    needs: [temperature],
+}

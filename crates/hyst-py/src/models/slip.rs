@@ -1,0 +1,87 @@
+//! Maxwell-slip elements, and the electromechanical model behind them.
+
+use hyst_core::{Error, MaxwellSlipParams, SlipReading, TdEmParams};
+
+use crate::errors;
+use crate::inversion::{Inverted, closed};
+use crate::model_macro::models;
+use hyst_ident::model::capacity::{PLAYS, TAPS};
+
+fn bank(elasto_slip: bool, widths: &[f64], gains: &[f64]) -> MaxwellSlipParams<Vec<f64>> {
+    let reading = if elasto_slip { SlipReading::ElastoSlip } else { SlipReading::Backlash };
+    MaxwellSlipParams { reading, widths: widths.to_vec(), gains: gains.to_vec() }
+}
+
+models! {
+    /// Bank of Maxwell-slip elements, ``y = Σ gains[i]·element(u, widths[i])``.
+    ///
+    /// An element is a backlash of that total width; exact inverse, whose drive jumps where the reference turns.
+    /// With ``elasto_slip`` it is a spring that slips at that deflection: such a bank saturates and has no inverse.
+    class MaxwellSlip {
+        /// Widths [u], positive and strictly rising, shape (n,), n ≤ 64.
+        widths: Vec<f64>,
+        /// Gains [y/u], shape (n,).
+        gains: Vec<f64>,
+        /// Whether an element is a spring that slips at that deflection; a backlash of that total width if not.
+        elasto_slip: bool = false,
+    }
+    params: |p| Ok(bank(p.elasto_slip, &p.widths, &p.gains)),
+    stage: hyst_core::MaxwellSlip<f64, PLAYS>,
+    inverse: closed,
+    needs: [],
+
+    /// Temperature-dependent electromechanical model: a Maxwell-slip bank gives the current that charges C ∥ R; the voltage
+    /// drives a mass on a spring through the coupling ``ψ(T)``. Needs ``temperature`` [°C].
+    ///
+    /// The linear part is exact for a current that is linear between samples. Inverse: band-limited with preview, then exact.
+    class TdEm {
+        /// Widths of the slip elements [u], shape (n,), n ≤ 64.
+        widths: Vec<f64>,
+        /// Gains of the slip elements [A/u], shape (n,).
+        gains: Vec<f64>,
+        /// Capacitance [F].
+        capacitance: f64,
+        /// Resistance [Ω].
+        resistance: f64,
+        /// Mass [kg].
+        mass: f64,
+        /// Stiffness [N/m].
+        stiffness: f64,
+        /// Damping [N s/m].
+        damping: f64,
+        /// Coefficients of ``ψ(T) = psi[0] + psi[1]·T + psi[2]·T²`` [N/V, T in °C], shape (3,).
+        psi: Vec<f64>,
+        /// Sample period [s].
+        period: f64,
+        /// Whether an element is a spring that slips; a backlash, as the paper's numbers ask for, if not.
+        elasto_slip: bool = false,
+        /// Output units in a metre: 1e6 for µm.
+        per_metre: f64 = 1.0,
+        /// Temperature for which the inverse's filter is made [°C]; its gain follows the given one.
+        filter_degc: f64 = 23.0,
+    }
+    params: |p| {
+        let coupling = <[f64; 3]>::try_from(p.psi.as_slice())
+            .map_err(|_| Error::OutOfRange { name: "td-em.psi", must: "three coefficients" })?;
+        Ok(TdEmParams {
+            slip: bank(p.elasto_slip, &p.widths, &p.gains),
+            capacitance: p.capacitance,
+            resistance: p.resistance,
+            mass: p.mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            coupling,
+            per_metre: p.per_metre,
+        })
+    },
+    stage: hyst_core::TdEm<f64, PLAYS>,
+    period: |p| p.period,
+    inverse: |built, options| {
+        options.only(&["bandwidth_hz"])?;
+        let inverse =
+            built.stage.band_limited::<TAPS>(built.given.filter_degc, options.bandwidth_hz).map_err(errors::core)?;
+        let (lead, band) = (inverse.lead(), (inverse.bandwidth_hz(), inverse.error()));
+        Ok(Inverted::in_band(inverse, lead, Some(band)))
+    },
+    needs: [temperature],
+}

@@ -1,0 +1,164 @@
+//! The stages around a hysteresis, in the chain's order.
+
+use hyst_core::{
+    AsymmetryParams, CreepParams, DelayParams, DriftParams, Env, InterferenceParams, Invert, LagParams, LoadParams,
+    ResonanceParams, SaturationParams, Stage, TemperatureParams,
+};
+use pyo3::prelude::*;
+
+use crate::errors;
+use crate::inversion::{Built, Inverted, Options, closed, compensator, refused};
+use crate::model_macro::models;
+use hyst_ident::model::capacity::{CREEP, DELAY};
+
+const IN_THE_SENSOR: &str = "this effect is in the sensor, not in the motion; no drive should follow it";
+
+/// In closed form; references at or beyond a limit all have one input.
+fn within_the_limits<P, Q>(
+    built: &Built<'_, P, Q, hyst_core::Saturation<f64>>,
+    options: &Options,
+) -> PyResult<Inverted> {
+    let inverse = built.stage.invert().map_err(errors::core)?;
+    let [low, high] = [f64::MIN, f64::MAX].map(|y| inverse.step(&mut (), &Env::default(), y));
+    Ok(closed(built, options)?.between(low, high, 0.0))
+}
+
+models! {
+    /// Dead time ``y(t) = u(t − seconds)``; between samples the input is linear.
+    class Delay {
+        /// Dead time [s], at most 8190 periods.
+        seconds: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(DelayParams { seconds: p.seconds }),
+    stage: hyst_core::Delay<f64, DELAY>,
+    period: |p| p.period,
+    inverse: compensator,
+    needs: [],
+
+    /// First-order lag ``τ ẏ + y = u``, exact for an input that is linear between samples.
+    class Lag {
+        /// Time constant τ [s].
+        seconds: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(LagParams { seconds: p.seconds }),
+    stage: hyst_core::Lag<f64>,
+    period: |p| p.period,
+    inverse: compensator,
+    needs: [],
+
+    /// Asymmetry: a curve of one-sided dead zones behind the hysteresis,
+    /// ``y = u + Σ weights[j]·dead(u, thresholds[j])``.
+    ///
+    /// Closed-form inverse, if the curve rises.
+    class Asymmetry {
+        /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 4.
+        thresholds: Vec<f64>,
+        /// Changes of slope [ratio], shape (n,).
+        weights: Vec<f64>,
+    }
+    params: |p| Ok(AsymmetryParams { thresholds: p.thresholds.clone(), weights: p.weights.clone() }),
+    stage: hyst_core::Asymmetry<f64, 4>,
+    inverse: closed,
+    needs: [],
+
+    /// Gain over temperature ``y = u·(1 + per_kelvin·(T − reference_degc))``.
+    class Temperature {
+        /// Relative change of gain [1/K].
+        per_kelvin: f64,
+        /// Temperature at which the gain is 1 [°C].
+        reference_degc: f64,
+    }
+    params: |p| Ok(TemperatureParams { per_kelvin: p.per_kelvin, reference_degc: p.reference_degc }),
+    stage: hyst_core::Temperature<f64>,
+    inverse: compensator,
+    needs: [temperature],
+
+    /// Creep ``y = u + Σ shares[i]·xᵢ``, ``τᵢ ẋᵢ = u − xᵢ``, exact for an input that is linear between samples.
+    ///
+    /// Exact recursive inverse.
+    class Creep {
+        /// Time constants τ [s], positive, shape (n,), n ≤ 32.
+        seconds: Vec<f64>,
+        /// Settled shares [ratio], shape (n,).
+        shares: Vec<f64>,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(CreepParams { seconds: p.seconds.clone(), shares: p.shares.clone() }),
+    stage: hyst_core::Creep<f64, CREEP>,
+    period: |p| p.period,
+    inverse: closed,
+    needs: [],
+
+    /// Load ``y = u + per_newton·F``. Needs ``load`` [N].
+    class Load {
+        /// Compliance [y/N].
+        per_newton: f64,
+    }
+    params: |p| Ok(LoadParams { per_newton: p.per_newton }),
+    stage: hyst_core::Load<f64>,
+    inverse: compensator,
+    needs: [load],
+
+    /// Structural mode ``y = u + gain·(x − u)``, ``ẍ + 2ζω ẋ + ω² x = ω² u``, exact for an input that is linear between
+    /// samples.
+    class Resonance {
+        /// Undamped natural frequency ω/2π [Hz].
+        hz: f64,
+        /// Damping ratio ζ, 0 ≤ ζ < 1.
+        damping: f64,
+        /// Share of the static output that the mode carries.
+        gain: f64 = 1.0,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(ResonanceParams { hz: p.hz, damping: p.damping, gain: p.gain }),
+    stage: hyst_core::Resonance<f64>,
+    period: |p| p.period,
+    inverse: compensator,
+    needs: [],
+
+    /// Saturation: the output is the input between two knees and approaches the limits beyond.
+    ///
+    /// Closed-form inverse for references between the limits.
+    class Saturation {
+        /// Lower limit [y].
+        low: f64,
+        /// Upper limit [y].
+        high: f64,
+        /// Width of each knee as a share of the range, 0 (a hard stop) to 0.5.
+        knee: f64 = 0.1,
+    }
+    params: |p| Ok(SaturationParams { low: p.low, high: p.high, knee: p.knee }),
+    stage: hyst_core::Saturation<f64>,
+    inverse: within_the_limits,
+    needs: [],
+
+    /// Drift of the sensor ``y = u + per_second·t`` on the lab's clock.
+    class Drift {
+        /// Rate [y/s].
+        per_second: f64,
+    }
+    params: |p| Ok(DriftParams { per_second: p.per_second }),
+    stage: hyst_core::Drift<f64>,
+    inverse: refused(IN_THE_SENSOR),
+    needs: [time],
+
+    /// Tone in the sensor ``y = u + amplitude·sin(2π·hz·t + phase)`` on the lab's clock.
+    class Interference {
+        /// Frequency [Hz].
+        hz: f64,
+        /// Amplitude [y].
+        amplitude: f64,
+        /// Phase at t = 0 [rad].
+        phase: f64 = 0.0,
+    }
+    params: |p| Ok(InterferenceParams { hz: p.hz, amplitude: p.amplitude, phase: p.phase }),
+    stage: hyst_core::Interference<f64>,
+    inverse: refused(IN_THE_SENSOR),
+    needs: [time],
+}

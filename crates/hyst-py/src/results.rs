@@ -1,0 +1,137 @@
+//! What a model predicts and what drive it computes, as Python's objects.
+
+use hyst_ident::simulate::Extrapolated;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Errors against a measurement as a dict.
+fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("rmse", errors.rmse)?;
+    dict.set_item("nrmse_percent", errors.nrmse_percent)?;
+    dict.set_item("max_abs", errors.max_abs)?;
+    dict.set_item("rmse_all_rows", errors.rmse_all_rows)?;
+    Ok(dict)
+}
+
+/// What a model says about a record.
+#[pyclass(frozen, module = "hyst")]
+pub(crate) struct Simulation {
+    pub(crate) timepts: Vec<f64>,
+    pub(crate) inputs: Vec<f64>,
+    pub(crate) simulated: hyst_ident::simulate::Simulation,
+}
+
+#[pymethods]
+impl Simulation {
+    /// Time [s], shape (n,).
+    #[getter]
+    fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.timepts)
+    }
+
+    /// Input, shape (n,).
+    #[getter]
+    fn inputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inputs)
+    }
+
+    /// Predicted output, shape (n,).
+    #[getter]
+    fn outputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.simulated.predicted)
+    }
+
+    /// Start-up rows: a transient from before the record, shape (n,), bool.
+    #[getter]
+    fn settling<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_slice(py, &self.simulated.settling)
+    }
+
+    /// Constant that was added per file; empty with ``zero="none"``.
+    #[getter]
+    fn zeros(&self) -> Vec<f64> {
+        self.simulated.zeros.clone()
+    }
+
+    /// Inputs beyond the model's ``input_range``: ``rows``, ``largest`` (how far the farthest lies beyond), ``row`` (which).
+    #[getter]
+    fn extrapolated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Extrapolated { rows, largest, row } = self.simulated.extrapolated;
+        let dict = PyDict::new(py);
+        dict.set_item("rows", rows)?;
+        dict.set_item("largest", largest)?;
+        dict.set_item("row", row)?;
+        Ok(dict)
+    }
+
+    /// ``rmse``, ``nrmse_percent``, ``max_abs`` and ``rmse_all_rows`` against the measured output; None without one.
+    #[getter]
+    fn errors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        self.simulated.errors.as_ref().map(|e| errors_dict(py, e)).transpose()
+    }
+
+    fn __repr__(&self) -> String {
+        let errors = self.simulated.errors.as_ref().map_or(String::new(), |e| format!(", rmse {:?}", e.rmse));
+        format!("<Simulation: {} rows{errors}>", self.timepts.len())
+    }
+}
+
+/// A drive, and what it took to get it.
+#[pyclass(frozen, module = "hyst")]
+pub(crate) struct Drive {
+    pub(crate) timepts: Vec<f64>,
+    pub(crate) drive: hyst_ident::compensate::Drive,
+}
+
+#[pymethods]
+impl Drive {
+    /// Time [s], shape (n,).
+    #[getter]
+    fn timepts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.timepts)
+    }
+
+    /// Input of the actuator at the reference's rows [V], shape (n,).
+    #[getter]
+    fn inputs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.drive.voltage)
+    }
+
+    /// Samples of preview that were used.
+    #[getter]
+    fn lead(&self) -> usize {
+        self.drive.lead
+    }
+
+    /// Band in which the dynamic stages are inverted [Hz]; None if there are none.
+    #[getter]
+    fn bandwidth_hz(&self) -> Option<f64> {
+        self.drive.bandwidth_hz
+    }
+
+    /// Largest relative error of that inversion inside its band.
+    #[getter]
+    fn band_error(&self) -> f64 {
+        self.drive.band_error
+    }
+
+    /// Rows at which the voltage limit acted.
+    #[getter]
+    fn voltage_limited(&self) -> Vec<usize> {
+        self.drive.voltage_limited.clone()
+    }
+
+    /// Rows at which the slew limit acted.
+    #[getter]
+    fn slew_limited(&self) -> Vec<usize> {
+        self.drive.slew_limited.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let d = &self.drive;
+        let limited = d.voltage_limited.len() + d.slew_limited.len();
+        format!("<Drive: {} rows, lead {}, limited in {limited}>", d.voltage.len(), d.lead)
+    }
+}
