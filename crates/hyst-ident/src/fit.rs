@@ -102,6 +102,32 @@ pub enum FitError {
         /// Why.
         source: crate::metrics::MetricsError,
     },
+    /// Bounds that are no box.
+    #[error("{record}: {source}")]
+    Space {
+        /// The record.
+        record: String,
+        /// What is wrong.
+        source: crate::optimize::SpaceError,
+    },
+    /// A search that cannot be run or finds nothing.
+    #[error("{record}: {source}")]
+    Search {
+        /// The record.
+        record: String,
+        /// Why.
+        source: crate::optimize::SearchError,
+    },
+    /// A way to optimise that the model does not have.
+    #[error("{kind}: {optimizer} does not fit it; {advice}")]
+    Optimizer {
+        /// The kind of model.
+        kind: &'static str,
+        /// The way that was asked for.
+        optimizer: String,
+        /// Which there are.
+        advice: &'static str,
+    },
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -16,6 +16,7 @@ pub mod excite;
 pub mod export;
 pub mod fit;
 pub mod full_memory;
+pub mod identify;
 mod lsq;
 pub mod metrics;
 pub mod model;
