@@ -61,7 +61,7 @@ pub(crate) fn fit(
         }
         _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
     };
-    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord };
+    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord, ..FitOptions::default() };
     py.detach(|| fitting::fit(&record, kind, &options)).map(Model).map_err(errors::fit)
 }
 

@@ -2,6 +2,7 @@
 
 mod excite;
 mod help;
+mod search;
 mod values;
 
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use hyst_ident::simulate::Zero;
 use crate::output::Target;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
+pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, VoltageLimits};
 use values::{finite, positive, seconds};
 
@@ -70,15 +72,14 @@ pub(crate) struct FitArgs {
     /// Records to fit, as one
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Kind of model: pi (Prandtl-Ishlinskii) or preisach
+    /// Kind of model
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
     /// Model file to write; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Target,
-    /// Seed of the search, kept in the model (the models of this version are fitted without chance)
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) search: SearchArgs,
     #[command(flatten)]
     pub(crate) zero: ZeroArg,
     #[command(flatten)]

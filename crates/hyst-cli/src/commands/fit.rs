@@ -2,10 +2,14 @@
 
 use std::path::Path;
 
+use std::ops::ControlFlow;
+
 use hyst_core::PiParams;
-use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::fit::{Fit, fit_with};
+use hyst_ident::identify::{Determined, Estimate, TradeOff};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::{Base, Model};
+use hyst_ident::optimize::{Spread, Stopped};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
@@ -28,10 +32,25 @@ struct Summary {
     errors: Option<Errors>,
     base: Option<BaseSummary>,
     sensor_zero: f64,
+    how: String,
+    seed: u64,
+    evaluations: u64,
+    /// Standard errors, correlations and what the record does not determine.
+    estimate: Option<Estimate>,
+    /// How the searches ended, and how their costs scatter.
+    trials: Option<TrialsSummary>,
     #[serde(skip)]
     input_unit: String,
     #[serde(skip)]
     seen: String,
+}
+
+/// Searches with different draws.
+#[derive(Debug, Serialize)]
+struct TrialsSummary {
+    count: usize,
+    costs: Option<Spread>,
+    stopped: Vec<Stopped>,
 }
 
 /// The hysteresis in a few numbers.
@@ -52,9 +71,13 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let record = input::training(&args.train, &args.map.map)?;
     let zero = args.zero.get();
 
-    let progress = Progress::spinner(&format!("fitting {} to {}", args.model, text::count(record.rows(), "row")));
-    let options = FitOptions { seed: args.seed, zero_per_record: zero == Zero::PerRecord };
-    let model = fit(&record, args.model, &options)?;
+    let options = args.search.options(zero == Zero::PerRecord)?;
+    let doing = format!("fitting {} to {}", args.model, text::count(record.rows(), "row"));
+    let progress = Progress::spinner(&doing);
+    let Fit { model, how, estimate, trials, evaluations } = fit_with(&record, args.model, &options, &mut |p| {
+        progress.say(&format!("{doing}: {} of at most {} evaluations", p.evaluations, p.budget));
+        ControlFlow::Continue(())
+    })?;
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
 
@@ -69,6 +92,15 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         errors: simulated.errors,
         base: base_summary(&model),
         sensor_zero: model.zero,
+        how,
+        seed: options.seed,
+        evaluations,
+        trials: trials.map(|t| TrialsSummary {
+            count: t.found.len(),
+            costs: t.costs(),
+            stopped: t.found.iter().map(|f| f.stopped).collect(),
+        }),
+        estimate,
         input_unit: model.input.unit.clone(),
         seen: seen(&record, &model),
     };
@@ -133,6 +165,40 @@ impl Summary {
             }
         }));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
+        lines.push(self.how.clone());
+        if let Some(TrialsSummary { count, costs: Some(costs), .. }) = self.trials.as_ref().filter(|t| t.count > 1) {
+            lines.push(format!(
+                "{count} trials: what they left from {} to {}, median {} {unit}",
+                text::short(costs.lowest),
+                text::short(costs.highest),
+                text::short(costs.median)
+            ));
+        }
+        lines.extend(self.estimate.as_ref().map(parameters));
         lines.join("\n")
     }
+}
+
+/// Parameters with their standard errors, and what the record does not say.
+fn parameters(estimate: &Estimate) -> String {
+    let mut lines = Vec::new();
+    let width = estimate.parameters.iter().map(|p| p.name.len()).max().unwrap_or(0);
+    for p in &estimate.parameters {
+        let what = match p.determined {
+            Determined::Yes => "",
+            Determined::NearZero => "  (zero within its error)",
+            Determined::Together => "  (known only together with others)",
+            Determined::No => "  (NOT determined by this record)",
+        };
+        lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
+    }
+    for TradeOff { changes, std_error } in estimate.trade_offs.iter().take(3) {
+        let part = |(name, share): &(String, f64)| format!("{name} {:+.2}", share);
+        lines.push(format!(
+            "  free by {}: {} together leave no trace",
+            text::percent(100.0 * std_error),
+            changes.iter().map(part).collect::<Vec<_>>().join(", ")
+        ));
+    }
+    lines.join("\n")
 }

@@ -8,6 +8,7 @@ mod fractional;
 mod gpi;
 mod maxwell;
 mod oscillator;
+mod pi;
 mod td_pi;
 
 use hyst_core::{Kind, SlipReading};
@@ -36,6 +37,7 @@ impl Default for Form {
 pub(crate) fn family_of<'a>(kind: Kind, samples: &'a Samples, form: &Form) -> Option<Box<dyn Family + 'a>> {
     let elements = |most: usize| form.elements.unwrap_or(most);
     Some(match kind {
+        Kind::Pi => Box::new(pi::PiFamily::new(samples, elements(6))),
         Kind::BoucWen => Box::new(bouc_wen::BoucWenFamily::new(samples, form.bouc_wen_n)),
         Kind::Atan | Kind::Sigmoid | Kind::Softplus | Kind::Softsign | Kind::Tanh => {
             Box::new(activation::ActivationFamily::new(samples, kind)?)
