@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use hyst_core::{Build, Kind, List, OperatorParams, Pi, Sampling, read_block};
-use hyst_tests::{Lab, every_stage, root};
+use hyst_core::{Build, Chain, Env, Kind, List, OperatorParams, Pi, Sampling, Stage, read_block};
+use hyst_tests::{Lab, column, every_stage, root};
 
 /// A fitted model with every stage around it.
 fn lab() -> Lab {
@@ -45,14 +45,31 @@ fn firmware_reads_the_block() {
     let bytes = std::fs::read(lab.path("model.bin")).unwrap();
     let chain = read_block::<List<64>, List<8>>(&bytes).unwrap();
     let OperatorParams::Pi(p) = &chain.operator else { panic!("{chain:?}") };
-    let pi: Pi<f32, 64> = p.build(&()).unwrap();
+    let pi: Pi<f64, 64> = p.build(&()).unwrap();
     let model: serde_json::Value = serde_json::from_str(&lab.read("model.json")).unwrap();
     let stages = model["stages"].as_array().unwrap();
     let stage = stages.iter().find(|s| s["stage"] == "pi").unwrap();
     assert_eq!(stage["gain"].as_f64(), Some(p.gain));
     assert_eq!(stage["weights"].as_array().unwrap().len(), p.weights.len());
     assert_eq!(chain.effects.resonances[1].unwrap().hz, 250.0);
-    assert!(chain.effects.around::<f32, _, 16, 8>(pi, &Sampling { period: 1e-3 }).is_ok());
+    // The board's chain says what the command says, the sensor's zero included.
+    assert!(chain.zero != 0.0);
+    let board: Chain<f64, Pi<f64, 64>, 16, 8> = chain.around(pi, &Sampling { period: 1e-3 }).unwrap();
+    let mut text = "time_s,voltage_v,temperature_degc,load_n\n".to_owned();
+    let drive = |k: u32| 60.0 - 60.0 * (0.05 * f64::from(k)).cos();
+    for k in 0..400 {
+        text += &format!("{:.3},{},25,1\n", 1e-3 * f64::from(k), drive(k));
+    }
+    lab.write("u.csv", text);
+    lab.ok("simulate --model model.json u.csv -o out.csv");
+    let (mut s, mut first) = (board.state(), true);
+    for (k, host) in column(&lab.read("out.csv"), "predicted_um").into_iter().enumerate() {
+        let env = Env { time: 1e-3 * k as f64, temperature: 25.0, load: 1.0 };
+        let u = drive(k as u32);
+        let y = if first { board.reset(&mut s, &env, u) } else { board.step(&mut s, &env, u) };
+        first = false;
+        assert!((y - host).abs() < 1e-9, "row {k}: {y} on the board, {host} by the command");
+    }
 }
 
 #[test]

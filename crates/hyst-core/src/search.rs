@@ -1,6 +1,6 @@
 //! The inverse of what has no closed form: a bounded search for the input.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::stage::{hold, rest};
 use crate::{Env, Error, Probe, Real, Stage};
 
@@ -43,7 +43,12 @@ impl<T: Real, M> Search<T, M> {
         finite("search.low", low)?;
         within("search.high", high, high > low, "above search.low")?;
         within("search.tolerance", tolerance, tolerance > 0.0, "positive")?;
-        Ok(Self { model, low: T::from_f64(low), high: T::from_f64(high), tolerance: T::from_f64(tolerance) })
+        let (low, high): (T, T) = (coefficient("search.low", low)?, coefficient("search.high", high)?);
+        // The middle of a range that overflows is none.
+        if !(high - low).is_finite() {
+            return Err(Error::NonFinite("search.high minus search.low"));
+        }
+        Ok(Self { model, low, high, tolerance: T::from_f64(tolerance) })
     }
 
     /// The model that is inverted.
@@ -86,9 +91,6 @@ impl<T: Real, M> Search<T, M> {
             }
             let secant = a - fa * ((b - a) / (fb - fa));
             let slow = i % 3 == 2 && (b - a).abs() > before * half;
-            if i % 3 == 2 {
-                before = (b - a).abs();
-            }
             let inside = (secant > a.at_most(b)) && (secant < a.at_least(b));
             let c = if slow || !inside { a + (b - a) * half } else { secant };
             if c == a || c == b {
@@ -103,6 +105,10 @@ impl<T: Real, M> Search<T, M> {
                 (a, fa) = (c, fc);
                 fb = if kept == -1 { fb * half } else { fb };
                 kept = -1;
+            }
+            // After the bisection, if there was one: the next three have to do as well.
+            if i % 3 == 2 {
+                before = (b - a).abs();
             }
         }
         if fa.abs() < fb.abs() { a } else { b }
@@ -201,6 +207,37 @@ mod tests {
             let u = 49.0 * libm::sin(1.7 * f64::from(k));
             let found = inverse.step(&mut s, &e, Kink.step(&mut (), &e, u));
             assert!((found - u).abs() <= range * libm::exp2(-38.0), "{found} {u}");
+        }
+    }
+
+    /// Steps of 1 over 1e-10 V, treads of 1e-9 V between them: the secant is misled all the way.
+    #[test]
+    fn on_a_staircase_too() {
+        struct Stairs;
+        impl Stage<f64> for Stairs {
+            type State = ();
+            fn state(&self) {}
+            fn reset(&self, (): &mut (), _: &Env<f64>, u0: f64) -> f64 {
+                let (pitch, tread) = (1.1e-9, 1e-9);
+                let place = u0 / pitch;
+                let inside = (place - libm::floor(place)) * pitch;
+                libm::floor(place) + if inside > tread { (inside - tread) / (pitch - tread) } else { 1e-10 * inside }
+            }
+            fn step(&self, (): &mut (), e: &Env<f64>, u: f64) -> f64 {
+                self.reset(&mut (), e, u)
+            }
+        }
+        impl Probe<f64> for Stairs {
+            fn probe(&self, (): &(), e: &Env<f64>, u: f64) -> f64 {
+                self.reset(&mut (), e, u)
+            }
+        }
+        let inverse = Search::new(Stairs, -50.0, 50.0, 1e-300).unwrap();
+        let (mut s, e) = (inverse.state(), Env::default());
+        for k in 0..500 {
+            let u = 49.0 * libm::sin(1.7 * f64::from(k));
+            let found = inverse.step(&mut s, &e, Stairs.step(&mut (), &e, u));
+            assert!((found - u).abs() <= 100.0 * libm::exp2(-38.0) + 1.1e-9, "{found} {u}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! The activation-function model.
 
 use super::kind::ActivationKind;
-use crate::error::finite;
+use crate::error::{coefficient, finite};
 use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
@@ -47,10 +47,10 @@ impl<T: Real> Build<Activation<T>> for (ActivationKind, ActivationParams) {
         finite("activation.alpha", p.alpha)?;
         Ok(Activation {
             kind: *kind,
-            k0: T::from_f64(finite("activation.k0", p.k0)?),
-            rate: T::from_f64(finite("activation.alpha over the sample period", p.alpha / h)?),
-            beta: T::from_f64(finite("activation.beta", p.beta)?),
-            gamma: T::from_f64(finite("activation.gamma", p.gamma)?),
+            k0: coefficient("activation.k0", p.k0)?,
+            rate: coefficient("activation.alpha over the sample period", p.alpha / h)?,
+            beta: coefficient("activation.beta", p.beta)?,
+            gamma: coefficient("activation.gamma", p.gamma)?,
         })
     }
 }

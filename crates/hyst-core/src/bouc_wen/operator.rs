@@ -2,6 +2,7 @@
 
 use super::BoucWenParams;
 use super::branch::Branch;
+use crate::error::coefficient;
 use crate::{Env, Error, Probe, Real, Search, Stage};
 
 /// Bouc-Wen operator `y = k₀ u + g`, `ġ = α u̇ − β |u̇| |g|ⁿ⁻¹ g − γ u̇ |g|ⁿ` (Xie et al., eq. 6, 7), from [`BoucWenParams`] or
@@ -67,10 +68,10 @@ impl<T: Real> BoucWen<T> {
         }
         let share = |x: f64| if larger > 0.0 { x / larger } else { 0.0 };
         Ok(Self {
-            k0: T::from_f64(p.k0),
+            k0: coefficient("bouc-wen.k0", p.k0)?,
             scale: T::from_f64(if p.alpha == 0.0 { 0.0 } else { sign * unit }),
             rate,
-            alpha: T::from_f64(p.alpha),
+            alpha: coefficient("bouc-wen.alpha", p.alpha)?,
             branch: Branch::new(share(ahead), share(behind), p.n),
         })
     }

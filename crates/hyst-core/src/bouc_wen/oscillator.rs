@@ -1,6 +1,6 @@
 //! The Bouc-Wen oscillator: a mass, a damper, a spring, and a hysteretic force beside it.
 
-use crate::error::within;
+use crate::error::{coefficient, within};
 use crate::stage::{hold, rest};
 use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
@@ -83,12 +83,12 @@ impl<T: Real> Build<BoucWenOscillator<T>> for BoucWenOscillatorParams {
             "at most 6.4 over the oscillator's sqrt((stiffness + alpha) / mass) + damping / mass",
         )?;
         Ok(BoucWenOscillator {
-            per_mass: T::from_f64(1.0 / mass),
-            damping: T::from_f64(damping),
-            stiffness: T::from_f64(stiffness),
-            alpha: T::from_f64(alpha),
-            dissipation: T::from_f64(beta * gamma),
-            asymmetry: T::from_f64(beta * delta),
+            per_mass: coefficient("bouc-wen-oscillator.mass", 1.0 / mass)?,
+            damping: coefficient("bouc-wen-oscillator.damping", damping)?,
+            stiffness: coefficient("bouc-wen-oscillator.stiffness", stiffness)?,
+            alpha: coefficient("bouc-wen-oscillator.alpha", alpha)?,
+            dissipation: coefficient("bouc-wen-oscillator.beta times gamma", beta * gamma)?,
+            asymmetry: coefficient("bouc-wen-oscillator.beta times delta", beta * delta)?,
             nu: T::from_f64(nu),
             substeps: substeps as u32,
             substep: T::from_f64(h / substeps),

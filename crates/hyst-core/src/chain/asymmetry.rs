@@ -4,7 +4,7 @@
 //! Prandtl-Ishlinskii model (Kuhnen 2003). It bends the two ends of a symmetric loop differently and has a closed-form inverse of the
 //! same shape.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of the curve. `L` is any list of numbers. Weights of zero are no asymmetry.
@@ -55,7 +55,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Asymmetry<T, N>> for Asymme
             within("asymmetry.thresholds", *s, last.is_none_or(|l| s.abs() > l.abs()), "moving away from zero")?;
             *last = Some(*s);
             *slot_s = T::from_f64(*s);
-            *slot_c = T::from_f64(finite("asymmetry.weights", *c)?);
+            *slot_c = coefficient("asymmetry.weights", *c)?;
         }
         Ok(curve)
     }

@@ -5,9 +5,10 @@
 //! share cᵢ is 1–2 % per decade in ordinary ceramics.
 
 use crate::chain::FirstOrder;
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
+use crate::fractional::zeros::none_outside;
 use crate::stage::{finite_or, hold, rest};
-use crate::{Build, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
+use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Real, Sampling, Stage};
 
 /// Parameters of a creep bank: element i adds `shares[i] · xᵢ`, `τᵢ ẋᵢ = v − xᵢ`. `L` is any list of numbers: a vector, an
 /// array, a slice.
@@ -68,7 +69,7 @@ impl<T: Real, L: AsRef<[f64]>, const N: usize> Build<Creep<T, N>> for CreepParam
         for ((element, share), (tau, c)) in slots.zip(seconds.iter().zip(shares)) {
             within("creep.seconds", *tau, *tau > 0.0, "positive")?;
             *element = FirstOrder::new("creep.seconds", h, *tau)?;
-            *share = T::from_f64(finite("creep.shares", *c)?);
+            *share = coefficient("creep.shares", *c)?;
         }
         Ok(creep)
     }
@@ -138,17 +139,25 @@ impl<T: Real, const N: usize> Invert<T> for Creep<T, N> {
     type Inverse = CreepInverse<T, N>;
 
     /// Exact and, for shares ≥ 0, stable: the bank's zeros interlace with its poles on the stable
-    /// side. Negative shares are accepted while the total gain stays positive.
+    /// side. With negative shares the zeros are looked at: one outside the unit circle would make the drive grow for ever.
     fn invert(&self) -> Result<Self::Inverse, Error> {
         let mut at_once = T::ONE;
         for (e, c) in self.elements.iter().zip(&self.shares).take(self.len) {
             at_once += *c * e.b;
         }
         let settled = T::ONE + self.total();
-        if at_once > T::ZERO && settled > T::ZERO {
+        let bank = || self.elements.iter().zip(&self.shares).take(self.len);
+        let interlaced = bank().all(|(_, c)| *c >= T::ZERO);
+        let response = |theta: f64| {
+            let z1 = Complex::polar(1.0, -theta);
+            bank().fold(Complex::from(1.0), |sum, (e, c)| sum + e.response(z1) * c.to_f64())
+        };
+        if at_once > T::ZERO && settled > T::ZERO && (interlaced || none_outside(0.05, response)) {
             Ok(CreepInverse { forward: *self, scale: T::ONE / at_once, at_rest: T::ONE / settled })
         } else {
-            Err(Error::NotInvertible("creep shares add up to -1 or less"))
+            Err(Error::NotInvertible(
+                "creep shares below zero take more than there is: the inverse would grow for ever",
+            ))
         }
     }
 }
@@ -240,6 +249,24 @@ mod tests {
                 let v = inverse.step(&mut i, &e, reference);
                 assert!((creep.step(&mut s, &e, v) - reference).abs() < 1e-12);
             }
+        }
+    }
+
+    /// Negative shares: a small one can be inverted, one whose zero lies outside the unit circle cannot.
+    #[test]
+    fn an_unstable_inverse_is_refused() {
+        let bank = |shares: [f64; 2]| -> Creep<f64, 2> {
+            CreepParams { seconds: [1.0, 0.01], shares }.build(&Sampling { period: 1e-4 }).unwrap()
+        };
+        assert!(matches!(bank([0.5, -1.2]).invert(), Err(Error::NotInvertible(_))));
+        let creep = bank([0.05, -0.1]);
+        let inverse = creep.invert().unwrap();
+        let (mut s, mut i, e) = (creep.state(), inverse.state(), Env::default());
+        inverse.reset(&mut i, &e, 0.0);
+        creep.reset(&mut s, &e, 0.0);
+        for k in 0..30_000 {
+            let v = inverse.step(&mut i, &e, 1.0);
+            assert!((creep.step(&mut s, &e, v) - 1.0).abs() < 1e-11 && v.abs() < 2.0, "{k} {v}");
         }
     }
 

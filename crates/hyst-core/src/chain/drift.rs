@@ -1,6 +1,6 @@
 //! Drift of the sensor: `y = v + ρ t` on the lab's clock.
 
-use crate::error::finite;
+use crate::error::coefficient;
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `y = v + ρ t`, t the lab's clock. Zero is no drift.
@@ -29,7 +29,7 @@ pub struct Drift<T> {
 impl<T: Real> Build<Drift<T>> for DriftParams {
     type Context = ();
     fn build(&self, (): &()) -> Result<Drift<T>, Error> {
-        Ok(Drift { per_second: T::from_f64(finite("drift.per_second", self.per_second)?) })
+        Ok(Drift { per_second: coefficient("drift.per_second", self.per_second)? })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The exact step of `τ ẋ = u − x` for an input that is linear between samples.
 
 use crate::error::within;
-use crate::{Error, Real};
+use crate::{Complex, Error, Real};
 
 /// Coefficients of one first-order element.
 ///
@@ -30,6 +30,12 @@ impl<T: Real> FirstOrder<T> {
             (a, 1.0 - a / x)
         };
         Ok(Self { a: T::from_f64(a), b: T::from_f64(b) })
+    }
+
+    /// Response of the sampled element at `z⁻¹`: `(b + (a − b) z⁻¹) / (1 − (1 − a) z⁻¹)`.
+    pub(crate) fn response(&self, z1: Complex) -> Complex {
+        let (a, b) = (self.a.to_f64(), self.b.to_f64());
+        (z1 * (a - b) + b) / (z1 * (a - 1.0) + 1.0)
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! A tone in the sensor, such as mains pick-up: `y = v + A sin(2π f t + φ)` on the lab's clock.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `y = v + A sin(2π f t + φ)`, t the lab's clock. A = 0 is no interference.
@@ -43,8 +43,8 @@ impl<T: Real> Build<Interference<T>> for InterferenceParams {
         within("interference.hz", self.hz, self.hz >= 0.0, "zero or positive")?;
         Ok(Interference {
             hz: T::from_f64(self.hz),
-            amplitude: T::from_f64(finite("interference.amplitude", self.amplitude)?),
-            phase: T::from_f64(finite("interference.phase", self.phase)?),
+            amplitude: coefficient("interference.amplitude", self.amplitude)?,
+            phase: coefficient("interference.phase", self.phase)?,
         })
     }
 }

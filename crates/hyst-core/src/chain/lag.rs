@@ -62,10 +62,9 @@ impl<T: Real> Stage<T> for Lag<T> {
 }
 
 impl<T: Real> Lag<T> {
-    /// Response of the sampled stage at `z⁻¹`: `(b + (a − b) z⁻¹) / (1 − (1 − a) z⁻¹)`.
+    /// Response of the sampled stage at `z⁻¹`.
     pub fn response(&self, z1: Complex) -> Complex {
-        let (a, b) = (self.element.a.to_f64(), self.element.b.to_f64());
-        (z1 * (a - b) + b) / (z1 * (a - 1.0) + 1.0)
+        self.element.response(z1)
     }
 }
 

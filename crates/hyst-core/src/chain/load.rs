@@ -1,6 +1,6 @@
 //! Load: the actuator yields under an external force, `y = v + c F`.
 
-use crate::error::finite;
+use crate::error::coefficient;
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `y = v + c F`, F the measured load. c = 0 is no load.
@@ -27,7 +27,7 @@ pub struct Load<T> {
 impl<T: Real> Build<Load<T>> for LoadParams {
     type Context = ();
     fn build(&self, (): &()) -> Result<Load<T>, Error> {
-        Ok(Load { per_newton: T::from_f64(finite("load.per_newton", self.per_newton)?) })
+        Ok(Load { per_newton: coefficient("load.per_newton", self.per_newton)? })
     }
 }
 

@@ -103,6 +103,10 @@ impl<T: Real, const N: usize> Preview<T, N> {
             }
             filter.error = filter.error.at_least((c * response(turn) - Complex::from(1.0)).abs());
         }
+        // A response that vanishes or is no number has no inverse.
+        if !filter.error.is_finite() || taps.iter().any(|tap| !tap.is_finite()) {
+            return Err(Error::NotInvertible("the response to be inverted vanishes at a frequency of the band"));
+        }
         for (slot, tap) in filter.taps.iter_mut().zip(taps) {
             *slot = T::from_f64(tap);
         }

@@ -1,6 +1,6 @@
 //! Saturation: the motion or its sensor ends at a stop, softly.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
 
 /// Parameters of a soft stop: the output is the input up to a knee and approaches the limit beyond,
@@ -40,7 +40,11 @@ impl<T: Real> Build<Saturation<T>> for SaturationParams {
         within("saturation.high", self.high, self.high > self.low, "above saturation.low")?;
         within("saturation.knee", self.knee, (0.0..=0.5).contains(&self.knee), "from 0 to 0.5")?;
         let width = self.knee * (self.high - self.low);
-        Ok(Saturation { low: T::from_f64(self.low), high: T::from_f64(self.high), width: T::from_f64(width) })
+        Ok(Saturation {
+            low: coefficient("saturation.low", self.low)?,
+            high: coefficient("saturation.high", self.high)?,
+            width: coefficient("saturation.knee", width)?,
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Gain that depends on temperature: `y = v (1 + α (T − T₀))`.
 
-use crate::error::finite;
+use crate::error::coefficient;
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `y = v (1 + α (T − T₀))`. α = 0 is no dependence.
@@ -31,8 +31,8 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
     type Context = ();
     fn build(&self, (): &()) -> Result<Temperature<T>, Error> {
         Ok(Temperature {
-            per_kelvin: T::from_f64(finite("temperature.per_kelvin", self.per_kelvin)?),
-            reference: T::from_f64(finite("temperature.reference_degc", self.reference_degc)?),
+            per_kelvin: coefficient("temperature.per_kelvin", self.per_kelvin)?,
+            reference: coefficient("temperature.reference_degc", self.reference_degc)?,
         })
     }
 }

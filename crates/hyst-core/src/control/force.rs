@@ -3,7 +3,7 @@
 //! What a model of the free actuator does not explain of the measured displacement is the work of a force on the output's
 //! stiffness: `f̂ = k_out (x − x₀)` (fractional-order force observer paper, eq. 4 and 16).
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `f̂ = k_out (x − (κ x̂₀ + χ))`: κ and χ take up slow changes of gain and zero of the free displacement.
@@ -49,9 +49,12 @@ impl<T: Real> Build<ForceObservation<T>> for ForceParams {
     type Context = ();
     fn build(&self, (): &()) -> Result<ForceObservation<T>, Error> {
         Ok(ForceObservation {
-            stiffness: T::from_f64(within("force.stiffness", self.stiffness, self.stiffness > 0.0, "positive")?),
-            kappa: T::from_f64(finite("force.kappa", self.kappa)?),
-            chi: T::from_f64(finite("force.chi", self.chi)?),
+            stiffness: coefficient(
+                "force.stiffness",
+                within("force.stiffness", self.stiffness, self.stiffness > 0.0, "positive")?,
+            )?,
+            kappa: coefficient("force.kappa", self.kappa)?,
+            chi: coefficient("force.chi", self.chi)?,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Limits of the drive: voltage and slew.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::{Error, Real, Sampling};
 
 /// Voltage and slew limits of an amplifier, per sample period.
@@ -34,7 +34,8 @@ impl<T: Real> Limits<T> {
             return Err(Error::OutOfRange { name: "slew", must: "positive" });
         }
         let step = slew * sampling.checked()?;
-        Ok(Self { low: T::from_f64(low), high: T::from_f64(high), step: T::from_f64(step) })
+        let (low, high) = (coefficient("voltage minimum", low)?, coefficient("voltage maximum", high)?);
+        Ok(Self { low, high, step: T::from_f64(step) })
     }
 
     /// The allowed drive nearest to `wanted`, one period after `last`. NaN gives `last`.

@@ -1,6 +1,6 @@
 //! PID with a filtered derivative and anti-windup.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::stage::{finite_or, hold};
 use crate::{Build, Error, Meta, Params, Real, Sampling};
 
@@ -93,14 +93,14 @@ impl<T: Real> Build<Pid<T>> for PidParams {
         }
         let lag = 1.0 / (2.0 * core::f64::consts::PI * corner);
         Ok(Pid {
-            proportional: T::from_f64(finite("pid.proportional", self.proportional)?),
-            integral: T::from_f64(finite("pid.integral", self.integral)? * h),
-            derivative: T::from_f64(finite("pid.derivative", self.derivative)? / (lag + h)),
+            proportional: coefficient("pid.proportional", self.proportional)?,
+            integral: coefficient("pid.integral", self.integral * h)?,
+            derivative: coefficient("pid.derivative", self.derivative / (lag + h))?,
             filter: T::from_f64(lag / (lag + h)),
             weights: [T::from_f64(self.proportional_weight), T::from_f64(self.derivative_weight)],
             tracking: T::from_f64((h / back).at_most(1.0)),
-            low: T::from_f64(self.low),
-            high: T::from_f64(self.high),
+            low: coefficient("pid.low", self.low)?,
+            high: coefficient("pid.high", self.high)?,
         })
     }
 }

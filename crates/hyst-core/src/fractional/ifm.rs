@@ -3,7 +3,7 @@
 
 use super::{GlOrder, Lfdm, LfdmParams, LfdmState, Memory, ShortMemory, zeros};
 use crate::chain::{Delay, DelayParams, DelayState};
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
 use crate::stage::{hold, rest};
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 use core::f64::consts::PI;
@@ -106,14 +106,13 @@ impl<T: Real, W: Memory<T>, const D: usize> Build<Ifm<T, W, D>> for IfmParams {
         for (name, x) in [("ifm.alpha", self.alpha), ("ifm.beta", self.beta)] {
             within(name, x, (0.0..=1.0).contains(&x), "from 0 to 1")?;
         }
-        finite("ifm.delta", self.delta)?;
         Ok(Ifm {
             hysteresis: self.hysteresis().build(cx)?,
             delay: DelayParams { seconds: self.tau }.build(cx).map_err(|e| match e {
                 Error::Capacity { needed, holds, .. } => Error::Capacity { name: "ifm.tau samples", needed, holds },
                 other => other,
             })?,
-            delta: T::from_f64(self.delta),
+            delta: coefficient("ifm.delta", self.delta)?,
         })
     }
 }

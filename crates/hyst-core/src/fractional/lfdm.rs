@@ -1,7 +1,7 @@
 //! The linear fractional-order differential model, `X + c s^β X = a U + b s^α U`.
 
 use super::{GlOrder, Memory, ShortMemory};
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::stage::{hold, rest};
 use crate::{Build, Complex, Env, Error, Invert, Meta, Params, Probe, Real, Sampling, Stage};
 
@@ -61,7 +61,11 @@ impl<T: Real, W: Memory<T>> Side<T, W> {
     fn new(gain: f64, weight: f64, mu: f64, order: GlOrder, h: f64) -> Result<Self, Error> {
         // p^(−μ) of a period near the smallest number is not finite.
         let weight = finite("sample period", weight * libm::pow(h, -mu))?;
-        Ok(Self { gain: T::from_f64(gain), weight: T::from_f64(weight), memory: W::new(mu, order)? })
+        Ok(Self {
+            gain: coefficient("fractional gain", gain)?,
+            weight: coefficient("sample period", weight)?,
+            memory: W::new(mu, order)?,
+        })
     }
 
     /// How much of a step is in the sum at once.

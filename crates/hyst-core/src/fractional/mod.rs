@@ -11,7 +11,7 @@ mod ifm;
 mod lfdm;
 mod memory;
 mod weights;
-mod zeros;
+pub(crate) mod zeros;
 
 pub use exponentials::{Exponentials, ExponentialsState};
 pub use ifm::{Ifm, IfmInverse, IfmInverseState, IfmParams, IfmState};

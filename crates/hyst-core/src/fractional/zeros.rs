@@ -10,7 +10,7 @@ use core::f64::consts::PI;
 /// on the way round; half the way is enough. A step from A to B is taken if |B − A| ≤ |A|/2, and halved if not; a
 /// zero that lies on the circle (or next to it) uses the work up and counts as one. `widest` is the largest step
 /// \[rad\].
-pub(super) fn none_outside(widest: f64, response: impl Fn(f64) -> Complex) -> bool {
+pub(crate) fn none_outside(widest: f64, response: impl Fn(f64) -> Complex) -> bool {
     let steps = (4.0 * PI / widest).at_most(1e6).index(1_000_000) + 4096;
     let (mut theta, mut step, mut turned) = (0.0, widest.at_most(1e-9), 0.0);
     let mut here = response(theta);

@@ -151,7 +151,9 @@ const HOTTEST: f64 = 1000.0;
 /// The temperature of a sample, the last one that was a number, within the range of the model.
 #[inline]
 fn sensed<T: Real>(held: &mut T, e: &Env<T>) -> T {
-    hold(held, e.temperature.at_least(T::from_f64(COLDEST)).at_most(T::from_f64(HOTTEST)))
+    let degc = hold(held, e.temperature);
+    *held = degc.at_least(T::from_f64(COLDEST)).at_most(T::from_f64(HOTTEST));
+    *held
 }
 
 /// Temperature before any was seen \[°C\].
@@ -194,6 +196,10 @@ impl<T: Real, const N: usize> TdEm<T, N> {
         let mode = libm::sqrt(self.circuit.stiffness / self.circuit.mass) / (2.0 * core::f64::consts::PI);
         let band = bandwidth_hz.map_or((2.5 * mode * h).at_most(0.16), |hz| hz * h);
         let psi = self.coupling(finite("td-em temperature", degc)?);
+        let gain = self.gain(degc);
+        if !(gain.is_finite() && gain > 0.0) {
+            return Err(Error::NotInvertible("td-em.coupling must be positive at the temperature of the filter"));
+        }
         let filter: Preview<T, P> = Preview::new(band, |z1| self.circuit.response(psi, z1))?;
         let late = DelayParams { seconds: filter.lead() as f64 }.build(&Sampling { period: 1.0 })?;
         Ok(TdEmInverse { filter, late, slip: self.slip.invert()?, forward: *self })

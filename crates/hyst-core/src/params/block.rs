@@ -114,8 +114,7 @@ pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
 ///     let chain = read_block::<List<16>, List<8>>(flash).map_err(|_| "bad block")?;
 ///     let OperatorParams::Pi(pi) = &chain.operator else { return Err("this firmware runs pi only") };
 ///     let pi: Pi<f32, 16> = pi.build(&()).map_err(|_| "bad parameters")?;
-///     let chain = chain.effects.around(pi, &Sampling { period: 1e-3 }).map_err(|_| "bad parameters")?;
-///     Ok(chain)
+///     chain.around(pi, &Sampling { period: 1e-3 }).map_err(|_| "bad parameters")
 /// }
 /// assert!(load(b"HYST").is_err());
 /// ```

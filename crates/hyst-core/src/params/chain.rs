@@ -91,3 +91,17 @@ pub struct ChainParams<L, E = L> {
     /// Inputs that the model was identified on, lowest and highest \[u\].
     pub input: [f64; 2],
 }
+
+impl<L, E: AsRef<[f64]>> ChainParams<L, E> {
+    /// The chain of the stages around an operator that was built from [`operator`](Self::operator), with the sensor's zero.
+    ///
+    /// # Errors
+    /// Names the parameter that is not finite, out of range or too long for `D` or `C`.
+    pub fn around<T: Real, H, const D: usize, const C: usize>(
+        &self,
+        hysteresis: H,
+        cx: &Sampling,
+    ) -> Result<Chain<T, H, D, C>, Error> {
+        Ok(self.effects.around(hysteresis, cx)?.with_zero(self.zero))
+    }
+}

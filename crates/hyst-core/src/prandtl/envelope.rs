@@ -4,7 +4,8 @@
 //! Rakheja and Su 2011). Where γₗ ≤ γᵣ all of them share one memory: `F_r = play_r(G)` with `G ← max(γₗ(u), min(γᵣ(u), G))`. There a
 //! generalised Prandtl-Ishlinskii operator is an ordinary one behind `G`, and its inverse is the ordinary inverse before `G⁻¹`.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, within};
+use crate::stage::finite_or;
 use crate::{Env, Error, Invert, Meta, Real, Stage};
 
 /// A rising envelope function γ.
@@ -36,8 +37,8 @@ impl Curve {
     pub const IDENTITY: Self = Self::Linear { slope: 1.0, offset: 0.0 };
 
     fn checked<T: Real>(self, names: &SideNames) -> Result<Shape<T>, Error> {
-        let rising = |name, x: f64| Ok(T::from_f64(within(name, x, x > 0.0, "positive: an envelope rises")?));
-        let any = |name, x: f64| Ok(T::from_f64(finite(name, x)?));
+        let rising = |name, x: f64| coefficient(name, within(name, x, x > 0.0, "positive: an envelope rises")?);
+        let any = |name, x: f64| Ok(coefficient(name, x)?);
         let SideNames { linear, tanh } = names;
         Ok(match self {
             Self::Linear { slope, offset } => {
@@ -105,6 +106,17 @@ impl<T: Real> Shape<T> {
         }
     }
 
+    /// Least and greatest value, a hair inside.
+    fn reach(&self) -> (T, T) {
+        match *self {
+            Self::Linear { .. } => (T::from_f64(f64::NEG_INFINITY), T::from_f64(f64::INFINITY)),
+            Self::Tanh { height, offset, .. } => {
+                let most = height * (T::ONE - T::EPSILON * T::from_f64(64.0));
+                (offset - most, offset + most)
+            }
+        }
+    }
+
     /// The input with γ(u) = x. Beyond what a saturating curve reaches: the input at which it is within rounding of its end.
     #[inline]
     fn inverse(&self, x: T) -> T {
@@ -146,6 +158,11 @@ impl<T: Real> Envelope<T> {
         (self.left.value(u), self.right.value(u))
     }
 
+    /// Values between which the play G can be brought by some input, a hair inside: all where the sides are lines.
+    pub(super) fn reach(&self) -> (T, T) {
+        (self.right.reach().0, self.left.reach().1)
+    }
+
     /// How far the inverse's drive jumps when the reference turns at drive `u`: from the left side to the right one
     /// \[u\]. Negative where γₗ > γᵣ.
     pub fn jump(&self, u: T) -> T {
@@ -179,7 +196,7 @@ impl<T: Real> Stage<T> for Envelope<T> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = EnvelopeState::default();
-        self.step(s, e, u0)
+        self.step(s, e, finite_or(u0, T::ZERO))
     }
 
     #[inline]
@@ -199,6 +216,13 @@ pub struct EnvelopeInverse<T> {
     forward: Envelope<T>,
 }
 
+impl<T: Real> EnvelopeInverse<T> {
+    /// Values of G that some drive brings about.
+    pub(super) fn reach(&self) -> (T, T) {
+        self.forward.reach()
+    }
+}
+
 impl<T: Real> Invert<T> for Envelope<T> {
     type Inverse = EnvelopeInverse<T>;
     fn invert(&self) -> Result<Self::Inverse, Error> {
@@ -215,6 +239,7 @@ impl<T: Real> Stage<T> for EnvelopeInverse<T> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = EnvelopeState::default();
+        let u0 = finite_or(u0, T::ZERO);
         if u0 == T::ZERO {
             // Virgin memory shows 0 for every drive between the sides: the one nearest to 0.
             let Envelope { left, right } = &self.forward;

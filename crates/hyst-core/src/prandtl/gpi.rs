@@ -1,6 +1,7 @@
 //! The generalised Prandtl-Ishlinskii operator: envelope functions on each side, so loops need not be symmetric.
 
 use super::envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState, LEFT, RIGHT};
+use crate::stage::{finite_or, hold};
 use crate::{Build, Env, Error, Invert, Meta, Params, Pi, PiState, Real, Stage};
 
 /// Parameters of `y = p₀ F₀(u) + Σᵢ wᵢ F_{rᵢ}(u)` with the generalised plays
@@ -103,6 +104,9 @@ pub struct GpiState<T, const N: usize> {
 pub struct GpiInverseState<T, const N: usize> {
     envelope: EnvelopeState<T>,
     pi: PiState<T, N>,
+    /// The last reference, and the nearest to it that the envelopes can reach.
+    reference: T,
+    reached: T,
 }
 
 impl<T: Real, const N: usize> Stage<T> for Gpi<T, N> {
@@ -114,7 +118,7 @@ impl<T: Real, const N: usize> Stage<T> for Gpi<T, N> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         *s = self.state();
-        self.step(s, e, u0)
+        self.step(s, e, finite_or(u0, T::ZERO))
     }
 
     #[inline]
@@ -142,21 +146,47 @@ impl<T: Real, const N: usize> Invert<T> for Gpi<T, N> {
     }
 }
 
+impl<T: Real, const N: usize> GpiInverse<T, N> {
+    /// The play G for a reference. Where envelopes saturate and cannot bring it there, the reference that they can
+    /// reach takes its place, so that the plays of model and inverse stay the same: found by halving, 64 times.
+    fn reached(&self, s: &mut GpiInverseState<T, N>, e: &Env<T>, y: T) -> T {
+        let y = hold(&mut s.reference, y);
+        let before = s.pi;
+        let g = self.pi.step(&mut s.pi, e, y);
+        let (low, high) = self.envelope.reach();
+        if g >= low && g <= high {
+            s.reached = y;
+            return g;
+        }
+        let (mut inside, mut outside) = (s.reached, y);
+        for _ in 0..64 {
+            let middle = inside + (outside - inside) * T::from_f64(0.5);
+            let g = self.pi.step(&mut before.clone(), e, middle);
+            if g >= low && g <= high { inside = middle } else { outside = middle }
+        }
+        s.pi = before;
+        s.reached = inside;
+        self.pi.step(&mut s.pi, e, inside)
+    }
+}
+
 impl<T: Real, const N: usize> Stage<T> for GpiInverse<T, N> {
     type State = GpiInverseState<T, N>;
 
     fn state(&self) -> Self::State {
-        GpiInverseState { envelope: self.envelope.state(), pi: self.pi.state() }
+        GpiInverseState { envelope: self.envelope.state(), pi: self.pi.state(), reference: T::ZERO, reached: T::ZERO }
     }
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        let g = self.pi.reset(&mut s.pi, e, u0);
+        self.pi.reset(&mut s.pi, e, T::ZERO);
+        s.reference = T::ZERO;
+        let g = self.reached(s, e, finite_or(u0, T::ZERO));
         self.envelope.reset(&mut s.envelope, e, g)
     }
 
     #[inline]
     fn step(&self, s: &mut Self::State, e: &Env<T>, u: T) -> T {
-        let g = self.pi.step(&mut s.pi, e, u);
+        let g = self.reached(s, e, u);
         self.envelope.step(&mut s.envelope, e, g)
     }
 }
@@ -197,6 +227,40 @@ mod tests {
                 prop_assert!((gpi.step(&mut a, &e, drive) - y).abs() < 60.0 * 1e-12);
             }
         }
+    }
+
+    /// Saturating sides: reachable references are reached, and one that is not leaves no trace in what follows.
+    #[test]
+    fn saturating_envelopes_do_not_wind_up() {
+        let side = |offset| Curve::Tanh { height: 90.0, rate: 0.01, shift: 0.0, offset };
+        let params = GpiParams {
+            left: side(-1.0),
+            right: side(1.0),
+            gain: 0.15,
+            thresholds: [5.0, 15.0, 30.0],
+            weights: [0.04, 0.03, 0.02],
+        };
+        let gpi: Gpi<f64, 3> = params.build(&()).unwrap();
+        let inverse = gpi.invert().unwrap();
+        let (mut a, mut b, e) = (gpi.state(), inverse.state(), Env::default());
+        gpi.reset(&mut a, &e, inverse.reset(&mut b, &e, 0.0));
+        let most = gpi.clone().step(&mut gpi.state(), &e, 1e6);
+        for k in 0..3000 {
+            // From k = 1000 to 1100 beyond what there is.
+            let y = if (1000..1100).contains(&k) { 2.0 * most } else { 0.7 * most * libm::sin(0.03 * f64::from(k)) };
+            let reached = gpi.step(&mut a, &e, inverse.step(&mut b, &e, y));
+            let expected = y.at_most(most);
+            assert!((reached - expected).abs() < 1e-9 * most, "{k}: {reached}, {expected} wanted");
+        }
+    }
+
+    #[test]
+    fn a_reset_to_no_number_is_one_to_zero() {
+        let side = |offset| Curve::Linear { slope: 1.0, offset };
+        let params = GpiParams { left: side(3.0), right: side(5.0), gain: 0.15, thresholds: [5.0], weights: [0.04] };
+        let gpi: Gpi<f64, 1> = params.build(&()).unwrap();
+        let (mut s, e) = (gpi.state(), Env::default());
+        assert_eq!(gpi.reset(&mut s, &e, f64::NAN), gpi.reset(&mut s, &e, 0.0));
     }
 
     /// With equal identity envelopes nothing is left of the generalisation.

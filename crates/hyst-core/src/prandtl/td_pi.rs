@@ -144,8 +144,8 @@ impl<T: Real, const N: usize> Build<TdPi<T, N>> for TdPiParams {
         }
         .build(&())?;
         let factor = Factor {
-            eta: T::from_f64(finite("td-pi.eta", self.eta)?),
-            reference: T::from_f64(finite("td-pi.reference_degc", self.reference_degc)?),
+            eta: coefficient("td-pi.eta", self.eta)?,
+            reference: coefficient("td-pi.reference_degc", self.reference_degc)?,
         };
         Ok(TdPi { at_reference, factor })
     }

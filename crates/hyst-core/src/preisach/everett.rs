@@ -1,6 +1,6 @@
 //! The Everett map on a uniform grid.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::{Error, Real};
 
 /// A uniform grid of `cells` cells from `low` to `high` \[V\].
@@ -103,10 +103,10 @@ impl<T: Real, const N: usize> Everett<T, N> {
             nodes: [[T::ZERO; N]; N],
             first: [T::ZERO; N],
             cells,
-            low: T::from_f64(low),
-            width: T::from_f64(width),
+            low: coefficient("preisach.low", low)?,
+            width: coefficient("preisach.high", width)?,
             per_width: T::from_f64(1.0 / width),
-            rest: T::from_f64(rest),
+            rest: coefficient("preisach.rest", rest)?,
         };
         // The row before in f64, whatever T is: nodes are sums of many cells.
         let (mut last, mut last_first) = ([0.0; N], 0.0);
@@ -116,7 +116,7 @@ impl<T: Real, const N: usize> Everett<T, N> {
             for (j, (slot, below)) in row.iter_mut().zip(&mut last).enumerate().take(i).rev() {
                 let e = surface(i, j, *below);
                 let wrong = |must| Err(Error::Node { name: SURFACE, alpha: i, beta: j, must });
-                if !e.is_finite() {
+                if !T::from_f64(e).is_finite() {
                     return wrong("be a finite number");
                 }
                 if e < *below {
@@ -129,8 +129,9 @@ impl<T: Real, const N: usize> Everett<T, N> {
                 (right, edge) = (e, e);
             }
             let e = virgin(i, edge);
-            if !e.is_finite() || e < last_first {
-                let must = if e.is_finite() { "not lie below the node before it" } else { "be a finite number" };
+            let finite = T::from_f64(e).is_finite();
+            if !finite || e < last_first {
+                let must = if finite { "not lie below the node before it" } else { "be a finite number" };
                 return Err(Error::Node { name: VIRGIN, alpha: i, beta: 0, must });
             }
             (*first, last_first) = (T::from_f64(e), e);

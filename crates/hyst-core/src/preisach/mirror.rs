@@ -1,6 +1,6 @@
 //! The mirror function of the dynamic Preisach model: how much a branch counts at a rate and a change.
 
-use crate::error::{finite, within};
+use crate::error::{coefficient, finite, within};
 use crate::{Build, Error, Meta, Params, Real};
 
 /// Parameters of a mirror function ξ(D, P): its values at the nodes of a uniform grid. `L` is any list of numbers.
@@ -151,7 +151,7 @@ impl<T: Real, const R: usize, const C: usize> Mirror<T, R, C> {
         for (d, row) in nodes.iter_mut().enumerate().take(rates) {
             for (p, slot) in row.iter_mut().enumerate().take(changes) {
                 let w = xi(rate.at(d), change.at(p));
-                *slot = T::from_f64(within("mirror.weights", w, w > 0.0, "positive")?);
+                *slot = coefficient("mirror.weights", within("mirror.weights", w, w > 0.0, "positive")?)?;
             }
         }
         Ok(Self { nodes, rate: rate.cast(), change: change.cast(), per_rate_low: T::from_f64(1.0 / rate_low) })

@@ -73,7 +73,7 @@ impl<T: Real, const N: usize> Stage<T> for Everett<T, N> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         self.virgin_memory(s);
-        self.step(s, e, u0)
+        self.step(s, e, finite_or(u0, T::ZERO))
     }
 
     #[inline]
@@ -164,7 +164,7 @@ impl<T: Real, const N: usize> Stage<T> for EverettInverse<T, N> {
 
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
         self.forward.virgin_memory(s);
-        self.step(s, e, u0)
+        self.step(s, e, finite_or(u0, T::ZERO))
     }
 
     fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
