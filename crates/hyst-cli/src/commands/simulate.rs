@@ -1,6 +1,6 @@
 //! `simulate`: what a model says about a record.
 
-use hyst_ident::metrics::Errors;
+use hyst_ident::metrics::{Errors, Mape, mape};
 use hyst_ident::record::{Extra, Need};
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
@@ -23,6 +23,8 @@ struct Summary {
     zeros: Vec<f64>,
     /// None without a measured output.
     errors: Option<Errors>,
+    /// None without a measured output.
+    mape: Option<Mape>,
 }
 
 /// Runs the command.
@@ -49,6 +51,8 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     if zero == Zero::PerRecord && simulated.errors.is_none() {
         say("note: without a measured output --zero per-record has no effect");
     }
+    // What could not be compared is an error of the simulation already.
+    let mape = record.output().and_then(|y| mape(y, &simulated.predicted, &simulated.settling).ok());
     let summary = Summary {
         record: args.input.display().to_string(),
         output: args.output.to_string(),
@@ -58,6 +62,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         zero,
         zeros: simulated.zeros,
         errors: simulated.errors,
+        mape,
     };
     report.print(&summary.text(), &summary)
 }
@@ -71,6 +76,9 @@ impl Summary {
             Some(errors) => {
                 let mut text = format!("{}: {rows} ({} settling), ", self.record, self.settling_rows);
                 text.push_str(&text::errors(errors, unit));
+                if let Some(mape) = &self.mape {
+                    text.push_str(&format!("\n{}", text::mape(mape)));
+                }
                 for zero in &self.zeros {
                     text.push_str(&format!(
                         "\nsensor zero of the record: {} {unit} from the model's",
