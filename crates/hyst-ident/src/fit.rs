@@ -102,6 +102,9 @@ pub enum FitError {
         /// Why.
         source: crate::metrics::MetricsError,
     },
+    /// First-order descent curves that give no surface.
+    #[error(transparent)]
+    Everett(#[from] crate::everett::EverettError),
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -296,6 +299,13 @@ fn fit_settled(
 
 /// Puts a fit into a model.
 pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitted: &Fitted, seed: u64) -> Model {
+    let zero = fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64;
+    let base = basis.operator(&fitted.weights);
+    Model { effects: fitted.effects.clone(), ..model_of(record, samples, base, zero, seed) }
+}
+
+/// A model without effects, identified on these samples of a record.
+pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
     let (least, most) =
@@ -308,9 +318,9 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitt
             low: least,
             high: most,
         },
-        zero: fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64,
-        base: basis.operator(&fitted.weights),
-        effects: fitted.effects.clone(),
+        zero,
+        base,
+        effects: Effects::default(),
         std_errors: BTreeMap::new(),
         recorded_at_hz: 1.0 / samples.period,
         fitted_on: fitted_on(record, samples),

@@ -11,6 +11,7 @@ pub mod atomic_file;
 mod base;
 pub mod compensate;
 pub mod diagnose;
+pub mod everett;
 pub mod excite;
 pub mod export;
 pub mod fit;
