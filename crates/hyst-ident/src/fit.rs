@@ -13,7 +13,7 @@ use crate::samples::Samples;
 use crate::settle::{start_up_rows, windows};
 
 /// Cells along one edge of the Preisach triangle.
-const CELLS: usize = 24;
+pub(crate) const CELLS: usize = 24;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
@@ -119,10 +119,10 @@ pub enum FitError {
 }
 
 /// Kinds of models that a fit of this version can identify.
-pub const FITTED: [Kind; 2] = [Kind::Pi, Kind::Preisach];
+pub const FITTED: [Kind; 3] = [Kind::Pi, Kind::Preisach, Kind::Dpm];
 
 fn fitted_kinds() -> String {
-    format!("it fits {}", FITTED.map(Kind::name).join(" and "))
+    format!("it fits {}", FITTED.map(Kind::name).join(", "))
 }
 
 /// What a fit may be told.
@@ -147,6 +147,9 @@ pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, F
             unknowns: FEWEST / 3,
             needed: FEWEST,
         });
+    }
+    if kind == Kind::Dpm {
+        return Ok(crate::everett::fit_dpm(record, options)?.model);
     }
     check(record, &samples)?;
     let basis = basis_for(kind, &samples)?;
@@ -260,7 +263,7 @@ pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> 
 }
 
 /// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
-fn fit_settled(
+pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,

@@ -2,16 +2,19 @@
 
 use std::path::Path;
 
+mod surface;
+
 use hyst_core::PiParams;
+use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
-use hyst_ident::model::{Base, Model};
+use hyst_ident::model::{Base, Kind, Model};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
 
-use crate::cli::FitArgs;
-use crate::exit::CommandResult;
+use crate::cli::{FitArgs, FitFrom};
+use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::{input, text};
@@ -28,6 +31,12 @@ struct Summary {
     errors: Option<Errors>,
     base: Option<BaseSummary>,
     sensor_zero: f64,
+    /// What first-order descent curves show, with `--from fod`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<FodReport>,
+    /// How the rate comes in, with `--model dpm`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dynamics: Option<DpmReport>,
     #[serde(skip)]
     input_unit: String,
     #[serde(skip)]
@@ -54,11 +63,18 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
 
     let progress = Progress::spinner(&format!("fitting {} to {}", args.model, text::count(record.rows(), "row")));
     let options = FitOptions { seed: args.seed, zero_per_record: zero == Zero::PerRecord };
-    let model = fit(&record, args.model, &options)?;
+    let Identified { model, surface, dynamics } = identify(args, &record, &options)?;
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
 
     args.output.write(|out| out.write_all(model.to_json().as_bytes()))?;
+    let notes = surface::notes(surface.as_ref(), dynamics.as_ref(), &model);
+    notes.iter().for_each(|note| output::say(note));
+    if args.model == Kind::Preisach && args.from.is_none() && shows_only_curves(&record) {
+        output::say(
+            "note: this record holds first-order descent curves only; --from fod measures the Everett surface itself",
+        );
+    }
     let summary = Summary {
         model: args.model.name(),
         output: args.output.to_string(),
@@ -69,10 +85,43 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         errors: simulated.errors,
         base: base_summary(&model),
         sensor_zero: model.zero,
+        surface,
+        dynamics,
         input_unit: model.input.unit.clone(),
         seen: seen(&record, &model),
     };
     report.print(&summary.text(), &summary)
+}
+
+/// A model and what was found on the way to it.
+struct Identified {
+    model: Model,
+    surface: Option<FodReport>,
+    dynamics: Option<DpmReport>,
+}
+
+fn identify(args: &FitArgs, record: &Record, options: &FitOptions) -> CommandResult<Identified> {
+    let fod = args.from == Some(FitFrom::Fod);
+    if fod && args.model != Kind::Preisach {
+        let message = format!(
+            "--from fod makes an Everett surface, which {} is not: give --model preisach (dpm finds descent curves by itself)",
+            args.model
+        );
+        return Err(CommandError::bad_input(message));
+    }
+    if args.as_measured && !fod {
+        return Err(CommandError::bad_input("--as-measured is about a measured surface; add --from fod"));
+    }
+    if fod {
+        let options = FodOptions { as_measured: args.as_measured, seed: args.seed, cells: None };
+        let fit = fit_fod(record, &options)?;
+        return Ok(Identified { model: fit.model, surface: Some(fit.report), dynamics: None });
+    }
+    if args.model == Kind::Dpm {
+        let fit = fit_dpm(record, options)?;
+        return Ok(Identified { model: fit.model, surface: None, dynamics: Some(fit.report) });
+    }
+    Ok(Identified { model: fit(record, args.model, options)?, surface: None, dynamics: None })
 }
 
 /// What the record looks like: a slip of a unit shows here.
@@ -132,6 +181,8 @@ impl Summary {
                 format!("{cells_with_density} of {cells} cells with density")
             }
         }));
+        lines.extend(self.surface.as_ref().map(|s| surface::measured(s, unit)));
+        lines.extend(self.dynamics.as_ref().map(|d| surface::dynamics(d, unit, &self.input_unit)));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
         lines.join("\n")
     }

@@ -60,35 +60,45 @@ pub fn fit_fod(record: &Record, options: &FodOptions) -> Result<FodFit, FitError
     let samples = Samples::from_record(record);
     check(record, &samples)?;
     let surface = Surface::measure(&record.name(), &samples, options.cells)?;
+    let (valid, report) = checked(&surface, &record.name(), options.as_measured)?;
+    let base = Base::Preisach(valid.params());
+    let model = model_of(record, &samples, base, surface.zero, options.seed);
+    // What an operator refuses is said here and not when the file is read.
+    model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
+    Ok(FodFit { model, surface, report })
+}
+
+/// The surface that an operator can be built of: the measured one, or the nearest valid one where it falls and may be
+/// moved. And what is to be said about it.
+pub(super) fn checked(
+    surface: &Surface,
+    record: &str,
+    as_measured: bool,
+) -> Result<(Surface, FodReport), EverettError> {
     let breaches = surface.breaches();
-    let steps = surface.steps_back();
-    let (valid, moved) = match steps {
+    let (valid, moved) = match surface.steps_back() {
         0 => (surface.clone(), None),
-        nodes if options.as_measured => {
-            let (record, beyond) = (record.name(), breaches.len());
-            return Err(EverettError::NotMonotone { record, nodes, beyond }.into());
+        nodes if as_measured => {
+            let (record, beyond) = (record.to_owned(), breaches.len());
+            return Err(EverettError::NotMonotone { record, nodes, beyond });
         }
         _ => {
             let (valid, moved) = surface.nearest_valid()?;
             (valid, Some(moved))
         }
     };
-    let base = Base::Preisach(valid.params());
-    let model = model_of(record, &samples, base, surface.zero, options.seed);
-    // What an operator refuses is said here and not when the file is read.
-    model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
-    let errors = (1..=surface.grid.cells).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let nodes = (1..=surface.grid.cells).flat_map(|i| (0..i).map(move |j| (i, j)));
     let report = FodReport {
         cells: surface.grid.cells,
         families: surface.families.clone(),
         passed_over: surface.passed_over,
         noise: surface.noise,
-        std_error: errors.map(|(i, j)| surface.std_error(i, j)).fold(0.0, f64::max),
+        std_error: nodes.map(|(i, j)| surface.std_error(i, j)).fold(0.0, f64::max),
         scatter: (surface.families.len() > 1).then(|| surface.scatter()),
         breaches,
         moved,
     };
-    Ok(FodFit { model, surface, report })
+    Ok((valid, report))
 }
 
 /// Whether a record is made of first-order descent curves and nothing else, so that [`fit_fod`] suits it.

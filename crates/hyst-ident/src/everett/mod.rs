@@ -9,8 +9,10 @@
 //! both parts.
 
 mod breach;
+mod dpm;
 mod flank;
 mod fod;
+mod mirror;
 mod nearest;
 mod peaks;
 mod surface;
@@ -18,6 +20,7 @@ mod surface;
 mod tests;
 
 pub use breach::{Breach, BreachRule};
+pub use dpm::{ClassicalPart, DpmFit, DpmReport, MirrorNode, fit_dpm};
 pub use fod::{FodFit, FodOptions, FodReport, fit_fod, shows_only_curves};
 pub use nearest::Moved;
 pub use peaks::{Family, PeakShape};
@@ -64,6 +67,18 @@ pub enum EverettError {
         nodes: usize,
         /// Those that break it by more than noise.
         beyond: usize,
+    },
+    /// Nothing tells how the output depends on the rate.
+    #[error(
+        "{record}: every segment moves at about the same rate ({slowest:.4} to {fastest:.4} input units/s), so nothing shows how the output depends on it; add records at other rates, each rate in a file or a segment of its own, or fit preisach"
+    )]
+    OneRate {
+        /// The record.
+        record: String,
+        /// Mean rate of the slowest segment.
+        slowest: f64,
+        /// Mean rate of the fastest segment.
+        fastest: f64,
     },
     /// The quadratic programme had no solution.
     #[error("{record}: no valid surface near the measured one was found; look for rows that are far off the others")]
