@@ -14,7 +14,11 @@ fn main() {
         r.fade,
         r.untouched.len()
     );
-    println!("calibration: RMSE {:.4} N classical, {:.4} N dynamic", r.rmse_classical, r.rmse);
+    let left_out = r.rmse_left_out.unwrap_or(f64::NAN);
+    println!(
+        "calibration: RMSE {:.4} N classical, {:.4} N dynamic, {left_out:.4} N on what is left out",
+        r.rmse_classical, r.rmse
+    );
     println!("\n{:32}{:>10}{:>10}{:>10}{:>12}", "prediction, RMSE [N]", "CPM", "CPM all", "DPM", "DPM / CPM");
     for row in &study.rows {
         let [slow, all, dynamic] = row.predicted;

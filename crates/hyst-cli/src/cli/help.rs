@@ -51,6 +51,8 @@ A simulated plant is a file like this; every section after [sensor] is an effect
   [sensor]
   range_um = [-12, 43]
   noise_um = 0.007
+  [viscosity]
+  volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
   [delay]
   seconds = 0.002
   [lag]

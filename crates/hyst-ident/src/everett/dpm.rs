@@ -16,7 +16,9 @@ const SLOW: f64 = 2.0;
 /// Nodes of the mirror along rate and change, as in the paper (Chen et al., section III).
 const NODES: (usize, usize) = (8, 9);
 /// Travels over which a step fades that are tried, as shares of the input's range.
-const FADES: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
+const FADES: [f64; 5] = [0.01, 0.03, 0.1, 0.2, 0.4];
+/// The longest fade is taken whose error on segments left out is within this factor of the least: it makes the smoothest drives.
+const AS_GOOD: f64 = 1.02;
 
 /// Where the classical part of a dynamic model came from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,12 +48,15 @@ pub struct DpmReport {
     pub slow_segments: usize,
     /// Mean rate of the slow segments and of the fastest one while the input moves \[input unit/s\].
     pub rates: [f64; 2],
-    /// Travel over which a step at a closing loop fades \[input unit\], the best of five.
+    /// Travel over which a step at a closing loop fades \[input unit\].
     pub fade: f64,
-    /// RMS residual of all rows that were fitted, of the classical part alone \[output unit\].
+    /// RMS residual of the faster segments, of the classical part alone \[output unit\].
     pub rmse_classical: f64,
     /// The same of the dynamic model \[output unit\].
     pub rmse: f64,
+    /// The same over segments that were left out of the fit in turn \[output unit\]; much above `rmse`, more rates are needed.
+    /// Absent where there is one faster segment only.
+    pub rmse_left_out: Option<f64>,
     /// Smallest and largest node value of ξ.
     pub xi: [f64; 2],
     /// Nodes at a bound.
@@ -69,7 +74,7 @@ pub struct DpmFit {
     pub report: DpmReport,
 }
 
-/// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to all of them.
+/// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
 ///
 /// Segments within a factor of two of the slowest rate are the slow ones. Where they hold first-order descent curves, the
 /// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), else a Preisach operator by least squares. The
@@ -105,25 +110,27 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         }
     };
     let grid = mirror_grid(&samples);
-    let zero_of_segment: Vec<usize> =
-        samples.file_of_segment.iter().map(|file| if options.zero_per_record { *file } else { 0 }).collect();
+    // The slow segments are the classical part's already; their rows would outweigh the others'.
+    let brisk: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] > SLOW * slowest).collect();
+    let brisk = samples.segments_only(&brisk);
+    let zero_of_segment = zeros(&brisk, options.zero_per_record);
     let problem =
-        MirrorProblem { samples: &samples, classical: &preisach, grid: &grid, zero_of_segment: &zero_of_segment };
+        MirrorProblem { samples: &brisk, classical: &preisach, grid: &grid, zero_of_segment: &zero_of_segment };
     let (low, high) = samples.input_range();
     let stage = |source| FitError::Stage { record: record.name(), source };
-    let mut best: Option<(f64, MirrorFit)> = None;
+    let mut fits: Vec<(f64, MirrorFit)> = Vec::new();
     for share in FADES {
         let fade = share * (high - low);
-        let fit = problem.fit(fade).map_err(stage)?;
-        if let Some(fit) = fit.filter(|fit| best.as_ref().is_none_or(|(_, b)| fit.rmse < b.rmse)) {
-            best = Some((fade, fit));
-        }
+        fits.extend(problem.fit(fade).map_err(stage)?.map(|fit| (fade, fit)));
     }
-    let (fade, fit) = best.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+    let error = |fit: &MirrorFit| fit.left_out.unwrap_or(fit.rmse);
+    let least = fits.iter().map(|(_, fit)| error(fit)).fold(f64::INFINITY, f64::min);
+    let longest = fits.into_iter().rfind(|(_, fit)| error(fit) <= AS_GOOD * least);
+    let (fade, fit) = longest.ok_or_else(|| FitError::Unsolvable { record: name() })?;
     let plain = problem.output(vec![1.0; grid.rates * grid.changes], fade).map_err(stage)?;
-    let rows = || (0..samples.len()).filter(|k| !samples.settling[*k]);
-    let mean = rows().map(|k| samples.output[k] - plain[k]).sum::<f64>() / rows().count().max(1) as f64;
-    let squares = rows().map(|k| (samples.output[k] - plain[k] - mean).powi(2)).sum::<f64>();
+    let misses = || brisk.output.iter().zip(&plain).map(|(y, p)| y - p);
+    let mean = misses().sum::<f64>() / brisk.len() as f64;
+    let squares = misses().map(|e| (e - mean) * (e - mean)).sum::<f64>();
     let node = |k: usize| {
         let on = |low: f64, high: f64, nodes: usize, k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
         MirrorNode {
@@ -137,8 +144,9 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         slow_segments: slow.len(),
         rates: [slowest, fastest],
         fade,
-        rmse_classical: (squares / rows().count().max(1) as f64).sqrt(),
+        rmse_classical: (squares / brisk.len() as f64).sqrt(),
         rmse: fit.rmse,
+        rmse_left_out: fit.left_out,
         xi: [least, most],
         bound: fit.bound,
         untouched: fit.untouched.iter().map(|k| node(*k)).collect(),
@@ -158,6 +166,18 @@ fn rate(samples: &Samples, segment: usize) -> f64 {
     // Rows at rest do not make a drive slow; a millionth of the swing is rest.
     let moving = moves().filter(|m| *m > 1e-6 * (high - low)).count();
     moves().sum::<f64>() / (moving.max(1) as f64 * samples.period)
+}
+
+/// Which zero of the sensor each segment has: one for all, or one for each file.
+fn zeros(samples: &Samples, per_file: bool) -> Vec<usize> {
+    let mut files: Vec<usize> = Vec::new();
+    let mut place = |file: &usize| {
+        files.iter().position(|f| f == file).unwrap_or_else(|| {
+            files.push(*file);
+            files.len() - 1
+        })
+    };
+    samples.file_of_segment.iter().map(|file| if per_file { place(file) } else { 0 }).collect()
 }
 
 /// A grid up to the highest mean rate since a reversal and the largest change that the records have.

@@ -6,7 +6,7 @@
 //! model with ξ ≡ 1, and the node values follow by linear least squares between bounds.
 
 use hyst_core::{Build, Dpm, DpmParams, Env, MirrorParams, PreisachParams, Sampling, Stage};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::Samples;
@@ -15,11 +15,15 @@ use crate::model::capacity::{MIRROR, NODES};
 
 /// Bounds of ξ: what lies outside is no rate-dependence but a record that does not belong to the classical part.
 const BOUNDS: Bounds = Bounds { lower: 0.2, upper: 3.0 };
-/// Weight of `(ξₐ − ξ_b)²` of neighbouring nodes, of the mean square of a node's column: what the records show overrules
-/// it, nodes that they touch little follow their neighbours.
-const TO_NEIGHBOURS: f64 = 1e-5;
-/// Weight of `(ξ − 1)²`, likewise: nodes whose neighbours show nothing either stay near the classical model.
-const TO_ONE: f64 = 1e-7;
+/// Weights of `(ξₐ − ξ_b)²` between neighbouring nodes that are tried, as shares of the mean square of a node's column; that
+/// one is taken which predicts a segment best that it was not fitted to. Nodes that the records touch little follow their
+/// neighbours, of which the classical model, ξ = 1 at D = 0, is one.
+const TO_NEIGHBOURS: [f64; 6] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+/// The one taken where only one segment is there.
+const USUAL: f64 = 1e-3;
+/// Weight of `(ξ(D, P) − ξ(D, −P))²`, of that between neighbours: a ξ that differs between rising and falling branches makes
+/// the model wander while loops are open, so it takes data to show that it does.
+const TO_IMAGE: f64 = 10.0;
 /// A node whose column has less than this share of the mean square is touched by no data.
 const UNTOUCHED: f64 = 1e-6;
 /// Rows that a fit uses at most.
@@ -31,6 +35,8 @@ pub(super) struct MirrorFit {
     pub(super) zeros: Vec<f64>,
     /// Root of the mean squared residual over the rows that were fitted.
     pub(super) rmse: f64,
+    /// The same over segments that were left out in turn, each with its own mean taken out; `None` of a single segment.
+    pub(super) left_out: Option<f64>,
     /// Nodes that no row touches.
     pub(super) untouched: Vec<usize>,
     /// Nodes at a bound.
@@ -73,7 +79,7 @@ impl MirrorProblem<'_> {
     pub(super) fn fit(&self, fade: f64) -> Result<Option<MirrorFit>, hyst_core::Error> {
         let (n, zeros) = (self.nodes(), self.zero_of_segment.iter().max().map_or(0, |m| m + 1));
         let classical = self.output(vec![1.0; n], fade)?;
-        // Only the rows that count are kept of each column.
+        // Only the rows that count are kept of each column; blocks come in the order of the rows.
         let blocks = Blocks::new(self.samples, 1, ROWS);
         let used: Vec<usize> = (0..blocks.rows.len()).flat_map(|b| blocks.used(b, self.samples)).collect();
         let column = |node: usize| -> Result<Vec<f64>, hyst_core::Error> {
@@ -83,44 +89,70 @@ impl MirrorProblem<'_> {
             Ok(used.iter().map(|k| raised[*k] - classical[*k]).collect())
         };
         let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(column).collect::<Result<_, _>>()?;
-        let mut segment_of_row = vec![0; self.samples.len()];
-        for (s, rows) in self.samples.segments.iter().enumerate() {
-            segment_of_row[rows.clone()].fill(s);
-        }
-        let x = DMatrix::from_fn(used.len(), n + zeros + 1, |r, c| {
-            let k = used[r];
-            if c < n {
-                columns[c][r]
-            } else if c < n + zeros {
-                f64::from(u8::from(self.zero_of_segment[segment_of_row[k]] == c - n))
-            } else {
-                self.samples.output[k] - classical[k]
-            }
-        });
-        let gram = Gram { matrix: x.tr_mul(&x), rows: used.len() };
-        let squares: Vec<f64> = (0..n).map(|c| gram.matrix[(c, c)]).collect();
+        let grams = self.grams(&columns, &used, &classical, zeros);
+        let total = Gram::sum(n + zeros + 1, grams.iter());
+        let squares: Vec<f64> = (0..n).map(|c| total.matrix[(c, c)]).collect();
         let level = squares.iter().sum::<f64>() / n as f64;
-        // Unknowns are ξ − 1, so that the ridge draws to the classical model.
-        let mut bounds = vec![Bounds { lower: BOUNDS.lower - 1.0, upper: BOUNDS.upper - 1.0 }; n];
-        bounds.extend(vec![Bounds::FREE; zeros]);
-        let Some(z) = solve(&gram, Some(&self.penalty(level, n + zeros)), &bounds) else { return Ok(None) };
+        let solved = |gram: &Gram, weight: f64| {
+            // Unknowns are ξ − 1.
+            let mut bounds = vec![Bounds { lower: BOUNDS.lower - 1.0, upper: BOUNDS.upper - 1.0 }; n];
+            bounds.extend(vec![Bounds::FREE; zeros]);
+            solve(gram, Some(&self.penalty(weight * level, n + zeros)), &bounds)
+        };
+        let mut best = (f64::INFINITY, USUAL);
+        if grams.len() > 1 {
+            for weight in TO_NEIGHBOURS {
+                let mut squares = 0.0;
+                for own in &grams {
+                    let others = Gram { matrix: &total.matrix - &own.matrix, rows: total.rows - own.rows };
+                    let Some(z) = solved(&others, weight) else { return Ok(None) };
+                    squares += unlike(own, &z, n);
+                }
+                // Of two that are as good, the smoother one.
+                if squares <= best.0 {
+                    best = (squares, weight);
+                }
+            }
+        }
+        let Some(z) = solved(&total, best.1) else { return Ok(None) };
+        let rmse = (total.error(&z) / total.rows.max(1) as f64).sqrt();
         let weights: Vec<f64> = z.iter().take(n).map(|z| (1.0 + z).clamp(BOUNDS.lower, BOUNDS.upper)).collect();
         let near = |w: &&f64| **w < BOUNDS.lower + 1e-6 || **w > BOUNDS.upper - 1e-6;
         Ok(Some(MirrorFit {
             bound: weights.iter().filter(near).count(),
             mirror: MirrorParams { weights, ..self.grid.clone() },
             zeros: z.iter().skip(n).copied().collect(),
-            rmse: (gram.error(&z) / used.len().max(1) as f64).sqrt(),
+            rmse,
+            left_out: (grams.len() > 1).then(|| (best.0 / total.rows.max(1) as f64).sqrt()),
             untouched: (0..n).filter(|c| squares[*c] <= UNTOUCHED * level).collect(),
         }))
     }
 
-    /// Ties each node to its neighbours along D and P, and weakly to 1.
-    fn penalty(&self, level: f64, unknowns: usize) -> DMatrix<f64> {
+    /// Normal equations of each segment: nodes, zeros, and what the classical model misses.
+    fn grams(&self, columns: &[Vec<f64>], used: &[usize], classical: &[f64], zeros: usize) -> Vec<Gram> {
+        let n = columns.len();
+        let of_segment = |(rows, zero): (&std::ops::Range<usize>, &usize)| {
+            let (first, end) = (used.partition_point(|k| *k < rows.start), used.partition_point(|k| *k < rows.end));
+            let x = DMatrix::from_fn(end - first, n + zeros + 1, |r, c| {
+                let k = used[first + r];
+                if c < n {
+                    columns[c][first + r]
+                } else if c < n + zeros {
+                    f64::from(u8::from(c - n == *zero))
+                } else {
+                    self.samples.output[k] - classical[k]
+                }
+            });
+            Gram { matrix: x.tr_mul(&x), rows: end - first }
+        };
+        self.samples.segments.iter().zip(self.zero_of_segment).map(of_segment).collect()
+    }
+
+    /// Ties each node to its neighbours along D, down to ξ = 1 at D = 0, and along P, and to its image at −P.
+    fn penalty(&self, weight: f64, unknowns: usize) -> DMatrix<f64> {
         let mut p = DMatrix::zeros(unknowns, unknowns);
         let (rates, changes) = (self.grid.rates, self.grid.changes);
-        let mut tie = |a: usize, b: usize| {
-            let weight = TO_NEIGHBOURS * level;
+        let mut tie = |a: usize, b: usize, weight: f64| {
             p[(a, a)] += weight;
             p[(b, b)] += weight;
             p[(a, b)] -= weight;
@@ -130,18 +162,35 @@ impl MirrorProblem<'_> {
             for c in 0..changes {
                 let node = d * changes + c;
                 if d + 1 < rates {
-                    tie(node, node + changes);
+                    tie(node, node + changes, weight);
                 }
                 if c + 1 < changes {
-                    tie(node, node + 1);
+                    tie(node, node + 1, weight);
+                }
+                if 2 * c + 1 < changes {
+                    tie(node, d * changes + changes - 1 - c, TO_IMAGE * weight);
                 }
             }
         }
-        for node in 0..rates * changes {
-            p[(node, node)] += TO_ONE * level;
+        for node in 0..changes {
+            p[(node, node)] += weight;
         }
         p
     }
+}
+
+/// Sum of the squared residuals of a segment for node values `z` that were fitted without it, its own mean taken out.
+fn unlike(own: &Gram, z: &DVector<f64>, nodes: usize) -> f64 {
+    let mut z = z.clone();
+    let rows = own.rows.max(1) as f64;
+    // The segment has one zero; in its normal equations the column of that zero is the one that is not empty.
+    for c in nodes..z.len() {
+        z[c] = 0.0;
+        if own.matrix[(c, c)] > 0.0 {
+            z[c] = own.score(&z)[c] / rows;
+        }
+    }
+    own.error(&z)
 }
 
 #[cfg(test)]
@@ -180,6 +229,15 @@ mod tests {
         PreisachParams { low: 0.0, high: 80.0, cells, rest: 0.0, density, once: vec![0.0; cells] }
     }
 
+    /// A zero for each of the five segments.
+    fn problem<'a>(
+        samples: &'a Samples,
+        classical: &'a PreisachParams<Vec<f64>>,
+        grid: &'a MirrorParams<Vec<f64>>,
+    ) -> MirrorProblem<'a> {
+        MirrorProblem { samples, classical, grid, zero_of_segment: &[0, 1, 2, 3, 4] }
+    }
+
     fn random(seed: u64) -> Vec<f64> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         (0..72).map(|_| 0.7 + 0.5 * rng.random::<f64>()).collect()
@@ -189,7 +247,7 @@ mod tests {
     fn the_output_is_affine_in_the_node_values() {
         let (samples, classical) = (samples(), classical());
         let grid = MirrorParams::on_printed_grid(Vec::new());
-        let problem = MirrorProblem { samples: &samples, classical: &classical, grid: &grid, zero_of_segment: &[0; 5] };
+        let problem = problem(&samples, &classical, &grid);
         for fade in [0.0, 15.0] {
             let (a, b) = (random(1), random(2));
             let mixed = a.iter().zip(&b).map(|(a, b)| 0.3 * a + 0.7 * b).collect();
@@ -208,21 +266,14 @@ mod tests {
         let truth: Vec<f64> = (0..72)
             .map(|k| {
                 let (d, p) = (f64::from(k / 9) / 7.0, f64::from(k % 9) / 8.0);
-                1.0 - 0.25 * d + 0.1 * d * (p - 0.5)
+                1.0 - 0.25 * d + 0.1 * d * (2.0 * p - 1.0).powi(2)
             })
             .collect();
-        let with = |samples: &Samples, weights| {
-            let problem =
-                MirrorProblem { samples, classical: &classical, grid: &grid, zero_of_segment: &[0, 1, 2, 3, 4] };
-            problem.output(weights, 12.0).unwrap()
-        };
-        samples.output = with(&samples, truth.clone());
+        samples.output = problem(&samples, &classical, &grid).output(truth.clone(), 12.0).unwrap();
         for (s, rows) in samples.segments.iter().enumerate() {
             samples.output[rows.clone()].iter_mut().for_each(|y| *y += s as f64 - 1.5);
         }
-        let problem =
-            MirrorProblem { samples: &samples, classical: &classical, grid: &grid, zero_of_segment: &[0, 1, 2, 3, 4] };
-        let fit = problem.fit(12.0).unwrap().unwrap();
+        let fit = problem(&samples, &classical, &grid).fit(12.0).unwrap().unwrap();
         assert!(fit.rmse < 2e-3, "{}", fit.rmse);
         for (s, zero) in fit.zeros.iter().enumerate() {
             assert!((zero - (s as f64 - 1.5)).abs() < 5e-3, "{zero}");

@@ -152,8 +152,8 @@ fn dented(by: f64) -> Record {
     let mut output = clean.output().unwrap().to_vec();
     // Peak 15 of 20, its falling half.
     let begin = (14.0 * 1100.0) as usize;
-    for k in begin + 500..begin + 1000 {
-        output[k] += by * (-((drive.voltage()[k] - 40.0) / 4.0).powi(2)).exp();
+    for (y, u) in output.iter_mut().zip(drive.voltage()).skip(begin + 500).take(500) {
+        *y += by * (-((u - 40.0) / 4.0).powi(2)).exp();
     }
     with_output(&drive, vec![0; clean.rows()], output)
 }

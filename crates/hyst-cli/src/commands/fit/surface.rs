@@ -96,15 +96,18 @@ pub(super) fn dynamics(d: &DpmReport, unit: &str, input: &str) -> String {
         ClassicalPart::LeastSquares => "classical part by least squares".to_owned(),
     };
     let bound = if d.bound == 0 { String::new() } else { format!(", {} at a bound", text::count(d.bound, "node")) };
+    let left_out = d
+        .rmse_left_out
+        .map_or_else(String::new, |e| format!(", {} {unit} each with what the others say", text::short(e)));
     format!(
-        "{classical}\n{} of about {} {input}/s, up to {} {input}/s in the others\nmirror function from {} to {}{bound}, steps fade over {} {input}\nRMSE {} {unit} with the mirror function, {} {unit} without",
+        "{classical}\n{} of about {} {input}/s, up to {} {input}/s in the others\nmirror function from {} to {}{bound}, steps fade over {} {input}\nRMSE of the faster segments {} {unit} without the mirror function, {} {unit} with it{left_out}",
         text::count(d.slow_segments, "slow segment"),
         text::short(d.rates[0]),
         text::short(d.rates[1]),
         text::short(d.xi[0]),
         text::short(d.xi[1]),
         text::short(d.fade),
-        text::short(d.rmse),
-        text::short(d.rmse_classical)
+        text::short(d.rmse_classical),
+        text::short(d.rmse)
     )
 }
