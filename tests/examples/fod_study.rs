@@ -69,6 +69,7 @@ fn surface(area: &Area<'_>, s: &Identified) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .caption(format!("Everett surface, {}: {} cells violated", s.name, s.report.breaches.len()), ("sans-serif", 18))
         .margin(10)
+        .margin_right(26)
         .x_label_area_size(38)
         .y_label_area_size(62)
         .build_cartesian_2d(grid.low..grid.high, -0.05 * top..1.05 * top)?;
@@ -92,6 +93,7 @@ fn lines(area: &Area<'_>, title: &str, x: &str, y: &str, curves: &[(&'static str
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 18))
         .margin(10)
+        .margin_right(26)
         .x_label_area_size(38)
         .y_label_area_size(62)
         .build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;

@@ -2,7 +2,8 @@
 //!
 //! A first-order descent curve rises from the lowest input to α and falls back; its falling flank is the Everett function
 //! itself, `E(α, β) = f_α − f_αβ` (Schirrer et al., eq. 2, counted as [`hyst_core::Everett`] counts). `peaks.rs` finds such
-//! curves in a record, `flank.rs` reads one of them at an input, `surface.rs` averages them over peak durations, `breach.rs`
+//! curves in a record, `flank.rs` reads one of them at an input and `reader.rs` a family of them on a
+//! grid, `surface.rs` averages families over peak durations, `breach.rs`
 //! says where the result is no Everett surface, `nearest.rs` finds the nearest one that is, `fod.rs` makes a model of it.
 //!
 //! `mirror.rs` identifies the mirror function of the dynamic model from records at several rates, `dpm.rs` makes a model of
@@ -15,6 +16,7 @@ mod fod;
 mod mirror;
 mod nearest;
 mod peaks;
+mod reader;
 mod surface;
 #[cfg(test)]
 mod tests;

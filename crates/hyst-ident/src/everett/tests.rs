@@ -113,6 +113,44 @@ fn durations_in_one_segment_are_told_apart_too() {
 }
 
 #[test]
+fn heights_between_the_nodes_are_interpolated() {
+    // 20 heights on 13 cells, and on 33: none but the last lies on a node.
+    for cells in [13, 33] {
+        let record = record(&peaks(Peak::HalfSine, &[1.0]), 0.0, 0.0);
+        let surface = Surface::measure("fod.csv", &Samples::from_record(&record), Some(cells)).unwrap();
+        let map = operator();
+        let span = surface.value(cells, 0);
+        for i in 1..=cells {
+            for j in 0..i {
+                let miss = surface.value(i, j) - map.value(surface.at(i), surface.at(j));
+                assert!(miss.abs() < 0.01 * span, "{cells}: ({i}, {j}) {miss} of {span}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_measured_drive_with_noise_of_its_own_is_read_too() {
+    let clean = record(&peaks(Peak::HalfSine, &[0.8, 1.2]), 0.0, 0.005);
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    let input = clean.input().iter().map(|u| u + 0.1 * (rng.random::<f64>() - 0.5)).collect();
+    let labels = (0..).zip(clean.segments()).flat_map(|(k, rows)| std::iter::repeat_n(k, rows.len())).collect();
+    let noisy = Record::from_samples(Columns {
+        name: "fod.csv".into(),
+        segment: Some(labels),
+        time: clean.time().to_vec(),
+        input: Some(input),
+        output: clean.output().map(|y| (OutputUnit::Micrometre, y.to_vec())),
+        ..Columns::default()
+    })
+    .unwrap();
+    let surface = measured(&noisy);
+    assert_eq!(surface.families().iter().map(|f| f.curves).collect::<Vec<_>>(), [CELLS; 2]);
+    let (largest, _) = misses(&surface);
+    assert!(largest < 0.01 * surface.value(surface.grid().cells, 0), "{largest}");
+}
+
+#[test]
 fn noise_is_measured_and_its_standard_errors_are_true() {
     let noise = 0.03;
     let surface = measured(&record(&peaks(Peak::HalfSine, &[0.7, 1.0]), -2.0, noise));
