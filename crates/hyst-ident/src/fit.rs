@@ -19,7 +19,7 @@ use crate::samples::Samples;
 use crate::settle::{start_up_rows, windows};
 
 /// Cells along one edge of the Preisach triangle.
-const CELLS: usize = 24;
+pub(crate) const CELLS: usize = 24;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
@@ -144,6 +144,9 @@ pub enum FitError {
         /// Which there are.
         advice: &'static str,
     },
+    /// First-order descent curves that give no surface.
+    #[error(transparent)]
+    Everett(#[from] crate::everett::EverettError),
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -158,23 +161,7 @@ pub enum FitError {
 }
 
 /// Kinds of models that a fit of this version can identify.
-pub const FITTED: [Kind; 15] = [
-    Kind::Pi,
-    Kind::Preisach,
-    Kind::Gpi,
-    Kind::TdPi,
-    Kind::MaxwellSlip,
-    Kind::TdEm,
-    Kind::BoucWen,
-    Kind::BoucWenOscillator,
-    Kind::Lfdm,
-    Kind::Ifm,
-    Kind::Atan,
-    Kind::Sigmoid,
-    Kind::Softplus,
-    Kind::Softsign,
-    Kind::Tanh,
-];
+pub const FITTED: [Kind; 16] = Kind::ALL;
 
 fn fitted_kinds() -> String {
     format!("it fits {}", FITTED.map(Kind::name).join(", "))
@@ -197,6 +184,13 @@ pub struct Fit {
     pub evaluations: u64,
 }
 
+impl Fit {
+    /// A fit in which nothing was searched.
+    pub fn at_once(model: Model, how: &str) -> Self {
+        Self { model, how: how.into(), estimate: None, trials: None, evaluations: 1 }
+    }
+}
+
 /// Fits a base model; the rows of a start-up transient are left out.
 ///
 /// # Errors
@@ -216,12 +210,15 @@ pub fn fit_with(
     options: &FitOptions,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
-    let convex = matches!(kind, Kind::Pi | Kind::Preisach);
-    match &options.optimizer {
-        Optimizer::Auto | Optimizer::Convex if convex => {
+    let convex = matches!(options.optimizer, Optimizer::Auto | Optimizer::Convex);
+    match kind {
+        Kind::Pi | Kind::Preisach if convex => {
             let model = convex_fit(record, kind, options)?;
-            let how = "convex: weights that are not negative, one optimum".into();
-            Ok(Fit { model, how, estimate: None, trials: None, evaluations: 1 })
+            Ok(Fit::at_once(model, "convex: weights that are not negative, one optimum"))
+        }
+        Kind::Dpm if convex => {
+            let model = crate::everett::fit_dpm(record, options)?.model;
+            Ok(Fit::at_once(model, "convex: the classical part from the slow rows, then the mirror's nodes"))
         }
         _ => searched::fit(record, kind, options, watch),
     }
@@ -356,7 +353,7 @@ pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<()
 }
 
 /// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
-fn fit_settled(
+pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,
@@ -401,7 +398,7 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitt
 }
 
 /// A model without effects, fitted to the settled rows of a record.
-fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
+pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
     let (least, most) =

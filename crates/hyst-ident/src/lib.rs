@@ -12,6 +12,7 @@ mod base;
 pub mod batch;
 pub mod compensate;
 pub mod diagnose;
+pub mod everett;
 pub mod excite;
 pub mod export;
 pub mod fit;

@@ -72,9 +72,16 @@ pub(crate) struct FitArgs {
     /// Records to fit, as one
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Kind of model
+    /// Kind of model; dpm takes records at several rates
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
+    /// What a preisach model is made of: all rows by least squares, or the Everett surface that first-order descent curves
+    /// measure (dpm finds such curves by itself)
+    #[arg(long, value_name = "rows|fod", value_enum, hide_possible_values = true)]
+    pub(crate) from: Option<FitFrom>,
+    /// Take the measured surface as it is or not at all; else one that is not monotone is moved to the nearest that is
+    #[arg(long, requires = "from")]
+    pub(crate) as_measured: bool,
     /// Model file to write; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Target,
@@ -86,6 +93,15 @@ pub(crate) struct FitArgs {
     pub(crate) map: MapArg,
     #[command(flatten)]
     pub(crate) json: JsonArg,
+}
+
+/// What a Preisach model is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FitFrom {
+    /// All rows, by least squares
+    Rows,
+    /// The falling flanks of first-order descent curves
+    Fod,
 }
 
 /// Write a model's parameters for a board

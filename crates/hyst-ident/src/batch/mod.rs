@@ -71,7 +71,7 @@ pub struct Rows<'a> {
 }
 
 /// The rows of samples: rates from the sample period.
-pub(crate) fn rows_of(samples: &crate::Samples) -> Vec<Row> {
+pub fn rows_of(samples: &crate::Samples) -> Vec<Row> {
     let mut rows = Vec::with_capacity(samples.len());
     for segment in &samples.segments {
         for k in segment.clone() {

@@ -61,7 +61,7 @@ fn run(
     name: &dyn Fn() -> String,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(Identified, String), FitError> {
-    if kind == Kind::Preisach {
+    if matches!(kind, Kind::Preisach | Kind::Dpm) {
         let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
         return Err(FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice });
     }
