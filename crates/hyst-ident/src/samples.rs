@@ -53,6 +53,17 @@ impl Samples {
         self
     }
 
+    /// The beginnings of all segments, the same share of each, of at most about `rows` rows together.
+    pub(crate) fn beginnings(&self, rows: usize) -> Self {
+        let share = (rows as f64 / self.len().max(1) as f64).min(1.0);
+        let mut cut = self.clone();
+        for s in &mut cut.segments {
+            s.end = s.start + ((share * s.len() as f64).ceil() as usize).min(s.len());
+        }
+        let all: Vec<usize> = (0..cut.segments.len()).collect();
+        cut.segments_only(&all)
+    }
+
     /// These segments alone, in their order.
     pub(crate) fn segments_only(&self, keep: &[usize]) -> Self {
         let column = |c: &[f64]| keep.iter().flat_map(|s| c[self.segments[*s].clone()].iter().copied()).collect();

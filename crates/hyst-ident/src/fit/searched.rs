@@ -11,6 +11,8 @@ use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
+/// Most rows that a global search looks at.
+const SEARCHED: usize = 12_000;
 /// Rows for each unknown that a fit needs.
 const ROWS_EACH: usize = 3;
 
@@ -93,7 +95,13 @@ fn run(
     };
     let setup = |source| FitError::Search { record: name(), source: SearchError::Method(source) };
     method.build(variables.len().max(1), search.evaluations, search.seed).map_err(setup)?;
-    let found = identify(&family, samples, &search, name, watch)?;
+    // The valley shows in a part of the record.
+    // An oscillator is an equation of motion in many substeps, and periods of it are short.
+    let searched = if kind == Kind::BoucWenOscillator { SEARCHED / 6 } else { SEARCHED };
+    let beginnings = (samples.len() > searched).then(|| samples.beginnings(searched));
+    let quick = beginnings.as_ref().and_then(|b| Some((family_of(kind, b, &options.form)?, b)));
+    let quick = quick.as_ref().map(|(family, rows)| (family.as_ref(), *rows));
+    let found = identify(&family, samples, quick, &search, name, watch)?;
     Ok((found, how))
 }
 

@@ -38,13 +38,15 @@ pub(crate) struct Identified {
 /// Points from which a polish starts, besides the best: ends of trials are many, valleys few.
 const STARTS: usize = 3;
 
-/// Identifies a family from the settled rows.
+/// Identifies a family from the settled rows. Where `beginnings` of the record are given, with the same model over them, the
+/// global search looks at those alone; the polish sees all.
 ///
 /// # Errors
 /// If the bounds are no box, the search is set up wrongly, or no parameters within the bounds give a finite output.
 pub(crate) fn identify(
     family: &dyn Family,
     samples: &Samples,
+    beginnings: Option<(&dyn Family, &Samples)>,
     how: &SearchOptions,
     name: &dyn Fn() -> String,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
@@ -56,7 +58,8 @@ pub(crate) fn identify(
         None => (Vec::new(), projection.at(&[]).ok_or_else(unsolvable)?, None, 1),
         Some(space) => {
             let space = space.map_err(|source| FitError::Space { record: name(), source })?;
-            let cost = Left { projection: &projection, dimensions: space.dimensions() };
+            let quick = beginnings.map(|(family, rows)| Projection::new(family, rows, how.zero_per_record));
+            let cost = Left { projection: quick.as_ref().unwrap_or(&projection), dimensions: space.dimensions() };
             let stop = Stop { tolerance: 1e-6, stall: 60, ..Stop::after(how.evaluations) };
             let found = trials(&space, &cost, &how.method, &stop, how.seed, how.trials, &mut |_, p| watch(p))
                 .map_err(|source| FitError::Search { record: name(), source })?;

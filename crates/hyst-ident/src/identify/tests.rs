@@ -66,7 +66,7 @@ fn search(method: &str, dimensions: usize) -> SearchOptions {
 fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Identified {
     let family = family_of(kind, samples, form).unwrap();
     let how = search(method, family.variables().len().max(1));
-    identify(family.as_ref(), samples, &how, &|| "record".into(), &mut |_| ControlFlow::Continue(())).unwrap()
+    identify(family.as_ref(), samples, None, &how, &|| "record".into(), &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
 /// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.

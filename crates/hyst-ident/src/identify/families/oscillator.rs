@@ -50,7 +50,7 @@ impl Family for OscillatorFamily<'_> {
         let nyquist = 0.5 / self.samples.period;
         let slowest = 2.0 / self.samples.longest_segment();
         vec![
-            Variable::log("hz", "Hz", slowest.min(0.1 * nyquist), 0.8 * nyquist),
+            Variable::log("hz", "Hz", slowest.max(1e-3 * nyquist).min(0.1 * nyquist), 0.5 * nyquist),
             Variable::log("zeta", "", 1e-3, 1.0),
             Variable::linear("stiffness share", "", 0.05, 0.999),
             Variable::linear("bend out", "", -20.0, 20.0),
