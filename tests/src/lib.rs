@@ -1,5 +1,8 @@
 //! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
 
+pub mod dpm_study;
+pub mod fod_study;
+
 use std::env;
 use std::ffi::OsStr;
 use std::fs;
@@ -7,6 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
+use hyst_hw::Plant;
+use hyst_ident::excite::{Drive, Identification, Limits};
+use hyst_ident::record::{Columns, OutputUnit, Record};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -258,16 +264,29 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
 ///
 /// # Panics
 /// When the drive or the plant refuses, which the tests' own configurations do not give cause for.
-pub fn experiment(plant: &mut hyst_hw::Plant, seed: u64, name: &str) -> hyst_ident::record::Record {
-    use hyst_ident::excite::{Identification, Limits};
-    use hyst_ident::record::{Columns, OutputUnit, Record};
-
+pub fn experiment(plant: &mut Plant, seed: u64, name: &str) -> Record {
     let range = hyst_hw::Daq::capabilities(plant).voltage;
     let limits = Limits { rate_hz: 1000.0, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
     let drive = Identification::at_rate(1000.0, seed).drive(&limits).expect("the standard drive fits");
+    played(plant, &drive, 1000.0, OutputUnit::Micrometre, name)
+}
+
+/// Plays the segments of a drive and returns the record; in newtons, the actuator presses on a sensor of 1 N/µm.
+///
+/// # Panics
+/// When the plant refuses.
+pub fn played(plant: &mut Plant, drive: &Drive, rate_hz: f64, output: OutputUnit, name: &str) -> Record {
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
-    let options = hyst_hw::RecordOptions::at(1000.0);
-    let recording = hyst_hw::record(plant, &segments, &options, |_| std::ops::ControlFlow::Continue(()))
+    measured(plant, &segments, rate_hz, output, name)
+}
+
+/// Plays segments of voltages and returns the record.
+///
+/// # Panics
+/// When the plant refuses.
+pub fn measured(plant: &mut Plant, segments: &[&[f64]], rate_hz: f64, output: OutputUnit, name: &str) -> Record {
+    let options = hyst_hw::RecordOptions::at(rate_hz);
+    let recording = hyst_hw::record(plant, segments, &options, |_| std::ops::ControlFlow::Continue(()))
         .expect("the plant plays what lies in its range");
     let samples = || recording.segments.iter().flat_map(|s| &s.samples);
     let labels = (0..).zip(&recording.segments).flat_map(|(k, s)| std::iter::repeat_n(k, s.samples.len()));
@@ -276,7 +295,7 @@ pub fn experiment(plant: &mut hyst_hw::Plant, seed: u64, name: &str) -> hyst_ide
         segment: Some(labels.collect()),
         time: samples().map(|s| s.time_s).collect(),
         input: Some(samples().map(|s| s.drive_v).collect()),
-        output: Some((OutputUnit::Micrometre, samples().map(|s| s.output).collect())),
+        output: Some((output, samples().map(|s| s.output).collect())),
         temperature: samples().map(|s| s.temperature_degc).collect(),
         ..Columns::default()
     };

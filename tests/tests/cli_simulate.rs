@@ -47,6 +47,12 @@ fn the_errors_are_those_of_the_columns() {
     let rmse = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     assert!((report["errors"]["rmse"].as_f64().unwrap() / rmse - 1.0).abs() < 1e-9);
     assert_eq!(report["rows"].as_u64().unwrap() as usize, measured.len());
+    let settled: Vec<f64> = measured.iter().zip(&settling).filter(|(_, s)| **s == 0.0).map(|(y, _)| *y).collect();
+    let span = settled.iter().fold(f64::MIN, |m, y| m.max(*y)) - settled.iter().fold(f64::MAX, |m, y| m.min(*y));
+    let near_zero = settled.iter().filter(|y| y.abs() < 0.01 * span).count();
+    assert!(near_zero > 0, "the record rests at zero");
+    assert_eq!(report["mape"]["left_out"].as_u64().unwrap() as usize, near_zero);
+    assert!(report["mape"]["ratio"].as_f64().unwrap() < 1.0, "{report}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use hyst_ident::metrics::Errors;
+use hyst_ident::metrics::{Errors, Mape};
 use hyst_ident::record::OutputUnit;
 
 /// `x` with four significant digits.
@@ -66,6 +66,12 @@ pub(crate) fn errors(e: &Errors, unit: &str) -> String {
         short(e.max_abs),
         short(e.rmse_all_rows)
     )
+}
+
+/// The mean relative error in one line, and what it leaves out.
+pub(crate) fn mape(m: &Mape) -> String {
+    let ratio = m.ratio.map_or_else(|| "none".to_owned(), |ratio| percent(100.0 * ratio));
+    format!("MAPE {ratio} ({} below 1 % of span left out)", count(m.left_out, "row"))
 }
 
 /// A table: the first column flush left, the others flush right.

@@ -25,6 +25,7 @@ mod runner;
 pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
 pub use plant::config::{
     Actuator, Creep, Delay, Drift, Interference, Lag, Mode, PlantConfig, Sensor, Temperature, TemperatureShape,
+    Viscosity,
 };
 pub use plant::error::{ConfigError, PlantError};
 pub use plant::{EFFECTS, Plant};

@@ -205,6 +205,7 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
         let title = stage.remove("stage").and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
         let units = stage.remove("units").unwrap_or_default();
         stage.remove("std_errors");
+        stage.remove("undetermined");
         let _ = writeln!(text, "\n/* {title} */");
         modes += usize::from(title == "resonance");
         // A second mode must not have the names of the first.

@@ -1,19 +1,25 @@
 //! `fit`: a base model from a record.
 
-use std::collections::BTreeMap;
+mod options;
+mod searched;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 
 use hyst_core::{Grid, PiParams};
 
 use crate::base::{Basis, PiBasis, PreisachBasis};
+use crate::identify::Estimate;
 use crate::lsq::Blocks;
 use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError};
 use crate::nested::{Fitted, Problem};
+use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{start_up_rows, windows};
 
 /// Cells along one edge of the Preisach triangle.
-const CELLS: usize = 24;
+pub(crate) const CELLS: usize = 24;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
@@ -102,6 +108,45 @@ pub enum FitError {
         /// Why.
         source: crate::metrics::MetricsError,
     },
+    /// Bounds that are no box.
+    #[error("{record}: {source}")]
+    Space {
+        /// The record.
+        record: String,
+        /// What is wrong.
+        source: crate::optimize::SpaceError,
+    },
+    /// A search that cannot be run or finds nothing.
+    #[error("{record}: {source}")]
+    Search {
+        /// The record.
+        record: String,
+        /// Why.
+        source: crate::optimize::SearchError,
+    },
+    /// Bounds of what is not searched.
+    #[error("bounds of {name}: {kind} has no such variable; it searches {names}")]
+    UnknownBounds {
+        /// The name given.
+        name: String,
+        /// The kind of model.
+        kind: &'static str,
+        /// What it searches.
+        names: String,
+    },
+    /// A way to optimise that the model does not have.
+    #[error("{kind}: {optimizer} does not fit it; {advice}")]
+    Optimizer {
+        /// The kind of model.
+        kind: &'static str,
+        /// The way that was asked for.
+        optimizer: String,
+        /// Which there are.
+        advice: &'static str,
+    },
+    /// First-order descent curves that give no surface.
+    #[error(transparent)]
+    Everett(#[from] crate::everett::EverettError),
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -116,26 +161,77 @@ pub enum FitError {
 }
 
 /// Kinds of models that a fit of this version can identify.
-pub const FITTED: [Kind; 2] = [Kind::Pi, Kind::Preisach];
+pub const FITTED: [Kind; 16] = Kind::ALL;
 
 fn fitted_kinds() -> String {
-    format!("it fits {}", FITTED.map(Kind::name).join(" and "))
+    format!("it fits {}", FITTED.map(Kind::name).join(", "))
 }
 
-/// What a fit may be told.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FitOptions {
-    /// Recorded with the model; the fits of this version draw nothing at random.
-    pub seed: u64,
-    /// One sensor zero for each file instead of one for all.
-    pub zero_per_record: bool,
+pub use options::{FitOptions, Optimizer, VariableBounds};
+
+/// A model, and how it was found.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model.
+    pub model: Model,
+    /// In words: what was searched, what was solved for, and why so.
+    pub how: String,
+    /// What the record says about each parameter; `None` for the Preisach triangle, whose cells are too many.
+    pub estimate: Option<Estimate>,
+    /// The searches, if there was something to search.
+    pub trials: Option<Trials>,
+    /// Evaluations of the model.
+    pub evaluations: u64,
 }
 
-/// Fits a base model: non-negative weights, the rows of a start-up transient left out.
+impl Fit {
+    /// A fit in which nothing was searched.
+    pub fn at_once(model: Model, how: &str) -> Self {
+        Self { model, how: how.into(), estimate: None, trials: None, evaluations: 1 }
+    }
+}
+
+/// Fits a base model; the rows of a start-up transient are left out.
 ///
 /// # Errors
 /// See [`FitError`].
 pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, FitError> {
+    fit_with(record, kind, options, &mut |_| ControlFlow::Continue(())).map(|fit| fit.model)
+}
+
+/// [`fit`] that says how it went. `watch` is told of every generation of a search and may end it; the best so far is
+/// then polished and returned.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn fit_with(
+    record: &Record,
+    kind: Kind,
+    options: &FitOptions,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Fit, FitError> {
+    let convex = matches!(options.optimizer, Optimizer::Auto | Optimizer::Convex);
+    match kind {
+        Kind::Pi | Kind::Preisach if convex => {
+            let model = convex_fit(record, kind, options)?;
+            Ok(Fit::at_once(model, "convex: weights that are not negative, one optimum"))
+        }
+        Kind::Dpm if convex => {
+            let model = crate::everett::fit_dpm(record, options)?.model;
+            Ok(Fit::at_once(model, "convex: the classical part from the slow rows, then the mirror's nodes"))
+        }
+        _ => searched::fit(record, kind, options, watch),
+    }
+}
+
+/// Models that rise and fall with their input: a record in which the output falls has a sensor with the wrong sign.
+fn sign_matters(kind: Kind) -> bool {
+    // The oscillator lags by up to half a turn.
+    kind != Kind::BoucWenOscillator
+}
+
+/// Non-negative weights over plays or cells.
+fn convex_fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, FitError> {
     let mut samples = Samples::from_record(record);
     if samples.len() < FEWEST {
         return Err(FitError::TooShort {
@@ -145,7 +241,7 @@ pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, F
             needed: FEWEST,
         });
     }
-    check(record, &samples)?;
+    check(record, &samples, sign_matters(kind))?;
     let basis = basis_for(kind, &samples)?;
     let name = || record.name();
     let needed = 3 * basis.len();
@@ -223,7 +319,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, FitE
     })
 }
 
-pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> {
+pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<(), FitError> {
     let name = record.name();
     let Some(unit) = record.output_unit() else {
         return Err(FitError::Missing {
@@ -250,14 +346,14 @@ pub(crate) fn check(record: &Record, samples: &Samples) -> Result<(), FitError> 
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let (u, y) = (mean(&samples.input), mean(&samples.output));
     let together: f64 = samples.input.iter().zip(&samples.output).map(|(a, b)| (a - u) * (b - y)).sum();
-    if together <= 0.0 {
+    if sign && together <= 0.0 {
         return Err(FitError::Falling { record: name });
     }
     Ok(())
 }
 
 /// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
-fn fit_settled(
+pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,
@@ -296,6 +392,13 @@ fn fit_settled(
 
 /// Puts a fit into a model.
 pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitted: &Fitted, seed: u64) -> Model {
+    let zero = fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64;
+    let base = basis.operator(&fitted.weights);
+    Model { effects: fitted.effects.clone(), ..model_of(record, samples, base, zero, seed) }
+}
+
+/// A model without effects, fitted to the settled rows of a record.
+pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
     let (least, most) =
@@ -308,10 +411,11 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitt
             low: least,
             high: most,
         },
-        zero: fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64,
-        base: basis.operator(&fitted.weights),
-        effects: fitted.effects.clone(),
+        zero,
+        base,
+        effects: Effects::default(),
         std_errors: BTreeMap::new(),
+        undetermined: BTreeSet::new(),
         recorded_at_hz: 1.0 / samples.period,
         fitted_on: fitted_on(record, samples),
         seed,

@@ -9,17 +9,21 @@
 
 pub mod atomic_file;
 mod base;
+pub mod batch;
 pub mod compensate;
 pub mod diagnose;
+pub mod everett;
 pub mod excite;
 pub mod export;
 pub mod fit;
 pub mod full_memory;
+pub mod identify;
 mod lsq;
 pub mod metrics;
 pub mod model;
 mod nested;
 mod noise;
+pub mod optimize;
 pub mod record;
 mod samples;
 mod settle;

@@ -65,29 +65,49 @@ impl Errors {
     pub fn of(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Self, MetricsError> {
         check(measured, predicted, settling)?;
         let rmse = root_mean_square(settled(measured, predicted, settling).map(|(y, p)| p - y));
-        let (low, high) = settled(measured, predicted, settling)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (y, _)| (low.min(y), high.max(y)));
+        let span = span(measured, predicted, settling);
         Ok(Self {
             rmse,
-            nrmse_percent: if rmse == 0.0 { 0.0 } else { 100.0 * rmse / (high - low) },
+            nrmse_percent: if rmse == 0.0 { 0.0 } else { 100.0 * rmse / span },
             max_abs: settled(measured, predicted, settling).fold(0.0, |most, (y, p)| f64::max(most, (p - y).abs())),
             rmse_all_rows: root_mean_square(measured.iter().zip(predicted).map(|(y, p)| p - y)),
         })
     }
 }
 
-/// Mean absolute error relative to the measurement, `mean |p − y| / |y|`, as a ratio (1 = 100 %).
+/// Share of the measured span below which an output is too near zero to relate an error to it.
+const NEAR_ZERO: f64 = 0.01;
+
+/// Mean absolute error relative to the measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Mape {
+    /// `mean |p − y| / |y|` as a ratio (1 = 100 %) over the rows that count; `None` when no row does.
+    pub ratio: Option<f64>,
+    /// Rows that are left out because |y| is below 1 % of the measured span.
+    pub left_out: usize,
+}
+
+/// Mean absolute error relative to the measurement, `mean |p − y| / |y|`.
 ///
-/// Rows in which the measured output is zero have no such ratio and are left out; near zero the figure says more about
-/// noise than about the model. `None` when no row has a ratio.
+/// Rows in which the measured output is zero or below 1 % of its span (maximum − minimum) are left out and counted: there
+/// the ratio says more about noise and the sensor's zero than about the model.
 ///
 /// # Errors
 /// As [`Errors::of`].
-pub fn mape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Option<f64>, MetricsError> {
+pub fn mape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Mape, MetricsError> {
     check(measured, predicted, settling)?;
-    let ratios = settled(measured, predicted, settling).filter(|(y, _)| *y != 0.0).map(|(y, p)| ((p - y) / y).abs());
-    let (sum, count) = ratios.fold((0.0, 0_usize), |(sum, count), ratio| (sum + ratio, count + 1));
-    Ok((count > 0).then(|| sum / count as f64))
+    let least = NEAR_ZERO * span(measured, predicted, settling);
+    let counts = |y: f64| y != 0.0 && y.abs() >= least;
+    let (mut sum, mut count, mut left_out) = (0.0, 0_usize, 0_usize);
+    for (y, p) in settled(measured, predicted, settling) {
+        if counts(y) {
+            sum += ((p - y) / y).abs();
+            count += 1;
+        } else {
+            left_out += 1;
+        }
+    }
+    Ok(Mape { ratio: (count > 0).then(|| sum / count as f64), left_out })
 }
 
 /// Symmetric mean absolute error, `mean |p − y| / ((|p| + |y|) / 2)`, as a ratio between 0 and 2.
@@ -142,6 +162,13 @@ fn settled<'a>(
     measured.iter().zip(predicted).zip(settling).filter(|(_, settling)| !**settling).map(|((y, p), _)| (*y, *p))
 }
 
+/// Maximum − minimum of the measured output in the rows that do not settle.
+fn span(measured: &[f64], predicted: &[f64], settling: &[bool]) -> f64 {
+    let (low, high) = settled(measured, predicted, settling)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (y, _)| (low.min(y), high.max(y)));
+    high - low
+}
+
 fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = errors.fold((0.0, 0_usize), |(sum, count), e| (sum + e * e, count + 1));
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
@@ -165,7 +192,7 @@ mod tests {
         assert_eq!(errors.max_abs, 4.0);
         assert_eq!(errors.rmse_all_rows, (106.0_f64 / 4.0).sqrt());
         assert_eq!(peak_to_valley(&Y, &P, &SETTLING), Ok(7.0));
-        assert_eq!(mape(&Y, &P, &SETTLING), Ok(Some((0.0 + 1.5 + 1.0) / 3.0)));
+        assert_eq!(mape(&Y, &P, &SETTLING), Ok(Mape { ratio: Some((0.0 + 1.5 + 1.0) / 3.0), left_out: 0 }));
         assert_eq!(smape(&Y, &P, &SETTLING), Ok((0.0 + 3.0 / 3.5 + 2.0) / 3.0));
     }
 
@@ -188,9 +215,24 @@ mod tests {
 
     #[test]
     fn zeros_have_no_ratio() {
-        assert_eq!(mape(&[0.0], &[1.0], &[false]), Ok(None));
+        assert_eq!(mape(&[0.0], &[1.0], &[false]), Ok(Mape { ratio: None, left_out: 1 }));
         assert_eq!(smape(&[0.0], &[0.0], &[false]), Ok(0.0));
         assert_eq!(smape(&[0.0], &[1.0], &[false]), Ok(2.0));
+    }
+
+    #[test]
+    fn rows_near_zero_count_for_nothing_but_are_counted() {
+        // A span of 100: ±0.999 is left out, ±1 is not.
+        let y = [-50.0, 50.0, 0.999, -0.999, 1.0, -1.0];
+        let p = [-50.0, 50.0, 9.0, 9.0, 1.5, -1.0];
+        let expected = Mape { ratio: Some(0.5 / 4.0), left_out: 2 };
+        assert_eq!(mape(&y, &p, &[false; 6]), Ok(expected));
+        // A start-up row is neither in the span nor in the count.
+        assert_eq!(
+            mape(&y, &p, &[true, false, false, false, false, false]).map(|m| m.left_out),
+            Ok(0),
+            "the span is 51: all rows lie above 1 % of it"
+        );
     }
 
     #[test]

@@ -53,6 +53,38 @@ impl Samples {
         self
     }
 
+    /// The beginnings of all segments, the same share of each, of at most about `rows` rows together.
+    pub(crate) fn beginnings(&self, rows: usize) -> Self {
+        let share = (rows as f64 / self.len().max(1) as f64).min(1.0);
+        let mut cut = self.clone();
+        for s in &mut cut.segments {
+            s.end = s.start + ((share * s.len() as f64).ceil() as usize).min(s.len());
+        }
+        let all: Vec<usize> = (0..cut.segments.len()).collect();
+        cut.segments_only(&all)
+    }
+
+    /// These segments alone, in their order.
+    pub(crate) fn segments_only(&self, keep: &[usize]) -> Self {
+        let column = |c: &[f64]| keep.iter().flat_map(|s| c[self.segments[*s].clone()].iter().copied()).collect();
+        let mut end = 0;
+        let length = |s: &usize| {
+            end += self.segments[*s].len();
+            end - self.segments[*s].len()..end
+        };
+        Self {
+            period: self.period,
+            segments: keep.iter().map(length).collect(),
+            time: column(&self.time),
+            input: column(&self.input),
+            output: column(&self.output),
+            temperature: self.temperature.as_deref().map(column),
+            load: self.load.as_deref().map(column),
+            file_of_segment: keep.iter().map(|s| self.file_of_segment[*s]).collect(),
+            settling: keep.iter().flat_map(|s| self.settling[self.segments[*s].clone()].iter().copied()).collect(),
+        }
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time.len()

@@ -20,7 +20,7 @@ use crate::record::{any_record, of_arrays};
 /// record : Record, path, or list of them
 ///     The training record; or give ``timepts``, ``inputs`` and ``outputs``.
 /// model : str
-///     Kind of the hysteresis: ``pi`` or ``preisach``.
+///     Kind of the hysteresis: ``pi``, ``preisach``, or ``dpm`` from records at several rates.
 /// timepts, inputs, outputs : ndarray of float64, shape (n,)
 ///     Columns in place of a record: time [s], input [V], output in the unit of ``output_column``.
 /// temperature : ndarray of float64, shape (n,), optional
@@ -61,7 +61,7 @@ pub(crate) fn fit(
         }
         _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
     };
-    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord };
+    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord, ..FitOptions::default() };
     py.detach(|| fitting::fit(&record, kind, &options)).map(Model).map_err(errors::fit)
 }
 

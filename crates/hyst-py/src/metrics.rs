@@ -70,8 +70,8 @@ pub(crate) fn max_abs(
     Ok(with(measured, predicted, settling, Errors::of)?.max_abs)
 }
 
-/// Mean of ``|p − y| / |y|``, as a ratio. Rows where the measured signal is zero are left out; ``None`` if no row is
-/// left. Arguments as ``rmse``.
+/// Mean of ``|p − y| / |y|``, as a ratio. Rows where the measured signal is below 1 % of its span are left out;
+/// ``None`` if no row is left. Arguments as ``rmse``.
 #[pyfunction]
 #[pyo3(signature = (measured, predicted, *, settling=None))]
 pub(crate) fn mape(
@@ -79,7 +79,7 @@ pub(crate) fn mape(
     predicted: &Bound<'_, PyAny>,
     settling: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<f64>> {
-    with(measured, predicted, settling, metrics::mape)
+    Ok(with(measured, predicted, settling, metrics::mape)?.ratio)
 }
 
 /// Mean of ``2 |p − y| / (|p| + |y|)``, as a ratio from 0 to 2. Arguments as ``rmse``.

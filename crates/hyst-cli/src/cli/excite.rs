@@ -159,9 +159,9 @@ pub(crate) enum ExciteKind {
         /// How many peaks
         #[arg(long, value_name = "N", default_value_t = 10)]
         curves: u32,
-        /// Duration of a peak
-        #[arg(long, value_name = "S", default_value_t = 1.0)]
-        seconds: f64,
+        /// Duration of a peak; several make as many segments, over which an Everett surface is averaged
+        #[arg(long, value_name = "S,…", value_delimiter = ',', default_value = "1")]
+        seconds: Vec<f64>,
         /// Rest after each peak
         #[arg(long, value_name = "S", default_value_t = 0.5)]
         rest: f64,

@@ -14,7 +14,9 @@ Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 device lost or data at
 pub(super) const FIT: &str = "\
 Examples:
   hystctl fit train.csv --model pi -o model.json
-  hystctl fit a.csv b.csv --model preisach --zero per-record -o model.json";
+  hystctl fit a.csv b.csv --model preisach --zero per-record -o model.json
+  hystctl fit forc.csv --model preisach --from fod -o model.json
+  hystctl fit slow.csv 20hz.csv 60hz.csv --model dpm -o model.json";
 
 pub(super) const SIMULATE: &str = "\
 Example:
@@ -52,6 +54,8 @@ A simulated plant is a file like this; every section after [sensor] is an effect
   [sensor]
   range_um = [-12, 43]
   noise_um = 0.007
+  [viscosity]
+  volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
   [delay]
   seconds = 0.002
   [lag]

@@ -2,6 +2,7 @@
 
 mod excite;
 mod help;
+mod search;
 mod values;
 
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use hyst_ident::simulate::Zero;
 use crate::output::Target;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
+pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, VoltageLimits};
 use values::{finite, positive, seconds};
 
@@ -70,21 +72,36 @@ pub(crate) struct FitArgs {
     /// Records to fit, as one
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Kind of model: pi (Prandtl-Ishlinskii) or preisach
+    /// Kind of model; dpm takes records at several rates
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
+    /// What a preisach model is made of: all rows by least squares, or the Everett surface that first-order descent curves
+    /// measure (dpm finds such curves by itself)
+    #[arg(long, value_name = "rows|fod", value_enum, hide_possible_values = true)]
+    pub(crate) from: Option<FitFrom>,
+    /// Take the measured surface as it is or not at all; else one that is not monotone is moved to the nearest that is
+    #[arg(long, requires = "from")]
+    pub(crate) as_measured: bool,
     /// Model file to write; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Target,
-    /// Seed of the search, kept in the model (the models of this version are fitted without chance)
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) search: SearchArgs,
     #[command(flatten)]
     pub(crate) zero: ZeroArg,
     #[command(flatten)]
     pub(crate) map: MapArg,
     #[command(flatten)]
     pub(crate) json: JsonArg,
+}
+
+/// What a Preisach model is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FitFrom {
+    /// All rows, by least squares
+    Rows,
+    /// The falling flanks of first-order descent curves
+    Fod,
 }
 
 /// Write a model's parameters for a board
@@ -341,7 +358,7 @@ mod tests {
     fn other_devices_and_models_are_refused_with_what_there_is() {
         let message = parse("hystctl run --daq serial:/dev/ttyACM0 --drive u.csv").unwrap_err();
         assert!(message.contains("sim:PLANT.toml"), "{message}");
-        let message = parse("hystctl fit a.csv --model gpi -o m.json").unwrap_err();
+        let message = parse("hystctl fit a.csv --model preisch -o m.json").unwrap_err();
         assert!(message.contains("pi, preisach"), "{message}");
     }
 }

@@ -87,7 +87,9 @@ fn make(kind: &ExciteKind) -> (&Common, Result<Drive, ExciteError>) {
                 PeakForm::Triangle => Peak::Triangle,
                 PeakForm::HalfSine => Peak::HalfSine,
             };
-            (common, Shape::Forc(Forc { curves: *curves, peak_s: *seconds, rest_s: *rest, peak }))
+            let one = |peak_s: &f64| Shape::Forc(Forc { curves: *curves, peak_s: *peak_s, rest_s: *rest, peak });
+            let shapes: Vec<Shape> = seconds.iter().map(one).collect();
+            return (common, Drive::new(&shapes, &limits(common), *rest));
         }
     };
     (common, Drive::new(&[shape], &limits(common), 0.0))

@@ -2,16 +2,23 @@
 
 use std::path::Path;
 
+mod surface;
+
+use std::ops::ControlFlow;
+
 use hyst_core::PiParams;
-use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
+use hyst_ident::fit::{Fit, FitOptions, fit_with};
+use hyst_ident::identify::{Determined, Estimate, TradeOff};
 use hyst_ident::metrics::Errors;
-use hyst_ident::model::{Base, Model};
+use hyst_ident::model::{Base, Kind, Model};
+use hyst_ident::optimize::{Spread, Stopped};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
 
-use crate::cli::FitArgs;
-use crate::exit::CommandResult;
+use crate::cli::{FitArgs, FitFrom};
+use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::{input, text};
@@ -28,10 +35,31 @@ struct Summary {
     errors: Option<Errors>,
     base: Option<BaseSummary>,
     sensor_zero: f64,
+    how: String,
+    seed: u64,
+    evaluations: u64,
+    /// Standard errors, correlations and what the record does not determine.
+    estimate: Option<Estimate>,
+    /// How the searches ended, and how their costs scatter.
+    trials: Option<TrialsSummary>,
+    /// What first-order descent curves show, with `--from fod`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<FodReport>,
+    /// How the rate comes in, with `--model dpm`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dynamics: Option<DpmReport>,
     #[serde(skip)]
     input_unit: String,
     #[serde(skip)]
     seen: String,
+}
+
+/// Searches with different draws.
+#[derive(Debug, Serialize)]
+struct TrialsSummary {
+    count: usize,
+    costs: Option<Spread>,
+    stopped: Vec<Stopped>,
 }
 
 /// The hysteresis in a few numbers.
@@ -52,13 +80,24 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let record = input::training(&args.train, &args.map.map)?;
     let zero = args.zero.get();
 
-    let progress = Progress::spinner(&format!("fitting {} to {}", args.model, text::count(record.rows(), "row")));
-    let options = FitOptions { seed: args.seed, zero_per_record: zero == Zero::PerRecord };
-    let model = fit(&record, args.model, &options)?;
+    let options = args.search.options(zero == Zero::PerRecord)?;
+    let doing = format!("fitting {} to {}", args.model, text::count(record.rows(), "row"));
+    let progress = Progress::spinner(&doing);
+    let Identified { fit, surface, dynamics } = identify(args, &record, &options, &|done, budget| {
+        progress.say(&format!("{doing}: {done} of at most {budget} evaluations"));
+    })?;
+    let Fit { model, how, estimate, trials, evaluations } = fit;
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
 
     args.output.write(|out| out.write_all(model.to_json().as_bytes()))?;
+    let notes = surface::notes(surface.as_ref(), dynamics.as_ref(), &model);
+    notes.iter().for_each(|note| output::say(note));
+    if args.model == Kind::Preisach && args.from.is_none() && shows_only_curves(&record) {
+        output::say(
+            "note: this record holds first-order descent curves only; --from fod measures the Everett surface itself",
+        );
+    }
     let summary = Summary {
         model: args.model.name(),
         output: args.output.to_string(),
@@ -69,10 +108,64 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         errors: simulated.errors,
         base: base_summary(&model),
         sensor_zero: model.zero,
+        how,
+        seed: options.seed,
+        evaluations,
+        trials: trials.map(|t| TrialsSummary {
+            count: t.found.len(),
+            costs: t.costs(),
+            stopped: t.found.iter().map(|f| f.stopped).collect(),
+        }),
+        estimate,
+        surface,
+        dynamics,
         input_unit: model.input.unit.clone(),
         seen: seen(&record, &model),
     };
     report.print(&summary.text(), &summary)
+}
+
+/// A model and what was found on the way to it.
+struct Identified {
+    fit: Fit,
+    surface: Option<FodReport>,
+    dynamics: Option<DpmReport>,
+}
+
+/// Identifies what was asked for; `tell` is told of evaluations done and of their budget.
+fn identify(
+    args: &FitArgs,
+    record: &Record,
+    options: &FitOptions,
+    tell: &dyn Fn(u64, u64),
+) -> CommandResult<Identified> {
+    let fod = args.from == Some(FitFrom::Fod);
+    if fod && args.model != Kind::Preisach {
+        let message = format!(
+            "--from fod makes an Everett surface, which {} is not: give --model preisach (dpm finds descent curves by itself)",
+            args.model
+        );
+        return Err(CommandError::bad_input(message));
+    }
+    if args.as_measured && !fod {
+        return Err(CommandError::bad_input("--as-measured is about a measured surface; add --from fod"));
+    }
+    if fod {
+        let options = FodOptions { as_measured: args.as_measured, seed: options.seed, cells: None };
+        let found = fit_fod(record, &options)?;
+        let fit = Fit::at_once(found.model, "a surface measured from first-order descent curves");
+        return Ok(Identified { fit, surface: Some(found.report), dynamics: None });
+    }
+    if args.model == Kind::Dpm {
+        let found = fit_dpm(record, options)?;
+        let fit = Fit::at_once(found.model, "convex: the classical part from the slow rows, then the mirror's nodes");
+        return Ok(Identified { fit, surface: None, dynamics: Some(found.report) });
+    }
+    let fit = fit_with(record, args.model, options, &mut |p| {
+        tell(p.evaluations, p.budget);
+        ControlFlow::Continue(())
+    })?;
+    Ok(Identified { fit, surface: None, dynamics: None })
 }
 
 /// What the record looks like: a slip of a unit shows here.
@@ -132,7 +225,43 @@ impl Summary {
                 format!("{cells_with_density} of {cells} cells with density")
             }
         }));
+        lines.extend(self.surface.as_ref().map(|s| surface::measured(s, unit)));
+        lines.extend(self.dynamics.as_ref().map(|d| surface::dynamics(d, unit, &self.input_unit)));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
+        lines.push(self.how.clone());
+        if let Some(TrialsSummary { count, costs: Some(costs), .. }) = self.trials.as_ref().filter(|t| t.count > 1) {
+            lines.push(format!(
+                "{count} trials: what they left from {} to {}, median {} {unit}",
+                text::short(costs.lowest),
+                text::short(costs.highest),
+                text::short(costs.median)
+            ));
+        }
+        lines.extend(self.estimate.as_ref().map(parameters));
         lines.join("\n")
     }
+}
+
+/// Parameters with their standard errors, and what the record does not say.
+fn parameters(estimate: &Estimate) -> String {
+    let mut lines = Vec::new();
+    let width = estimate.parameters.iter().map(|p| p.name.len()).max().unwrap_or(0);
+    for p in &estimate.parameters {
+        let what = match p.determined {
+            Determined::Yes => "",
+            Determined::NearZero => "  (zero within its error)",
+            Determined::Together => "  (known only together with others)",
+            Determined::No => "  (NOT determined by this record)",
+        };
+        lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
+    }
+    for TradeOff { changes, std_error } in estimate.trade_offs.iter().take(3) {
+        let part = |(name, share): &(String, f64)| format!("{name} {:+.2}", share);
+        lines.push(format!(
+            "  free by {}: {} together leave no trace",
+            text::percent(100.0 * std_error),
+            changes.iter().map(part).collect::<Vec<_>>().join(", ")
+        ));
+    }
+    lines.join("\n")
 }

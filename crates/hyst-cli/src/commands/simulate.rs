@@ -1,6 +1,6 @@
 //! `simulate`: what a model says about a record.
 
-use hyst_ident::metrics::Errors;
+use hyst_ident::metrics::{Errors, Mape, mape};
 use hyst_ident::model::Channel;
 use hyst_ident::record::{Extra, Need};
 use hyst_ident::simulate::{Extrapolated, SimulateOptions, Zero, simulate_with};
@@ -26,6 +26,8 @@ struct Summary {
     errors: Option<Errors>,
     /// Inputs beyond the range of the record that the model was fitted to.
     extrapolated: Extrapolated,
+    /// None without a measured output.
+    mape: Option<Mape>,
 }
 
 /// Runs the command.
@@ -56,6 +58,8 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     if simulated.extrapolated.rows > 0 {
         say(&extrapolation(&simulated.extrapolated, &model.input));
     }
+    // What could not be compared is an error of the simulation already.
+    let mape = record.output().and_then(|y| mape(y, &simulated.predicted, &simulated.settling).ok());
     let summary = Summary {
         record: args.input.display().to_string(),
         output: args.output.to_string(),
@@ -66,6 +70,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         zeros: simulated.zeros,
         errors: simulated.errors,
         extrapolated: simulated.extrapolated,
+        mape,
     };
     report.print(&summary.text(), &summary)
 }
@@ -91,6 +96,9 @@ impl Summary {
             Some(errors) => {
                 let mut text = format!("{}: {rows} ({} settling), ", self.record, self.settling_rows);
                 text.push_str(&text::errors(errors, unit));
+                if let Some(mape) = &self.mape {
+                    text.push_str(&format!("\n{}", text::mape(mape)));
+                }
                 for zero in &self.zeros {
                     text.push_str(&format!(
                         "\nsensor zero of the record: {} {unit} from the model's",

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let test = write_record(out, "test.csv", test)?;
 
     progress.say("fitting Prandtl-Ishlinskii");
-    let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, zero_per_record: false })?;
+    let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, ..FitOptions::default() })?;
     let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
     let diagnosis = diagnose(&train, Some(&test), &model, &options, &|what| progress.say(what))?;
 

@@ -36,6 +36,8 @@ impl Chain {
 
     fn with_steps(config: &PlantConfig, hysteresis: Hysteresis, rate_hz: f64, steps: u32) -> Self {
         let step_s = 1.0 / (rate_hz * f64::from(steps));
+        let mut hysteresis = hysteresis;
+        hysteresis.set_step(step_s);
         let mut chain = Self {
             steps,
             input: InputPath::new(
@@ -120,7 +122,7 @@ mod tests {
     fn a_chain_of_nothing_is_the_hysteresis_alone() {
         let mut config = clean();
         config.actuator.loop_share = 0.12;
-        let mut alone = Hysteresis::new(config.seed, &config.actuator).unwrap();
+        let mut alone = Hysteresis::new(config.seed, &config.actuator, None).unwrap();
         let mut chain = Chain::new(&config, alone.clone(), 1000.0);
         for v in [0.0, 30.0, 90.0, 20.0, 60.0, 0.0, 100.0] {
             assert_eq!(chain.advance(v, None, 0.0, 0.001), alone.move_to(v));
@@ -131,7 +133,7 @@ mod tests {
     fn a_finer_grid_gives_the_same_motion() {
         for seed in 0..4 {
             let config = PlantConfig::random_with(seed, &["delay", "lag", "creep", "resonance"]).unwrap();
-            let hysteresis = Hysteresis::new(config.seed, &config.actuator).unwrap();
+            let hysteresis = Hysteresis::new(config.seed, &config.actuator, None).unwrap();
             let steps = fine_steps(&config, 1000.0);
             let mut chain = Chain::new(&config, hysteresis.clone(), 1000.0);
             let mut finer = Chain::with_steps(&config, hysteresis, 1000.0, 5 * steps);
@@ -149,7 +151,7 @@ mod tests {
     fn ring_down_seen_in_samples_has_the_declared_mode() {
         let mut config = clean();
         config.modes = vec![Mode { hz: 100.0, damping: 0.02, gain: 1.0 }];
-        let hysteresis = Hysteresis::new(1, &config.actuator).unwrap();
+        let hysteresis = Hysteresis::new(1, &config.actuator, None).unwrap();
         let mut chain = Chain::new(&config, hysteresis, 1000.0);
         let y: Vec<f64> = (0..200).map(|_| chain.advance(50.0, None, 0.0, 0.0) - 5.0).collect();
         // Free motion obeys y[n+2] = a y[n+1] - b y[n] exactly; two unknowns by least squares.

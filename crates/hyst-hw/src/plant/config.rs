@@ -32,6 +32,9 @@ pub struct PlantConfig {
     pub actuator: Actuator,
     /// Position sensor and its converter.
     pub sensor: Sensor,
+    /// Drag on the relays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscosity: Option<Viscosity>,
     /// Dead time between drive and actuator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay: Option<Delay>,
@@ -74,6 +77,15 @@ pub struct Actuator {
     /// Number of relays; 15 000 unless given.
     #[serde(default = "default_relays")]
     pub relays: usize,
+}
+
+/// Section `[viscosity]`: relays take time to turn, `φ' = (u - threshold) / J` beyond a threshold, so that loops widen
+/// with the drive's rate. Each relay has a `J` of its own, `volt_seconds` on average.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Viscosity {
+    /// Mean of the overdrive over time that turns a relay (V·s).
+    pub volt_seconds: f64,
 }
 
 /// Section `[sensor]`: zero, noise and converter of the position measurement.
@@ -256,6 +268,7 @@ impl PlantConfig {
         let on = [
             ("delay", self.delay.is_some()),
             ("lag", self.lag.is_some()),
+            ("rate-dependence", self.viscosity.is_some()),
             ("temperature", self.temperature.as_ref().is_some_and(|t| t.per_k != 0.0)),
             ("creep", self.creep.is_some()),
             ("resonance", !self.modes.is_empty()),
@@ -283,6 +296,7 @@ pub(crate) mod tests {
                 relays: 2000,
             },
             sensor: Sensor { range_um: [-20.0, 40.0], bits: 48, noise_um: 0.0, offset_um: 0.0, max_rate_hz: 20_000.0 },
+            viscosity: None,
             delay: None,
             lag: None,
             temperature: None,
@@ -308,6 +322,8 @@ pub(crate) mod tests {
         noise_um = 0.007
         offset_um = 1.5
         max_rate_hz = 5000.0
+        [viscosity]
+        volt_seconds = 4e-4
         [delay]
         seconds = 0.002
         [lag]
@@ -346,7 +362,10 @@ pub(crate) mod tests {
     #[test]
     fn every_section_is_read_written_and_read_again_alike() {
         let config = PlantConfig::from_toml(FULL).unwrap();
-        assert_eq!(config.effects(), ["delay", "lag", "temperature", "creep", "resonance", "drift", "interference"]);
+        assert_eq!(
+            config.effects(),
+            ["delay", "lag", "rate-dependence", "temperature", "creep", "resonance", "drift", "interference"]
+        );
         assert_eq!(config.modes[1].hz, 350.0);
         let again = PlantConfig::from_toml(&config.to_toml().unwrap()).unwrap();
         assert_eq!(config, again);

@@ -16,6 +16,7 @@ mod sensor;
 mod structure;
 mod temperature;
 mod validate;
+mod viscous;
 
 use crate::daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
 use chain::Chain;
@@ -64,7 +65,7 @@ impl Plant {
     /// When the description is not valid.
     pub fn new(config: PlantConfig) -> Result<Self, PlantError> {
         config.validate()?;
-        let hysteresis = Hysteresis::new(config.seed, &config.actuator)?;
+        let hysteresis = Hysteresis::new(config.seed, &config.actuator, config.viscosity.as_ref())?;
         let climate = config.temperature.as_ref().map(|t| Climate::new(config.seed, t));
         let actuator = &config.actuator;
         let capabilities = Capabilities {

@@ -116,6 +116,7 @@ fn draw(seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
         seed,
         actuator,
         sensor,
+        viscosity: None,
         delay: has("delay").then_some(delay),
         lag: has("lag").then_some(lag),
         temperature: if has("temperature") { Some(temperature) } else { recorded_without_effect.then_some(idle) },

@@ -3,9 +3,10 @@
 //! Nothing here is a play operator or a threshold grid: the models that are fitted to the plant
 //! cannot be right by construction.
 
-use super::config::Actuator;
+use super::config::{Actuator, Viscosity};
 use super::error::ConfigError;
 use super::rng::{Draws, Purpose};
+use super::viscous::ViscousBed;
 
 /// Relays that go up when the input reaches `alpha` and down when it reaches `beta < alpha`.
 #[derive(Debug, Clone)]
@@ -30,11 +31,10 @@ struct BedState {
 }
 
 impl RelayBed {
-    /// A virgin bed of relays `(alpha, beta)` at input `rest`: those centred below `rest` are up.
-    pub(crate) fn new(mut thresholds: Vec<(f64, f64)>, rest: f64) -> Self {
-        thresholds.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    /// A virgin bed of relays `(alpha, beta)`, ascending in alpha, at input `rest`: those centred below `rest` are up.
+    pub(crate) fn new(thresholds: &[(f64, f64)], rest: f64) -> Self {
         let alpha: Vec<f64> = thresholds.iter().map(|t| t.0).collect();
-        let mut beta: Vec<(f64, u32)> = (0_u32..).zip(&thresholds).map(|(i, t)| (t.1, i)).collect();
+        let mut beta: Vec<(f64, u32)> = (0_u32..).zip(thresholds).map(|(i, t)| (t.1, i)).collect();
         beta.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let up: Vec<bool> = thresholds.iter().map(|t| t.0 + t.1 < 2.0 * rest).collect();
         let virgin = BedState {
@@ -112,10 +112,18 @@ fn draw_thresholds(draws: &mut Draws, relays: usize, min: f64, max: f64) -> Vec<
         .collect()
 }
 
-/// The static element: relays and a reversible linear part, scaled to span and opening.
+/// Relays that turn at once, or take their time.
+#[derive(Debug, Clone)]
+enum Bed {
+    Quick(RelayBed),
+    Viscous(ViscousBed),
+}
+
+/// The hysteretic element: relays and a reversible linear part, scaled to the span and opening that it has when it is
+/// driven slowly.
 #[derive(Debug, Clone)]
 pub(crate) struct Hysteresis {
-    bed: RelayBed,
+    bed: Bed,
     rest_v: f64,
     linear_um_per_v: f64,
     um_per_relay: f64,
@@ -126,14 +134,16 @@ pub(crate) struct Hysteresis {
 impl Hysteresis {
     /// Draws the bed and scales it: the major loop spans `gain · (max - min)` and opens by
     /// `loop_share` of that at its widest.
-    pub(crate) fn new(seed: u64, actuator: &Actuator) -> Result<Self, ConfigError> {
+    pub(crate) fn new(seed: u64, actuator: &Actuator, viscosity: Option<&Viscosity>) -> Result<Self, ConfigError> {
         let &Actuator { min_v, max_v, rest_v, gain_um_per_v: gain, loop_share, relays } = actuator;
         if loop_share == 0.0 {
-            let bed = RelayBed::new(Vec::new(), rest_v);
-            return Ok(Self { bed, rest_v, linear_um_per_v: gain, um_per_relay: 0.0, virgin: 0.0 });
+            let bed = RelayBed::new(&[], rest_v);
+            return Ok(Self { bed: Bed::Quick(bed), rest_v, linear_um_per_v: gain, um_per_relay: 0.0, virgin: 0.0 });
         }
         let mut draws = Draws::new(seed, Purpose::Relays);
-        let mut bed = RelayBed::new(draw_thresholds(&mut draws, relays, min_v, max_v), rest_v);
+        let mut thresholds = draw_thresholds(&mut draws, relays, min_v, max_v);
+        thresholds.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut bed = RelayBed::new(&thresholds, rest_v);
         let (swing, opening) = major_loop(&mut bed, min_v, max_v);
         bed.reset();
         // Share of the span that the relays must carry for the asked opening.
@@ -145,21 +155,43 @@ impl Hysteresis {
         }
         Ok(Self {
             virgin: bed.count() as f64,
-            bed,
+            bed: match viscosity {
+                None => Bed::Quick(bed),
+                Some(viscosity) => Bed::Viscous(ViscousBed::new(seed, &thresholds, rest_v, viscosity)),
+            },
             rest_v,
             linear_um_per_v: gain * (1.0 - share),
             um_per_relay: gain * (max_v - min_v) * share / swing,
         })
     }
 
-    /// Moves the input monotonically to `v` (V); returns the displacement from the virgin rest (µm).
+    /// Sets how long a move takes (s); quick relays do not care.
+    pub(crate) fn set_step(&mut self, step_s: f64) {
+        if let Bed::Viscous(bed) = &mut self.bed {
+            bed.set_step(step_s);
+        }
+    }
+
+    /// Moves the input monotonically to `v` (V), in one step; returns the displacement from the virgin rest (µm).
     pub(crate) fn move_to(&mut self, v: f64) -> f64 {
-        self.bed.move_to(v);
-        self.linear_um_per_v * (v - self.rest_v) + self.um_per_relay * (self.bed.count() as f64 - self.virgin)
+        let up = match &mut self.bed {
+            Bed::Quick(bed) => {
+                bed.move_to(v);
+                bed.count() as f64
+            }
+            Bed::Viscous(bed) => {
+                bed.move_to(v);
+                bed.count()
+            }
+        };
+        self.linear_um_per_v * (v - self.rest_v) + self.um_per_relay * (up - self.virgin)
     }
 
     pub(crate) fn reset(&mut self) {
-        self.bed.reset();
+        match &mut self.bed {
+            Bed::Quick(bed) => bed.reset(),
+            Bed::Viscous(bed) => bed.reset(),
+        }
     }
 }
 
@@ -195,8 +227,9 @@ mod tests {
     #[test]
     fn sorted_walk_agrees_with_asking_every_relay() {
         let mut draws = Draws::new(5, Purpose::Relays);
-        let thresholds = draw_thresholds(&mut draws, 500, 0.0, 100.0);
-        let mut bed = RelayBed::new(thresholds.clone(), 0.0);
+        let mut thresholds = draw_thresholds(&mut draws, 500, 0.0, 100.0);
+        thresholds.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut bed = RelayBed::new(&thresholds, 0.0);
         let mut naive: Vec<bool> = thresholds.iter().map(|t| t.0 + t.1 < 0.0).collect();
         for _ in 0..2000 {
             let u = draws.between(-10.0, 110.0);
@@ -210,14 +243,14 @@ mod tests {
 
     #[test]
     fn return_point_memory_and_wiping_out() {
-        let mut h = Hysteresis::new(9, &actuator()).unwrap();
+        let mut h = Hysteresis::new(9, &actuator(), None).unwrap();
         let outer = play(&mut h, &[80.0, 20.0]);
         let inner = play(&mut h, &[60.0, 35.0]);
         // A minor loop closes exactly where it began.
         assert_eq!(play(&mut h, &[50.0, 35.0]), inner);
         // The input that passes the outer extremes leaves no trace of what was inside.
         assert_eq!(play(&mut h, &[60.0, 20.0]), outer);
-        let mut plain = Hysteresis::new(9, &actuator()).unwrap();
+        let mut plain = Hysteresis::new(9, &actuator(), None).unwrap();
         play(&mut plain, &[90.0, 10.0]);
         play(&mut h, &[90.0, 10.0]);
         assert_eq!(h.move_to(47.0), plain.move_to(47.0));
@@ -225,7 +258,7 @@ mod tests {
 
     #[test]
     fn output_does_not_depend_on_the_steps_of_a_monotone_move() {
-        let mut coarse = Hysteresis::new(2, &actuator()).unwrap();
+        let mut coarse = Hysteresis::new(2, &actuator(), None).unwrap();
         let mut fine = coarse.clone();
         let path: Vec<f64> = (0..=700).map(|k| 0.1 * f64::from(k)).collect();
         assert_eq!(coarse.move_to(70.0), play(&mut fine, &path));
@@ -233,7 +266,7 @@ mod tests {
 
     #[test]
     fn reset_is_as_good_as_new() {
-        let fresh = Hysteresis::new(4, &actuator()).unwrap();
+        let fresh = Hysteresis::new(4, &actuator(), None).unwrap();
         let mut used = fresh.clone();
         play(&mut used, &[100.0, 3.0, 77.0, 12.0]);
         used.reset();
@@ -247,7 +280,7 @@ mod tests {
     #[test]
     fn span_and_opening_are_the_declared_ones_for_many_seeds() {
         for seed in 0..40 {
-            let mut h = Hysteresis::new(seed, &actuator()).unwrap();
+            let mut h = Hysteresis::new(seed, &actuator(), None).unwrap();
             assert!(h.linear_um_per_v > 0.0);
             let top = play(&mut h, &[100.0]);
             let bottom = play(&mut h, &[0.0]);
@@ -258,6 +291,36 @@ mod tests {
             assert!((opening / 10.0 - 0.12).abs() < 0.002, "seed {seed}: {opening}");
             // Both branches rise with the input.
             assert!(rising.is_sorted() && falling.is_sorted_by(|a, b| a >= b));
+        }
+    }
+
+    /// Opening of a 0 to 100 V loop at a rate (V/s), over its span when slow, and the highest output.
+    fn loop_at(rate: f64, viscosity: Option<&Viscosity>) -> (f64, f64) {
+        let mut h = Hysteresis::new(3, &actuator(), viscosity).unwrap();
+        let step_s = 1e-6;
+        h.set_step(step_s);
+        let steps = (100.0 / (rate * step_s)) as u32;
+        let mut ramp = |from: f64, to: f64| -> Vec<f64> {
+            (1..=steps).map(|k| h.move_to(from + (to - from) * f64::from(k) / f64::from(steps))).collect()
+        };
+        ramp(0.0, 100.0);
+        ramp(100.0, 0.0);
+        let (rising, falling) = (ramp(0.0, 100.0), ramp(100.0, 0.0));
+        let opening = rising.iter().zip(falling.iter().rev()).map(|(r, f)| f - r).fold(0.0, f64::max);
+        (opening / 10.0, rising.iter().chain(&falling).copied().fold(0.0, f64::max))
+    }
+
+    #[test]
+    fn viscous_loops_widen_with_the_rate_and_are_the_quick_ones_when_slow() {
+        let drag = Viscosity { volt_seconds: 4e-4 };
+        let quick = loop_at(500.0, None);
+        let loops = [50.0, 2000.0, 8000.0, 32_000.0].map(|rate| loop_at(rate, Some(&drag)));
+        assert!(
+            (loops[0].0 - quick.0).abs() < 0.004 && (loops[0].1 / quick.1 - 1.0).abs() < 0.003,
+            "{quick:?} {loops:?}"
+        );
+        for pair in loops.windows(2) {
+            assert!(pair[1].0 > pair[0].0 + 0.004 && pair[1].1 < pair[0].1, "{loops:?}");
         }
     }
 }

@@ -23,6 +23,8 @@ pub(crate) enum Purpose {
     Parameters = 5,
     /// Choice of effects of a random plant.
     Effects = 6,
+    /// Drag of each relay.
+    Viscosity = 7,
 }
 
 /// A stream of random numbers.

@@ -30,6 +30,11 @@ pub(crate) fn check(config: &PlantConfig) -> Checked {
     }
     actuator(&config.actuator)?;
     sensor(&config.sensor)?;
+    if let Some(viscosity) = &config.viscosity {
+        let advice = "give a drag from 1e-7 to 1 V s, or remove the section [viscosity]";
+        let fits = (1e-7..=1.0).contains(&viscosity.volt_seconds);
+        demand("viscosity.volt_seconds", viscosity.volt_seconds, fits, advice)?;
+    }
     if let Some(delay) = &config.delay {
         let fits = delay.seconds > 0.0 && delay.seconds <= 1.0;
         let advice = "give a dead time above 0 and up to 1 s, or remove the section [delay]";

@@ -61,7 +61,7 @@ impl Basis for PiBasis {
 }
 
 /// The play operator over a drive, virgin at each segment's start.
-pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
+pub(crate) fn plays(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
     let mut out = vec![0.0; drive.len()];
     for segment in segments {
         let mut p = 0.0;

@@ -73,7 +73,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, FitError> {
     let before = simulate(model, train, options.zero)?;
     let mut samples = Samples::from_record(train);
-    check(train, &samples)?;
+    check(train, &samples, true)?;
     samples.settling.clone_from(&before.settling);
     let stage = |source| FitError::Stage { record: train.name(), source };
     let per_record = options.zero == Zero::PerRecord;

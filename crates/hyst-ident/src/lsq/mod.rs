@@ -1,7 +1,9 @@
-//! Least squares by normal equations that are kept per block of the record.
+//! Least squares by normal equations that are kept per block of the record, and the nearest values in an order.
 
 mod gram;
+mod ordered;
 mod quadratic;
 
 pub(crate) use gram::{Blocks, Gram};
+pub(crate) use ordered::{Order, nearest_ordered};
 pub(crate) use quadratic::{Bounds, solve};

@@ -1,6 +1,6 @@
 //! Models whose parameters come from elsewhere than a fit: a paper, another program, a person.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hyst_core::{Env, Error, Stage};
 
@@ -53,6 +53,7 @@ impl Model {
             base,
             effects,
             std_errors: BTreeMap::new(),
+            undetermined: BTreeSet::new(),
             recorded_at_hz: ends.rate_hz,
             fitted_on: Vec::new(),
             seed: 0,

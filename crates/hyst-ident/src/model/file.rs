@@ -1,6 +1,6 @@
 //! `model.json`: reading, checking, writing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
@@ -70,6 +70,8 @@ pub struct Model {
     pub effects: Effects,
     /// Standard errors by `stage.parameter`.
     pub std_errors: BTreeMap<String, f64>,
+    /// Parameters, by `stage.parameter`, that the record does not determine, or only together with others.
+    pub undetermined: BTreeSet<String>,
     /// Sample rate of the record \[Hz\].
     pub recorded_at_hz: f64,
     /// The record's files.
@@ -262,7 +264,7 @@ impl Model {
     }
 
     fn from_file(file: File<serde_json::Value>) -> Result<Self, String> {
-        let stages::Stages { base, effects, std_errors } = stages::read(file.stages)?;
+        let stages::Stages { base, effects, std_errors, undetermined } = stages::read(file.stages)?;
         if base.kind() != file.kind {
             return Err(format!("the kind is {}, but the hysteresis stage is {}", file.kind, base.kind()));
         }
@@ -281,6 +283,7 @@ impl Model {
             base,
             effects,
             std_errors,
+            undetermined,
             recorded_at_hz: file.recorded_at_hz,
             fitted_on: file.fitted_on,
             seed: file.seed,

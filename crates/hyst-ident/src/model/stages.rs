@@ -1,6 +1,6 @@
 //! The stages of a model file: each a JSON object with its name, its parameters, their units and standard errors.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hyst_core::{Params, ViscousPiParams};
 use serde::de::DeserializeOwned;
@@ -14,6 +14,7 @@ pub(super) struct Stages {
     pub(super) base: Base,
     pub(super) effects: Effects,
     pub(super) std_errors: BTreeMap<String, f64>,
+    pub(super) undetermined: BTreeSet<String>,
 }
 
 /// Drag of the plays of a Prandtl-Ishlinskii base, in the file a stage of its own.
@@ -39,6 +40,10 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
         entry.insert("units".into(), Value::Object(units));
         if !errors.is_empty() {
             entry.insert("std_errors".into(), Value::Object(errors));
+        }
+        let vague: Vec<Value> = model.undetermined.iter().filter_map(own).map(Value::from).collect();
+        if !vague.is_empty() {
+            entry.insert("undetermined".into(), Value::Array(vague));
         }
         list.push(Value::Object(entry));
     };
@@ -117,7 +122,7 @@ fn unknown(given: &Value, known: &Value, path: &str) -> Option<String> {
         let here = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
         match known.get(key) {
             Some(known) => unknown(value, known, &here),
-            None if path.is_empty() && ["stage", "units", "std_errors"].contains(&key.as_str()) => None,
+            None if path.is_empty() && ["stage", "units", "std_errors", "undetermined"].contains(&key.as_str()) => None,
             None => Some(here),
         }
     })
@@ -156,7 +161,7 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
     let mut effects = Effects::default();
     let mut bases: Option<Base> = None;
     let mut drag: Option<RateDependence> = None;
-    let mut std_errors = BTreeMap::new();
+    let (mut std_errors, mut undetermined) = (BTreeMap::new(), BTreeSet::new());
     for value in &stages {
         let name = value.get("stage").and_then(Value::as_str).ok_or("a stage has no name in its field \"stage\"")?;
         let mut key = name;
@@ -189,6 +194,8 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
         let errors: BTreeMap<String, f64> =
             value.get("std_errors").map_or_else(|| Ok(BTreeMap::new()), |v| fields(name, v))?;
         std_errors.extend(errors.into_iter().map(|(k, v)| (format!("{key}.{k}"), v)));
+        let vague: Vec<String> = value.get("undetermined").map_or_else(|| Ok(Vec::new()), |v| fields(name, v))?;
+        undetermined.extend(vague.into_iter().map(|k| format!("{key}.{k}")));
     }
     let base = match (bases.ok_or("there is no hysteresis stage")?, drag) {
         (base, None) => base,
@@ -200,7 +207,7 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
             return Err(format!("rate-dependence is a variant of pi; {kind} has none (of preisach it is dpm)"));
         }
     };
-    Ok(Stages { base, effects, std_errors })
+    Ok(Stages { base, effects, std_errors, undetermined })
 }
 
 #[cfg(test)]

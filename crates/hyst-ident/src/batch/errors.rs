@@ -1,0 +1,121 @@
+//! Root mean square errors of many candidates as the cost of a search.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::{Kernel, LANES, Lanes, Rows};
+use crate::optimize::Cost;
+
+/// Rows between two looks at whether the candidates are still worth it.
+const STRIDE: usize = 256;
+
+/// Root mean square error of a kernel's candidates over the rows that count \[y\].
+#[derive(Debug)]
+pub struct Errors<'a, K> {
+    kernel: K,
+    data: Rows<'a>,
+    count: f64,
+    arch: Arch,
+}
+
+impl<'a, K: Kernel> Errors<'a, K> {
+    /// Of a kernel over some rows.
+    pub fn new(kernel: K, data: Rows<'a>) -> Self {
+        let count = data.counts.iter().filter(|c| **c).count().max(1) as f64;
+        Self { kernel, data, count, arch: Arch::new() }
+    }
+
+    /// Sums of squared errors; those of candidates beyond their `limits` may be infinite.
+    #[inline(always)]
+    fn pass(&self, parameters: &[Lanes], limits: Lanes) -> Lanes {
+        let c = self.kernel.coefficients(parameters);
+        let mut sum = Lanes::ZERO;
+        for segment in self.data.segments {
+            let mut s = self.kernel.state();
+            let columns = (&self.data.rows[segment.clone()], &self.data.output[segment.clone()]);
+            let counts = &self.data.counts[segment.clone()];
+            let strides = columns.0.chunks(STRIDE).zip(columns.1.chunks(STRIDE)).zip(counts.chunks(STRIDE));
+            for ((rows, output), counts) in strides {
+                for ((row, y), counts) in rows.iter().zip(output).zip(counts) {
+                    let error = self.kernel.step(&c, &mut s, row) - Lanes::all(*y);
+                    sum += error * error * f64::from(u8::from(*counts));
+                }
+                if sum.0.iter().zip(limits.0).all(|(s, limit)| *s > limit) {
+                    return Lanes::all(f64::INFINITY);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Outputs of up to eight candidates over all rows, one list each.
+    pub fn outputs(&self, points: &[f64]) -> Vec<Vec<f64>> {
+        let parameters = self.kernel.parameters();
+        let used = points.len() / parameters;
+        let c = self.kernel.coefficients(&transposed(points, parameters));
+        let mut out = vec![Vec::with_capacity(self.data.rows.len()); used];
+        for segment in self.data.segments {
+            let mut s = self.kernel.state();
+            for row in &self.data.rows[segment.clone()] {
+                let y = self.kernel.step(&c, &mut s, row);
+                for (out, y) in out.iter_mut().zip(y.0) {
+                    out.push(y);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// One pass over the rows, compiled once for each set of vector instructions.
+struct Pass<'a, 'b, K> {
+    errors: &'b Errors<'a, K>,
+    parameters: &'b [Lanes],
+    limits: Lanes,
+}
+
+impl<K: Kernel> WithSimd for Pass<'_, '_, K> {
+    type Output = Lanes;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Lanes {
+        self.errors.pass(self.parameters, self.limits)
+    }
+}
+
+/// Most parameters of a kernel.
+const MOST: usize = 64;
+
+/// Candidates one after the other, as parameters side by side; lanes without a candidate repeat the first.
+fn transposed(points: &[f64], parameters: usize) -> [Lanes; MOST] {
+    let mut out = [Lanes::ZERO; MOST];
+    for (p, lanes) in out.iter_mut().enumerate().take(parameters) {
+        for (l, x) in lanes.0.iter_mut().enumerate() {
+            *x = points.get(l * parameters + p).or_else(|| points.get(p)).copied().unwrap_or(0.0);
+        }
+    }
+    out
+}
+
+impl<K: Kernel> Cost for Errors<'_, K> {
+    fn width(&self) -> usize {
+        LANES
+    }
+
+    fn costs(&self, points: &[f64], hopeless: &[f64], costs: &mut [f64]) {
+        let parameters = self.kernel.parameters();
+        for ((costs, points), hopeless) in
+            costs.chunks_mut(LANES).zip(points.chunks(LANES * parameters)).zip(hopeless.chunks(LANES))
+        {
+            let lanes = transposed(points, parameters);
+            let mut limits = Lanes::all(f64::NEG_INFINITY);
+            for (limit, h) in limits.0.iter_mut().zip(hopeless) {
+                // A hair more than the limit: a sum that rounds to it must not be given up.
+                *limit = h * h * self.count * (1.0 + 1e-9);
+            }
+            let sums = self.arch.dispatch(Pass { errors: self, parameters: &lanes[..parameters], limits });
+            for (cost, sum) in costs.iter_mut().zip(sums.0) {
+                *cost = (sum / self.count).sqrt();
+            }
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The dynamic Preisach model from records at several rates.
+
+use hyst_core::{DpmParams, MirrorParams};
+use serde::Serialize;
+
+use super::mirror::{MirrorFit, MirrorProblem};
+use super::{EverettError, FodReport, Surface, fod};
+use crate::base::PreisachBasis;
+use crate::fit::{CELLS, FitError, FitOptions, check, fit_settled, model_of};
+use crate::model::{Base, Model};
+use crate::record::Record;
+use crate::samples::Samples;
+
+/// Segments whose rate is at most this many times the slowest one's belong to the classical part.
+const SLOW: f64 = 2.0;
+/// Nodes of the mirror along rate and change, as in the paper (Chen et al., section III).
+const NODES: (usize, usize) = (8, 9);
+/// Travels over which a step fades that are tried, as shares of the input's range.
+const FADES: [f64; 5] = [0.01, 0.03, 0.1, 0.2, 0.4];
+/// The longest fade is taken whose error on segments left out is within this factor of the least: it makes the smoothest drives.
+const AS_GOOD: f64 = 1.02;
+
+/// Where the classical part of a dynamic model came from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClassicalPart {
+    /// The first-order descent curves of the slow segments.
+    Fod(FodReport),
+    /// Least squares on the rows of the slow segments.
+    LeastSquares,
+}
+
+/// A node of a mirror function.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MirrorNode {
+    /// Rate D \[input unit/s\].
+    pub rate: f64,
+    /// Change P \[input unit\].
+    pub change: f64,
+}
+
+/// What a fit of a dynamic model found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DpmReport {
+    /// The classical part.
+    pub classical: ClassicalPart,
+    /// Segments that it is from.
+    pub slow_segments: usize,
+    /// Mean rate of the slow segments and of the fastest one while the input moves \[input unit/s\].
+    pub rates: [f64; 2],
+    /// Travel over which a step at a closing loop fades \[input unit\].
+    pub fade: f64,
+    /// RMS residual of the faster segments, of the classical part alone \[output unit\].
+    pub rmse_classical: f64,
+    /// The same of the dynamic model \[output unit\].
+    pub rmse: f64,
+    /// The same over segments that were left out of the fit in turn \[output unit\]; much above `rmse`, more rates are needed.
+    /// Absent where there is one faster segment only.
+    pub rmse_left_out: Option<f64>,
+    /// Smallest and largest node value of ξ.
+    pub xi: [f64; 2],
+    /// Nodes at a bound.
+    pub bound: usize,
+    /// Nodes that no row touches: their values are those of their neighbours, and the model is a guess there.
+    pub untouched: Vec<MirrorNode>,
+}
+
+/// A dynamic model and what was found on the way.
+#[derive(Clone, Debug)]
+pub struct DpmFit {
+    /// The model.
+    pub model: Model,
+    /// What was found.
+    pub report: DpmReport,
+}
+
+/// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
+///
+/// Segments within a factor of two of the slowest rate are the slow ones. Where they hold first-order descent curves, the
+/// classical part is their Everett surface ([`fit_fod`](super::fit_fod)), else a Preisach operator by least squares. The
+/// mirror's grid has 8 by 9 nodes up to the highest rate and change of the records.
+///
+/// # Errors
+/// [`EverettError::OneRate`] if all segments have one rate; else as the fit of the classical part.
+pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError> {
+    let name = || record.name();
+    let mut samples = Samples::from_record(record);
+    check(record, &samples, true)?;
+    let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(&samples, s)).collect();
+    // A segment in which nothing moves has no rate.
+    let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);
+    let fastest = rates.iter().copied().fold(0.0, f64::max);
+    let slow: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] <= SLOW * slowest).collect();
+    if fastest <= SLOW * slowest {
+        return Err(EverettError::OneRate { record: name(), slowest, fastest }.into());
+    }
+    let mut quiet = samples.segments_only(&slow);
+    let (preisach, classical) = match Surface::measure(&name(), &quiet, None) {
+        Ok(surface) => {
+            let (valid, report) = fod::checked(&surface, &name(), false)?;
+            (valid.params(), ClassicalPart::Fod(report))
+        }
+        Err(_) => {
+            let basis = PreisachBasis::for_samples(&quiet, CELLS);
+            let fitted = fit_settled(&mut quiet, &basis, options, &name)?;
+            for (s, own) in slow.iter().zip(&quiet.segments) {
+                samples.settling[samples.segments[*s].clone()].copy_from_slice(&quiet.settling[own.clone()]);
+            }
+            (basis.spec(&fitted.weights), ClassicalPart::LeastSquares)
+        }
+    };
+    let grid = mirror_grid(&samples);
+    // The slow segments are the classical part's already; their rows would outweigh the others'.
+    let brisk: Vec<usize> = (0..rates.len()).filter(|s| rates[*s] > SLOW * slowest).collect();
+    let brisk = samples.segments_only(&brisk);
+    let zero_of_segment = zeros(&brisk, options.zero_per_record);
+    let problem =
+        MirrorProblem { samples: &brisk, classical: &preisach, grid: &grid, zero_of_segment: &zero_of_segment };
+    let (low, high) = samples.input_range();
+    let stage = |source| FitError::Stage { record: record.name(), source };
+    let mut fits: Vec<(f64, MirrorFit)> = Vec::new();
+    for share in FADES {
+        let fade = share * (high - low);
+        fits.extend(problem.fit(fade).map_err(stage)?.map(|fit| (fade, fit)));
+    }
+    let error = |fit: &MirrorFit| fit.left_out.unwrap_or(fit.rmse);
+    let least = fits.iter().map(|(_, fit)| error(fit)).fold(f64::INFINITY, f64::min);
+    let longest = fits.into_iter().rfind(|(_, fit)| error(fit) <= AS_GOOD * least);
+    let (fade, fit) = longest.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+    let plain = problem.output(vec![1.0; grid.rates * grid.changes], fade).map_err(stage)?;
+    let misses = || brisk.output.iter().zip(&plain).map(|(y, p)| y - p);
+    let mean = misses().sum::<f64>() / brisk.len() as f64;
+    let squares = misses().map(|e| (e - mean) * (e - mean)).sum::<f64>();
+    let node = |k: usize| {
+        let on = |low: f64, high: f64, nodes: usize, k: usize| low + (high - low) * k as f64 / (nodes - 1) as f64;
+        MirrorNode {
+            rate: on(grid.rate_low, grid.rate_high, grid.rates, k / grid.changes),
+            change: on(grid.change_low, grid.change_high, grid.changes, k % grid.changes),
+        }
+    };
+    let (least, most) = crate::samples::range(fit.mirror.weights.iter().copied());
+    let report = DpmReport {
+        classical,
+        slow_segments: slow.len(),
+        rates: [slowest, fastest],
+        fade,
+        rmse_classical: (squares / brisk.len() as f64).sqrt(),
+        rmse: fit.rmse,
+        rmse_left_out: fit.left_out,
+        xi: [least, most],
+        bound: fit.bound,
+        untouched: fit.untouched.iter().map(|k| node(*k)).collect(),
+    };
+    let zero = fit.zeros.iter().sum::<f64>() / fit.zeros.len() as f64;
+    let base = Base::Dpm(DpmParams { preisach, mirror: fit.mirror, fade });
+    let model = model_of(record, &samples, base, zero, options.seed);
+    model.build(samples.period).map_err(stage)?;
+    Ok(DpmFit { model, report })
+}
+
+/// Mean rate of a segment while the input moves \[input unit/s\].
+fn rate(samples: &Samples, segment: usize) -> f64 {
+    let u = &samples.input[samples.segments[segment].clone()];
+    let (low, high) = crate::samples::range(u.iter().copied());
+    let moves = || u.windows(2).map(|w| (w[1] - w[0]).abs());
+    // Rows at rest do not make a drive slow; a millionth of the swing is rest.
+    let moving = moves().filter(|m| *m > 1e-6 * (high - low)).count();
+    moves().sum::<f64>() / (moving.max(1) as f64 * samples.period)
+}
+
+/// Which zero of the sensor each segment has: one for all, or one for each file.
+fn zeros(samples: &Samples, per_file: bool) -> Vec<usize> {
+    let mut files: Vec<usize> = Vec::new();
+    let mut place = |file: &usize| {
+        files.iter().position(|f| f == file).unwrap_or_else(|| {
+            files.push(*file);
+            files.len() - 1
+        })
+    };
+    samples.file_of_segment.iter().map(|file| if per_file { place(file) } else { 0 }).collect()
+}
+
+/// A grid up to the highest mean rate since a reversal and the largest change that the records have.
+fn mirror_grid(samples: &Samples) -> MirrorParams<Vec<f64>> {
+    let (low, high) = samples.input_range();
+    let mut rates = Vec::new();
+    let mut largest = 0.0f64;
+    for rows in &samples.segments {
+        let u = &samples.input[rows.clone()];
+        let (mut from, mut age, mut up) = (u[0], 0usize, true);
+        for w in u.windows(2) {
+            if w[1] != w[0] && (w[1] > w[0]) != up {
+                (from, age, up) = (w[0], 0, w[1] > w[0]);
+            }
+            age += 1;
+            let change = (w[1] - from).abs();
+            largest = largest.max(change);
+            // The first samples of a branch have rates of their own; they carry next to no output.
+            if change > 0.1 * (high - low) {
+                rates.push(change / (age as f64 * samples.period));
+            }
+        }
+    }
+    rates.sort_by(f64::total_cmp);
+    let highest = rates.get(rates.len().saturating_sub(1 + rates.len() / 1000)).copied().unwrap_or(1.0);
+    let (rates, changes) = NODES;
+    MirrorParams {
+        rate_low: highest / rates as f64,
+        rate_high: highest,
+        rates,
+        change_low: -largest,
+        change_high: largest,
+        changes,
+        weights: Vec::new(),
+    }
+}

@@ -1,0 +1,104 @@
+//! The fractional models: linear in the gains, not in c, the orders and the delay.
+
+use hyst_core::{Build, Error, Exponentials, GlOrder, Ifm, IfmParams, Lfdm, LfdmParams, Sampling};
+use nalgebra::DMatrix;
+
+use crate::Samples;
+use crate::identify::family::run_into;
+use crate::identify::{Family, Linear};
+use crate::model::Base;
+use crate::model::capacity::DELAY;
+use crate::optimize::Variable;
+
+/// Memory of a trial: all of it, to 1e-6 of the output's span.
+type Memory = Exponentials<f64, 24>;
+
+pub(super) struct LfdmFamily<'a> {
+    samples: &'a Samples,
+}
+
+impl<'a> LfdmFamily<'a> {
+    pub(super) fn new(samples: &'a Samples) -> Self {
+        Self { samples }
+    }
+
+    fn sampling(&self) -> Sampling {
+        Sampling { period: self.samples.period }
+    }
+}
+
+/// c and the orders: the paper's bounds, c on a logarithmic scale.
+fn orders() -> Vec<Variable> {
+    vec![
+        Variable::log("c", "s^beta", 1e-3, 10.0),
+        Variable::linear("alpha", "", 0.0, 1.0),
+        Variable::linear("beta", "", 0.0, 1.0),
+    ]
+}
+
+impl Family for LfdmFamily<'_> {
+    fn variables(&self) -> Vec<Variable> {
+        orders()
+    }
+
+    fn linear(&self) -> Vec<Linear> {
+        ["a", "b"].map(Linear::not_negative).to_vec()
+    }
+
+    fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
+        for (column, (a, b)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
+            let p = LfdmParams { a, b, c: values[0], alpha: values[1], beta: values[2], order: GlOrder::First };
+            let model: Lfdm<f64, Memory> = p.build(&self.sampling())?;
+            run_into(self.samples, &model, columns, column);
+        }
+        Ok(())
+    }
+
+    fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+        let (c, alpha, beta) = (values[0], values[1], values[2]);
+        Base::Lfdm(LfdmParams { a: linear[0], b: linear[1], c, alpha, beta, order: GlOrder::First })
+    }
+}
+
+pub(super) struct IfmFamily<'a> {
+    samples: &'a Samples,
+}
+
+impl<'a> IfmFamily<'a> {
+    pub(super) fn new(samples: &'a Samples) -> Self {
+        Self { samples }
+    }
+}
+
+impl Family for IfmFamily<'_> {
+    /// Delays from a tenth of a sample to a tenth of the record, at most what a delay of the host holds.
+    fn variables(&self) -> Vec<Variable> {
+        let h = self.samples.period;
+        let longest = (0.1 * self.samples.longest_segment()).min(h * (DELAY as f64 - 4.0)).min(0.1);
+        let mut list = orders();
+        list.push(Variable::log("tau", "s", 0.1 * h, longest.max(h)));
+        list
+    }
+
+    fn linear(&self) -> Vec<Linear> {
+        ["a", "b", "delta"].map(Linear::not_negative).to_vec()
+    }
+
+    fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
+        let cx = Sampling { period: self.samples.period };
+        for (column, (a, b)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
+            let (c, alpha, beta, tau) = (values[0], values[1], values[2], values[3]);
+            let p = IfmParams { a, b, c, alpha, beta, tau, delta: 0.0, order: GlOrder::First };
+            let model: Box<Ifm<f64, Memory, DELAY>> = Box::new(p.build(&cx)?);
+            run_into(self.samples, &*model, columns, column);
+        }
+        columns.column_mut(2).copy_from_slice(&self.samples.input);
+        Ok(())
+    }
+
+    fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+        let (c, alpha, beta, tau) = (values[0], values[1], values[2], values[3]);
+        let (a, b, delta) = (linear[0], linear[1], linear[2]);
+        Base::Ifm(IfmParams { a, b, c, alpha, beta, tau, delta, order: GlOrder::First })
+    }
+}

@@ -1,0 +1,165 @@
+//! Maxwell-slip banks and the electromechanical model: linear in the gains of their elements.
+
+use hyst_core::{Build, Error, MaxwellSlip, MaxwellSlipParams, Sampling, SlipReading, TdEm, TdEmParams};
+use nalgebra::DMatrix;
+
+use super::largest_input;
+use crate::Samples;
+use crate::identify::family::run_into;
+use crate::identify::{Family, Linear};
+use crate::model::Base;
+use crate::model::capacity::PLAYS;
+use crate::optimize::Variable;
+
+fn gains(count: usize) -> Vec<Linear> {
+    (0..count).map(|i| Linear::not_negative(&format!("gains[{i}]"))).collect()
+}
+
+/// A bank whose widths are even over the range of the input.
+pub(super) struct SlipFamily<'a> {
+    samples: &'a Samples,
+    widths: Vec<f64>,
+    reading: SlipReading,
+}
+
+impl<'a> SlipFamily<'a> {
+    pub(super) fn new(samples: &'a Samples, elements: usize, reading: SlipReading) -> Self {
+        let (low, high) = samples.input_range();
+        let elements = elements.clamp(1, PLAYS);
+        // The first backlash is as good as none, and carries what has no hysteresis; springs begin with a width of their own.
+        let first = if reading == SlipReading::Backlash { 1e-3 } else { 1.0 };
+        let widths = (0..elements).map(|i| (high - low) * (first + i as f64) / elements as f64).collect();
+        Self { samples, widths, reading }
+    }
+}
+
+impl Family for SlipFamily<'_> {
+    fn variables(&self) -> Vec<Variable> {
+        Vec::new()
+    }
+
+    fn linear(&self) -> Vec<Linear> {
+        gains(self.widths.len())
+    }
+
+    fn columns(&self, _: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
+        for (i, d) in self.widths.iter().enumerate() {
+            let element: MaxwellSlip<f64, 1> =
+                MaxwellSlipParams { reading: self.reading, widths: [*d], gains: [1.0] }.build(&())?;
+            run_into(self.samples, &element, columns, i);
+        }
+        Ok(())
+    }
+
+    fn base(&self, _: &[f64], linear: &[f64]) -> Base {
+        Base::MaxwellSlip(MaxwellSlipParams {
+            reading: self.reading,
+            widths: self.widths.clone(),
+            gains: linear.to_vec(),
+        })
+    }
+
+    fn identified(&self, name: &str) -> bool {
+        name.starts_with("gains")
+    }
+
+    fn scale(&self, base: &Base, _: &str) -> Option<f64> {
+        match base {
+            Base::MaxwellSlip(p) => Some(p.gains.iter().sum()),
+            _ => None,
+        }
+    }
+}
+
+/// The electromechanical model: the first width d₁ (the others are its multiples, as printed) and the course of ψ over
+/// temperature are searched, the gains solved for. C, R, m, k, b and ψ at the reference are those of the printed tube: from
+/// displacement only the products ψ R gᵢ can be known, and they are what comes out.
+pub(super) struct TdEmFamily<'a> {
+    samples: &'a Samples,
+    elements: usize,
+    reference_degc: f64,
+}
+
+impl<'a> TdEmFamily<'a> {
+    pub(super) fn new(samples: &'a Samples, elements: usize) -> Self {
+        let reference_degc =
+            samples.temperature.as_ref().map_or(23.0, |t| t.iter().sum::<f64>() / t.len().max(1) as f64);
+        Self { samples, elements: elements.clamp(1, PLAYS), reference_degc }
+    }
+
+    fn varies(&self) -> bool {
+        self.samples.temperature.as_ref().is_some_and(|t| {
+            let (low, high) = crate::samples::range(t.iter().copied());
+            high - low > 0.5
+        })
+    }
+
+    fn params(&self, values: &[f64], gains: Vec<f64>) -> TdEmParams<Vec<f64>> {
+        let printed = TdEmParams::PRINTED;
+        let [c0, c1, c2] = printed.coupling;
+        let t0 = self.reference_degc;
+        let psi = c0 + t0 * (c1 + t0 * c2);
+        // ψ(T) = ψ(T₀) (1 + p (T − T₀) + q (T − T₀)²), in powers of T.
+        let (p, q) = (values.get(1).copied().unwrap_or(0.0), values.get(2).copied().unwrap_or(0.0));
+        let coupling = [psi * (1.0 - p * t0 + q * t0 * t0), psi * (p - 2.0 * q * t0), psi * q];
+        TdEmParams {
+            slip: MaxwellSlipParams {
+                reading: SlipReading::Backlash,
+                widths: (1..=gains.len()).map(|i| values[0] * i as f64).collect(),
+                gains,
+            },
+            capacitance: printed.capacitance,
+            resistance: printed.resistance,
+            mass: printed.mass,
+            stiffness: printed.stiffness,
+            damping: printed.damping,
+            coupling,
+            per_metre: printed.per_metre,
+        }
+    }
+}
+
+impl Family for TdEmFamily<'_> {
+    fn variables(&self) -> Vec<Variable> {
+        let u = largest_input(self.samples);
+        let n = self.elements as f64;
+        let mut list = vec![Variable::log("slip.widths[0]", "u", 0.02 * u / n, 2.0 * u / n)];
+        if self.varies() {
+            list.push(Variable::linear("relative slope of the coupling", "1/K", -0.05, 0.05));
+            list.push(Variable::linear("relative bend of the coupling", "1/K^2", -0.005, 0.005));
+        }
+        list
+    }
+
+    fn linear(&self) -> Vec<Linear> {
+        gains(self.elements)
+    }
+
+    fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
+        let cx = Sampling { period: self.samples.period };
+        for i in 0..self.elements {
+            let mut p = self.params(values, Vec::new());
+            p.slip.widths = vec![values[0] * (i as f64 + 1.0)];
+            p.slip.gains = vec![1.0];
+            let element: TdEm<f64, 1> = p.build(&cx)?;
+            run_into(self.samples, &element, columns, i);
+        }
+        Ok(())
+    }
+
+    fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+        Base::TdEm(self.params(values, linear.to_vec()))
+    }
+
+    /// What belongs to the electrical and mechanical side is given.
+    fn identified(&self, name: &str) -> bool {
+        name.starts_with("slip") || name.starts_with("coupling")
+    }
+
+    fn scale(&self, base: &Base, name: &str) -> Option<f64> {
+        match base {
+            Base::TdEm(p) if name.starts_with("slip.gains") => Some(p.slip.gains.iter().sum()),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! How each model is identified: which of its parameters are searched, within which bounds, and which are solved for.
+//!
+//! Bounds come from the record: its ranges of input and temperature, its sample period and length. No family looks at the output.
+
+mod activation;
+mod bouc_wen;
+mod fractional;
+mod gpi;
+mod maxwell;
+mod oscillator;
+mod pi;
+mod td_pi;
+
+use hyst_core::{Kind, SlipReading};
+
+use super::Family;
+use crate::Samples;
+
+/// Forms of models that have more than one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Form {
+    /// Exponent n of a Bouc-Wen model; `None` searches it.
+    pub bouc_wen_n: Option<f64>,
+    /// Plays of `gpi` and `td-pi`, elements of `maxwell-slip` and `td-em`.
+    pub elements: Option<usize>,
+    /// What an element of `maxwell-slip` is.
+    pub slip: SlipReading,
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        Self { bouc_wen_n: Some(1.0), elements: None, slip: SlipReading::Backlash }
+    }
+}
+
+/// How a kind of model is identified by search; `None` if it is not.
+pub(crate) fn family_of<'a>(kind: Kind, samples: &'a Samples, form: &Form) -> Option<Box<dyn Family + 'a>> {
+    let elements = |most: usize| form.elements.unwrap_or(most);
+    Some(match kind {
+        Kind::Pi => Box::new(pi::PiFamily::new(samples, elements(6))),
+        Kind::BoucWen => Box::new(bouc_wen::BoucWenFamily::new(samples, form.bouc_wen_n)),
+        Kind::Atan | Kind::Sigmoid | Kind::Softplus | Kind::Softsign | Kind::Tanh => {
+            Box::new(activation::ActivationFamily::new(samples, kind)?)
+        }
+        Kind::Lfdm => Box::new(fractional::LfdmFamily::new(samples)),
+        Kind::Ifm => Box::new(fractional::IfmFamily::new(samples)),
+        Kind::Gpi => Box::new(gpi::GpiFamily::new(samples, elements(16))),
+        Kind::TdPi => Box::new(td_pi::TdPiFamily::new(samples, elements(9))),
+        Kind::MaxwellSlip => Box::new(maxwell::SlipFamily::new(samples, elements(16), form.slip)),
+        Kind::TdEm => Box::new(maxwell::TdEmFamily::new(samples, elements(10))),
+        Kind::BoucWenOscillator => Box::new(oscillator::OscillatorFamily::new(samples)),
+        _ => return None,
+    })
+}
+
+/// Largest |input| of a record, at least a hair.
+fn largest_input(samples: &Samples) -> f64 {
+    let (low, high) = samples.input_range();
+    low.abs().max(high.abs()).max(f64::MIN_POSITIVE)
+}

@@ -1,0 +1,88 @@
+//! The Bouc-Wen oscillator: nothing in it is linear, its static response sets the scales.
+
+use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error, Sampling};
+use nalgebra::DMatrix;
+
+use super::largest_input;
+use crate::Samples;
+use crate::identify::family::run_into;
+use crate::identify::{Family, Linear};
+use crate::model::Base;
+use crate::optimize::Variable;
+
+/// With y = Y ỹ for any Y the equation keeps its form; Y is the one linear parameter, so that mass, damping and stiffness are
+/// searched relative to the stiffness at rest. Only the products of β with γ and δ leave a trace; β is chosen so that γ and δ are of
+/// the order of one where the hysteretic force is as large as the largest input.
+pub(super) struct OscillatorFamily<'a> {
+    samples: &'a Samples,
+}
+
+impl<'a> OscillatorFamily<'a> {
+    pub(super) fn new(samples: &'a Samples) -> Self {
+        Self { samples }
+    }
+
+    /// From the frequency of small motions, the damping ratio, the share of the spring without memory, the two terms that bend the
+    /// other, and ν.
+    fn params(&self, values: &[f64], y: f64) -> BoucWenOscillatorParams {
+        let [hz, zeta, share, out, back, nu] = [0, 1, 2, 3, 4, 5].map(|i| values.get(i).copied().unwrap_or(1.0));
+        let omega = std::f64::consts::TAU * hz;
+        // In units in which k + α = 1.
+        let size = largest_input(self.samples);
+        let (stiffness, alpha) = (share, 1.0 - share);
+        // dz/dy = α (1 − out |z/size|^ν) on the way out, α (1 + back |z/size|^ν) on the way back.
+        let (gamma, delta) = (0.5 * (out + back), 0.5 * (out - back));
+        BoucWenOscillatorParams {
+            mass: 1.0 / (omega * omega) / y,
+            damping: 2.0 * zeta / omega / y,
+            stiffness: stiffness / y,
+            alpha: alpha / y,
+            beta: size.powf(-nu) * alpha / y,
+            gamma,
+            delta,
+            nu,
+        }
+    }
+}
+
+impl Family for OscillatorFamily<'_> {
+    fn variables(&self) -> Vec<Variable> {
+        let nyquist = 0.5 / self.samples.period;
+        let slowest = 2.0 / self.samples.longest_segment();
+        vec![
+            Variable::log("hz", "Hz", slowest.max(1e-3 * nyquist).min(0.1 * nyquist), 0.5 * nyquist),
+            Variable::log("zeta", "", 1e-3, 1.0),
+            Variable::linear("stiffness share", "", 0.05, 0.999),
+            Variable::linear("bend out", "", -20.0, 20.0),
+            Variable::linear("bend back", "", 0.0, 40.0),
+            Variable::linear("nu", "", 1.0, 3.0),
+        ]
+    }
+
+    fn linear(&self) -> Vec<Linear> {
+        vec![Linear::not_negative("compliance")]
+    }
+
+    fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
+        let model: BoucWenOscillator<f64> =
+            self.params(values, 1.0).build(&Sampling { period: self.samples.period })?;
+        run_into(self.samples, &model, columns, 0);
+        Ok(())
+    }
+
+    fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+        Base::BoucWenOscillator(self.params(values, linear[0].max(f64::MIN_POSITIVE)))
+    }
+
+    /// β is a convention.
+    fn identified(&self, name: &str) -> bool {
+        name != "beta"
+    }
+
+    fn scale(&self, base: &Base, name: &str) -> Option<f64> {
+        match (base, name) {
+            (Base::BoucWenOscillator(p), "gamma" | "delta") => Some(p.gamma.abs() + p.delta.abs()),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Identification of models by search: global, then local, then honest about what the record determines.
+//!
+//! A model's output is linear in most of its parameters. A [`Family`](family::Family) says in which: those are solved for at every
+//! trial of the others (variable projection, Golub & Pereyra 1973), and only the others are searched. So a Bouc-Wen model
+//! of five parameters is a search in three, an activation-function model one in a single variable.
+//!
+//! - `family.rs`: what a model has to say to be identified; `families/`: one file for each.
+//! - `projection.rs`: the linear parameters for trial values of the others, and the error that remains.
+//! - `polish.rs`: Levenberg-Marquardt on the projected residual, from where the global search ended.
+//! - `profile.rs`: how far a searched variable can go before the record objects.
+//! - `uncertainty.rs`: standard errors and correlations at the optimum; parameters that the record cannot determine, by name.
+//! - `search.rs`: all of it in a row.
+
+pub(crate) mod families;
+mod family;
+mod polish;
+mod profile;
+mod projection;
+mod search;
+#[cfg(test)]
+mod tests;
+mod uncertainty;
+
+pub use families::Form;
+pub(crate) use families::family_of;
+pub(crate) use family::{Family, Linear};
+pub(crate) use search::{Identified, SearchOptions, identify};
+pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

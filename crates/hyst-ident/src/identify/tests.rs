@@ -1,0 +1,278 @@
+//! Parameters that the papers print, recovered from records simulated with them plus noise.
+
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::Samples;
+use crate::model::{Base, Operator};
+use crate::optimize::Method;
+use hyst_core::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Standard normal noise.
+fn noise(rng: &mut ChaCha8Rng) -> f64 {
+    let (a, b): (f64, f64) = (rng.random(), rng.random());
+    (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+}
+
+/// A record of `base`: one segment for each temperature, noise of 0.1 % of the output's span.
+fn record(
+    base: &Base,
+    period: f64,
+    rows: usize,
+    degc: &[f64],
+    drive: impl Fn(f64) -> f64,
+    seed: u64,
+) -> (Samples, f64) {
+    let mut samples = Samples {
+        period,
+        time: Vec::new(),
+        input: Vec::new(),
+        output: Vec::new(),
+        temperature: Some(Vec::new()),
+        load: None,
+        segments: Vec::new(),
+        file_of_segment: Vec::new(),
+        settling: Vec::new(),
+    };
+    for t in degc {
+        let start = samples.time.len();
+        for k in 0..rows {
+            samples.time.push((start + k) as f64 * period);
+            samples.input.push(drive(k as f64 * period));
+            samples.temperature.as_mut().unwrap().push(*t);
+        }
+        samples.segments.push(start..start + rows);
+        samples.file_of_segment.push(0);
+    }
+    let (low, high) = samples.input_range();
+    let operator = Operator::new(base, [low, high], &Sampling { period }).unwrap();
+    let mut y = vec![0.0; samples.len()];
+    family::run(&samples, &operator, &mut y);
+    let (least, most) = crate::samples::range(y.iter().copied());
+    let sigma = 1e-3 * (most - least);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    samples.output = y.iter().map(|y| y + sigma * noise(&mut rng)).collect();
+    samples.settling = vec![false; samples.len()];
+    (samples, sigma)
+}
+
+fn search(method: &str, dimensions: usize) -> SearchOptions {
+    let method = Method::named(method, dimensions).unwrap();
+    SearchOptions { method, evaluations: 1500 * dimensions as u64, seed: 1, trials: 1, zero_per_record: false }
+}
+
+fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Identified {
+    let family = family_of(kind, samples, form).unwrap();
+    let how = search(method, family.variables().len().max(1));
+    identify(family.as_ref(), samples, None, &how, &|| "record".into(), &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.
+fn agrees(found: &Identified, truth: &Base, sigma: f64) {
+    let true_values = uncertainty::parameters_of(truth);
+    for p in &found.estimate.parameters {
+        let (_, true_value) = true_values.iter().find(|(n, _)| *n == p.name).unwrap();
+        let off = (p.value - true_value).abs();
+        if !found.estimate.undetermined().contains(&p.name.as_str()) {
+            assert!(off <= 3.0 * p.std_error, "{}: {} ± {}, {true_value} expected", p.name, p.value, p.std_error);
+        }
+    }
+    let (left, rows) = (found.estimate.left, found.residual.len() as f64);
+    assert!((left / sigma - 1.0).abs() < 4.0 / (2.0 * rows).sqrt(), "left {left}, noise {sigma}");
+}
+
+#[test]
+fn bouc_wen_of_the_paper_by_particle_swarm() {
+    let truth = Base::BoucWen(BoucWenClassicParams::PRINTED.general());
+    let drive = |t: f64| 10.0 + 8.0 * (62.0 * t).sin() * (5.0 * t).sin() - 10.0 * (-30.0 * t).exp();
+    let (samples, sigma) = record(&truth, 1e-3, 4000, &[23.0], drive, 3);
+    let found = identified(Kind::BoucWen, &samples, &Form::default(), "pso");
+    agrees(&found, &truth, sigma);
+    // Γ is printed as nothing, and found to be.
+    assert_eq!(found.estimate.parameter("gamma").unwrap().determined, Determined::NearZero);
+}
+
+#[test]
+fn activation_functions_at_10_hz_by_particle_swarm() {
+    // Tables 6 and 5 (the latter as softsign(γu) of size β/γ), 10 Hz, 40 V, five cycles at 1 kHz.
+    let drive = |t: f64| 20.0 - 20.0 * (20.0 * std::f64::consts::PI * t).cos();
+    let tanh = ActivationParams { k0: 0.1461, alpha: -9e-5, beta: 0.3857, gamma: 500_032.0 };
+    let (samples, sigma) = record(&Base::Tanh(tanh), 1e-3, 500, &[23.0], drive, 5);
+    let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
+    agrees(&found, &Base::Tanh(tanh), sigma);
+    // Saturated over the whole range: γ leaves no trace, and says so.
+    assert!(found.estimate.undetermined().contains(&"gamma"), "{:?}", found.estimate.parameters);
+
+    let softsign = ActivationParams::from_scaled_softsign(0.1516, -0.00017, 100.0, 318.2799);
+    let (samples, sigma) = record(&Base::Softsign(softsign), 1e-3, 500, &[23.0], drive, 6);
+    let found = identified(Kind::Softsign, &samples, &Form::default(), "pso");
+    agrees(&found, &Base::Softsign(softsign), sigma);
+    // Its long tails tell a γ that tanh hides.
+    let gamma = found.estimate.parameter("gamma").unwrap();
+    assert!(gamma.determined == Determined::Yes && gamma.std_error > 0.05 * gamma.value, "{gamma:?}");
+    // One that bends within the range is known.
+    let bent = ActivationParams { gamma: 0.05, ..tanh };
+    let (samples, sigma) = record(&Base::Tanh(bent), 1e-3, 500, &[23.0], drive, 7);
+    let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
+    agrees(&found, &Base::Tanh(bent), sigma);
+    assert!(found.estimate.undetermined().is_empty());
+}
+
+/// Five sines about 50 V, as in the paper on fractional models.
+fn five_sines(t: f64) -> f64 {
+    let wave = |hz: f64, phase: f64| (std::f64::consts::TAU * hz * t + phase).sin() - phase.sin();
+    50.0 + 8.0 * (wave(5.0, 0.0) + wave(10.0, 1.0) + wave(15.0, 2.0) + wave(20.0, 3.0) + wave(30.0, 4.0))
+}
+
+/// Largest relative distance of two responses over 5 … 30 Hz.
+fn apart(a: impl Fn(f64) -> Complex, b: impl Fn(f64) -> Complex) -> f64 {
+    (5..=30).map(|hz| (a(f64::from(hz)) - b(f64::from(hz))).abs() / b(f64::from(hz)).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn linear_fractional_model_by_particle_swarm() {
+    let truth = LfdmParams::PRINTED;
+    let (samples, sigma) = record(&Base::Lfdm(truth), 1e-3, 3000, &[23.0], five_sines, 8);
+    let found = identified(Kind::Lfdm, &samples, &Form::default(), "pso");
+    agrees(&found, &Base::Lfdm(truth), sigma);
+    let Base::Lfdm(p) = found.base else { panic!() };
+    let off = apart(|hz| p.response(hz), |hz| truth.response(hz));
+    assert!(off < 1e-3, "{off}");
+}
+
+#[test]
+fn improved_fractional_model_by_differential_evolution() {
+    let truth = IfmParams::PRINTED;
+    let (samples, sigma) = record(&Base::Ifm(truth), 2e-4, 10_000, &[23.0], five_sines, 9);
+    let found = identified(Kind::Ifm, &samples, &Form::default(), "de");
+    agrees(&found, &Base::Ifm(truth), sigma);
+    let undetermined = found.estimate.undetermined();
+    for name in ["a", "b", "c", "alpha"] {
+        assert!(undetermined.contains(&name), "{name} not in {undetermined:?}: {:?}", found.estimate.parameters);
+    }
+    let Base::Ifm(p) = found.base else { panic!() };
+    let off = apart(|hz| p.response(hz), |hz| truth.response(hz));
+    assert!(off < 1e-3, "{off}");
+}
+
+/// The seven numbers that TD-PI leaves a trace of.
+fn invariants(p: &TdPiParams) -> [f64; 7] {
+    [p.epsilon * p.alpha, p.alpha * p.tau, p.a0 / p.alpha, p.a1 / p.alpha, p.b0 / p.alpha, p.b1 / p.alpha, p.eta]
+}
+
+#[test]
+fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
+    let truth = TdPiParams::PRINTED;
+    let drive = |t: f64| 200.0 * (0.2 * std::f64::consts::PI * t).sin();
+    let (samples, sigma) = record(&Base::TdPi(truth), 4e-3, 5000, &[23.0, 33.0, 39.0], drive, 10);
+    let found = identified(Kind::TdPi, &samples, &Form::default(), "gwo");
+    let Base::TdPi(p) = &found.base else { panic!() };
+    assert!((found.estimate.left / sigma - 1.0).abs() < 0.02);
+    // α is one by choice; in that unit each of the others is one of the invariants.
+    let own = ["epsilon", "tau", "a0", "a1", "b0", "b1", "eta"];
+    for ((name, value), expected) in own.iter().zip(invariants(p)).zip(invariants(&truth)) {
+        let gradient: Vec<f64> =
+            found.estimate.parameters.iter().map(|q| invariant_gradient(p, name, &q.name)).collect();
+        let error = found.estimate.std_error_of(&gradient);
+        assert!(
+            (value - expected).abs() < 3.0 * error && error < 0.2 * expected.abs(),
+            "{name}: {value} ± {error}, {expected}"
+        );
+    }
+    // The scale is found to be free, and what it moves.
+    let free = &found.estimate.trade_offs[0];
+    let sign = |name: &str| free.changes.iter().find(|(n, _)| n == name).map(|(_, x)| x.signum());
+    assert!(sign("alpha").is_some() && sign("alpha") == sign("a0") && sign("alpha") != sign("epsilon"), "{free:?}");
+    assert_eq!(sign("epsilon"), sign("tau"));
+    // Temperatures that it has not seen.
+    let (other, _) = record(&Base::TdPi(truth), 4e-3, 2500, &[29.0, 35.0], drive, 11);
+    let operator = Operator::new(&found.base, [-200.0, 200.0], &Sampling { period: 4e-3 }).unwrap();
+    let mut y = vec![0.0; other.len()];
+    family::run(&other, &operator, &mut y);
+    let zero = found.zeros[0];
+    let squares: f64 = y.iter().zip(&other.output).map(|(a, b)| (a + zero - b).powi(2)).sum();
+    assert!((squares / y.len() as f64).sqrt() < 1.05 * sigma);
+}
+
+/// Slope of one of [`invariants`] (named after its parameter) with respect to a parameter.
+fn invariant_gradient(p: &TdPiParams, invariant: &str, by: &str) -> f64 {
+    match (invariant, by) {
+        ("epsilon", "epsilon") | ("tau", "tau") => p.alpha,
+        ("epsilon", "alpha") => p.epsilon,
+        ("tau", "alpha") => p.tau,
+        ("eta", "eta") => 1.0,
+        ("a0" | "a1" | "b0" | "b1", own) if own == invariant => 1.0 / p.alpha,
+        ("a0", "alpha") => -p.a0 / p.alpha.powi(2),
+        ("a1", "alpha") => -p.a1 / p.alpha.powi(2),
+        ("b0", "alpha") => -p.b0 / p.alpha.powi(2),
+        ("b1", "alpha") => -p.b1 / p.alpha.powi(2),
+        _ => 0.0,
+    }
+}
+
+#[test]
+fn electromechanical_model_and_its_products() {
+    let printed = TdEmParams::PRINTED;
+    let truth = Base::TdEm(TdEmParams {
+        slip: MaxwellSlipParams {
+            reading: printed.slip.reading,
+            // Multiples of the first one, to the printed digits.
+            widths: (1..=10).map(|i| 7.9475 * f64::from(i)).collect(),
+            gains: printed.slip.gains.to_vec(),
+        },
+        capacitance: printed.capacitance,
+        resistance: printed.resistance,
+        mass: printed.mass,
+        stiffness: printed.stiffness,
+        damping: printed.damping,
+        coupling: printed.coupling,
+        per_metre: printed.per_metre,
+    });
+    let drive = |t: f64| 200.0 * (0.2 * std::f64::consts::PI * t).sin();
+    let (samples, sigma) = record(&truth, 2e-2, 1500, &[23.0, 33.0, 39.0], drive, 12);
+    let found = identified(Kind::TdEm, &samples, &Form::default(), "de");
+    assert!((found.estimate.left / sigma - 1.0).abs() < 0.03, "{} {sigma}", found.estimate.left);
+    let (Base::TdEm(p), Base::TdEm(q)) = (&found.base, &truth) else { panic!() };
+    assert!((p.slip.widths[0] - q.slip.widths[0]).abs() < 0.01 * q.slip.widths[0]);
+    let psi = |p: &TdEmParams<Vec<f64>>, t: f64| p.coupling[0] + t * (p.coupling[1] + t * p.coupling[2]);
+    // ψ(T) R Σ gᵢ: what all elements together give at each temperature.
+    for t in [23.0, 29.0, 33.0, 35.0, 39.0] {
+        let product =
+            |p: &TdEmParams<Vec<f64>>| psi(p, t) * p.resistance * p.slip.gains.iter().sum::<f64>() / p.stiffness;
+        assert!((product(p) / product(q) - 1.0).abs() < 2e-3, "{t}: {} {}", product(p), product(q));
+    }
+    // ψ and the gains belong together.
+    let undetermined = found.estimate.undetermined();
+    assert!(undetermined.contains(&"coupling[0]") && undetermined.contains(&"slip.gains[0]"), "{undetermined:?}");
+}
+
+/// Over twelve draws of the noise the parameters scatter about the truth as their standard errors say.
+#[test]
+fn standard_errors_are_the_scatter_of_repeated_records() {
+    let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
+    let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
+    let true_values = uncertainty::parameters_of(&truth);
+    let mut squares = [0.0; 4];
+    for seed in 0..12 {
+        let (samples, _) = record(&truth, 1e-3, 3000, &[23.0], drive, seed);
+        let found = identified(Kind::BoucWen, &samples, &Form::default(), "de");
+        for ((sum, p), (_, t)) in squares.iter_mut().zip(&found.estimate.parameters).zip(&true_values) {
+            *sum += ((p.value - t) / p.std_error).powi(2) / 12.0;
+            assert_eq!(p.determined, Determined::Yes, "{p:?}");
+        }
+    }
+    // χ² of twelve: outside of these in one of a thousand.
+    assert!(squares.iter().all(|s| (0.18..2.75).contains(s)), "{squares:?}");
+}
+
+#[test]
+fn the_exponent_of_bouc_wen_is_found_too() {
+    let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.6 });
+    let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
+    let (samples, sigma) = record(&truth, 1e-3, 2000, &[23.0], drive, 2);
+    let found = identified(Kind::BoucWen, &samples, &Form { bouc_wen_n: None, ..Form::default() }, "de");
+    agrees(&found, &truth, sigma);
+    assert_eq!(found.estimate.parameter("n").unwrap().determined, Determined::Yes);
+}

@@ -1,0 +1,160 @@
+//! The searches by name, and their presets.
+
+use super::{De, Gwo, Optimizer, Pso, Shade};
+
+/// Why a search cannot be set up.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MethodError {
+    /// Too small a population.
+    #[error("{setting} = {value}: this search needs at least {least}")]
+    TooFew {
+        /// The setting.
+        setting: &'static str,
+        /// Its value.
+        value: usize,
+        /// The least that works.
+        least: usize,
+    },
+    /// A setting is out of its range.
+    #[error("{setting} = {value}: it has to be from {lower} to {upper}")]
+    OutOfRange {
+        /// The setting.
+        setting: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its lower bound.
+        lower: f64,
+        /// Its upper bound.
+        upper: f64,
+    },
+    /// There is no such search.
+    #[error("there is no search {name}; there are {}", Method::NAMES.join(", "))]
+    Unknown {
+        /// The name given.
+        name: String,
+    },
+}
+
+impl MethodError {
+    pub(super) fn at_least(setting: &'static str, value: usize, least: usize) -> Result<(), Self> {
+        if value >= least { Ok(()) } else { Err(Self::TooFew { setting, value, least }) }
+    }
+
+    pub(super) fn within(setting: &'static str, value: f64, lower: f64, upper: f64) -> Result<(), Self> {
+        if (lower..=upper).contains(&value) { Ok(()) } else { Err(Self::OutOfRange { setting, value, lower, upper }) }
+    }
+}
+
+/// A search and its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// [`Shade`].
+    Shade {
+        /// Members at the beginning.
+        population: usize,
+    },
+    /// [`De`].
+    De {
+        /// Members.
+        population: usize,
+        /// F.
+        factor: f64,
+        /// CR.
+        crossover: f64,
+    },
+    /// [`Pso`].
+    Pso {
+        /// Particles.
+        population: usize,
+        /// w.
+        inertia: f64,
+        /// c₁.
+        own: f64,
+        /// c₂.
+        common: f64,
+    },
+    /// [`Gwo`].
+    Gwo {
+        /// Wolves.
+        population: usize,
+        /// Where in the box the origin of its equations lies.
+        origin: f64,
+    },
+}
+
+impl Method {
+    /// Names that [`named`](Self::named) knows.
+    pub const NAMES: [&'static str; 6] = ["de", "de-rand-1-bin", "pso", "pso-xie", "gwo", "gwo-paper"];
+
+    /// A search by its name, set up for a number of variables:
+    ///
+    /// - `de`: L-SHADE with 18 members a variable, but at most 120; the best choice for all models here.
+    /// - `de-rand-1-bin`: ten members a variable, F = 0.5, CR = 0.9 (Storn & Price).
+    /// - `pso`: 40 particles, Clerc's constriction (w = 0.7298, c = 1.49618).
+    /// - `pso-xie`: 30 particles, w = 0.8, c = 1.5, as in the paper on activation functions (200 iterations there). Just beyond the
+    ///   limit of stability, so the swarm never settles quite.
+    /// - `gwo`: 50 wolves about the centre of the box.
+    /// - `gwo-paper`: 100 wolves about its lower corner, as in the paper on temperature-dependent models (3000 generations).
+    ///
+    /// # Errors
+    /// If there is no such name.
+    pub fn named(name: &str, dimensions: usize) -> Result<Self, MethodError> {
+        Ok(match name {
+            "de" => Self::Shade { population: (18 * dimensions).clamp(20, 120) },
+            "de-rand-1-bin" => Self::De { population: 10 * dimensions.max(1), factor: 0.5, crossover: 0.9 },
+            "pso" => Self::Pso { population: 40, inertia: 0.7298, own: 1.49618, common: 1.49618 },
+            "pso-xie" => Self::Pso { population: 30, inertia: 0.8, own: 1.5, common: 1.5 },
+            "gwo" => Self::Gwo { population: 50, origin: 0.5 },
+            "gwo-paper" => Self::Gwo { population: 100, origin: 0.0 },
+            _ => return Err(MethodError::Unknown { name: name.into() }),
+        })
+    }
+
+    /// Members, particles or wolves at the beginning.
+    pub fn population(&self) -> usize {
+        match self {
+            Self::Shade { population }
+            | Self::De { population, .. }
+            | Self::Pso { population, .. }
+            | Self::Gwo { population, .. } => *population,
+        }
+    }
+
+    /// The same with another population.
+    #[must_use]
+    pub fn with_population(mut self, wanted: usize) -> Self {
+        match &mut self {
+            Self::Shade { population }
+            | Self::De { population, .. }
+            | Self::Pso { population, .. }
+            | Self::Gwo { population, .. } => *population = wanted,
+        }
+        self
+    }
+
+    /// The search, for a number of variables and of evaluations.
+    ///
+    /// # Errors
+    /// If a setting is out of its range.
+    pub fn build(
+        &self,
+        dimensions: usize,
+        evaluations: u64,
+        seed: u64,
+    ) -> Result<Box<dyn Optimizer + Send>, MethodError> {
+        Ok(match *self {
+            Self::Shade { population } => Box::new(Shade::new(dimensions, population, evaluations, seed)?),
+            Self::De { population, factor, crossover } => {
+                Box::new(De::new(dimensions, population, factor, crossover, seed)?)
+            }
+            Self::Pso { population, inertia, own, common } => {
+                Box::new(Pso::new(dimensions, population, inertia, own, common, seed)?)
+            }
+            Self::Gwo { population, origin } => {
+                let generations = evaluations / (population.max(1) as u64);
+                Box::new(Gwo::new(dimensions, population, generations, origin, seed)?)
+            }
+        })
+    }
+}

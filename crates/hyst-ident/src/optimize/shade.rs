@@ -1,0 +1,207 @@
+//! Differential evolution that learns its own settings: L-SHADE.
+
+use super::de::inside;
+use super::population::{Draws, Pending, Points, comparable};
+use super::{Asked, MethodError, Optimizer, SearchError};
+
+/// Success-history based adaptive differential evolution with a population that shrinks linearly (Tanabe & Fukunaga 2014).
+///
+/// Rivals are `v = xᵢ + F (x_p − xᵢ) + F (x_a − x_b)`, x_p one of the best `p N`, x_b also from an archive of members that were
+/// beaten; F and CR are drawn about means that follow what succeeded. Settings of the paper: memory of 6, p = 0.11, archive 2.6 N,
+/// 4 members at the end. The population shrinks with the evaluations spent, so it has to be told how many there will be.
+#[derive(Clone, Debug)]
+pub struct Shade {
+    members: Points,
+    archive: Vec<Vec<f64>>,
+    factors: [f64; MEMORY],
+    /// `None`: the crossover rate has died out there, it is zero.
+    crossovers: [Option<f64>; MEMORY],
+    slot: usize,
+    trial: Vec<(f64, f64)>,
+    pending: Pending,
+    draws: Draws,
+    initial: usize,
+    spent: u64,
+    budget: u64,
+    started: bool,
+}
+
+const MEMORY: usize = 6;
+const BEST: f64 = 0.11;
+const ARCHIVE: f64 = 2.6;
+const FEWEST: usize = 4;
+/// Width of both distributions about their means.
+const WIDTH: f64 = 0.1;
+
+impl Shade {
+    /// A population of `population` (at least four) for `budget` evaluations.
+    ///
+    /// # Errors
+    /// If a setting is out of its range; the message names it.
+    pub fn new(dimensions: usize, population: usize, budget: u64, seed: u64) -> Result<Self, MethodError> {
+        MethodError::at_least("population", population, FEWEST)?;
+        let mut draws = Draws::new(seed);
+        let members = Points::latin(dimensions, population, &mut draws);
+        Ok(Self {
+            members,
+            archive: Vec::new(),
+            factors: [0.5; MEMORY],
+            crossovers: [Some(0.5); MEMORY],
+            slot: 0,
+            trial: Vec::new(),
+            pending: Pending::default(),
+            draws,
+            initial: population,
+            spent: 0,
+            budget,
+            started: false,
+        })
+    }
+
+    /// F and CR of one rival.
+    fn settings(&mut self) -> (f64, f64) {
+        let slot = self.draws.index(MEMORY);
+        let crossover = match self.crossovers[slot] {
+            Some(mean) => (mean + WIDTH * self.draws.normal()).clamp(0.0, 1.0),
+            None => 0.0,
+        };
+        loop {
+            let factor = self.draws.cauchy(self.factors[slot], WIDTH);
+            if factor > 0.0 {
+                return (factor.min(1.0), crossover);
+            }
+        }
+    }
+
+    fn rival(&mut self, i: usize, ranked: &[usize]) -> Vec<f64> {
+        let n = self.members.len();
+        let (factor, crossover) = self.settings();
+        self.trial.push((factor, crossover));
+        let leaders = ((BEST * n as f64).round() as usize).clamp(2, n);
+        let leader = ranked[self.draws.index(leaders)];
+        let a = loop {
+            let a = self.draws.index(n);
+            if a != i {
+                break a;
+            }
+        };
+        let b = loop {
+            let b = self.draws.index(n + self.archive.len());
+            if b != i && b != a {
+                break b;
+            }
+        };
+        let certain = self.draws.index(self.members.dimensions);
+        let mut rival = self.members.point(i).to_vec();
+        for (d, x) in rival.iter_mut().enumerate() {
+            if self.draws.uniform() < crossover || d == certain {
+                let beaten = if b < n { self.members.point(b)[d] } else { self.archive[b - n][d] };
+                let towards = factor * (self.members.point(leader)[d] - *x);
+                *x = inside(*x + towards + factor * (self.members.point(a)[d] - beaten), *x);
+            }
+        }
+        rival
+    }
+
+    /// Moves the means towards what succeeded, each by how much it gained.
+    fn learn(&mut self, succeeded: &[(f64, f64, f64)]) {
+        let total: f64 = succeeded.iter().map(|s| s.2).sum();
+        if succeeded.is_empty() || total.is_nan() || total <= 0.0 {
+            return;
+        }
+        // Members that were infinite before say that they gained, not by how much.
+        let weight = |gain: f64| if total.is_finite() { gain / total } else { 1.0 / succeeded.len() as f64 };
+        let lehmer = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+            let squares: f64 = succeeded.iter().map(|s| weight(s.2) * of(s) * of(s)).sum();
+            let plain: f64 = succeeded.iter().map(|s| weight(s.2) * of(s)).sum();
+            if plain > 0.0 { Some(squares / plain) } else { None }
+        };
+        if let Some(mean) = lehmer(&|s| s.0) {
+            self.factors[self.slot] = mean;
+        }
+        self.crossovers[self.slot] = match self.crossovers[self.slot] {
+            Some(_) => lehmer(&|s| s.1),
+            None => None,
+        };
+        self.slot = (self.slot + 1) % MEMORY;
+    }
+
+    /// Drops the worst members until as many are left as the evaluations spent allow.
+    fn shrink(&mut self) {
+        let share = (self.spent as f64 / self.budget.max(1) as f64).min(1.0);
+        let wanted = self.initial as f64 + (FEWEST as f64 - self.initial as f64) * share;
+        let wanted = (wanted.round() as usize).max(FEWEST);
+        if wanted < self.members.len() {
+            let mut kept = self.members.ranked();
+            kept.truncate(wanted);
+            // In their old order: the order decides on nothing but the draws.
+            kept.sort_unstable();
+            let at = kept.iter().flat_map(|i| self.members.point(*i).to_vec()).collect();
+            let costs = kept.iter().map(|i| self.members.costs[*i]).collect();
+            self.members = Points { dimensions: self.members.dimensions, at, costs };
+        }
+        self.trim_archive();
+    }
+
+    fn trim_archive(&mut self) {
+        let room = (ARCHIVE * self.members.len() as f64).round() as usize;
+        while self.archive.len() > room {
+            let out = self.draws.index(self.archive.len());
+            self.archive.swap_remove(out);
+        }
+    }
+}
+
+impl Optimizer for Shade {
+    fn dimensions(&self) -> usize {
+        self.members.dimensions
+    }
+
+    fn ask(&mut self) -> Asked<'_> {
+        if self.pending.is_empty() {
+            self.trial.clear();
+            let ranked = self.members.ranked();
+            for i in 0..self.members.len() {
+                let (point, hopeless) = if self.started {
+                    (self.rival(i, &ranked), self.members.costs[i])
+                } else {
+                    (self.members.point(i).to_vec(), f64::INFINITY)
+                };
+                self.pending.push(&point, hopeless);
+            }
+        }
+        self.pending.asked()
+    }
+
+    fn tell(&mut self, costs: &[f64]) -> Result<(), SearchError> {
+        self.pending.check(costs)?;
+        self.spent += costs.len() as u64;
+        let dimensions = self.members.dimensions;
+        let mut succeeded = Vec::new();
+        for (i, (cost, point)) in costs.iter().zip(self.pending.points.chunks_exact(dimensions)).enumerate() {
+            let (cost, before) = (comparable(*cost), self.members.costs[i]);
+            if !self.started {
+                self.members.costs[i] = cost;
+            } else if cost < before {
+                let (factor, crossover) = self.trial[i];
+                succeeded.push((factor, crossover, before - cost));
+                self.archive.push(self.members.point(i).to_vec());
+                self.members.point_mut(i).copy_from_slice(point);
+                self.members.costs[i] = cost;
+            }
+        }
+        self.started = true;
+        self.pending.clear();
+        self.learn(&succeeded);
+        self.shrink();
+        Ok(())
+    }
+
+    fn best(&self) -> Option<(&[f64], f64)> {
+        self.members.best().map(|i| (self.members.point(i), self.members.costs[i]))
+    }
+
+    fn extent(&self) -> f64 {
+        self.members.extent()
+    }
+}

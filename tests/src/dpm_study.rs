@@ -1,0 +1,166 @@
+//! Prediction and feedforward with the classical and the dynamic Preisach model, as Chen et al. did it on a force actuator
+//! (Tables 2 and 3), with a simulated actuator whose rate-dependence is of another kind: relays with viscous walls.
+
+use std::f64::consts::TAU;
+
+use hyst_hw::{Actuator, Plant, PlantConfig, Sensor, Viscosity};
+use hyst_ident::compensate::{CompensateOptions, compensate};
+use hyst_ident::everett::{DpmReport, FodOptions, fit_dpm, fit_fod};
+use hyst_ident::excite::{DecayingSine, Drive, Forc, Limits, Peak, Shape, Triangle};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::metrics::Errors;
+use hyst_ident::model::{Kind, Model};
+use hyst_ident::record::{Columns, OutputUnit, Record};
+use hyst_ident::simulate::{Zero, simulate};
+
+use crate::measured;
+
+/// Rows per second.
+const RATE: f64 = 10_000.0;
+/// The linear relation that feedforward is to bring about \[N/V\].
+const GAIN: f64 = 0.18;
+/// Frequencies of the calibration \[Hz\]: swings of up to 80 V at mean rates of up to 20 V/ms, which cover the waveforms.
+const CALIBRATION: [f64; 7] = [10.0, 20.0, 35.0, 55.0, 75.0, 100.0, 125.0];
+
+/// Errors on one waveform \[N\].
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The waveform.
+    pub name: &'static str,
+    /// RMSE of the prediction: classical model from slow curves, classical model fitted to all rates, dynamic model.
+    pub predicted: [f64; 3],
+    /// RMSE of tracking: without compensation, classical inverse, dynamic inverse.
+    pub tracked: [f64; 3],
+}
+
+/// What the study found.
+#[derive(Clone, Debug)]
+pub struct DpmStudy {
+    /// What the fit says.
+    pub report: DpmReport,
+    /// The four waveforms.
+    pub rows: Vec<Row>,
+}
+
+/// 0.18 N/V at low rates; a relay turns after 5 mV·s of overdrive, so that the classical model errs about as much as in the
+/// paper's Table 2.
+fn actuator(seed: u64) -> PlantConfig {
+    PlantConfig {
+        seed,
+        actuator: Actuator {
+            min_v: 0.0,
+            max_v: 100.0,
+            rest_v: 0.0,
+            gain_um_per_v: GAIN,
+            loop_share: 0.12,
+            relays: 15_000,
+        },
+        sensor: Sensor { range_um: [-10.0, 30.0], bits: 16, noise_um: 0.005, offset_um: 0.0, max_rate_hz: 20_000.0 },
+        viscosity: Some(Viscosity { volt_seconds: 5e-3 }),
+        delay: None,
+        lag: None,
+        temperature: None,
+        creep: None,
+        modes: Vec::new(),
+        drift: None,
+        interference: None,
+    }
+}
+
+/// The paper's kind of waveforms \[V\], from rest at 0 V and between 0 and 80 V.
+fn waveforms() -> [(&'static str, Vec<f64>); 4] {
+    let rows = |seconds: f64, u: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        let lead = 0.02;
+        // To the first value in 20 ms, so that each begins at rest.
+        let begin = u(0.0);
+        (0..=((seconds + lead) * RATE) as usize)
+            .map(|k| {
+                let t = k as f64 / RATE;
+                if t < lead { begin * (0.5 - 0.5 * (0.5 * TAU * t / lead).cos()) } else { u(t - lead) }
+            })
+            .collect()
+    };
+    // Frequency and amplitude fall: f (1 − t / 2T), e^(−t/T).
+    let decaying =
+        |hz: f64| rows(0.1, &|t| 40.0 + 38.0 * (-t / 0.1).exp() * (TAU * hz * (t - 0.25 * t * t / 0.1)).sin());
+    let simple = rows(0.12, &|t| 40.0 + 22.0 * (TAU * 25.0 * t).sin() + 14.0 * (TAU * 58.0 * t + 0.9).sin());
+    let complex = rows(0.12, &|t| {
+        let tones = [(23.0, 13.0, 0.3), (41.0, 12.0, 2.1), (67.0, 9.0, 4.0), (98.0, 5.0, 1.2)];
+        40.0 + tones.iter().map(|(hz, a, p)| a * (TAU * hz * t + p).sin()).sum::<f64>()
+    });
+    [
+        ("75 Hz variable frequency sine", decaying(75.0)),
+        ("50 Hz variable frequency sine", decaying(50.0)),
+        ("simple arbitrary waveform", simple),
+        ("complex arbitrary waveform", complex),
+    ]
+}
+
+fn played(plant: &mut Plant, shapes: &[Shape], name: &str) -> Record {
+    let limits = Limits { rate_hz: RATE, lo_v: 0.0, hi_v: 90.0, slew_v_per_s: None };
+    let drive = Drive::new(shapes, &limits, 1.0).expect("the shapes are sound");
+    crate::played(plant, &drive, RATE, OutputUnit::Newton, name)
+}
+
+/// Runs the study on the actuator of a seed.
+///
+/// # Panics
+/// When a part of it refuses what the study gives it.
+pub fn run(seed: u64) -> DpmStudy {
+    let mut plant = Plant::new(actuator(seed)).expect("the actuator is sound");
+    let curves = Shape::Forc(Forc { curves: 18, peak_s: 0.5, rest_s: 0.02, peak: Peak::HalfSine });
+    let slow = played(&mut plant, &[curves], "slow");
+    let calibration: Vec<Shape> = CALIBRATION
+        .iter()
+        .flat_map(|hz| {
+            let cycles = 2;
+            [
+                Shape::DecayingSine(DecayingSine { frequency_hz: *hz, duration_s: f64::max(0.2, 4.0 / hz) }),
+                Shape::Triangle(Triangle { frequency_hz: *hz, cycles }),
+            ]
+        })
+        .collect();
+    let calibration = played(&mut plant, &calibration, "calibration");
+
+    let failed = "the records suit the model";
+    let classical = fit_fod(&slow, &FodOptions::default()).expect(failed).model;
+    let all = Record::join(vec![slow, calibration]).expect("the records are alike");
+    let overall = fit(&all, Kind::Preisach, &FitOptions::default()).expect(failed);
+    let dynamic = fit_dpm(&all, &FitOptions::default()).expect(failed);
+
+    let rows = waveforms()
+        .into_iter()
+        .map(|(name, drive)| {
+            let test = measured(&mut plant, &[&drive], RATE, OutputUnit::Newton, name);
+            let predicted = [&classical, &overall, &dynamic.model].map(|model| {
+                let errors = simulate(model, &test, Zero::None).expect(failed).errors;
+                errors.map_or(f64::NAN, |e| e.rmse_all_rows)
+            });
+            let wanted: Vec<f64> = drive.iter().map(|u| GAIN * u).collect();
+            let mut tracked = |drive: &[f64]| {
+                let run = measured(&mut plant, &[drive], RATE, OutputUnit::Newton, name);
+                let force = run.output().unwrap_or_default();
+                Errors::of(&wanted, force, &vec![false; wanted.len()]).map_or(f64::NAN, |e| e.rmse)
+            };
+            let tracked = [
+                tracked(&drive),
+                tracked(&compensated(&classical, &wanted)),
+                tracked(&compensated(&dynamic.model, &wanted)),
+            ];
+            Row { name, predicted, tracked }
+        })
+        .collect();
+    DpmStudy { report: dynamic.report, rows }
+}
+
+fn compensated(model: &Model, wanted: &[f64]) -> Vec<f64> {
+    let reference = Record::from_samples(Columns {
+        name: "reference".into(),
+        time: (0..wanted.len()).map(|k| k as f64 / RATE).collect(),
+        output: Some((OutputUnit::Newton, wanted.iter().map(|y| y + model.zero).collect())),
+        ..Columns::default()
+    })
+    .expect("the reference is sound");
+    let options = CompensateOptions { voltage: Some((0.0, 100.0)), ..CompensateOptions::default() };
+    compensate(model, &reference, &options).expect("the model has an inverse").voltage
+}

@@ -1,0 +1,100 @@
+//! `fit` from first-order descent curves, and of the dynamic model: what it says, writes and refuses.
+
+use hyst_tests::Lab;
+
+/// A mode that rings, so that triangular curves dent the surface.
+const RINGING: &str = "[[mode]]\nhz = 20\ndamping = 0.05\ngain = 0.9\n";
+
+fn curves(plant: &str, options: &str) -> Lab {
+    let lab = Lab::new();
+    lab.write("plant.toml", format!("{}{plant}", hyst_tests::PLANT.replace("[lag]\nseconds = 0.01\n", "")));
+    lab.ok(&format!("excite forc --high 100 --rate 1000 --curves 40 {options} -o u.csv"));
+    lab.ok("run --daq sim:plant.toml --drive u.csv --record fod.csv");
+    lab
+}
+
+#[test]
+fn half_sine_curves_of_several_durations_make_a_model() {
+    let lab = curves(RINGING, "--seconds 0.8,1,1.25 --rest 0.5");
+    let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
+    assert_eq!(ran.stderr, "");
+    for part in ["40 cells a side", "half-sine of 0.8", "half-sine of 1.25", "0 cells violated"] {
+        assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
+    }
+    let report = lab.ok("fit fod.csv --model preisach --from fod --as-measured -o same.json --json").json();
+    assert_eq!(lab.read("model.json"), lab.read("same.json"));
+    assert_eq!(report["surface"]["families"].as_array().unwrap().len(), 3);
+    assert!(report["surface"]["moved"].is_null());
+    assert!(report["errors"]["nrmse_percent"].as_f64().unwrap() < 0.6, "{report}");
+    lab.ok("simulate --model model.json fod.csv -o out.csv");
+}
+
+#[test]
+fn violated_cells_are_listed_and_the_nearest_surface_is_taken() {
+    let lab = curves(RINGING, "--seconds 1 --rest 0.5 --peak triangle");
+    let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
+    for part in ["warning: in", "alpha [V]", "sigmas", "half-sine peaks", "nearest valid"] {
+        assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
+    }
+    let report = lab.ok("fit fod.csv --model preisach --from fod -o model.json --json").json();
+    let breaches = report["surface"]["breaches"].as_array().unwrap();
+    assert!(breaches.len() > 3);
+    for b in breaches {
+        assert!(b["sigmas"].as_f64().unwrap() > 3.0 && b["by"].as_f64().unwrap() > 0.0, "{b}");
+        assert!(b["alpha"].as_f64().unwrap() > b["beta"].as_f64().unwrap(), "{b}");
+    }
+    assert!(report["surface"]["moved"]["largest"].as_f64().unwrap() > 0.0);
+    let message = lab.refuses("fit fod.csv --model preisach --from fod --as-measured -o new.json", 2);
+    assert!(message.contains("more than 3 standard errors"), "{message}");
+}
+
+#[test]
+fn what_does_not_suit_is_refused_and_curves_are_pointed_out() {
+    let lab = Lab::with_train("");
+    let message = lab.refuses("fit train.csv --model preisach --from fod -o m.json", 2);
+    assert!(message.contains("excite forc"), "{message}");
+    let message = lab.refuses("fit train.csv --model pi --from fod -o m.json", 2);
+    assert!(message.contains("--model preisach"), "{message}");
+    let message = lab.refuses("fit train.csv --model preisach --from rows --as-measured -o m.json", 2);
+    assert!(message.contains("--from fod"), "{message}");
+    // Without being told, curves are rows like others; a note says that there is more in them.
+    let lab = curves("", "--seconds 1 --rest 0.2");
+    let ran = lab.ok("fit fod.csv --model preisach -o rows.json");
+    assert!(ran.stderr.contains("--from fod"), "{}", ran.stderr);
+    assert_eq!(lab.ok("fit fod.csv --model preisach --from rows -o same.json").stderr, "");
+    assert_eq!(lab.read("rows.json"), lab.read("same.json"));
+}
+
+#[test]
+fn a_dynamic_model_comes_from_records_at_several_rates() {
+    let lab = Lab::new();
+    let plant = hyst_tests::PLANT.replace("[lag]\nseconds = 0.01\n", "[viscosity]\nvolt_seconds = 5e-3\n");
+    lab.write("plant.toml", plant);
+    let record = |name: &str, excite: &str| {
+        lab.ok(&format!("excite {excite} --high 100 --rate 5000 -o u.csv"));
+        lab.ok(&format!("run --daq sim:plant.toml --drive u.csv --record {name}"));
+    };
+    record("slow.csv", "forc --curves 15 --seconds 0.6 --rest 0.05");
+    record("20.csv", "decaying-sine --frequency 20 --seconds 0.4");
+    record("35.csv", "decaying-sine --frequency 35 --seconds 0.4");
+    record("60.csv", "decaying-sine --frequency 60 --seconds 0.3");
+    record("test.csv", "decaying-sine --frequency 45 --seconds 0.3");
+    let message = lab.refuses("fit slow.csv --model dpm -o m.json", 2);
+    assert!(message.contains("at other rates"), "{message}");
+    lab.ok("fit slow.csv --model preisach --from fod -o classical.json");
+    let report = lab.ok("fit slow.csv 20.csv 35.csv 60.csv --model dpm -o dynamic.json --json").json();
+    let found = &report["dynamics"];
+    assert_eq!(found["slow_segments"], 1);
+    assert_eq!(found["classical"]["fod"]["families"][0]["curves"], 15);
+    assert!(found["rmse"].as_f64().unwrap() < 0.6 * found["rmse_classical"].as_f64().unwrap(), "{found}");
+    let rmse = |model: &str| {
+        let report = lab.ok(&format!("simulate --model {model} test.csv -o out.csv --json")).json();
+        report["errors"]["rmse_all_rows"].as_f64().unwrap()
+    };
+    let (dynamic, classical) = (rmse("dynamic.json"), rmse("classical.json"));
+    assert!(dynamic < 0.73 * classical, "{dynamic} {classical}");
+    let ran = lab.ok("fit slow.csv 60.csv --model dpm -o one.json");
+    assert!(ran.stdout.contains("mirror function from"), "{}", ran.stdout);
+    // One fast rate leaves much of the grid untouched, and that is said.
+    assert!(ran.stderr.contains("no row comes near") && ran.stderr.contains("rate [V/s]"), "{}", ran.stderr);
+}
