@@ -15,6 +15,7 @@ pub mod excite;
 pub mod export;
 pub mod fit;
 pub mod full_memory;
+pub mod linear;
 mod lsq;
 pub mod metrics;
 pub mod model;
