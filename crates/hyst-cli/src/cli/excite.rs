@@ -134,6 +134,9 @@ pub(crate) enum ExciteKind {
         /// Duration of each fade; a tenth of the whole if not given
         #[arg(long, value_name = "S")]
         fade: Option<f64>,
+        /// How often the sum repeats, for averages over periods (response --period)
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        periods: u32,
         /// Seed of random phases; phases of low crest factor if not given
         #[arg(long)]
         seed: Option<u64>,
@@ -159,15 +162,62 @@ pub(crate) enum ExciteKind {
         /// How many peaks
         #[arg(long, value_name = "N", default_value_t = 10)]
         curves: u32,
-        /// Duration of a peak
-        #[arg(long, value_name = "S", default_value_t = 1.0)]
-        seconds: f64,
+        /// Duration of a peak; several (as 0.5,1,2) make one segment each, to average structural modes away
+        #[arg(long, value_name = "S", value_delimiter = ',', default_value = "1")]
+        seconds: Vec<f64>,
         /// Rest after each peak
         #[arg(long, value_name = "S", default_value_t = 0.5)]
         rest: f64,
         /// Form of the peaks
         #[arg(long, value_enum, default_value_t = PeakForm::HalfSine)]
         peak: PeakForm,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Sine around mid-span whose amplitude swings: every amplitude at one frequency
+    AmSine {
+        /// Frequency
+        #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+        frequency: f64,
+        /// Frequency at which the amplitude swings
+        #[arg(long, value_name = "HZ", default_value_t = 0.2)]
+        modulation: f64,
+        /// How far the amplitude swings; 1 = down to nothing
+        #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
+        depth: f64,
+        /// Whole swings of the amplitude
+        #[arg(long, value_name = "N", default_value_t = 2)]
+        cycles: u32,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Sines around mid-span, one segment for each amplitude and frequency: for gain maps
+    Tones {
+        /// Frequencies
+        #[arg(long, value_name = "HZ", value_delimiter = ',', default_value = "1,5,10,20")]
+        frequencies: Vec<f64>,
+        /// Amplitudes as shares of half the span
+        #[arg(long, value_name = "SHARE", value_delimiter = ',', default_value = "0.25,0.5,0.75,1")]
+        amplitudes: Vec<f64>,
+        /// Cycles of each, without fades
+        #[arg(long, value_name = "N", default_value_t = 10)]
+        cycles: u32,
+        /// Rest between segments
+        #[arg(long, value_name = "S", default_value_t = 0.5)]
+        rest: f64,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Small cosine waves at several levels: minor loops
+    MinorLoops {
+        /// How many levels
+        #[arg(long, value_name = "N", default_value_t = 5)]
+        levels: u32,
+        /// Height of the loops as a share of the span
+        #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+        share: f64,
+        #[command(flatten)]
+        periodic: Periodic,
         #[command(flatten)]
         common: Common,
     },

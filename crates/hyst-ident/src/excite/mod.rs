@@ -4,16 +4,19 @@
 //! rest at the lowest voltage, stays between the lowest and the highest, and keeps to the slew limit. What is random
 //! depends on its seed alone.
 
+mod crest;
 mod identification;
 mod shapes;
 #[cfg(test)]
 mod tests;
+mod waves;
 
 use std::io::Write;
 use std::ops::Range;
 
 pub use identification::Identification;
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
+pub use waves::{AmSine, MinorLoops, Tone};
 
 use crate::record::{Columns, Extra, Record, RecordError, WriteError};
 
