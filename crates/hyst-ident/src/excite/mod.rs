@@ -6,6 +6,7 @@
 
 mod crest;
 mod identification;
+mod separate;
 mod shapes;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use std::io::Write;
 use std::ops::Range;
 
 pub use identification::Identification;
+pub use separate::{SeparateOptions, Separation, Suspect, Tried, Verdict, separate};
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
 pub use waves::{AmSine, MinorLoops, Tone};
 
@@ -75,6 +77,12 @@ pub enum ExciteError {
         limit: f64,
         /// Which field to change.
         remedy: &'static str,
+    },
+    /// An effect cannot be told from itself.
+    #[error("both effects are {effect}; give two different ones")]
+    Same {
+        /// The effect.
+        effect: &'static str,
     },
     /// There is no shape to make a drive of.
     #[error("a drive needs at least one segment")]
