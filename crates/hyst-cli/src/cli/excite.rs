@@ -1,6 +1,7 @@
 //! Arguments of `excite`.
 
 use clap::{Args, Subcommand, ValueEnum};
+use hyst_ident::excite::Suspect;
 
 use super::JsonArg;
 use crate::output::Target;
@@ -9,6 +10,7 @@ const EXAMPLES: &str = "\
 Examples:
   hystctl excite identification --rate 1000 --high 120 -o u.csv
   hystctl excite sine --frequency 2 --cycles 5 --low -20 --high 120 -o u.csv
+  hystctl excite separate lag delay --high 120 -o u.csv
   hystctl excite --help; hystctl excite stairs --help
 
 Every segment starts and ends at rest at the lowest voltage and stays within the limits.";
@@ -208,6 +210,7 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
+    Separate(SeparateArgs),
     /// Small cosine waves at several levels: minor loops
     MinorLoops {
         /// How many levels
@@ -221,6 +224,36 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
+}
+
+/// The drive that tells two effects apart, and why
+///
+/// For each drive of a family it is computed, with a typical actuator, how much of what one effect does the best-fitting other
+/// one cannot imitate; the drive that leaves most is written. Effects: delay, lag, asymmetry, rate-dependence, temperature,
+/// creep, load, resonance, saturation, drift, interference.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl excite separate lag delay --high 120 --slew 20000 -o u.csv")]
+pub(crate) struct SeparateArgs {
+    /// One effect
+    #[arg(value_name = "EFFECT")]
+    pub(crate) first: Suspect,
+    /// The other
+    #[arg(value_name = "OTHER")]
+    pub(crate) second: Suspect,
+    /// Duration
+    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    pub(crate) seconds: f64,
+    /// Noise of the sensor as a share of the output's span
+    #[arg(long, value_name = "SHARE", default_value_t = 0.001)]
+    pub(crate) noise: f64,
+    /// The record will have temperature_degc
+    #[arg(long)]
+    pub(crate) thermometer: bool,
+    /// The record will have load_n
+    #[arg(long)]
+    pub(crate) load_cell: bool,
+    #[command(flatten)]
+    pub(crate) common: Common,
 }
 
 /// Waves that repeat.

@@ -6,10 +6,12 @@ use hyst_ident::excite::{
 };
 use serde::Serialize;
 
-use crate::cli::{Common, ExciteArgs, ExciteKind, PeakForm};
+use crate::cli::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::text;
+
+mod separate;
 
 /// What is said about a drive.
 #[derive(Debug, Serialize)]
@@ -26,7 +28,10 @@ struct Summary<'a> {
 
 /// Runs the command.
 pub(super) fn run(args: &ExciteArgs) -> CommandResult {
-    let Made { common, drive, crest_factor } = make(&args.kind);
+    let Made { common, drive, crest_factor } = match make(&args.kind) {
+        Ok(made) => made,
+        Err(separation) => return separate::run(separation),
+    };
     output::check(&[], &[&common.output])?;
     let report = Report::new(common.json.json, &[&common.output])?;
     let drive = drive.map_err(in_options)?;
@@ -50,11 +55,12 @@ struct Made<'a> {
 }
 
 /// Rest between segments of one kind \[s\].
-const FORC_REST: f64 = 1.0;
+const REST: f64 = 1.0;
 
-fn make(kind: &ExciteKind) -> Made<'_> {
+/// Makes the drive, or gives back the arguments of a separation, which has a report of its own.
+fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
     let limits = |c: &Common| Limits { rate_hz: c.rate, lo_v: c.low, hi_v: c.high, slew_v_per_s: c.slew };
-    let (mut crest_factor, mut between) = (None, FORC_REST);
+    let (mut crest_factor, mut between) = (None, REST);
     let (common, shapes) = match kind {
         ExciteKind::Identification { seconds, rest, slow, fast, band, hold, ramp, seed, common } => {
             let usual = Identification::at_rate(common.rate, *seed);
@@ -68,8 +74,9 @@ fn make(kind: &ExciteKind) -> Made<'_> {
                 ramp_s: ramp.unwrap_or(usual.ramp_s),
                 seed: *seed,
             };
-            return Made { common, drive: spec.drive(&limits(common)), crest_factor: None };
+            return Ok(Made { common, drive: spec.drive(&limits(common)), crest_factor: None });
         }
+        ExciteKind::Separate(args) => return Err(args),
         ExciteKind::Sine { periodic, common } => {
             (common, vec![Shape::Sine(Sine { frequency_hz: periodic.frequency, cycles: periodic.cycles })])
         }
@@ -122,7 +129,7 @@ fn make(kind: &ExciteKind) -> Made<'_> {
             (common, vec![Shape::MinorLoops(MinorLoops { levels: *levels, share: *share, frequency_hz, cycles })])
         }
     };
-    Made { common, drive: Drive::new(&shapes, &limits(common), between), crest_factor }
+    Ok(Made { common, drive: Drive::new(&shapes, &limits(common), between), crest_factor })
 }
 
 /// The library's fields and the options that set them.

@@ -72,7 +72,7 @@ pub struct Multisine {
     /// The highest line \[Hz\].
     pub high_hz: f64,
     /// How many lines, evenly spaced; each is moved to a whole number of cycles in a period, with
-    /// [`Phases::LowCrest`] to a multiple of one spacing: phases cannot flatten a sum of uneven lines.
+    /// [`Phases::LowCrest`] to a multiple of one spacing, as many as fit: phases cannot flatten a sum of uneven lines.
     pub lines: u32,
     /// How often the sum repeats in `duration_s`, fades included: a period is `duration_s / periods`.
     pub periods: u32,
@@ -341,14 +341,13 @@ impl Multisine {
         let spacing = if self.lines == 1 { 0.0 } else { (high - low) / (count - 1.0) };
         let (low, spacing) = match self.phases {
             Phases::LowCrest if spacing > 1.0 => {
-                let whole = spacing.floor();
-                // The nearest multiple of the spacing that leaves room for all lines.
-                let most = ((high - (count - 1.0) * whole) / whole).floor();
-                ((low / whole).round().min(most).max(1.0) * whole, whole)
+                let whole = spacing.round();
+                ((low / whole).round().max(1.0) * whole, whole)
             }
             _ => (low, spacing),
         };
-        Ok((0..self.lines).map(|k| (low + f64::from(k) * spacing).round() as usize).collect())
+        let lines = (0..self.lines).map(|k| (low + f64::from(k) * spacing).round());
+        Ok(lines.take_while(|line| *line <= high).map(|line| line as usize).collect())
     }
 
     fn phases(&self, cycles: &[usize]) -> Vec<f64> {

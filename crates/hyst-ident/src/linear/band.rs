@@ -6,20 +6,15 @@
 use super::FrequencyResponse;
 use crate::Samples;
 
-/// Lines over which the coherence is smoothed.
-const SMOOTHED: usize = 9;
-
-/// The highest frequency up to which the drive moves the output \[Hz\]: that of the last line at which the coherence, the median
-/// of nine lines, is above one half. `None` if it is nowhere.
+/// The highest frequency up to which the drive moves the output \[Hz\]: there the sum of coherence − ½ over all lines below is
+/// greatest, so that neither a dip nor a few lines of chance decide. `None` if the coherence is below one half everywhere.
 pub fn band_of(response: &FrequencyResponse) -> Option<f64> {
-    let window = SMOOTHED.min(response.lines.len()).max(1);
-    let median = |lines: &[super::ResponseLine]| {
-        let mut coherence: Vec<f64> = lines.iter().map(|line| line.coherence).collect();
-        coherence.sort_by(f64::total_cmp);
-        coherence[coherence.len() / 2]
-    };
-    let last = response.lines.windows(window).rposition(|lines| median(lines) > 0.5)?;
-    Some(response.lines[last + window / 2].hz)
+    let mut sum = 0.0;
+    let sums = response.lines.iter().map(|line| {
+        sum += line.coherence - 0.5;
+        (sum, line.hz)
+    });
+    sums.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(sum, _)| *sum > 0.0).map(|(_, hz)| hz)
 }
 
 /// A record with fewer rows.

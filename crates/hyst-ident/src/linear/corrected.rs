@@ -55,10 +55,10 @@ pub fn corrected_loop(
     hz: Option<f64>,
     phase: f64,
 ) -> Result<CorrectedLoop, LinearError> {
-    require("--phase", phase.to_degrees(), phase.abs() <= TAU, "between -360 and 360 degrees")?;
+    require("phase", phase.to_degrees(), phase.abs() <= TAU, "between -360 and 360 degrees")?;
     let no_sine = |reason: &str| LinearError::NoSine { reason: reason.into() };
     let hz = hz.or_else(|| strongest(x, period)).ok_or_else(|| no_sine("it does not move"))?;
-    require("--frequency", hz, hz.is_finite() && hz > 0.0, "a positive number")?;
+    require("hz", hz, hz.is_finite() && hz > 0.0, "a positive number")?;
     let cycle = 1.0 / (hz * period);
     let shift = -phase / TAU * cycle;
     let start = cycle.round() as usize;

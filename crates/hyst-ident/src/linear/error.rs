@@ -34,14 +34,14 @@ pub enum LinearError {
     },
     /// The equations could not be solved.
     #[error(
-        "no ARMAX model of order {order} fits the record; try a lower order, or --to HZ below the drive's highest frequency"
+        "no ARMAX model of order {order} fits the record; take a lower order, or a band that ends at the drive's highest frequency"
     )]
     Unfit {
         /// The order.
         order: usize,
     },
     /// No periods of the drive repeat.
-    #[error("no period of {seconds} s repeats: {reason}; give the period of the drive, or leave --period away")]
+    #[error("no period of {seconds} s repeats: {reason}; give the period of the drive, or none")]
     NotPeriodic {
         /// The period asked for \[s\].
         seconds: f64,

@@ -53,7 +53,7 @@ const ROWS: f64 = 12.0;
 /// When no segment has three cycles of at least twelve rows.
 pub fn gain_map(samples: &Samples, hz: Option<f64>) -> Result<Vec<GainPoint>, LinearError> {
     if let Some(hz) = hz {
-        require("--frequency", hz, hz.is_finite() && hz > 0.0, "a positive number")?;
+        require("hz", hz, hz.is_finite() && hz > 0.0, "a positive number")?;
     }
     let mut points = Vec::new();
     let mut found = None;
@@ -91,7 +91,9 @@ pub(super) fn strongest(x: &[f64], period: f64) -> Option<f64> {
     }
     fft.process(&mut padded, &mut spectrum).ok()?;
     let power: Vec<f64> = spectrum.iter().map(Complex::norm_sqr).collect();
-    let top = (1..power.len().saturating_sub(1)).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+    // The slope's spectrum: of a small sine around mid-span the way there and back is far the larger motion, but slow.
+    let slope = |i: usize| power[i] * (i as f64).powi(2);
+    let top = (1..power.len().saturating_sub(1)).max_by(|a, b| slope(*a).total_cmp(&slope(*b)))?;
     if power[top] <= 0.0 {
         return None;
     }

@@ -21,7 +21,7 @@ const EXCITED: f64 = 0.01;
 /// # Errors
 /// When the period is no whole number of rows, or fewer than two periods repeat.
 pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyResponse, LinearError> {
-    require("--period", period_s, period_s.is_finite() && period_s > 0.0, "a positive number of seconds")?;
+    require("period_s", period_s, period_s.is_finite() && period_s > 0.0, "a positive number of seconds")?;
     let rows = period_s / samples.period;
     let length = rows.round() as usize;
     let reason = |reason: String| LinearError::NotPeriodic { seconds: period_s, reason };

@@ -131,6 +131,18 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
         assert!((point.phase - im.atan2(re)).abs() < 5e-3, "{point:?} {}", im.atan2(re));
         assert!(point.gain_std_error.unwrap() < 1e-3 && point.harmonics > 0.01);
     }
+    // A small sine far from rest: the way there is the larger motion.
+    let small: Vec<f64> = (0..6000)
+        .map(|k| {
+            let t = k as f64 * PERIOD;
+            t.min(6.0 - t).min(1.0) * (50.0 + 4.0 * (TAU * 5.0 * t).sin())
+        })
+        .collect();
+    let y = through(&pi, &small);
+    let points = gain_map(&samples(PERIOD, small, y), None).unwrap();
+    let steady = points.iter().max_by_key(|p| p.cycles).unwrap();
+    assert!((steady.hz / 5.0 - 1.0).abs() < 2e-3 && (steady.amplitude - 4.0).abs() < 0.01, "{points:?}");
+    assert!((steady.bias - 50.0).abs() < 0.05 && (steady.gain - 1.0).abs() < 1e-3, "{steady:?}");
     // A decaying sine gives a point of each cycle.
     let decaying: Vec<f64> =
         (0..4000).map(|k| 80.0 * (1.0 - k as f64 / 4000.0) * (TAU * 5.0 * k as f64 * PERIOD).sin()).collect();
@@ -165,5 +177,24 @@ fn the_structures_phase_is_removed_and_the_loop_is_left() {
     assert!((with.gain / bare.gain * ((1.0 - s.0 * s.0).powi(2) + s.1 * s.1).sqrt() - 1.0).abs() < 0.01);
     assert!((with.hz - hz).abs() < 0.01, "{}", with.hz);
     assert!(matches!(corrected_loop(period, &u[..900], &alone, None, 0.0), Err(LinearError::NoSine { .. })));
-    assert!(matches!(corrected_loop(period, &u, &alone, None, 9.0), Err(LinearError::Field { field: "--phase", .. })));
+    assert!(matches!(corrected_loop(period, &u, &alone, None, 9.0), Err(LinearError::Field { field: "phase", .. })));
+}
+
+#[test]
+fn a_structure_is_identified_from_a_record_that_is_too_fast_for_it() {
+    // One mode driven by a multisine up to 60 Hz, at 4 kHz.
+    let period = 2.5e-4;
+    let mode: Resonance<f64> =
+        ResonanceParams { hz: 35.0, damping: 0.03, gain: 0.8 }.build(&Sampling { period }).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let lines: Vec<(f64, f64)> = (1..120).map(|k| (0.5 * f64::from(k), TAU * rng.random::<f64>())).collect();
+    let u: Vec<f64> = (0..64_000)
+        .map(|k| lines.iter().map(|(hz, phase)| (TAU * hz * k as f64 * period + phase).sin()).sum::<f64>())
+        .collect();
+    let y: Vec<f64> = through(&mode, &u).iter().map(|y| y + 0.2 * normal(&mut rng)).collect();
+    let found = identify_structure(&samples(period, u, y), &StructureOptions::default()).unwrap();
+    assert!((55.0..70.0).contains(&found.band_hz) && found.factor > 15, "{} {}", found.band_hz, found.factor);
+    let near = found.modes.iter().min_by(|a, b| (a.hz - 35.0).abs().total_cmp(&(b.hz - 35.0).abs())).unwrap();
+    assert!((near.hz / 35.0 - 1.0).abs() < 0.01 && (near.damping / 0.03 - 1.0).abs() < 0.1, "{near:?}");
+    assert!(!found.orders.is_empty() && found.simulation_share < 0.05, "{}", found.simulation_share);
 }

@@ -95,12 +95,12 @@ pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyRe
     let longest = samples.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
     let length = match options.window_s {
         Some(seconds) => {
-            require("--window", seconds, seconds.is_finite() && seconds > 0.0, "a positive number of seconds")?;
+            require("window_s", seconds, seconds.is_finite() && seconds > 0.0, "a positive number of seconds")?;
             (seconds / samples.period).round() as usize
         }
         None => (2 * samples.len() / (WINDOWS + 1)).min(longest),
     };
-    let remedy = "record longer, or shorten --window";
+    let remedy = "record longer, or take shorter windows";
     let short = |needed| LinearError::TooShort { what: "the response", needed, found: longest, remedy };
     if length < 16 {
         return Err(short(200));

@@ -27,7 +27,7 @@ pub fn estimate_delay(samples: &Samples) -> Result<usize, LinearError> {
             what: "the delay's estimate",
             needed: 200,
             found: longest,
-            remedy: "record longer, or give --delay",
+            remedy: "record longer, or give the delay",
         });
     }
     // All delays predict the same rows, or their errors could not be compared.

@@ -29,10 +29,12 @@ pub struct ArmaxOptions {
     pub delay: Delay,
 }
 
-/// Most steps of the search.
-const STEPS: usize = 60;
-/// The search ends when a step lowers the cost by less than this share.
-const ENOUGH: f64 = 1e-8;
+/// Steps from each start, before the better one goes on.
+const FIRST_STEPS: usize = 5;
+/// Most steps from there.
+const STEPS: usize = 40;
+/// The search ends when a step lowers the cost by less than this share: far below what a record can tell.
+const ENOUGH: f64 = 1e-6;
 
 /// Fits an ARMAX model: least squares of what a prediction one row ahead misses, over all segments.
 ///
@@ -87,13 +89,14 @@ pub(super) fn fit(signals: &Signals, order: usize, delay: usize) -> Result<Fitte
     }
     let unfit = || LinearError::Unfit { order };
     let long = LongArx::fit(signals, shape).ok_or_else(unfit)?;
-    [long.extended(signals, shape), long.reduced(signals, shape)]
+    let best = [long.extended(signals, shape), long.reduced(signals, shape)]
         .into_iter()
         .flatten()
-        .map(|start| search(signals, shape, start, STEPS))
+        .map(|start| search(signals, shape, start, FIRST_STEPS))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .filter(|best| best.cost.is_finite())
-        .ok_or_else(unfit)
+        .ok_or_else(unfit)?;
+    Ok(search(signals, shape, best.theta, STEPS))
 }
 
 /// Levenberg's and Marquardt's search from a start whose C is stable.

@@ -73,17 +73,17 @@ impl Polynomials<'_> {
 /// fall below 10⁻⁶ of its greatest.
 fn memory(c: &[f64], rows: usize) -> DMatrix<f64> {
     let n = c.len();
-    // Newest last; column j has its one j + 1 rows before the first.
-    let mut history = DMatrix::<f64>::zeros(n + rows, n);
-    (0..n).for_each(|j| history[(n - 1 - j, j)] = 1.0);
+    // Row by row; column j has its one j + 1 rows before the first.
+    let mut history = vec![0.0; (n + rows) * n];
+    (0..n).for_each(|j| history[(n - 1 - j) * n + j] = 1.0);
     let (mut most, mut kept) = (0.0_f64, 0);
     for t in n..n + rows {
-        let mut size = 0.0_f64;
-        for j in 0..n {
-            let h = -c.iter().zip(1..).map(|(c, i)| c * history[(t - i, j)]).sum::<f64>();
-            history[(t, j)] = h;
-            size = size.max(h.abs());
+        let (past, now) = history.split_at_mut(t * n);
+        let now = &mut now[..n];
+        for (c, row) in c.iter().zip(past.rchunks_exact(n)) {
+            now.iter_mut().zip(row).for_each(|(h, before)| *h -= c * before);
         }
+        let size = now.iter().fold(0.0_f64, |most, h| most.max(h.abs()));
         most = most.max(size);
         // A ringing passes through zero: it is over when it stays there.
         if size > 1e-6 * most {
@@ -92,5 +92,5 @@ fn memory(c: &[f64], rows: usize) -> DMatrix<f64> {
             break;
         }
     }
-    history.rows(n, kept).into()
+    DMatrix::from_row_slice(kept, n, &history[n * n..(n + kept) * n])
 }

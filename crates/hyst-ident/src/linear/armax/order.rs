@@ -54,19 +54,22 @@ pub struct OrderChoice {
     pub reason: String,
 }
 
+/// How much more than the best a model's prediction may miss.
+const PREDICTION: f64 = 1.05;
 /// Pieces of the record that are left out in turn.
 const BLOCKS: usize = 12;
 /// Fits in which all blocks are left out once, every third block at a time.
 const FOLDS: usize = 3;
 /// Steps from the model of all rows to the one without the blocks left out.
-const FOLD_STEPS: usize = 8;
+const FOLD_STEPS: usize = 3;
 
 /// Chooses the order by cross-validation: the record is cut into twelve blocks, every third is left out in turn, and what the
-/// models miss in the blocks left out is compared. Taken is the lowest order whose simulation and whose prediction miss no
-/// more than one standard error (over the blocks, of the difference) above the best one's.
+/// models miss in the blocks left out is compared. Taken is the lowest order whose simulation misses no more than one standard
+/// error (over the blocks, of the difference) above the best one's, and whose prediction misses no more than 5 % above the best.
+/// The comparison goes upwards, and ends when two orders in a row simulate no better than the ones before.
 ///
-/// Simulation alone would not see a mode that the drive hardly excites, prediction alone is content with any model that
-/// follows the last rows.
+/// Simulation is what modes, inversions and pictures are for, but it would not see a mode that the drive hardly excites, which
+/// prediction does; prediction alone would go on taking what hysteresis leaves for ever more poles.
 ///
 /// # Errors
 /// When no order can be fitted: the error of the first.
@@ -76,17 +79,27 @@ pub fn choose_order(samples: &Samples, orders: &[usize], delay: Delay) -> Result
         Delay::Rows(delay) => delay,
     };
     let signals = Signals::new(samples)?;
-    let tried: Vec<Result<Candidate, LinearError>> =
-        orders.par_iter().map(|order| Candidate::new(samples, &signals, *order, delay)).collect();
+    let mut orders = orders.to_vec();
+    orders.sort_unstable();
     let mut first_error = None;
     let mut candidates: Vec<Candidate> = Vec::new();
-    for tried in tried {
-        match tried {
-            Ok(candidate) => candidates.push(candidate),
-            Err(error) => first_error = first_error.or(Some(error)),
+    // Two at a time whatever the number of threads, so that the same orders are compared everywhere.
+    for orders in orders.chunks(2) {
+        let tried: Vec<Result<Candidate, LinearError>> =
+            orders.par_iter().map(|order| Candidate::new(samples, &signals, *order, delay)).collect();
+        let least = |of: &[Candidate]| of.iter().map(|c| c.row.simulation).fold(f64::INFINITY, f64::min);
+        let before = least(&candidates);
+        let known = candidates.len();
+        for tried in tried {
+            match tried {
+                Ok(candidate) => candidates.push(candidate),
+                Err(error) => first_error = first_error.or(Some(error)),
+            }
+        }
+        if known > 0 && least(&candidates[known..]) >= before {
+            break;
         }
     }
-    candidates.sort_by_key(|candidate| candidate.row.order);
     let (chosen, reason) = choose(&candidates).ok_or_else(|| first_error.unwrap_or(LinearError::Unfit { order: 0 }))?;
     let model = candidates[chosen].fitted.model(&signals);
     Ok(OrderChoice { table: candidates.iter().map(|candidate| candidate.row).collect(), model, reason })
@@ -97,7 +110,6 @@ struct Candidate {
     row: OrderRow,
     fitted: Fitted,
     /// Mean squared errors of each block left out.
-    one_step: Vec<f64>,
     simulation: Vec<f64>,
 }
 
@@ -133,7 +145,7 @@ impl Candidate {
             aic: loss + 2.0 * unknowns,
             bic: loss + unknowns * count.ln(),
         };
-        Ok(Self { row, fitted, one_step, simulation })
+        Ok(Self { row, fitted, simulation })
     }
 }
 
@@ -170,16 +182,17 @@ fn choose(candidates: &[Candidate]) -> Option<(usize, String)> {
         candidates.iter().filter(usable).min_by(|a, b| figure(&a.row).total_cmp(&figure(&b.row)))
     };
     let (predicts, simulates) = (best(|row| row.one_step)?, best(|row| row.simulation)?);
-    let as_good =
-        |c: &Candidate| !exceeds(&c.one_step, &predicts.one_step) && !exceeds(&c.simulation, &simulates.simulation);
+    let as_good = |c: &Candidate| {
+        c.row.one_step <= PREDICTION * predicts.row.one_step && !exceeds(&c.simulation, &simulates.simulation)
+    };
     let chosen = candidates.iter().position(|c| usable(&c) && as_good(c));
     let chosen = chosen.or_else(|| candidates.iter().position(|c| c.row.order == predicts.row.order))?;
     let reason = format!(
-        "lowest order that misses no more than the best within one standard error over {} blocks left out (best: {} in \
-         prediction, {} in simulation)",
-        predicts.one_step.len(),
-        predicts.row.order,
-        simulates.row.order
+        "lowest order whose simulation of {} blocks left out is within one standard error of the best (order {}), and its \
+         prediction within 5 % (order {})",
+        simulates.simulation.len(),
+        simulates.row.order,
+        predicts.row.order
     );
     Some((chosen, reason))
 }

@@ -111,7 +111,7 @@ impl Signals {
             for (t, e) in found.e.iter().enumerate().take(remembered) {
                 local.row(|p| match p {
                     p if p < n => -found.memory[(t, p)],
-                    p if p < n + unknowns => columns[(t, p - n)],
+                    p if p < n + unknowns => columns[t * unknowns + p - n],
                     _ => *e,
                 });
             }
@@ -124,42 +124,39 @@ impl Signals {
             }
             local.without_first(n, &mut stacked);
             for (t, e) in found.e.iter().enumerate().skip(remembered) {
-                stacked.row(|p| if p == unknowns { *e } else { columns[(t, p)] });
+                stacked.row(|p| if p == unknowns { *e } else { columns[t * unknowns + p] });
             }
         }
         Some(stacked.triangle())
     }
 
-    /// The negative derivatives of one stretch's errors: with them the solution is the step itself.
-    fn derivatives(
-        &self,
-        shape: Shape,
-        theta: &DVector<f64>,
-        rows: &Range<usize>,
-        found: &Innovations,
-    ) -> DMatrix<f64> {
-        let (n, delay) = (shape.n, shape.delay);
+    /// The negative derivatives of one stretch's errors, row by row: with them the solution is the step itself.
+    fn derivatives(&self, shape: Shape, theta: &DVector<f64>, rows: &Range<usize>, found: &Innovations) -> Vec<f64> {
+        let (n, delay, width) = (shape.n, shape.delay, shape.unknowns());
         let model = shape.polynomials(theta);
         let (u, y) = self.of(rows);
         let from = model.reach();
-        let mut columns = DMatrix::zeros(found.e.len(), shape.unknowns());
-        for (p, mut column) in columns.column_iter_mut().enumerate() {
-            let regressor = |t: usize| match p {
-                p if p < n => -y[from + t - 1 - p],
-                p if p <= 2 * n => u[from + t - delay - (p - n)],
-                p if p <= 3 * n => {
-                    let back = p - 2 * n;
-                    if t >= back { found.e[t - back] } else { found.before[back - t - 1] }
-                }
-                _ => 1.0,
-            };
-            let column = column.as_mut_slice();
-            for t in 0..column.len() {
-                let past: f64 = model.c.iter().zip(column[..t].iter().rev()).map(|(c, g)| c * g).sum();
-                column[t] = regressor(t) - past;
+        let mut all = vec![0.0; found.e.len() * width];
+        for t in 0..found.e.len() {
+            let (past, now) = all.split_at_mut(t * width);
+            let now = &mut now[..width];
+            for (p, g) in now.iter_mut().enumerate() {
+                *g = match p {
+                    p if p < n => -y[from + t - 1 - p],
+                    p if p <= 2 * n => u[from + t - delay - (p - n)],
+                    p if p <= 3 * n => {
+                        let back = p - 2 * n;
+                        if t >= back { found.e[t - back] } else { found.before[back - t - 1] }
+                    }
+                    _ => 1.0,
+                };
+            }
+            // 1/C on all columns at once.
+            for (c, row) in model.c.iter().zip(past.rchunks_exact(width)) {
+                now.iter_mut().zip(row).for_each(|(g, before)| *g -= c * before);
             }
         }
-        columns
+        all
     }
 
     /// The model in the record's units.

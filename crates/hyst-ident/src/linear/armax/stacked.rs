@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Rows that are taken in at once, as multiples of the columns.
-const ROWS: usize = 4;
+const ROWS: usize = 12;
 
 /// The triangle R of all rows seen so far; the last column is the target.
 pub(super) struct Stacked {
