@@ -2,8 +2,19 @@
 
 use hyst_tests::{Lab, column};
 
-const KINDS: [&str; 8] =
-    ["identification", "sine", "decaying-sine", "triangle", "stairs", "multisine", "sweep", "forc"];
+const KINDS: [&str; 11] = [
+    "identification",
+    "sine",
+    "decaying-sine",
+    "triangle",
+    "stairs",
+    "multisine",
+    "sweep",
+    "forc",
+    "am-sine",
+    "tones",
+    "minor-loops",
+];
 
 #[test]
 fn every_kind_makes_a_drive_within_its_limits() {
@@ -39,6 +50,19 @@ fn options_do_what_they_say() {
 }
 
 #[test]
+fn several_durations_and_tones_are_segments_and_a_crest_factor_is_told() {
+    let lab = Lab::new();
+    let segments = |line: &str| {
+        let report = lab.ok(&format!("excite {line} --high 100 -o u.csv --json")).json();
+        report["segments"].as_array().unwrap().len()
+    };
+    assert_eq!(segments("forc --curves 3 --seconds 0.5,1,2 --peak triangle"), 3);
+    assert_eq!(segments("tones --frequencies 1,10 --amplitudes 0.2,0.6,1 --cycles 3"), 6);
+    let crest = lab.ok("excite multisine --high 100 --periods 2 -o u.csv --json").json()["crest_factor"].as_f64();
+    assert!(crest.unwrap() < 1.5, "{crest:?}");
+}
+
+#[test]
 fn messages_name_the_options() {
     let lab = Lab::new();
     for (line, parts) in [
@@ -51,6 +75,9 @@ fn messages_name_the_options() {
         ("identification --slow 5 --fast 4 --high 10", ["--fast = 4", "above --slow"]),
         ("multisine --from 9 --to 8 --high 10", ["--to = 8", "at least --from"]),
         ("forc --seconds 0.001 --high 10", ["--seconds = 0.001", "four rows"]),
+        ("forc --seconds 1,0.001 --high 10", ["--seconds = 0.001", "four rows"]),
+        ("am-sine --modulation 9 --high 10", ["--modulation = 9", "fifth of --frequency"]),
+        ("tones --amplitudes 0.5,2 --high 10", ["--amplitudes = 2", "at most 1"]),
     ] {
         let message = lab.refuses(&format!("excite {line} -o u.csv"), 2);
         assert!(parts.iter().all(|part| message.contains(part)), "{line}: {message}");

@@ -11,6 +11,7 @@ use hyst_ident::atomic_file::AtomicFileError;
 use hyst_ident::compensate::CompensateError;
 use hyst_ident::excite::ExciteError;
 use hyst_ident::fit::FitError;
+use hyst_ident::linear::LinearError;
 use hyst_ident::metrics::MetricsError;
 use hyst_ident::model::ModelError;
 use hyst_ident::record::{MapError, RecordError, WriteError};
@@ -113,6 +114,15 @@ impl Classified for FitError {
     fn exit(&self) -> Exit {
         match self {
             Self::Unsolvable { .. } | Self::Compare { source: MetricsError::NotFinite { .. }, .. } => Exit::Failed,
+            _ => Exit::BadInput,
+        }
+    }
+}
+
+impl Classified for LinearError {
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Unfit { .. } => Exit::Failed,
             _ => Exit::BadInput,
         }
     }

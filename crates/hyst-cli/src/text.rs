@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use hyst_ident::metrics::{Errors, Mape};
-use hyst_ident::record::OutputUnit;
+use hyst_ident::record::{OutputUnit, Record};
 
 /// `x` with four significant digits.
 pub(crate) fn short(x: f64) -> String {
@@ -55,6 +55,20 @@ pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
 /// The unit of an output as a person reads it, from the ending of its column.
 pub(crate) fn symbol(suffix: &str) -> &str {
     OutputUnit::of_suffix(suffix).map_or(suffix, |unit| unit.symbol())
+}
+
+/// The unit that a column's name ends in, as a person reads it: `V` of `voltage_v`.
+pub(crate) fn column_unit(column: &str) -> String {
+    match column.rsplit('_').next().unwrap_or(column) {
+        "v" => "V".to_owned(),
+        suffix => symbol(suffix).to_owned(),
+    }
+}
+
+/// The unit of a record's gain, as `µm/V`.
+pub(crate) fn gain_unit(record: &Record) -> String {
+    let output = record.output_unit().map_or("", OutputUnit::symbol);
+    format!("{output}/{}", column_unit(record.input_column()))
 }
 
 /// The errors of a prediction in one line.

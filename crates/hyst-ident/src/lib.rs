@@ -18,6 +18,7 @@ pub mod export;
 pub mod fit;
 pub mod full_memory;
 pub mod identify;
+pub mod linear;
 mod lsq;
 pub mod metrics;
 pub mod model;

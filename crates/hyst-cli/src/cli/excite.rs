@@ -1,6 +1,7 @@
 //! Arguments of `excite`.
 
 use clap::{Args, Subcommand, ValueEnum};
+use hyst_ident::excite::Suspect;
 
 use super::JsonArg;
 use crate::output::Target;
@@ -9,6 +10,7 @@ const EXAMPLES: &str = "\
 Examples:
   hystctl excite identification --rate 1000 --high 120 -o u.csv
   hystctl excite sine --frequency 2 --cycles 5 --low -20 --high 120 -o u.csv
+  hystctl excite separate lag delay --high 120 -o u.csv
   hystctl excite --help; hystctl excite stairs --help
 
 Every segment starts and ends at rest at the lowest voltage and stays within the limits.";
@@ -134,6 +136,9 @@ pub(crate) enum ExciteKind {
         /// Duration of each fade; a tenth of the whole if not given
         #[arg(long, value_name = "S")]
         fade: Option<f64>,
+        /// How often the sum repeats, for averages over periods (response --period)
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        periods: u32,
         /// Seed of random phases; phases of low crest factor if not given
         #[arg(long)]
         seed: Option<u64>,
@@ -171,6 +176,84 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
+    /// Sine around mid-span whose amplitude swings: every amplitude at one frequency
+    AmSine {
+        /// Frequency
+        #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+        frequency: f64,
+        /// Frequency at which the amplitude swings
+        #[arg(long, value_name = "HZ", default_value_t = 0.2)]
+        modulation: f64,
+        /// How far the amplitude swings; 1 = down to nothing
+        #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
+        depth: f64,
+        /// Whole swings of the amplitude
+        #[arg(long, value_name = "N", default_value_t = 2)]
+        cycles: u32,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Sines around mid-span, one segment for each amplitude and frequency: for gain maps
+    Tones {
+        /// Frequencies
+        #[arg(long, value_name = "HZ", value_delimiter = ',', default_value = "1,5,10,20")]
+        frequencies: Vec<f64>,
+        /// Amplitudes as shares of half the span
+        #[arg(long, value_name = "SHARE", value_delimiter = ',', default_value = "0.25,0.5,0.75,1")]
+        amplitudes: Vec<f64>,
+        /// Cycles of each, without fades
+        #[arg(long, value_name = "N", default_value_t = 10)]
+        cycles: u32,
+        /// Rest between segments
+        #[arg(long, value_name = "S", default_value_t = 0.5)]
+        rest: f64,
+        #[command(flatten)]
+        common: Common,
+    },
+    Separate(SeparateArgs),
+    /// Small cosine waves at several levels: minor loops
+    MinorLoops {
+        /// How many levels
+        #[arg(long, value_name = "N", default_value_t = 5)]
+        levels: u32,
+        /// Height of the loops as a share of the span
+        #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+        share: f64,
+        #[command(flatten)]
+        periodic: Periodic,
+        #[command(flatten)]
+        common: Common,
+    },
+}
+
+/// The drive that tells two effects apart, and why
+///
+/// For each drive of a family it is computed, with a typical actuator, how much of what one effect does the best-fitting other
+/// one cannot imitate; the drive that leaves most is written. Effects: delay, lag, asymmetry, rate-dependence, temperature,
+/// creep, load, resonance, saturation, drift, interference.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl excite separate lag delay --high 120 --slew 20000 -o u.csv")]
+pub(crate) struct SeparateArgs {
+    /// One effect
+    #[arg(value_name = "EFFECT")]
+    pub(crate) first: Suspect,
+    /// The other
+    #[arg(value_name = "OTHER")]
+    pub(crate) second: Suspect,
+    /// Duration
+    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    pub(crate) seconds: f64,
+    /// Noise of the sensor as a share of the output's span
+    #[arg(long, value_name = "SHARE", default_value_t = 0.001)]
+    pub(crate) noise: f64,
+    /// The record will have temperature_degc
+    #[arg(long)]
+    pub(crate) thermometer: bool,
+    /// The record will have load_n
+    #[arg(long)]
+    pub(crate) load_cell: bool,
+    #[command(flatten)]
+    pub(crate) common: Common,
 }
 
 /// Waves that repeat.

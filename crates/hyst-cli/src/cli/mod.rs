@@ -2,6 +2,7 @@
 
 mod excite;
 mod help;
+mod linear;
 mod search;
 mod values;
 
@@ -16,8 +17,9 @@ use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 
 use crate::output::Target;
-pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm};
+pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
+pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
 pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, VoltageLimits};
 use values::{finite, positive, seconds};
@@ -37,6 +39,9 @@ pub(crate) enum Command {
     Diagnose(DiagnoseArgs),
     Compensate(CompensateArgs),
     Excite(ExciteArgs),
+    Response(ResponseArgs),
+    Gain(GainArgs),
+    Loop(LoopArgs),
     Run(RunArgs),
     Export(ExportArgs),
     Demo(DemoArgs),

@@ -1,15 +1,17 @@
 //! `excite`: drives with which to identify or test an actuator.
 
 use hyst_ident::excite::{
-    DecayingSine, Drive, ExciteError, Forc, Identification, Limits, Multisine, Peak, Phases, Shape, Sine, Stairs,
-    Sweep, Triangle,
+    AmSine, DecayingSine, Drive, ExciteError, Forc, Identification, Limits, MinorLoops, Multisine, Peak, Phases, Shape,
+    Sine, Stairs, Sweep, Tone, Triangle,
 };
 use serde::Serialize;
 
-use crate::cli::{Common, ExciteArgs, ExciteKind, PeakForm};
+use crate::cli::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::text;
+
+mod separate;
 
 /// What is said about a drive.
 #[derive(Debug, Serialize)]
@@ -19,11 +21,17 @@ struct Summary<'a> {
     rate_hz: f64,
     seconds: f64,
     segments: &'a [&'static str],
+    /// Peak over root mean square of a multisine, without its fades.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    crest_factor: Option<f64>,
 }
 
 /// Runs the command.
 pub(super) fn run(args: &ExciteArgs) -> CommandResult {
-    let (common, drive) = make(&args.kind);
+    let Made { common, drive, crest_factor } = match make(&args.kind) {
+        Ok(made) => made,
+        Err(separation) => return separate::run(separation),
+    };
     output::check(&[], &[&common.output])?;
     let report = Report::new(common.json.json, &[&common.output])?;
     let drive = drive.map_err(in_options)?;
@@ -34,14 +42,26 @@ pub(super) fn run(args: &ExciteArgs) -> CommandResult {
         rate_hz: common.rate,
         seconds: drive.time().last().map_or(0.0, |end| end + 1.0 / common.rate),
         segments: drive.shapes(),
+        crest_factor,
     };
     report.print(&summary.text(), &summary)
 }
 
-/// The drive that the arguments describe.
-fn make(kind: &ExciteKind) -> (&Common, Result<Drive, ExciteError>) {
+/// What the arguments describe.
+struct Made<'a> {
+    common: &'a Common,
+    drive: Result<Drive, ExciteError>,
+    crest_factor: Option<f64>,
+}
+
+/// Rest between segments of one kind \[s\].
+const REST: f64 = 1.0;
+
+/// Makes the drive, or gives back the arguments of a separation, which has a report of its own.
+fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
     let limits = |c: &Common| Limits { rate_hz: c.rate, lo_v: c.low, hi_v: c.high, slew_v_per_s: c.slew };
-    let (common, shape) = match kind {
+    let (mut crest_factor, mut between) = (None, REST);
+    let (common, shapes) = match kind {
         ExciteKind::Identification { seconds, rest, slow, fast, band, hold, ramp, seed, common } => {
             let usual = Identification::at_rate(common.rate, *seed);
             let spec = Identification {
@@ -54,49 +74,68 @@ fn make(kind: &ExciteKind) -> (&Common, Result<Drive, ExciteError>) {
                 ramp_s: ramp.unwrap_or(usual.ramp_s),
                 seed: *seed,
             };
-            return (common, spec.drive(&limits(common)));
+            return Ok(Made { common, drive: spec.drive(&limits(common)), crest_factor: None });
         }
+        ExciteKind::Separate(args) => return Err(args),
         ExciteKind::Sine { periodic, common } => {
-            (common, Shape::Sine(Sine { frequency_hz: periodic.frequency, cycles: periodic.cycles }))
+            (common, vec![Shape::Sine(Sine { frequency_hz: periodic.frequency, cycles: periodic.cycles })])
         }
         ExciteKind::DecayingSine { frequency, seconds, common } => {
-            (common, Shape::DecayingSine(DecayingSine { frequency_hz: *frequency, duration_s: *seconds }))
+            (common, vec![Shape::DecayingSine(DecayingSine { frequency_hz: *frequency, duration_s: *seconds })])
         }
         ExciteKind::Triangle { periodic, common } => {
-            (common, Shape::Triangle(Triangle { frequency_hz: periodic.frequency, cycles: periodic.cycles }))
+            (common, vec![Shape::Triangle(Triangle { frequency_hz: periodic.frequency, cycles: periodic.cycles })])
         }
         ExciteKind::Stairs { levels, hold, ramp, seed, common } => {
-            (common, Shape::Stairs(Stairs { levels: *levels, hold_s: *hold, ramp_s: *ramp, seed: *seed }))
+            (common, vec![Shape::Stairs(Stairs { levels: *levels, hold_s: *hold, ramp_s: *ramp, seed: *seed })])
         }
-        ExciteKind::Multisine { from, to, lines, seconds, fade, seed, common } => {
+        ExciteKind::Multisine { from, to, lines, seconds, fade, periods, seed, common } => {
             let shape = Multisine {
                 low_hz: *from,
                 high_hz: *to,
                 lines: *lines,
-                phases: seed.map_or(Phases::Schroeder, Phases::Random),
+                periods: *periods,
+                phases: seed.map_or(Phases::LowCrest, Phases::Random),
                 duration_s: *seconds,
                 fade_s: fade.unwrap_or(0.1 * seconds),
             };
-            (common, Shape::Multisine(shape))
+            crest_factor = shape.crest_factor(common.rate).ok();
+            (common, vec![Shape::Multisine(shape)])
         }
         ExciteKind::Sweep { from, to, seconds, common } => {
-            (common, Shape::Sweep(Sweep { low_hz: *from, high_hz: *to, duration_s: *seconds }))
+            (common, vec![Shape::Sweep(Sweep { low_hz: *from, high_hz: *to, duration_s: *seconds })])
         }
         ExciteKind::Forc { curves, seconds, rest, peak, common } => {
             let peak = match peak {
                 PeakForm::Triangle => Peak::Triangle,
                 PeakForm::HalfSine => Peak::HalfSine,
             };
-            let one = |peak_s: &f64| Shape::Forc(Forc { curves: *curves, peak_s: *peak_s, rest_s: *rest, peak });
-            let shapes: Vec<Shape> = seconds.iter().map(one).collect();
-            return (common, Drive::new(&shapes, &limits(common), *rest));
+            between = *rest;
+            let forc = |peak_s: &f64| Shape::Forc(Forc { curves: *curves, peak_s: *peak_s, rest_s: *rest, peak });
+            (common, seconds.iter().map(forc).collect())
+        }
+        ExciteKind::AmSine { frequency, modulation, depth, cycles, common } => {
+            let (frequency_hz, modulation_hz) = (*frequency, *modulation);
+            (common, vec![Shape::AmSine(AmSine { frequency_hz, modulation_hz, depth: *depth, cycles: *cycles })])
+        }
+        ExciteKind::Tones { frequencies, amplitudes, cycles, rest, common } => {
+            between = *rest;
+            let tone =
+                |frequency_hz: f64, amplitude: f64| Shape::Tone(Tone { frequency_hz, amplitude, cycles: *cycles });
+            let of = |hz: &f64| amplitudes.iter().map(|a| tone(*hz, *a)).collect::<Vec<_>>();
+            (common, frequencies.iter().flat_map(of).collect())
+        }
+        ExciteKind::MinorLoops { levels, share, periodic, common } => {
+            let (frequency_hz, cycles) = (periodic.frequency, periodic.cycles);
+            (common, vec![Shape::MinorLoops(MinorLoops { levels: *levels, share: *share, frequency_hz, cycles })])
         }
     };
-    (common, Drive::new(&[shape], &limits(common), 0.0))
+    Ok(Made { common, drive: Drive::new(&shapes, &limits(common), between), crest_factor })
 }
 
 /// The library's fields and the options that set them.
-const OPTIONS: [(&str, &str); 20] = [
+const OPTIONS: [(&str, &str); 25] = [
+    ("modulation_hz", "--modulation"),
     ("slew_v_per_s", "--slew"),
     ("frequency_hz", "--frequency"),
     ("duration_s", "--seconds"),
@@ -117,6 +156,10 @@ const OPTIONS: [(&str, &str); 20] = [
     ("curves =", "--curves ="),
     ("levels =", "--levels ="),
     ("lines =", "--lines ="),
+    ("periods =", "--periods ="),
+    ("depth =", "--depth ="),
+    ("share =", "--share ="),
+    ("amplitude =", "--amplitudes ="),
 ];
 
 /// The message with the options' names instead of the fields'.
@@ -127,8 +170,9 @@ fn in_options(error: ExciteError) -> CommandError {
 
 impl Summary<'_> {
     fn text(&self) -> String {
+        let crest = self.crest_factor.map_or_else(String::new, |crest| format!(", crest factor {crest:.2}"));
         format!(
-            "{}: {} at {} Hz, {} s, {}: {}",
+            "{}: {} at {} Hz, {} s, {}: {}{crest}",
             self.output,
             text::count(self.rows, "row"),
             self.rate_hz,

@@ -5,6 +5,9 @@ mod diagnose;
 mod excite;
 mod export;
 mod fit;
+mod gain;
+mod hysteresis_loop;
+mod response;
 mod run;
 mod simulate;
 
@@ -23,6 +26,9 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Compensate(args) => compensate::run(&args),
         Command::Excite(args) => excite::run(&args),
+        Command::Response(args) => response::run(&args),
+        Command::Gain(args) => gain::run(&args),
+        Command::Loop(args) => hysteresis_loop::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),

@@ -77,6 +77,7 @@ impl Identification {
                 low_hz: self.slow_hz,
                 high_hz: self.band_hz,
                 lines: room.floor().clamp(1.0, 40.0) as u32,
+                periods: 1,
                 phases: Phases::Random(self.seed),
                 duration_s: multisine_s,
                 fade_s: 0.1 * multisine_s,

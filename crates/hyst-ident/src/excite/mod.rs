@@ -4,16 +4,21 @@
 //! rest at the lowest voltage, stays between the lowest and the highest, and keeps to the slew limit. What is random
 //! depends on its seed alone.
 
+mod crest;
 mod identification;
+mod separate;
 mod shapes;
 #[cfg(test)]
 mod tests;
+mod waves;
 
 use std::io::Write;
 use std::ops::Range;
 
 pub use identification::Identification;
+pub use separate::{SeparateOptions, Separation, Suspect, Tried, Verdict, separate};
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
+pub use waves::{AmSine, MinorLoops, Tone};
 
 use crate::record::{Columns, Extra, Record, RecordError, WriteError};
 
@@ -72,6 +77,12 @@ pub enum ExciteError {
         limit: f64,
         /// Which field to change.
         remedy: &'static str,
+    },
+    /// An effect cannot be told from itself.
+    #[error("both effects are {effect}; give two different ones")]
+    Same {
+        /// The effect.
+        effect: &'static str,
     },
     /// There is no shape to make a drive of.
     #[error("a drive needs at least one segment")]

@@ -7,8 +7,15 @@ use proptest::prelude::*;
 const LIMITS: Limits = Limits { rate_hz: 1000.0, lo_v: -20.0, hi_v: 100.0, slew_v_per_s: None };
 
 fn shapes() -> Vec<Shape> {
-    let multisine =
-        Multisine { low_hz: 1.0, high_hz: 40.0, lines: 30, phases: Phases::Schroeder, duration_s: 2.0, fade_s: 0.3 };
+    let multisine = Multisine {
+        low_hz: 1.0,
+        high_hz: 40.0,
+        lines: 30,
+        periods: 1,
+        phases: Phases::Schroeder,
+        duration_s: 2.0,
+        fade_s: 0.3,
+    };
     vec![
         Shape::Sine(Sine { frequency_hz: 7.0, cycles: 3 }),
         Shape::DecayingSine(DecayingSine { frequency_hz: 5.0, duration_s: 3.0 }),
@@ -16,6 +23,10 @@ fn shapes() -> Vec<Shape> {
         Shape::Stairs(Stairs { levels: 6, hold_s: 0.3, ramp_s: 0.08, seed: 5 }),
         Shape::Multisine(multisine),
         Shape::Multisine(Multisine { phases: Phases::Random(9), ..multisine }),
+        Shape::Multisine(Multisine { phases: Phases::LowCrest, ..multisine }),
+        Shape::AmSine(AmSine { frequency_hz: 7.0, modulation_hz: 0.5, depth: 0.8, cycles: 2 }),
+        Shape::Tone(Tone { frequency_hz: 9.0, amplitude: 0.8, cycles: 6 }),
+        Shape::MinorLoops(MinorLoops { levels: 4, share: 0.3, frequency_hz: 5.0, cycles: 3 }),
         Shape::Sweep(Sweep { low_hz: 1.0, high_hz: 50.0, duration_s: 2.0 }),
         Shape::Forc(Forc { curves: 5, peak_s: 0.2, rest_s: 0.1, peak: Peak::HalfSine }),
         Shape::Forc(Forc { curves: 5, peak_s: 0.2, rest_s: 0.1, peak: Peak::Triangle }),
@@ -106,8 +117,15 @@ fn stairs_hold_levels_from_every_part_of_the_span() {
 fn a_multisine_has_its_lines_and_no_other() {
     // Without fades to speak of, the lines are orthogonal over the duration.
     let limits = Limits { lo_v: -1.0, hi_v: 1.0, ..LIMITS };
-    let multisine =
-        Multisine { low_hz: 2.0, high_hz: 10.0, lines: 5, phases: Phases::Schroeder, duration_s: 4.0, fade_s: 0.01 };
+    let multisine = Multisine {
+        low_hz: 2.0,
+        high_hz: 10.0,
+        lines: 5,
+        periods: 1,
+        phases: Phases::Schroeder,
+        duration_s: 4.0,
+        fade_s: 0.01,
+    };
     let u = only(Shape::Multisine(multisine), &limits);
     let amplitude = |hz: f64| {
         let (re, im) = u[..4000].iter().enumerate().fold((0.0, 0.0), |(re, im), (k, u)| {
@@ -121,6 +139,51 @@ fn a_multisine_has_its_lines_and_no_other() {
     }
     for hz in [1.0, 3.0, 5.0, 9.0, 12.0] {
         assert!(amplitude(hz) < 0.02, "{hz} Hz: {}", amplitude(hz));
+    }
+}
+
+#[test]
+fn a_multisine_repeats_and_its_crest_is_low() {
+    let limits = Limits { lo_v: -1.0, hi_v: 1.0, ..LIMITS };
+    let phases = Phases::LowCrest;
+    let multisine =
+        Multisine { low_hz: 2.0, high_hz: 62.0, lines: 31, periods: 5, phases, duration_s: 10.0, fade_s: 0.5 };
+    let u = only(Shape::Multisine(multisine), &limits);
+    let (second, third) = (&u[2000..4000], &u[4000..6000]);
+    assert!(second.iter().zip(third).all(|(a, b)| (a - b).abs() < 1e-5));
+    assert!(multisine.crest_factor(1000.0).unwrap() < 1.5);
+    // Room for uneven lines: multiples of one spacing are taken.
+    let usual = Multisine { low_hz: 1.0, high_hz: 50.0, lines: 40, periods: 1, duration_s: 5.0, ..multisine };
+    assert!(usual.crest_factor(1000.0).unwrap() < 1.5);
+    let plain = Multisine { phases: Phases::Schroeder, ..multisine };
+    assert!(plain.crest_factor(1000.0).unwrap() > 1.55);
+}
+
+#[test]
+fn a_modulated_sine_has_all_amplitudes_and_a_tone_only_one() {
+    let peaks = |u: &[f64]| u.windows(3).filter(|w| w[0] < w[1] && w[1] >= w[2]).map(|w| w[1]).collect::<Vec<f64>>();
+    let limits = Limits { lo_v: -1.0, hi_v: 1.0, ..LIMITS };
+    let sine = AmSine { frequency_hz: 20.0, modulation_hz: 1.0, depth: 0.75, cycles: 2 };
+    let tops = peaks(&only(Shape::AmSine(sine), &limits));
+    let (least, most) = extremes(&tops);
+    assert_eq!(tops.len(), 40);
+    assert!((least - 0.25).abs() < 0.01 && most > 0.98, "{least} {most}");
+    let tone = only(Shape::Tone(Tone { frequency_hz: 20.0, amplitude: 0.1, cycles: 10 }), &limits);
+    // Three cycles of fade at each end.
+    let (least, most) = extremes(&tone[151..649]);
+    assert_eq!(tone.len(), 801);
+    assert!((least + 0.1).abs() < 1e-3 && (most - 0.1).abs() < 1e-3, "{least} {most}");
+}
+
+#[test]
+fn minor_loops_stand_at_even_levels() {
+    let limits = Limits { lo_v: 0.0, hi_v: 10.0, ..LIMITS };
+    let loops = MinorLoops { levels: 5, share: 0.2, frequency_hz: 10.0, cycles: 4 };
+    let u = only(Shape::MinorLoops(loops), &limits);
+    for level in 0..5 {
+        let low = 2.0 * level as f64;
+        let (least, most) = extremes(&u[level * 500 + 100..=level * 500 + 500]);
+        assert!((least - low).abs() < 1e-4 && (most - low - 2.0).abs() < 1e-4, "{level}: {least} {most}");
     }
 }
 
@@ -214,8 +277,15 @@ fn fields_out_of_range_are_named() {
     let spec = |spec: Identification| spec.drive(&LIMITS).unwrap_err().to_string();
     let usual = Identification::at_rate(1000.0, 0);
     let stairs = Stairs { levels: 6, hold_s: 0.3, ramp_s: 0.08, seed: 5 };
-    let multisine =
-        Multisine { low_hz: 1.0, high_hz: 9.0, lines: 9, phases: Phases::Schroeder, duration_s: 2.0, fade_s: 0.3 };
+    let multisine = Multisine {
+        low_hz: 1.0,
+        high_hz: 9.0,
+        lines: 9,
+        periods: 1,
+        phases: Phases::Schroeder,
+        duration_s: 2.0,
+        fade_s: 0.3,
+    };
     for (message, field) in [
         (limits(Limits { rate_hz: 0.0, ..LIMITS }), "rate_hz = 0"),
         (limits(Limits { lo_v: f64::NAN, ..LIMITS }), "lo_v = NaN"),
@@ -242,6 +312,14 @@ fn fields_out_of_range_are_named() {
         (shape(Shape::Multisine(Multisine { duration_s: 1e12, lines: 1, ..multisine })), "duration_s = 1000000000000"),
         (shape(Shape::Sweep(Sweep { low_hz: 5.0, high_hz: 5.0, duration_s: 1.0 })), "high_hz = 5"),
         (shape(Shape::Forc(Forc { curves: 5, peak_s: 0.001, rest_s: 0.1, peak: Peak::HalfSine })), "peak_s = 0.001"),
+        (shape(Shape::Multisine(Multisine { periods: 0, ..multisine })), "periods = 0"),
+        (
+            shape(Shape::AmSine(AmSine { frequency_hz: 5.0, modulation_hz: 2.0, depth: 0.5, cycles: 1 })),
+            "modulation_hz = 2",
+        ),
+        (shape(Shape::AmSine(AmSine { frequency_hz: 5.0, modulation_hz: 1.0, depth: 1.5, cycles: 1 })), "depth = 1.5"),
+        (shape(Shape::Tone(Tone { frequency_hz: 5.0, amplitude: 0.0, cycles: 1 })), "amplitude = 0"),
+        (shape(Shape::MinorLoops(MinorLoops { levels: 2, share: -1.0, frequency_hz: 1.0, cycles: 1 })), "share = -1"),
         (spec(Identification { duration_s: 9.0, ..usual }), "duration_s = 9"),
         (spec(Identification { fast_hz: 0.5, ..usual }), "fast_hz = 0.5"),
         (spec(Identification { band_hz: 400.0, ..usual }), "band_hz = 400"),

@@ -1,0 +1,78 @@
+//! `excite separate`: the drive that tells two effects apart.
+
+use hyst_ident::excite::{Limits, SeparateOptions, Separation, Tried, Verdict, separate};
+use serde::Serialize;
+
+use super::in_options;
+use crate::cli::SeparateArgs;
+use crate::exit::CommandResult;
+use crate::output::{self, Report};
+use crate::progress::Progress;
+use crate::text;
+
+/// What is said about a separation.
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    output: String,
+    first: &'static str,
+    second: &'static str,
+    verdict: Verdict,
+    reason: &'a str,
+    rows: usize,
+    segments: &'a [&'static str],
+    tried: &'a [Tried],
+}
+
+/// Runs the command.
+pub(super) fn run(args: &SeparateArgs) -> CommandResult {
+    let common = &args.common;
+    output::check(&[], &[&common.output])?;
+    let report = Report::new(common.json.json, &[&common.output])?;
+    let limits = Limits { rate_hz: common.rate, lo_v: common.low, hi_v: common.high, slew_v_per_s: common.slew };
+    let options = SeparateOptions {
+        duration_s: args.seconds,
+        noise: args.noise,
+        thermometer: args.thermometer,
+        load_cell: args.load_cell,
+    };
+    let progress = Progress::spinner("trying drives");
+    let found = separate(args.first, args.second, &limits, &options).map_err(in_options)?;
+    drop(progress);
+    common.output.write(|out| found.drive.write_csv(out).map_err(output::io_error))?;
+    let summary = Summary {
+        output: common.output.to_string(),
+        first: args.first.name(),
+        second: args.second.name(),
+        verdict: found.verdict,
+        reason: &found.reason,
+        rows: found.drive.voltage().len(),
+        segments: found.drive.shapes(),
+        tried: &found.tried,
+    };
+    report.print(&summary.text(&found), &summary)
+}
+
+/// Drives that are listed.
+const LISTED: usize = 6;
+
+impl Summary<'_> {
+    fn text(&self, found: &Separation) -> String {
+        let head = [
+            "left, as multiples of the noise",
+            &format!("of {} by {}", self.first, self.second),
+            &format!("of {} by {}", self.second, self.first),
+        ];
+        let row = |t: &Tried| vec![t.drive.to_owned(), text::short(t.first_left), text::short(t.second_left)];
+        let rows: Vec<Vec<String>> =
+            std::iter::once(head.map(str::to_owned).to_vec()).chain(found.tried.iter().take(LISTED).map(row)).collect();
+        format!(
+            "{}\n\n{}\n{}: {}, {}: {}",
+            self.reason,
+            text::table(&rows),
+            self.output,
+            text::count(self.rows, "row"),
+            text::count(self.segments.len(), "segment"),
+            self.segments.join(", ")
+        )
+    }
+}

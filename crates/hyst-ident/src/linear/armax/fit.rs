@@ -1,0 +1,127 @@
+//! The fit: least squares of the prediction error.
+
+use nalgebra::DVector;
+
+use super::delay::estimate_delay;
+use super::model::Armax;
+use super::prediction::{Shape, Signals};
+use super::start::LongArx;
+use crate::Samples;
+use crate::linear::LinearError;
+use crate::linear::error::require;
+
+/// The delay of the input.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Delay {
+    /// What [`estimate_delay`] says.
+    #[default]
+    Auto,
+    /// So many rows.
+    Rows(usize),
+}
+
+/// How an ARMAX model is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmaxOptions {
+    /// The order n of A, B and C, 1 to 40. Two for each mode.
+    pub order: usize,
+    /// The delay of the input.
+    pub delay: Delay,
+}
+
+/// Steps from each start, before the better one goes on.
+const FIRST_STEPS: usize = 5;
+/// Most steps from there.
+const STEPS: usize = 40;
+/// The search ends when a step lowers the cost by less than this share: far below what a record can tell.
+const ENOUGH: f64 = 1e-6;
+
+/// Fits an ARMAX model: least squares of what a prediction one row ahead misses, over all segments.
+///
+/// Begins with a long ARX model. Its errors stand for e in a linear fit (Hannan and Rissanen 1982), a start for any
+/// disturbance; what it simulates from the input alone is reduced to the order wanted (Steiglitz and McBride 1965), with C = A,
+/// a start for white noise of the sensor. From both, Levenberg's and Marquardt's steps on the prediction error; a step that
+/// would take a root of C out of the unit circle is shortened. The better one is returned.
+///
+/// # Errors
+/// When the order is out of range, a column is constant, there are too few rows, or no model of the order fits.
+pub fn fit_armax(samples: &Samples, options: &ArmaxOptions) -> Result<Armax, LinearError> {
+    let delay = match options.delay {
+        Delay::Auto => estimate_delay(samples)?,
+        Delay::Rows(delay) => delay,
+    };
+    let signals = Signals::new(samples)?;
+    let fitted = fit(&signals, options.order, delay)?;
+    Ok(fitted.model(&signals))
+}
+
+/// A fit on scaled signals.
+#[derive(Clone)]
+pub(super) struct Fitted {
+    pub(super) shape: Shape,
+    pub(super) theta: DVector<f64>,
+    /// Sum of squared prediction errors.
+    pub(super) cost: f64,
+}
+
+impl Fitted {
+    /// The model, in units and with covariance.
+    pub(super) fn model(&self, signals: &Signals) -> Armax {
+        let unknowns = self.shape.unknowns();
+        let freedom = signals.count(self.shape).saturating_sub(unknowns).max(1) as f64;
+        let noise = (self.cost / freedom).sqrt();
+        let gram = signals.linearised(self.shape, &self.theta).and_then(|triangle| triangle.inverse_gram());
+        let covariance = gram.unwrap_or_else(|| nalgebra::DMatrix::from_element(unknowns, unknowns, f64::INFINITY));
+        signals.model(self.shape, &self.theta, noise, &(covariance * (noise * noise)))
+    }
+}
+
+/// Fits a model of one order and delay.
+pub(super) fn fit(signals: &Signals, order: usize, delay: usize) -> Result<Fitted, LinearError> {
+    require("order", order as f64, (1..=40).contains(&order), "between 1 and 40")?;
+    require("delay", delay as f64, delay <= 10_000, "at most 10000 rows")?;
+    let shape = Shape { n: order, delay };
+    let longest = signals.rows.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    let needed = 10 * shape.unknowns() + delay;
+    if longest < needed {
+        let remedy = "record longer, or lower the order";
+        return Err(LinearError::TooShort { what: "this order", needed, found: longest, remedy });
+    }
+    let unfit = || LinearError::Unfit { order };
+    let long = LongArx::fit(signals, shape).ok_or_else(unfit)?;
+    let best = [long.extended(signals, shape), long.reduced(signals, shape)]
+        .into_iter()
+        .flatten()
+        .map(|start| search(signals, shape, start, FIRST_STEPS))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .filter(|best| best.cost.is_finite())
+        .ok_or_else(unfit)?;
+    Ok(search(signals, shape, best.theta, STEPS))
+}
+
+/// Levenberg's and Marquardt's search from a start whose C is stable.
+pub(super) fn search(signals: &Signals, shape: Shape, start: DVector<f64>, steps: usize) -> Fitted {
+    let mut best = Fitted { shape, cost: signals.cost(shape, &start), theta: start };
+    let mut lambda = 1e-6;
+    for _ in 0..steps {
+        let Some(triangle) = signals.linearised(shape, &best.theta) else { break };
+        let before = best.cost;
+        // Shorter steps until one goes down; without any this is the minimum.
+        while lambda < 1e8 {
+            let theta = triangle.solve(lambda).map(|step| &best.theta + step);
+            let cost = theta.as_ref().map_or(f64::INFINITY, |theta| signals.cost(shape, theta));
+            match theta {
+                Some(theta) if cost < best.cost => {
+                    best = Fitted { theta, cost, ..best };
+                    lambda = f64::max(lambda / 10.0, 1e-12);
+                    break;
+                }
+                _ => lambda *= 10.0,
+            }
+        }
+        if best.cost > before * (1.0 - ENOUGH) {
+            break;
+        }
+    }
+    best
+}

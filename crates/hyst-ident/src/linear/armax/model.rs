@@ -1,0 +1,96 @@
+//! The model: its equation, simulation, prediction and response.
+
+use hyst_core::Complex;
+use nalgebra::DMatrix;
+
+use super::innovations::Polynomials;
+use crate::Samples;
+use crate::linear::LinearError;
+
+/// An ARMAX model `A(q) y = B(q) u + d + C(q) e` with
+///
+/// ```text
+/// A = 1 + a₁ q⁻¹ + … + aₙ q⁻ⁿ    B = q⁻ᵏ (b₀ + … + bₙ q⁻ⁿ)    C = 1 + c₁ q⁻¹ + … + cₙ q⁻ⁿ
+/// ```
+///
+/// e is white noise; the roots of C are inside the unit circle. `y = B/A u + C/A e` is the structure and what disturbs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Armax {
+    /// Sample period \[s\].
+    pub period: f64,
+    /// Delay k of the input \[rows\].
+    pub delay: usize,
+    /// a₁ … aₙ
+    pub a: Vec<f64>,
+    /// b₀ … bₙ \[y/u\]
+    pub b: Vec<f64>,
+    /// c₁ … cₙ
+    pub c: Vec<f64>,
+    /// d \[y\]; the output of a device at rest is `d / A(1)` above the input's share.
+    pub offset: f64,
+    /// Standard deviation of e, what a prediction one row ahead misses \[y\].
+    pub noise: f64,
+    /// Covariance of a₁ … aₙ: what the standard errors of the modes are made of.
+    pub(super) covariance: DMatrix<f64>,
+    /// Rows that were fitted.
+    pub(super) rows: usize,
+}
+
+impl Armax {
+    /// The order n.
+    pub fn order(&self) -> usize {
+        self.a.len()
+    }
+
+    /// How many rows were fitted.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The response `B/A` at a frequency \[Hz\].
+    pub fn response(&self, hz: f64) -> Complex {
+        let angle = std::f64::consts::TAU * hz * self.period;
+        let at = |c: &[f64], from: usize| {
+            c.iter().zip(from..).fold(Complex::default(), |sum, (c, i)| sum + Complex::polar(*c, -angle * i as f64))
+        };
+        at(&self.b, self.delay) / (Complex::from(1.0) + at(&self.a, 1))
+    }
+
+    /// What the model says the output is, from the input alone: every segment starts settled at its first input.
+    pub fn simulate(&self, samples: &Samples) -> Result<Vec<f64>, LinearError> {
+        self.check(samples)?;
+        let mut y = vec![0.0; samples.len()];
+        for s in &samples.segments {
+            let (u, y) = (&samples.input[s.clone()], &mut y[s.clone()]);
+            let settled = (self.b.iter().sum::<f64>() * u[0] + self.offset) / (1.0 + self.a.iter().sum::<f64>());
+            for t in 0..u.len() {
+                let moved: f64 = self.b.iter().zip(self.delay..).map(|(b, i)| b * u[t.saturating_sub(i)]).sum();
+                let past = |i: usize| if i > t { settled } else { y[t - i] };
+                y[t] = moved + self.offset - self.a.iter().zip(1..).map(|(a, i)| a * past(i)).sum::<f64>();
+            }
+        }
+        Ok(y)
+    }
+
+    /// What a prediction one row ahead misses, measured minus predicted; 0 in the first rows of each segment, which the
+    /// recursion starts from.
+    ///
+    /// # Errors
+    /// When the sample period is not the model's, or the recursion diverges.
+    pub fn prediction_errors(&self, samples: &Samples) -> Result<Vec<f64>, LinearError> {
+        self.check(samples)?;
+        let model = Polynomials { a: &self.a, b: &self.b, c: &self.c, offset: self.offset, delay: self.delay };
+        let mut errors = vec![0.0; samples.len()];
+        for s in &samples.segments {
+            let found = model.innovations(&samples.input[s.clone()], &samples.output[s.clone()]);
+            let found = found.ok_or(LinearError::Unfit { order: self.order() })?;
+            errors[s.end - found.e.len()..s.end].copy_from_slice(&found.e);
+        }
+        Ok(errors)
+    }
+
+    fn check(&self, samples: &Samples) -> Result<(), LinearError> {
+        let same = (samples.period / self.period - 1.0).abs() < 1e-6;
+        crate::linear::error::require("sample period", samples.period, same, format!("the model's, {} s", self.period))
+    }
+}

@@ -1,0 +1,30 @@
+//! Linear models and responses of an actuator in a flexible structure.
+//!
+//! Hysteresis is one half of such an actuator, the structure that it is mounted in is the other (Schirrer, Kozek and
+//! Benatzky, paper 2 of docs/models.md). Here is what their measurements need: the frequency response with its
+//! coherence ([`response`]), the ARMAX model whose poles are the structure's modes ([`fit_armax`], [`choose_order`],
+//! [`Armax::modes`]; all of it in one call: [`identify_structure`]), the gain over amplitude and frequency of sines ([`gain_map`]), and loops from which the structure's
+//! phase and gain are removed before hysteresis is judged ([`corrected_loop`]).
+
+mod armax;
+mod band;
+mod corrected;
+mod error;
+mod fundamental;
+mod periodic;
+mod roots;
+mod structure;
+#[cfg(test)]
+mod tests;
+mod welch;
+
+pub use armax::{
+    Armax, ArmaxOptions, Delay, Mode, Order, OrderChoice, OrderRow, Zero, choose_order, estimate_delay, fit_armax,
+};
+pub use band::{Decimated, band_of, decimate};
+pub use corrected::{CorrectedLoop, LoopFigures, corrected_loop};
+pub use error::LinearError;
+pub use fundamental::{GainPoint, gain_map};
+pub use periodic::periodic_response;
+pub use structure::{Structure, StructureOptions, identify_structure};
+pub use welch::{FrequencyResponse, Method, ResponseLine, WelchOptions, response};
