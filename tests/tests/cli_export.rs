@@ -181,6 +181,29 @@ fn a_name_that_means_nothing_is_refused() {
     }
 }
 
+/// What a board does with the example: a drive that follows, and by how much of its swing the model misses at most.
+const FOLLOWS: &str = "use hyst_core::*;
+fn missed<M: Stage<f32>, I: Stage<f32>>(model: &M, inverse: &I, lead: usize, env: &Env<f32>, input: [f64; 2]) -> f32 {
+    let (mut m, mut i) = (model.state(), inverse.state());
+    let ends = input.map(|u| model.reset(&mut m, env, u as f32));
+    let (middle, swing) = (0.5 * (ends[0] + ends[1]), 0.3 * (ends[1] - ends[0]));
+    let at = |k: usize| middle - swing * (0.01 * k as f32).cos();
+    let mut worst = 0.0f32;
+    let mut drives = vec![inverse.reset(&mut i, env, at(0))];
+    for k in 1..3000 + lead {
+        drives.push(inverse.step(&mut i, env, at(k)));
+    }
+    for (k, drive) in drives.iter().enumerate() {
+        let y = if k == 0 { model.reset(&mut m, env, *drive) } else { model.step(&mut m, env, *drive) };
+        if k > lead + 1000 {
+            worst = worst.max((y - at(k - lead)).abs());
+        }
+    }
+    assert!(worst < 0.02 * swing.abs(), \"{worst} of {swing}\");
+    worst
+}
+";
+
 /// Every kind of model, and one with all that surrounds it, as a program for a board that runs it.
 #[test]
 fn rustc_takes_the_source() {
@@ -201,9 +224,20 @@ fn rustc_takes_the_source() {
              [[bin]]\nname = \"board\"\npath = \"main.rs\"\n[dependencies]\nhyst-core = {{ path = {core:?} }}\n"
         ),
     );
-    let mut main = String::from("use hyst_core::*;\n");
+    let mut main = String::from(FOLLOWS);
     for module in &modules {
-        main += &format!("mod {module};\n");
+        // The example in the head of the file, as a function of what it leaves to the board.
+        let source = lab.read(&format!("{module}.rs"));
+        let example: String =
+            source.lines().filter_map(|line| line.strip_prefix("//   ")).map(|line| format!("    {line}\n")).collect();
+        let inverts = example.contains("let inverse = ");
+        assert_eq!(inverts, !source.contains("No drive can be computed"), "{module}:\n{source}");
+        main += &format!(
+            "mod {module};\n#[allow(unused_assignments, unused_variables)]\n\
+             fn example_{module}(env: &Env<f32>, drive: f32, reference: f32) -> Result<f32, Error> {{\n    \
+             use {module}::*;\n    let env = *env;\n{example}    {}\n}}\n",
+            if inverts { "Ok(drive + missed(&model, &inverse, inverse.lead(), &env, INPUT))" } else { "Ok(y)" }
+        );
     }
     main += "fn main() -> Result<(), Error> {\n    let env = Env { temperature: 23.0, ..Env::default() };\n";
     for module in &modules {
@@ -211,7 +245,8 @@ fn rustc_takes_the_source() {
             "    let model = Box::new({module}::chain::<f64, 64>(&Sampling {{ period: 1e-3 }})?);\n    \
              let mut state = Box::new(model.state());\n    \
              model.reset(&mut state, &env, {module}::INPUT[0]);\n    \
-             println!(\"{module} {{:e}}\", model.step(&mut state, &env, {module}::INPUT[1]));\n"
+             let of_example = example_{module}(&Env {{ temperature: 23.0, ..Env::default() }}, 1.0, 1.0)?;\n    \
+             println!(\"{module} {{:e}} {{of_example:e}}\", model.step(&mut state, &env, {module}::INPUT[1]));\n"
         );
     }
     lab.write("main.rs", main + "    Ok(())\n}\n");
@@ -226,8 +261,8 @@ fn rustc_takes_the_source() {
     let outputs: Vec<&str> = said.lines().collect();
     assert_eq!(outputs.len(), modules.len(), "{said}");
     for line in outputs {
-        let (_, y) = line.split_once(' ').unwrap();
-        assert!(y.parse::<f64>().is_ok_and(f64::is_finite), "{line}");
+        let numbers: Vec<f64> = line.split(' ').skip(1).map(|x| x.parse().unwrap()).collect();
+        assert!(numbers.len() == 2 && numbers.iter().all(|x| x.is_finite()), "{line}");
     }
     // An exported function is the one of the file.
     assert!(

@@ -39,6 +39,8 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     input_side: Option<Preview<T, N>>,
     /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
     whole_samples: usize,
+    /// The share of the inverse hysteresis in it.
+    hysteresis_lead: usize,
     /// Band \[Hz\] and error of the inverse hysteresis, if it has dynamics of its own.
     hysteresis_band: Option<(f64, f64)>,
     surroundings: Delay<T, N>,
@@ -142,6 +144,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             temperature: self.temperature,
             asymmetry: self.asymmetry.as_ref().map(Invert::invert).transpose()?,
             whole_samples: self.delay.as_ref().map_or(0, Delay::whole_samples) + hysteresis.lead,
+            hysteresis_lead: hysteresis.lead,
             hysteresis_band: hysteresis.band,
             hysteresis: hysteresis.inverse,
             input_side,
@@ -156,6 +159,18 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Comp
     pub fn lead(&self) -> usize {
         let half = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
         half(&self.output_side) + half(&self.input_side) + self.whole_samples
+    }
+
+    /// Taps of the longest preview filter, and no less than the smallest `N` that can be built: another compensator of the same chain
+    /// at the same sample period needs no more.
+    pub fn taps(&self) -> usize {
+        let half = |p: &Option<Preview<T, N>>| p.as_ref().map_or(0, Preview::lead);
+        2 * half(&self.output_side).max(half(&self.input_side)).max(1) + 1
+    }
+
+    /// Samples of preview that the inverse hysteresis takes.
+    pub fn hysteresis_lead(&self) -> usize {
+        self.hysteresis_lead
     }
 
     /// Band in which the dynamic stages are inverted \[Hz\]; `None` if there are none.

@@ -48,7 +48,10 @@ pub enum BlockError {
         /// Check sum of the bytes.
         computed: u32,
     },
-    /// The payload is no set of parameters, or has a list that is longer than this firmware has room for.
+    /// A list is longer than the [`List`] that it is read into, or a choice (a kind of model, an order, a curve) is one that this
+    /// build does not know. Nothing is damaged.
+    TooLong,
+    /// The payload is no set of parameters.
     Malformed,
     /// The buffer is too small to write to.
     NoRoom,
@@ -68,9 +71,11 @@ impl fmt::Display for BlockError {
             Self::Corrupt { stated, computed } => {
                 write!(f, "block damaged: check sum {computed:08x}, stated {stated:08x}")
             }
-            Self::Malformed => {
-                f.write_str("the block's parameters cannot be read, or a list is too long for this build")
-            }
+            Self::TooLong => f.write_str(
+                "a list of the block is longer than this build has room for: raise N of the List<N> that read_block is told \
+                 (or the block has a kind of model that is newer than this build)",
+            ),
+            Self::Malformed => f.write_str("the block's parameters cannot be read: export the model anew"),
             Self::NoRoom => f.write_str("the buffer is too small for the block"),
         }
     }
@@ -108,14 +113,29 @@ pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
 /// The parameters are not checked beyond their form: `build` does that. They are returned by value: with lists of 300 numbers (a
 /// Preisach triangle of 24 × 24) and of 8 they take 8 KB (dpm has three such lists), besides what building needs (`docs/firmware.md`).
 ///
+/// The first list has to hold the longest of the operator (`fit --model pi` makes 20 plays by itself, and 64 at most; a triangle of n
+/// cells along an edge has n (n + 1) / 2), the second the creep bank and the dead zones; [`BlockError::TooLong`] says that one does not.
+///
 /// ```
 /// use hyst_core::{Build, Chain, List, OperatorParams, Pi, Sampling, read_block};
-/// fn load(flash: &[u8]) -> Result<Chain<f32, Pi<f32, 16>, 32, 8>, &'static str> {
-///     let chain = read_block::<List<16>, List<8>>(flash).map_err(|_| "bad block")?;
+///
+/// /// Room for 64 plays, 32 samples of dead time and 8 creep elements.
+/// type Actuator = Chain<f32, Pi<f32, 64>, 32, 8>;
+///
+/// fn load(flash: &[u8]) -> Result<Actuator, &'static str> {
+///     let chain = read_block::<List<64>, List<8>>(flash).map_err(|_| "bad block")?;
 ///     let OperatorParams::Pi(pi) = &chain.operator else { return Err("this firmware runs pi only") };
-///     let pi: Pi<f32, 16> = pi.build(&()).map_err(|_| "bad parameters")?;
+///     let pi: Pi<f32, 64> = pi.build(&()).map_err(|_| "bad parameters")?;
 ///     chain.around(pi, &Sampling { period: 1e-3 }).map_err(|_| "bad parameters")
 /// }
+///
+/// # use hyst_core::{ChainParams, EffectParams, PiParams, write_block};
+/// # let thresholds: Vec<f64> = (1..=20).map(f64::from).collect();
+/// # let operator = OperatorParams::Pi(PiParams { gain: 0.1, weights: thresholds.clone(), thresholds });
+/// # let fitted: ChainParams<Vec<f64>> = ChainParams { operator, effects: EffectParams::default(), zero: 0.0, input: [0.0, 120.0] };
+/// # let mut buffer = [0; 512];
+/// # let flash = write_block(&fitted, &mut buffer).unwrap();
+/// assert!(load(flash).is_ok());
 /// assert!(load(b"HYST").is_err());
 /// ```
 ///
@@ -147,6 +167,8 @@ where
     let payload = bytes.get(HEAD..end).ok_or(short(needed))?;
     match postcard::take_from_bytes(payload) {
         Ok((chain, [])) => Ok(chain),
+        // What the types themselves refuse; bytes that make no types at all are other errors.
+        Err(postcard::Error::SerdeDeCustom) => Err(BlockError::TooLong),
         _ => Err(BlockError::Malformed),
     }
 }
@@ -197,11 +219,30 @@ mod tests {
         assert!(size_of::<ChainParams<List<300>, List<8>>>() <= 8192);
     }
 
+    /// The same bytes with another payload, and a check sum that fits it.
+    fn honest(payload: &[u8]) -> Vec<u8> {
+        let length = (payload.len() as u32).to_le_bytes();
+        let mut bytes: Vec<u8> =
+            MAGIC.into_iter().chain([BLOCK_VERSION]).chain(length).chain(payload.iter().copied()).collect();
+        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+        bytes
+    }
+
     #[test]
-    fn a_list_that_is_too_long_is_refused() {
+    fn a_list_that_is_too_long_is_no_damage() {
         let mut buffer = [0; 512];
         let bytes = write_block(&chain(10), &mut buffer).unwrap();
-        assert_eq!(read_block::<List<8>, List<8>>(bytes), Err(BlockError::Malformed));
+        assert_eq!(read_block::<List<8>, List<8>>(bytes), Err(BlockError::TooLong));
+        assert_eq!(read_block::<List<16>, List<1>>(bytes), Err(BlockError::TooLong));
+        let payload = bytes[HEAD..bytes.len() - TAIL].to_vec();
+        // Too little, too much, and an option that is neither there nor absent (the last byte before the sensor's zero and the
+        // range of the input says that there is no interference).
+        let mut option = payload.clone();
+        option[payload.len() - 25] = 7;
+        for broken in [payload[..payload.len() - 1].to_vec(), [&payload[..], &[0]].concat(), option] {
+            assert_eq!(read_block::<List<16>, List<8>>(&honest(&broken)), Err(BlockError::Malformed));
+        }
+        read_block::<List<16>, List<8>>(&honest(&payload)).unwrap();
     }
 
     #[test]
@@ -221,12 +262,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_bytes_make_it_panic(body in prop::collection::vec(any::<u8>(), 0..300), honest: bool) {
-            let mut bytes: Vec<u8> = MAGIC.into_iter().chain([1]).chain((body.len() as u32).to_le_bytes()).chain(body).collect();
-            if honest {
-                bytes.extend(CRC.checksum(&bytes).to_le_bytes());
-            }
-            let _ = read_block::<List<16>, List<8>>(&bytes);
+        fn no_bytes_make_it_panic(body in prop::collection::vec(any::<u8>(), 0..300), whole: bool) {
+            let bytes = honest(&body);
+            let _ = read_block::<List<16>, List<8>>(&bytes[..bytes.len() - if whole { 0 } else { TAIL }]);
         }
     }
 }

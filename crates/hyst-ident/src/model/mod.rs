@@ -16,3 +16,4 @@ pub use hyst_core::Kind;
 pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState, searchable};
 
 pub(crate) use effects::Parameter;
+pub(crate) use operator::{ROOM as TEMPERATURE_OF_INVERSE, searched_range};

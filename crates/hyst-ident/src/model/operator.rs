@@ -23,7 +23,7 @@ type HostDpm = Dpm<f64, NODES, MIRROR, MIRROR>;
 type FullMemory = Exponentials<f64, 40>;
 
 /// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
-pub(super) const ROOM: f64 = 23.0;
+pub(crate) const ROOM: f64 = 23.0;
 
 /// What the preview of an activation-function model's inverse may miss, of the largest |α u̇|.
 const PREVIEW_TOLERANCE: f64 = 1e-10;
@@ -164,7 +164,7 @@ fn searched<O: Probe<f64> + Clone>(operator: &O, how: Inversion) -> Result<Searc
 }
 
 /// What was never driven may have to be reached by an inverse: as much again on either side.
-fn searched_range([low, high]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn searched_range([low, high]: [f64; 2]) -> [f64; 2] {
     let reach = (high - low).abs().max(f64::MIN_POSITIVE);
     [low - reach, high + reach]
 }
