@@ -82,7 +82,7 @@ fn fastest(mut run: impl FnMut()) -> f64 {
 
 fn candidates(c: &mut Criterion) {
     let data = data();
-    let (counts, segments) = (vec![true; ROWS], [0..ROWS]);
+    let (counts, segments) = (vec![true; ROWS], std::slice::from_ref(&(0..ROWS)).to_vec());
     let rows = Rows { rows: &data.rows, output: &data.output, counts: &counts, segments: &segments };
     let mut costs = vec![0.0; CANDIDATES];
     let never = vec![f64::INFINITY; CANDIDATES];
@@ -95,13 +95,13 @@ fn candidates(c: &mut Criterion) {
     }
     let (errors, points) = (batch(PiKernel::<16>, rows), pi_points());
     group.bench_function("PI-16, eight side by side", |b| {
-        b.iter(|| errors.costs(black_box(&points), &never, &mut costs))
+        b.iter(|| errors.costs(black_box(&points), &never, &mut costs));
     });
     let side = fastest(|| errors.costs(black_box(&points), &never, &mut costs));
     let single = fastest(|| {
         points.chunks_exact(33).for_each(|p| {
             black_box(alone(&pi(p), &data));
-        })
+        });
     });
     report.push(("PI-16", single, side));
 
@@ -113,7 +113,7 @@ fn candidates(c: &mut Criterion) {
     let single = fastest(|| {
         points.chunks_exact(8).for_each(|p| {
             black_box(alone(&td_pi(p), &data));
-        })
+        });
     });
     report.push(("TD-PI", single, side));
     group.finish();
