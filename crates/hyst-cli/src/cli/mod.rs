@@ -18,7 +18,7 @@ use crate::output::Target;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
 pub(crate) use values::{Device, VoltageLimits};
-use values::{finite, positive, seconds};
+use values::{celsius, positive, seconds};
 
 /// Identify, diagnose and compensate piezo actuators and others with hysteresis.
 #[derive(Debug, Parser)]
@@ -259,7 +259,7 @@ pub(crate) struct LimitArgs {
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TemperatureArg {
     /// Temperature, where the model needs it and the record or reference has no column of it
-    #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) degc: Option<f64>,
 }
 
