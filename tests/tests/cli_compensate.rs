@@ -26,6 +26,65 @@ fn the_drive_stands_beside_the_reference() {
     assert!(wanted.iter().zip(&predicted).all(|(y, p)| (y - p).abs() < 1e-6));
 }
 
+/// The row of the largest miss, from 1 in text and JSON; where the drive went; what is missed at the start and after.
+#[test]
+fn what_the_model_misses_is_said() {
+    let lab = lab();
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    let line = "compensate --model extended.json reference.csv -o drive.csv --limit 0,50";
+    let ran = lab.ok(line);
+    let missed = &lab.ok(&format!("{line} --json")).json()["missed"];
+    assert!(ran.stderr.contains(&format!("at most (row {})", missed["row"])), "{missed} {}", ran.stderr);
+    assert!(ran.stderr.contains("written: drive.csv"), "{}", ran.stderr);
+    lab.ok("simulate --model extended.json drive.csv -o check.csv");
+    let check = lab.read("check.csv");
+    let miss: Vec<f64> = column(&check, "displacement_um")
+        .iter()
+        .zip(column(&check, "predicted_um"))
+        .map(|(y, p)| (y - p).abs())
+        .collect();
+    let row = missed["row"].as_u64().unwrap() as usize;
+    assert!(miss.iter().all(|other| *other <= miss[row - 1] + 1e-9), "{missed}");
+    let number = |key: &str| missed[key].as_f64().unwrap();
+    assert!(number("settled_largest") <= number("largest") && number("settled_rmse") > 0.0, "{missed}");
+}
+
+#[test]
+fn a_band_beyond_the_sample_rate_names_the_option() {
+    let lab = lab();
+    lab.write("model.json", hyst_tests::every_stage(&lab.read("model.json")));
+    lab.write(
+        "reference.csv",
+        "time_s,displacement_um,temperature_degc,load_n\n0,4,23,0\n0.002,4,23,0\n0.004,4,23,0\n",
+    );
+    let message = lab.refuses("compensate --model model.json reference.csv -o drive.csv --bandwidth 5000", 2);
+    assert!(message.contains("--bandwidth 5000") && message.contains(" 125 Hz"), "{message}");
+}
+
+/// What is colder than anything is a fault of the sensor or of the typing.
+#[test]
+fn temperatures_below_absolute_zero_are_refused() {
+    let lab = lab();
+    let message = lab.refuses("compensate --model model.json reference.csv -o drive.csv --temperature -300", 2);
+    assert!(message.contains("--temperature") && message.contains("-273.15"), "{message}");
+    lab.write("cold.csv", "time_s,displacement_um,temperature_degc\n0,4,23\n0.002,4,-273.2\n");
+    let message = lab.refuses("compensate --model model.json cold.csv -o drive.csv", 2);
+    assert!(message.contains("cold.csv, line 3") && message.contains("temperature_degc"), "{message}");
+}
+
+#[test]
+fn a_misspelt_kind_is_named_with_its_place() {
+    let lab = lab();
+    let model = lab.read("model.json");
+    lab.write("pii.json", model.replacen("\"kind\": \"pi\"", "\"kind\": \"pii\"", 1));
+    let message = lab.refuses("compensate --model pii.json reference.csv -o drive.csv", 2);
+    assert!(message.contains("pii") && message.contains("correct that field"), "{message}");
+    assert!(message.matches("line 3").count() == 1 && !message.contains("cut off"), "{message}");
+    lab.write("cut.json", &model[..model.len() / 2]);
+    let message = lab.refuses("compensate --model cut.json reference.csv -o drive.csv", 2);
+    assert!(message.contains("cut off"), "{message}");
+}
+
 #[test]
 fn limits_are_kept_and_reported() {
     let lab = lab();

@@ -91,6 +91,33 @@ fn a_c_compiler_takes_the_header() {
     assert_eq!(said, "pi HYST 340\n", "{}", lab.read("model.h"));
 }
 
+/// A header says what its chain is, and of each stage its equation and how lists are laid out.
+#[test]
+fn a_header_explains_its_constants() {
+    let lab = lab();
+    let says = |model: &str, parts: &[&str]| {
+        lab.ok(&format!("export {model} --format c -o said.h"));
+        let header = lab.read("said.h");
+        for part in parts {
+            assert!(header.contains(part), "no {part:?} in\n{header}");
+        }
+        header
+    };
+    let order = "voltage_v -> delay -> lag -> pi -> ";
+    let end = "-> drift -> interference -> + hyst_zero -> displacement_um";
+    let weights = "weights[i] play[i]";
+    let header = says("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
+    assert_eq!(header.matches("What the sensor shows at rest").count(), 1, "{header}");
+    lab.write("preisach.json", paper(Kind::Preisach));
+    says("preisach.json", &["density[a (a + 1) / 2 + b]", "once[a]", "voltage_v -> preisach -> + hyst_zero"]);
+    // Newton is N beside seconds, where n would be nano: of a file whose output has the ending of its column.
+    let force =
+        lab.read("preisach.json").replace("displacement_um", "force_n").replace("\"unit\": \"um\"", "\"unit\": \"n\"");
+    lab.write("force.json", force);
+    let header = says("force.json", &["output force_n [N]", "/* N */"]);
+    assert!(!header.contains("/* n */") && !header.contains("n/V") && !header.contains("[n]"), "{header}");
+}
+
 /// Every constant says its unit, of a fitted model with every stage and of every kind.
 #[test]
 fn constants_in_c_have_their_units() {

@@ -67,6 +67,19 @@ fn span(y: &[f64]) -> f64 {
     y.iter().copied().fold(f64::NEG_INFINITY, f64::max) - y.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
+/// The files with round numbers say how far their output goes.
+#[test]
+fn the_output_range_is_what_the_model_reaches() {
+    for kind in [Kind::Pi, Kind::Gpi] {
+        let paper = Paper::new(kind);
+        paper.write("full.csv", &paper.input, &(0..=1000).map(|k| 0.12 * f64::from(k)).collect::<Vec<_>>());
+        let text = paper.lab.read("model.json");
+        let stated = serde_json::from_str::<Value>(&text).unwrap()["output"]["high"].as_f64().unwrap();
+        let reached = paper.simulated("full.csv").pop().unwrap();
+        assert!((stated - reached).abs() < 0.05, "{kind}: {stated} in the file, {reached} reached");
+    }
+}
+
 #[test]
 fn every_kind_is_simulated_and_exported() {
     for kind in Kind::ALL {

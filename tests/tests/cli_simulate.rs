@@ -181,6 +181,9 @@ fn inputs_beyond_the_models_range_are_reported() {
     assert!(ran.stderr.contains(&said), "{}", ran.stderr);
     let report = &ran.json()["extrapolated"];
     assert_eq!((report["rows"].as_u64(), report["largest"].as_f64()), (Some(beyond.len() as u64), Some(largest)));
+    assert!(ran.stderr.contains(&format!("(row {})", report["row"])), "{report} {}", ran.stderr);
+    let ran = lab.ok("simulate --model model.json far.csv -o out.csv");
+    assert!(ran.stderr.contains("written: out.csv"), "{}", ran.stderr);
 }
 
 fn without_last_column(csv: &str) -> String {

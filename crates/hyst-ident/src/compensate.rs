@@ -9,6 +9,7 @@ use crate::model::capacity::{CREEP, TAPS};
 use crate::model::{Compensator, InverseState, Model};
 use crate::record::Record;
 use crate::samples::Samples;
+use crate::settle::start_up_rows;
 
 /// What a compensation may be told.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +58,13 @@ pub struct Missed {
     pub largest: f64,
     /// Its row, from 0.
     pub row: usize,
+    /// Start-up rows: the drive begins at rest, where a reference that moves already, or an inverse with preview, would have had it
+    /// move before.
+    pub settling_rows: usize,
+    /// Root mean square over the other rows \[output unit\].
+    pub settled_rmse: f64,
+    /// Largest of the other rows \[output unit\].
+    pub settled_largest: f64,
 }
 
 /// Why a reference cannot be compensated.
@@ -65,7 +73,7 @@ pub struct Missed {
 pub enum CompensateError {
     /// Beyond the stroke.
     #[error(
-        "{record}: row {row} (time {time} s): {value} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference"
+        "{record}: row {} (time {time} s): {value} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference", row + 1
     )]
     OutOfReach {
         /// The reference.
@@ -92,6 +100,18 @@ pub enum CompensateError {
         column: String,
         /// What to do.
         advice: String,
+    },
+    /// The band is wider than the sample rate allows.
+    #[error(
+        "--bandwidth {hz} Hz is more than {limit} Hz, a quarter of the sample rate of {record}; give less, or sample the reference faster"
+    )]
+    Bandwidth {
+        /// The reference.
+        record: String,
+        /// What was asked for \[Hz\].
+        hz: f64,
+        /// The widest band \[Hz\].
+        limit: f64,
     },
     /// The model has no inverse at this sample rate, or an option is out of range.
     #[error("{0}")]
@@ -120,30 +140,41 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
             }
         }
     }
-    drive.missed = missed(model, &follower, &drive.voltage)?;
+    drive.missed = missed(model, &mut follower, &drive.voltage)?;
     Ok(drive)
 }
 
 /// The model driven as it would drive the actuator.
-fn missed(model: &Model, follower: &Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
-    let samples = &follower.samples;
-    let chain = Box::new(model.without_sensor().build(samples.period)?);
+fn missed(model: &Model, follower: &mut Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
+    let period = follower.samples.period;
+    let chain = Box::new(model.without_sensor().build(period)?);
     let mut state = Box::new(chain.state());
-    let mut missed = Missed::default();
-    let mut sum = 0.0;
-    for segment in &samples.segments {
+    let mut residual = Vec::with_capacity(drive.len());
+    for segment in follower.samples.segments.clone() {
         for row in segment.clone() {
             let (env, u) = (follower.env(row, None), drive[row]);
             let y =
                 if row == segment.start { chain.reset(&mut state, &env, u) } else { chain.step(&mut state, &env, u) };
-            let miss = (samples.output[row] - y).abs();
-            sum += miss * miss;
-            if miss > missed.largest {
-                (missed.largest, missed.row) = (miss, row);
-            }
+            residual.push(follower.samples.output[row] - y);
         }
     }
-    missed.rmse = (sum / drive.len().max(1) as f64).sqrt();
+    // A reference has no input of its own: start-ups are looked for along the drive.
+    follower.samples.input = drive.to_vec();
+    let settling = start_up_rows(&follower.samples, &residual);
+    let mut missed = Missed { settling_rows: settling.iter().filter(|s| **s).count(), ..Missed::default() };
+    let (mut all, mut settled) = (0.0, 0.0);
+    for (row, (miss, settling)) in residual.iter().map(|r| r.abs()).zip(settling).enumerate() {
+        all += miss * miss;
+        if miss > missed.largest {
+            (missed.largest, missed.row) = (miss, row);
+        }
+        if !settling {
+            settled += miss * miss;
+            missed.settled_largest = missed.settled_largest.max(miss);
+        }
+    }
+    missed.rmse = (all / drive.len().max(1) as f64).sqrt();
+    missed.settled_rmse = (settled / (drive.len() - missed.settling_rows).max(1) as f64).sqrt();
     Ok(missed)
 }
 
@@ -170,7 +201,16 @@ impl Follower {
         let samples = Samples::from_record(reference).at_temperature(options.temperature);
         check(model, reference, &samples, options)?;
         let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };
-        let compensator = Box::new(model.compensator(samples.period, &own)?);
+        // Of a period that was read off a column of times: what is printed is the figure that was meant.
+        let limit = (0.25e6 / samples.period).round() / 1e6;
+        let compensator = model.compensator(samples.period, &own).map_err(|why| match (why, options.bandwidth_hz) {
+            // Of a model without dynamics no band is asked for, and none refused.
+            (hyst_core::Error::OutOfRange { name: "preview band", .. }, Some(hz)) if hz > limit => {
+                CompensateError::Bandwidth { record: reference.name(), hz, limit }
+            }
+            (why, _) => why.into(),
+        });
+        let compensator = Box::new(compensator?);
         let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
         let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
         let state = Box::new(compensator.state());

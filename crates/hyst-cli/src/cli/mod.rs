@@ -22,7 +22,7 @@ use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, 
 pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
 pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, VoltageLimits};
-use values::{finite, positive, seconds};
+use values::{celsius, positive, seconds};
 
 /// Identify, diagnose and compensate piezo actuators and others with hysteresis.
 #[derive(Debug, Parser)]
@@ -281,7 +281,7 @@ pub(crate) struct LimitArgs {
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TemperatureArg {
     /// Temperature, where the model needs it and the record or reference has no column of it
-    #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) degc: Option<f64>,
 }
 

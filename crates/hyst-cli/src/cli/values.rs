@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use hyst_ident::record::ABSOLUTE_ZERO;
+
 /// Voltages between which a drive has to stay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VoltageLimits {
@@ -55,6 +57,15 @@ pub(super) fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "it has to be a finite number".to_owned())
 }
 
+/// A temperature that there can be \[°C\].
+pub(super) fn celsius(text: &str) -> Result<f64, String> {
+    let usable = |degc: &f64| *degc >= ABSOLUTE_ZERO;
+    finite(text)
+        .ok()
+        .filter(usable)
+        .ok_or_else(|| format!("it has to be a temperature in degC, {ABSOLUTE_ZERO} or above"))
+}
+
 /// A time from zero up.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let usable = |x: &f64| x.is_finite() && *x >= 0.0;
@@ -89,6 +100,10 @@ mod tests {
         }
         assert_eq!(finite("-3"), Ok(-3.0));
         finite("nan").unwrap_err();
+        assert_eq!((celsius("-273.15"), celsius("23")), (Ok(-273.15), Ok(23.0)));
+        for text in ["-273.16", "-300", "inf", "nan", "warm"] {
+            assert!(celsius(text).unwrap_err().contains("-273.15"), "{text}");
+        }
         assert_eq!(seconds("0"), Ok(0.0));
         seconds("-1").unwrap_err();
     }

@@ -14,6 +14,8 @@ use crate::{input, text};
 #[derive(Debug, Serialize)]
 pub(super) struct Compensation {
     rows: usize,
+    /// Where the drive was written; none where it runs live.
+    output: Option<String>,
     /// Where the drive starts \[V\].
     first: f64,
     lowest: f64,
@@ -59,7 +61,9 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
         ));
     }
     let mut compensation = Compensation::new(&model, &reference, &drive);
-    compensation.missed = Some(drive.missed);
+    // People and JSON count rows from 1.
+    compensation.missed = Some(Missed { row: drive.missed.row + 1, ..drive.missed });
+    compensation.output = Some(args.output.to_string());
     report.print(&compensation.text(), &compensation)
 }
 
@@ -80,6 +84,7 @@ impl Compensation {
         let in_the_sensor = model.effects.names().into_iter().filter(|effect| !effect.acts_on_the_motion());
         Self {
             rows: drive.voltage.len(),
+            output: None,
             first: drive.voltage.first().copied().unwrap_or_default(),
             lowest,
             highest,
@@ -125,13 +130,22 @@ impl Compensation {
             None => lead,
         });
         if let Some(missed) = &self.missed {
-            lines.push(format!(
-                "with this drive the model itself misses the reference by {} {} RMS, {} at most (row {})",
+            let unit = text::symbol(&self.output_unit);
+            let mut line = format!(
+                "with this drive the model itself misses the reference by {} {unit} RMS, {} at most (row {})",
                 short(missed.rmse),
-                text::symbol(&self.output_unit),
                 short(missed.largest),
-                missed.row + 1
-            ));
+                missed.row
+            );
+            if missed.settling_rows > 0 {
+                line += &format!(
+                    "; after {} of start-up (the actuator begins at rest) by {} {unit} RMS, {} at most",
+                    text::count(missed.settling_rows, "row"),
+                    short(missed.settled_rmse),
+                    short(missed.settled_largest)
+                );
+            }
+            lines.push(line);
         }
         if self.first.abs() > 0.01 * (self.highest - self.lowest) {
             lines.push(format!(
@@ -143,6 +157,9 @@ impl Compensation {
             let (effects, verb) =
                 (text::listed(&self.not_compensated), if self.not_compensated.len() == 1 { "is" } else { "are" });
             lines.push(format!("{effects} {verb} in the sensor, not in the motion, and {verb} not compensated"));
+        }
+        if let Some(output) = &self.output {
+            lines.push(format!("written: {output}"));
         }
         lines.join("\n")
     }

@@ -69,7 +69,11 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         zero,
         zeros: simulated.zeros,
         errors: simulated.errors,
-        extrapolated: simulated.extrapolated,
+        // People and JSON count rows from 1, where there is one.
+        extrapolated: Extrapolated {
+            row: simulated.extrapolated.row + usize::from(simulated.extrapolated.rows > 0),
+            ..simulated.extrapolated
+        },
         mape,
     };
     report.print(&summary.text(), &summary)
@@ -91,7 +95,7 @@ impl Summary {
     fn text(&self) -> String {
         let unit = text::symbol(&self.unit);
         let rows = text::count(self.rows, "row");
-        match &self.errors {
+        let text = match &self.errors {
             None => format!("{}: {rows}, no measured output to compare with", self.record),
             Some(errors) => {
                 let mut text = format!("{}: {rows} ({} settling), ", self.record, self.settling_rows);
@@ -107,6 +111,7 @@ impl Summary {
                 }
                 text
             }
-        }
+        };
+        format!("{text}\nwritten: {}", self.output)
     }
 }

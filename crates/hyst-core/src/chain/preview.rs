@@ -149,9 +149,12 @@ impl<T: Real, const N: usize> Stage<T> for Preview<T, N> {
         s.inputs.push(finite_or(u, s.inputs.back(0, T::ZERO)));
         // The first tap (n = −lead) meets the newest sample.
         let (recent, wrapped) = s.inputs.newest_first();
-        let mut y = T::ZERO;
+        // The taps add up to one, so the middle can be taken out: an input at rest then passes without rounding, which an inverse
+        // with a jump wherever its input turns would take for a turn.
+        let middle = s.inputs.back(self.half, T::ZERO);
+        let mut y = middle;
         for (x, c) in recent.iter().chain(wrapped).zip(&self.taps).take(2 * self.half + 1) {
-            y += *c * *x;
+            y += *c * (*x - middle);
         }
         y
     }

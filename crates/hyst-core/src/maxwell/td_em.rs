@@ -399,6 +399,21 @@ mod tests {
         }
     }
 
+    /// Rounding in the filter is no turn: the bank's drive would jump across its narrowest backlash, and stay there.
+    #[test]
+    fn a_reference_at_rest_is_held() {
+        let model = tube(SlipReading::Backlash);
+        let inverse: Box<TdEmInverse<f64, 10, 255>> = Box::new(model.band_limited(23.0, None).unwrap());
+        for y in [-22.96, -3.7, 0.3, 5.1, 27.9] {
+            let (mut s, mut i, e) = (model.state(), inverse.state(), at(23.0));
+            let drive = inverse.reset(&mut i, &e, y);
+            assert!((model.reset(&mut s, &e, drive) - y).abs() < 1e-9);
+            for _ in 0..300 {
+                assert_eq!(inverse.step(&mut i, &e, y), drive, "{y}");
+            }
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
         /// Random circuits and references in the band: the stated error times the reference's tones.

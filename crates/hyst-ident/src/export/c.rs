@@ -6,7 +6,7 @@ use std::str::FromStr;
 use hyst_core::BlockError;
 use serde_json::Value;
 
-use super::{block, harmless, origin};
+use super::{block, harmless, origin, words};
 use crate::model::Model;
 
 /// What the symbols of a C header begin with; its macros have it in capitals.
@@ -44,11 +44,13 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     // The block's own check sum tells two models apart.
     let sum: String = bytes.iter().rev().take(4).map(|byte| format!("{byte:02x}")).collect();
     let mut text = format!(
-        "/* Written by hystctl {}. {} */\n#ifndef {macros}_MODEL_H\n#define {macros}_MODEL_H\n#define {macros}_MODEL_SUM 0x{sum}u\n\n\
+        "/* Written by hystctl {}. {}\n *\n\
+         {} */\n#ifndef {macros}_MODEL_H\n#define {macros}_MODEL_H\n#define {macros}_MODEL_SUM 0x{sum}u\n\n\
          #include <stdint.h>\n\n#define {macros}_KIND \"{}\"\n\n/* What hyst_core::read_block reads. */\n\
          static const uint8_t {name}_block[{}] = {{",
         env!("CARGO_PKG_VERSION"),
         origin(model),
+        about(model, name),
         model.base.kind(),
         bytes.len()
     );
@@ -56,8 +58,10 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
         let _ = write!(text, "{}0x{byte:02x},", if i % 16 == 0 { "\n    " } else { " " });
     }
     text += "\n};\n";
-    let (input, output) = (harmless(&model.input.unit), harmless(&model.output.unit));
-    let _ = writeln!(text, "\nstatic const double {name}_zero = {:?}; /* {output} */", model.zero);
+    let (input, output) = (harmless(model.input.symbol()), harmless(model.output.symbol()));
+    let _ = writeln!(text, "\n/* What the sensor shows at rest: added to what leaves the last stage. */");
+    let _ = writeln!(text, "static const double {name}_zero = {:?}; /* {output} */", model.zero);
+    let _ = writeln!(text, "/* Inputs that the model was identified on. */");
     let _ = writeln!(text, "static const double {name}_input_low = {:?}; /* {input} */", model.input.low);
     let _ = writeln!(text, "static const double {name}_input_high = {:?}; /* {input} */", model.input.high);
     let mut modes = 0;
@@ -67,7 +71,11 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
         let units = stage.remove("units").unwrap_or_default();
         stage.remove("std_errors");
         stage.remove("undetermined");
-        let _ = writeln!(text, "\n/* {title} */");
+        let _ = write!(text, "\n/* {title}");
+        for line in words::of_stage(&title) {
+            let _ = write!(text, "\n *   {line}");
+        }
+        text += " */\n";
         modes += usize::from(title == "resonance");
         // A second mode must not have the names of the first.
         let second = if title == "resonance" && modes > 1 { format!("_{modes}") } else { String::new() };
@@ -79,6 +87,21 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
         "\n#elif {macros}_MODEL_SUM != 0x{sum}u\n#error \"two models are called {name}: export one of them with --name\"\n#endif\n"
     );
     Ok(text)
+}
+
+/// What a header holds, as lines of a comment: the block, and the chain that the constants make.
+fn about(model: &Model, name: &str) -> String {
+    let stages = model.stages();
+    let chain: Vec<&str> = stages.iter().filter_map(|stage| stage.get("stage")?.as_str()).collect();
+    format!(
+        " * {name}_block is for Rust firmware: hyst_core::read_block (feature block) makes the model of it.\n\
+         \x20* The constants are for code of your own: {} -> {} -> + {name}_zero -> {},\n\
+         \x20* stage by stage below; in each, u is what enters it and y what leaves it. No constant depends on a sample period.\n\
+         \x20* After each constant stands its unit; NAME_length is the number of a list's elements.",
+        harmless(&model.input.column),
+        chain.join(" -> "),
+        harmless(&model.output.column),
+    )
 }
 
 fn identifier(name: &str) -> String {

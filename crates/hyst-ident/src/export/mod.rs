@@ -3,6 +3,7 @@
 mod c;
 mod inverse;
 mod rust;
+mod words;
 
 pub use c::{CName, c};
 pub use rust::rust;
@@ -44,8 +45,8 @@ fn origin(model: &Model) -> String {
         "Parameters of the model {}, input {} [{}], output {} [{}]{from}.",
         model.base.kind(),
         model.input.column,
-        model.input.unit,
+        model.input.symbol(),
         model.output.column,
-        model.output.unit
+        model.output.symbol()
     ))
 }

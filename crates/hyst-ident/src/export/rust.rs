@@ -117,7 +117,7 @@ pub fn rust(model: &Model) -> String {
         period = period,
         dead_time = dead_time(model, period),
         inverse = inverse::example(model, period),
-        unit = harmless(&model.output.unit),
-        input = harmless(&model.input.unit),
+        unit = harmless(model.output.symbol()),
+        input = harmless(model.input.symbol()),
     )
 }

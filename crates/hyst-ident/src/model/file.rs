@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hyst_core::{ChainParams, CompensatorOptions, Error, Kind, Sampling};
 use serde::{Deserialize, Serialize};
+use serde_json::error::Category;
 
 use super::operator::inverse_ends;
 use super::{Base, Compensator, Effects, HostChain, Operator, stages, units};
@@ -24,6 +25,13 @@ pub struct Channel {
     pub low: f64,
     /// Highest value in that record.
     pub high: f64,
+}
+
+impl Channel {
+    /// The unit as it stands beside numbers: `N` for the ending `n`, which beside `s` would read as nano.
+    pub fn symbol(&self) -> &str {
+        if self.unit == "n" { "N" } else { &self.unit }
+    }
 }
 
 /// A file that a model was fitted to.
@@ -94,8 +102,8 @@ pub enum ModelError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// Not a model, or cut off.
-    #[error("{path}: line {line}, column {column}: {message}; the file is truncated or no model: fit it anew")]
+    /// Not JSON, cut off, or with a field that is none.
+    #[error("{path}: line {line}, column {column}: {message}; {advice}")]
     Syntax {
         /// The file.
         path: String,
@@ -105,6 +113,8 @@ pub enum ModelError {
         column: usize,
         /// What is wrong there.
         message: String,
+        /// What to do.
+        advice: &'static str,
     },
     /// Another schema.
     #[error("{path}: schema {found:?}, this version reads {SCHEMA:?}: {advice}")]
@@ -240,7 +250,15 @@ impl Model {
             path: path.clone(),
             line: e.line(),
             column: e.column(),
-            message: e.to_string(),
+            // The place stands before it.
+            message: e.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
+            advice: match e.classify() {
+                Category::Data => "correct that field, or fit the model anew",
+                Category::Eof => "the file is cut off: fit the model anew",
+                Category::Syntax | Category::Io => {
+                    "this is no JSON: give the model.json that `fit` or `diagnose` wrote"
+                }
+            },
         };
         let head: Head = serde_json::from_str(text).map_err(syntax)?;
         let found = head.schema.unwrap_or_default();

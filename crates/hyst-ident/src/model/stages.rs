@@ -25,7 +25,7 @@ struct RateDependence {
 
 /// The stages of a model, in the chain's order.
 pub(super) fn write(model: &Model) -> Vec<Value> {
-    let (u, y) = (&model.input.unit, &model.output.unit);
+    let (u, y) = (model.input.symbol(), model.output.symbol());
     let mut list = Vec::new();
     let mut push = |name: &str, key: &str, fields: Value, params: &mut dyn Params| {
         let units = units::of(&fields, params, u, y);

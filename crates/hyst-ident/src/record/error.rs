@@ -184,6 +184,20 @@ pub enum RecordError {
         /// The value.
         value: String,
     },
+    /// A temperature that no thing has.
+    #[error(
+        "{file}, {place}, column \"{column}\": {value} degC is below absolute zero, -273.15 degC; repair the sensor's value, or leave the column out"
+    )]
+    TooCold {
+        /// The file.
+        file: String,
+        /// The row.
+        place: Place,
+        /// The column's name in the file.
+        column: String,
+        /// The value.
+        value: String,
+    },
     /// A segment label is not an integer.
     #[error("{file}, {place}, column \"{column}\": \"{text}\" is not an integer; number the segments 0, 1, 2 …")]
     SegmentNotInteger {

@@ -80,6 +80,9 @@ pub struct Record {
     text: Option<Arc<[u8]>>,
 }
 
+/// Nothing is colder \[°C\].
+pub const ABSOLUTE_ZERO: f64 = -273.15;
+
 impl Record {
     /// Makes a record of columns in memory.
     ///
@@ -114,6 +117,16 @@ impl Record {
                     value: values.map_or(f64::NAN, |values| values[row]).to_string(),
                 });
             }
+        }
+        let coldest =
+            |values: &Vec<f64>| values.iter().position(|degc| *degc < ABSOLUTE_ZERO).map(|row| (row, values[row]));
+        if let Some((row, degc)) = samples.temperature.as_ref().and_then(coldest) {
+            return Err(RecordError::TooCold {
+                file: samples.name,
+                place: Place::Row(row),
+                column: "temperature_degc".into(),
+                value: degc.to_string(),
+            });
         }
         let origin = Origin { time_column: "time_s", segment_column: "segment", place: &Place::Row };
         Self::assemble(samples, Printed::EXACT, &origin)

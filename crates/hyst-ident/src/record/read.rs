@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use csv::ByteRecord;
 
+use super::ABSOLUTE_ZERO;
 use super::columns::{ColumnMap, Layout, Need};
 use super::error::{Place, RecordError};
 use super::grid::Printed;
@@ -86,6 +87,16 @@ impl Table<'_> {
             }
             time.push(self.number(&fields, time_at)? / time_unit.per_second());
             printed.take(fields[time_at].trim_ascii());
+            if let Some((at, _)) = &temperature
+                && self.number(&fields, *at)? < ABSOLUTE_ZERO
+            {
+                return Err(RecordError::TooCold {
+                    file: self.name.to_owned(),
+                    place: self.place(&fields),
+                    column: self.names[*at].clone(),
+                    value: shortened(fields[*at].trim_ascii()),
+                });
+            }
             for (at, values) in [&mut input, &mut output, &mut temperature, &mut load].into_iter().flatten() {
                 values.push(self.number(&fields, *at)?);
             }

@@ -1,0 +1,93 @@
+//! What a C header says of each stage: its equation, in the names of its constants, and how its lists are laid out.
+
+/// The lines about a stage, by its name in the file. `u` is what enters it, `y` what leaves it, `h` the sample period.
+pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
+    match name {
+        "delay" => &["y(t) = u(t - seconds)"],
+        "lag" => &["seconds dy/dt + y = u"],
+        "pi" => &[
+            "y = gain u + sum over i of weights[i] play[i]",
+            "play[i] <- max(u - thresholds[i], min(u + thresholds[i], play[i])), 0 before the first input; thresholds rise",
+        ],
+        "rate-dependence" => &[
+            "the plays of pi slide with drag: seconds d(play[i])/dt = what u is beyond play[i] -+ thresholds[i]",
+            "a sliding play moves by h / (h + seconds) of that in a sample",
+        ],
+        "gpi" => &[
+            "y = gain F(0) + sum over i of weights[i] F(thresholds[i])",
+            "F(r) <- max(left(u) - r, min(right(u) + r, F(r))), 0 before the first input; thresholds rise",
+            "left, right: linear is slope u + offset, tanh is height tanh(rate u + shift) + offset",
+        ],
+        "td-pi" => &[
+            "y = sum over i = 0 .. plays of p(i) F(alpha i), p(i) = epsilon exp(eta (T - reference_degc)) exp(-tau alpha i)",
+            "F(r) <- max(a0 u + a1 - r, min(b0 u + b1 + r, F(r))), 0 before the first input",
+        ],
+        "maxwell-slip" => &[
+            "y = sum over i of gains[i] element[i]; widths rise",
+            "backlash: element[i] is the play of half-width widths[i] / 2; elasto-slip: u minus the play of half-width widths[i]",
+        ],
+        "td-em" => &[
+            "i = sum over k of slip_gains[k] element[k] (backlash: the play of half-width slip_widths[k] / 2), a current",
+            "it charges capacitance || resistance to a voltage v, and mass x'' + damping x' + stiffness x = psi v; y = per_metre x",
+            "psi = coupling[0] + coupling[1] T + coupling[2] T^2, T in degC",
+        ],
+        "preisach" => &[
+            "relays switch up at alpha and down at beta <= alpha; the grid cuts low .. high into cells intervals for each",
+            "density[a (a + 1) / 2 + b]: output gained by the relays with alpha in interval a and beta in interval b <= a, counted from 0",
+            "once[a]: output gained by those with alpha in interval a that never switch back; rest: input of the virgin memory",
+            "y is 0 at rest; between the nodes of the grid it is interpolated",
+        ],
+        "dpm" => &[
+            "each branch of preisach counts times xi(rate |du/dt|, change of the input since it began), bilinear between nodes",
+            "preisach_density[a (a + 1) / 2 + b]: relays with alpha in interval a and beta in interval b <= a of the grid, from 0;",
+            "preisach_once[a]: those with alpha in interval a that never switch back; preisach_rest: input of the virgin memory",
+            "mirror_weights[d mirror_changes + p]: xi at node d of rate_low .. rate_high and node p of change_low .. change_high",
+            "fade: travel over which the step at a closing loop fades to 1/e; 0 leaves it a step",
+        ],
+        "bouc-wen" => {
+            &["y = k0 u + g, dg = alpha du - beta |du| |g|^(n-1) g - gamma du |g|^n, g = 0 before the first input"]
+        }
+        "bouc-wen-oscillator" => &[
+            "mass y'' + damping y' + stiffness y + z = u",
+            "z' = alpha y' - beta (gamma |y'| |z|^(nu-1) z + delta y' |z|^nu)",
+        ],
+        "lfdm" => &["Y(s) = (a + b s^alpha) / (1 + c s^beta) U(s); order: accuracy of the sampled derivatives"],
+        "ifm" => &[
+            "Y(s) = delta U(s) + (a + b s^alpha) / (1 + c s^beta) (e^(-tau s) - 1) U(s)",
+            "order: accuracy of the sampled derivatives",
+        ],
+        "atan" => &["y = k0 u + alpha du/dt + beta atan(gamma u)"],
+        "sigmoid" => &["y = k0 u + alpha du/dt + beta / (1 + exp(-gamma u))"],
+        "softplus" => &["y = k0 u + alpha du/dt + beta ln(1 + exp(gamma u))"],
+        "softsign" => &["y = k0 u + alpha du/dt + beta gamma u / (1 + |gamma u|)"],
+        "tanh" => &["y = k0 u + alpha du/dt + beta tanh(gamma u)"],
+        "asymmetry" => &[
+            "y = u + sum over j of weights[j] d[j]: of thresholds[j] >= 0, d = max(u - thresholds[j], 0); below, min(u - thresholds[j], 0)",
+        ],
+        "temperature" => &["y = u (1 + per_kelvin (T - reference_degc))"],
+        "creep" => &["y = u + sum over i of shares[i] x[i], seconds[i] dx[i]/dt = u - x[i], x[i] = u at rest"],
+        "load" => &["y = u + per_newton F, F the measured load"],
+        "resonance" => &["y = (1 - gain) u + gain x, x'' = w^2 (u - x) - 2 damping w x', w = 2 pi hz"],
+        "saturation" => &[
+            "y = u but within knee (high - low) of low and high, where it nears them as k + (L - k) tanh((u - k) / (L - k))",
+        ],
+        "drift" => &["y = u + per_second t, t the lab's clock"],
+        "interference" => &["y = u + amplitude sin(2 pi hz t + phase), t the lab's clock"],
+        _ => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Kind;
+
+    #[test]
+    fn every_kind_and_the_triangle_are_described() {
+        for kind in Kind::ALL {
+            assert!(!of_stage(kind.name()).is_empty(), "{kind}");
+        }
+        // The place that the words give.
+        assert_eq!(hyst_core::preisach_cell(5, 3), 5 * (5 + 1) / 2 + 3);
+    }
+}
