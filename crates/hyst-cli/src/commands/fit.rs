@@ -256,7 +256,7 @@ fn parameters(estimate: &Estimate) -> String {
         lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
     }
     for TradeOff { changes, std_error } in estimate.trade_offs.iter().take(3) {
-        let part = |(name, share): &(String, f64)| format!("{name} {:+.2}", share);
+        let part = |(name, share): &(String, f64)| format!("{name} {share:+.2}");
         lines.push(format!(
             "  free by {}: {} together leave no trace",
             text::percent(100.0 * std_error),
