@@ -58,36 +58,38 @@ pub(super) fn stable(p: &[f64]) -> bool {
     true
 }
 
-/// `p` with its roots drawn towards zero just far enough to be inside the unit circle.
-pub(super) fn drawn_inside(p: &[f64]) -> Vec<f64> {
-    let mut drawn = p.to_vec();
-    let mut shrink = 1.0;
-    while !stable(&drawn) {
-        shrink *= 0.97;
-        // zⁿ p(z / shrink): every root is multiplied by `shrink`.
-        drawn = p.iter().zip(1..).map(|(c, i)| c * f64::powi(shrink, i)).collect();
-        if shrink < 1e-3 || !drawn.iter().all(|c| c.is_finite()) {
-            return vec![0.0; p.len()];
-        }
+/// The polynomial whose roots outside the unit circle are reflected to inside, z to 1/z̄: as a filter it has the same gain at
+/// every frequency but for a factor. Without any effect where all are inside; zero coefficients where there are no roots.
+pub(super) fn reflected(p: &[f64]) -> Vec<f64> {
+    if stable(p) {
+        return p.to_vec();
     }
-    drawn
+    let inside = |z: Complex<f64>| {
+        let reflected = if z.norm() > 1.0 { Complex::new(1.0, 0.0) / z.conj() } else { z };
+        // A root on the circle would leave a recursion that never forgets.
+        reflected * (MOST / reflected.norm()).min(1.0)
+    };
+    let found = roots(p).map(|found| with_roots(&found.into_iter().map(inside).collect::<Vec<_>>()));
+    found.filter(|p| stable(p)).unwrap_or_else(|| vec![0.0; p.len()])
+}
+
+/// Farthest from zero that a reflected root comes to lie.
+const MOST: f64 = 1.0 - 1e-5;
+
+/// Coefficients of the polynomial with these roots, all real or in conjugate pairs.
+fn with_roots(roots: &[Complex<f64>]) -> Vec<f64> {
+    let p = roots.iter().fold(vec![Complex::new(1.0, 0.0)], |p, r| {
+        let mut next = p.clone();
+        next.push(Complex::new(0.0, 0.0));
+        p.iter().zip(&mut next[1..]).for_each(|(c, next)| *next -= r * c);
+        next
+    });
+    p[1..].iter().map(|c| c.re).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Coefficients of the polynomial with these roots, all in conjugate pairs or real.
-    fn with_roots(roots: &[Complex<f64>]) -> Vec<f64> {
-        let one = Complex::new(1.0, 0.0);
-        let p = roots.iter().fold(vec![one], |p, r| {
-            let mut next = p.clone();
-            next.push(Complex::new(0.0, 0.0));
-            p.iter().enumerate().for_each(|(i, c)| next[i + 1] -= r * c);
-            next
-        });
-        p[1..].iter().map(|c| c.re).collect()
-    }
 
     #[test]
     fn lightly_damped_pairs_near_one_are_found() {
@@ -110,9 +112,12 @@ mod tests {
         for (radius, inside) in [(0.999_999, true), (1.000_001, false)] {
             let p = with_roots(&[Complex::from_polar(radius, 1.0), Complex::from_polar(radius, -1.0)]);
             assert_eq!(stable(&p), inside);
-            assert!(stable(&drawn_inside(&p)));
-            assert_eq!(drawn_inside(&p) == p, inside);
+            assert!(stable(&reflected(&p)));
+            assert_eq!(reflected(&p) == p, inside);
         }
         assert!(!stable(&[f64::NAN]));
+        assert_eq!(reflected(&[f64::NAN]), [0.0]);
+        // z + 4 becomes z + 1/4.
+        assert!((reflected(&[4.0])[0] - 0.25).abs() < 1e-12);
     }
 }

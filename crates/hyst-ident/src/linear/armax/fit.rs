@@ -30,18 +30,20 @@ pub struct ArmaxOptions {
 }
 
 /// Steps from each start, before the better one goes on.
-const FIRST_STEPS: usize = 5;
+const FIRST_STEPS: usize = 8;
 /// Most steps from there.
 const STEPS: usize = 40;
 /// The search ends when a step lowers the cost by less than this share: far below what a record can tell.
-const ENOUGH: f64 = 1e-6;
+const ENOUGH: f64 = 1e-5;
+/// Damping of the first step, on columns of unit length.
+const LAMBDA: f64 = 1e-6;
 
 /// Fits an ARMAX model: least squares of what a prediction one row ahead misses, over all segments.
 ///
 /// Begins with a long ARX model. Its errors stand for e in a linear fit (Hannan and Rissanen 1982), a start for any
 /// disturbance; what it simulates from the input alone is reduced to the order wanted (Steiglitz and McBride 1965), with C = A,
-/// a start for white noise of the sensor. From both, Levenberg's and Marquardt's steps on the prediction error; a step that
-/// would take a root of C out of the unit circle is shortened. The better one is returned.
+/// a start for white noise of the sensor. From both, Levenberg's and Marquardt's steps on the prediction error; a root of C that a
+/// step takes out of the unit circle is reflected. The better one is returned.
 ///
 /// # Errors
 /// When the order is out of range, a column is constant, there are too few rows, or no model of the order fits.
@@ -102,13 +104,13 @@ pub(super) fn fit(signals: &Signals, order: usize, delay: usize) -> Result<Fitte
 /// Levenberg's and Marquardt's search from a start whose C is stable.
 pub(super) fn search(signals: &Signals, shape: Shape, start: DVector<f64>, steps: usize) -> Fitted {
     let mut best = Fitted { shape, cost: signals.cost(shape, &start), theta: start };
-    let mut lambda = 1e-6;
+    let (mut lambda, mut calm) = (LAMBDA, 0);
     for _ in 0..steps {
         let Some(triangle) = signals.linearised(shape, &best.theta) else { break };
         let before = best.cost;
         // Shorter steps until one goes down; without any this is the minimum.
         while lambda < 1e8 {
-            let theta = triangle.solve(lambda).map(|step| &best.theta + step);
+            let theta = triangle.solve(lambda).map(|step| shape.with_stable_c(&best.theta + step));
             let cost = theta.as_ref().map_or(f64::INFINITY, |theta| signals.cost(shape, theta));
             match theta {
                 Some(theta) if cost < best.cost => {
@@ -120,7 +122,12 @@ pub(super) fn search(signals: &Signals, shape: Shape, start: DVector<f64>, steps
             }
         }
         if best.cost > before * (1.0 - ENOUGH) {
-            break;
+            // A short step in a bent valley goes down little too: only a second one, after a fresh start, is the end.
+            calm += 1;
+            if calm == 2 {
+                break;
+            }
+            lambda = LAMBDA;
         }
     }
     best

@@ -9,7 +9,7 @@ use super::model::Armax;
 use super::stacked::{Stacked, Triangle};
 use crate::Samples;
 use crate::linear::LinearError;
-use crate::linear::roots::stable;
+use crate::linear::roots::{reflected, stable};
 
 /// Input and output, scaled, and the rows that count.
 #[derive(Clone)]
@@ -33,6 +33,13 @@ pub(super) struct Shape {
 impl Shape {
     pub(super) fn unknowns(self) -> usize {
         3 * self.n + 2
+    }
+
+    /// The same unknowns with the roots of C inside the unit circle.
+    pub(super) fn with_stable_c(self, mut theta: DVector<f64>) -> DVector<f64> {
+        let c = reflected(self.polynomials(&theta).c);
+        theta.rows_mut(2 * self.n + 1, self.n).copy_from_slice(&c);
+        theta
     }
 
     pub(super) fn polynomials(self, theta: &DVector<f64>) -> Polynomials<'_> {

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::prediction::{Shape, Signals};
 use super::stacked::Stacked;
-use crate::linear::roots::drawn_inside;
+use crate::linear::roots::reflected;
 
 /// Passes of the reduction; it settles in three or four.
 const PASSES: usize = 8;
@@ -75,10 +75,7 @@ impl LongArx {
                 });
             }
         }
-        let mut theta = stacked.triangle().solve(0.0)?;
-        let c = drawn_inside(shape.polynomials(&theta).c);
-        theta.rows_mut(2 * n + 1, n).copy_from_slice(&c);
-        Some(theta)
+        Some(shape.with_stable_c(stacked.triangle().solve(0.0)?))
     }
 
     /// The start that simulates what this model does, with C = A.
@@ -102,7 +99,7 @@ impl LongArx {
                 }
             }
             let solved = stacked.triangle().solve(0.0)?;
-            a = drawn_inside(&solved.as_slice()[..n]);
+            a = reflected(&solved.as_slice()[..n]);
             theta = Some(solved);
         }
         let solved = theta?;
@@ -118,7 +115,7 @@ impl LongArx {
     /// Its output from the input alone in one stretch, which begins as the record does.
     fn simulated(&self, signals: &Signals, rows: &Range<usize>) -> Vec<f64> {
         let (a, b, d) = self.parts();
-        let a = drawn_inside(a);
+        let a = reflected(a);
         let (u, y) = signals.of(rows);
         let mut x: Vec<f64> = Vec::with_capacity(rows.len());
         for t in 0..rows.len() {
