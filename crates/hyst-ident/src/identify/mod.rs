@@ -1,6 +1,6 @@
 //! Identification of models by search: global, then local, then honest about what the record determines.
 //!
-//! A model's output is linear in most of its parameters. A [`Family`](family::Family) says in which: those are solved for at every
+//! A model's output is linear in most of its parameters. A family says in which: those are solved for at every
 //! trial of the others (variable projection, Golub & Pereyra 1973), and only the others are searched. So a Bouc-Wen model
 //! of five parameters is a search in three, an activation-function model one in a single variable.
 //!
