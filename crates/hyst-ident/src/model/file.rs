@@ -254,7 +254,7 @@ impl Model {
             message: e.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
             advice: match e.classify() {
                 Category::Data => "correct that field, or fit the model anew",
-                Category::Eof => "the file is cut off: fit the model anew",
+                Category::Eof => "the file is truncated: fit the model anew",
                 Category::Syntax | Category::Io => {
                     "this is no JSON: give the model.json that `fit` or `diagnose` wrote"
                 }
