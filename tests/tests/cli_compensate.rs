@@ -79,10 +79,10 @@ fn a_misspelt_kind_is_named_with_its_place() {
     lab.write("pii.json", model.replacen("\"kind\": \"pi\"", "\"kind\": \"pii\"", 1));
     let message = lab.refuses("compensate --model pii.json reference.csv -o drive.csv", 2);
     assert!(message.contains("pii") && message.contains("correct that field"), "{message}");
-    assert!(message.matches("line 3").count() == 1 && !message.contains("cut off"), "{message}");
+    assert!(message.matches("line 3").count() == 1 && !message.contains("truncated"), "{message}");
     lab.write("cut.json", &model[..model.len() / 2]);
     let message = lab.refuses("compensate --model cut.json reference.csv -o drive.csv", 2);
-    assert!(message.contains("cut off"), "{message}");
+    assert!(message.contains("truncated"), "{message}");
 }
 
 #[test]

@@ -46,7 +46,7 @@ const CHECKS: &[Check] = &[
     },
     // The process-level tests drive this binary.
     Check { name: "build", arguments: &["build", "--package", "hyst-cli"], environment: &[] },
-    Check { name: "tests", arguments: &["test", "--workspace"], environment: &[] },
+    Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast"], environment: &[] },
     Check {
         name: "core without features",
         arguments: &["test", "--package", "hyst-core", "--no-default-features"],
