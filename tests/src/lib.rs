@@ -1,7 +1,9 @@
 //! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
 
+pub mod activation_study;
 pub mod dpm_study;
 pub mod fod_study;
+pub mod force_study;
 
 use std::env;
 use std::ffi::OsStr;

@@ -112,3 +112,43 @@ fn measured_records_are_fitted() {
     assert!(report["errors"]["nrmse_percent"].as_f64().unwrap() < 2.0, "{report}");
     assert_eq!(report["rows"], 8027);
 }
+
+#[test]
+fn the_way_of_a_search_is_written_trial_by_trial() {
+    let lab = Lab::with_train("");
+    let search = "--model bouc-wen --optimizer pso --seed 3 --trials 3 --evaluations 400";
+    let report = lab.ok(&format!("fit train.csv {search} --trace t.csv --picture t.svg -o model.json --json")).json();
+    let trace = lab.read("t.csv");
+    assert_eq!(
+        trace.lines().next().unwrap().split(',').take(4).collect::<Vec<_>>(),
+        ["trial", "generation", "evaluations", "cost"]
+    );
+    let columns = ["trial", "generation", "evaluations", "cost", "beta"].map(|name| column(&trace, name));
+    let [trial, generation, evaluations, cost, beta] = &columns;
+    assert!(trial.is_sorted() && trial.last() == Some(&2.0));
+    assert!(beta.windows(2).any(|w| w[0] != w[1]), "the search has moved");
+    let mut ends = Vec::new();
+    for k in 0..trial.len() {
+        if k + 1 < trial.len() && trial[k + 1] == trial[k] {
+            assert!(
+                cost[k + 1] <= cost[k]
+                    && generation[k + 1] == generation[k] + 1.0
+                    && evaluations[k + 1] > evaluations[k]
+            );
+        } else {
+            ends.push(cost[k]);
+            assert!(evaluations[k] <= 400.0);
+        }
+    }
+    ends.sort_by(f64::total_cmp);
+    let costs = &report["trials"]["costs"];
+    assert_eq!([&costs["lowest"], &costs["median"], &costs["highest"]].map(|c| c.as_f64().unwrap()), ends[..]);
+    let svg = lab.read("t.svg");
+    for part in ["</svg>", "best trial", "other trials", "costs at the end", "beta", "evaluations"] {
+        assert!(svg.contains(part), "{part} is not in the picture");
+    }
+    lab.ok(&format!("fit train.csv {search} --trace again.csv -o model.json"));
+    assert_eq!(trace, lab.read("again.csv"));
+    let message = lab.refuses("fit train.csv --model pi --trace no.csv -o no.json", 2);
+    assert!(message.contains("--trace") && message.contains("without"), "{message}");
+}

@@ -1,6 +1,6 @@
-//! The comparisons of the examples `fod_study` and `dpm_study`, on actuators of other seeds.
+//! The comparisons of the examples, on actuators of other seeds.
 
-use hyst_tests::{dpm_study, fod_study};
+use hyst_tests::{activation_study, dpm_study, fod_study, force_study};
 
 #[test]
 fn half_sine_curves_measure_a_valid_surface_in_a_structure_that_rings_and_triangles_do_not() {
@@ -25,4 +25,46 @@ fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_one_at_every_
         assert!(dynamic <= 0.73 * classical, "{row:?}");
         assert!(by_dynamic <= 0.46 * none && by_dynamic < by_classical, "{row:?}");
     }
+}
+
+#[test]
+fn every_activation_model_has_its_figures_in_all_24_cases() {
+    let cases = activation_study::run(12, 90);
+    assert_eq!(cases.len(), 24);
+    for case in &cases {
+        let kinds: Vec<_> = case.models.iter().map(|m| m.kind).collect();
+        assert_eq!(kinds, activation_study::MODELS, "{} V, {} Hz", case.volts, case.hz);
+        for m in &case.models {
+            let f = m.train;
+            let figures =
+                [f.errors.rmse, f.errors.max_abs, f.peak_to_valley, f.smape, f.mape.ratio.unwrap(), m.fit_seconds];
+            assert!(figures.iter().all(|x| x.is_finite() && *x > 0.0), "{} V, {} Hz: {m:?}", case.volts, case.hz);
+            // No worse than a straight line would be on so wide a loop.
+            assert!(f.errors.nrmse_percent < 10.0, "{} V, {} Hz: {m:?}", case.volts, case.hz);
+        }
+    }
+    let again = activation_study::run(12, 90);
+    let order = |cases: &[activation_study::Case]| cases.iter().map(activation_study::ranking).collect::<Vec<_>>();
+    assert_eq!(order(&cases), order(&again));
+}
+
+#[test]
+fn a_force_is_seen_through_each_of_the_three_free_models() {
+    let study = force_study::run(12, 9.0, Some(300));
+    assert_eq!(study.models.len(), 3);
+    let rmse: Vec<f64> = study.models.iter().map(|m| m.model.test.unwrap().errors.rmse).collect();
+    assert!(rmse.is_sorted(), "{rmse:?}");
+    for m in &study.models {
+        let (kappa, chi) = m.affine;
+        assert!((kappa - 1.0).abs() < 0.15 && chi.abs() < 0.1 * study.span, "{m:?}");
+        assert!((m.stiffness / force_study::STIFFNESS - 1.0).abs() < 0.1, "{m:?}");
+        // To guess no force at all would miss by the whole of it.
+        let (rms, most) = m.force;
+        assert!(rms <= most && most < 0.5 * study.force, "{m:?}");
+    }
+    let again = force_study::run(12, 9.0, Some(300));
+    let numbers = |s: &force_study::ForceStudy| {
+        s.models.iter().map(|m| (m.model.kind, m.affine, m.stiffness, m.force)).collect::<Vec<_>>()
+    };
+    assert_eq!(numbers(&study), numbers(&again));
 }

@@ -10,6 +10,7 @@
 pub mod atomic_file;
 mod base;
 pub mod batch;
+pub mod compare;
 pub mod compensate;
 pub mod diagnose;
 pub mod everett;

@@ -16,7 +16,14 @@ Examples:
   hystctl fit train.csv --model pi -o model.json
   hystctl fit a.csv b.csv --model preisach --zero per-record -o model.json
   hystctl fit forc.csv --model preisach --from fod -o model.json
-  hystctl fit slow.csv 20hz.csv 60hz.csv --model dpm -o model.json";
+  hystctl fit slow.csv 20hz.csv 60hz.csv --model dpm -o model.json
+  hystctl fit train.csv --model bouc-wen --optimizer gwo --seed 1 --trials 12 --trace t.csv --picture t.svg -o model.json";
+
+pub(super) const COMPARE: &str = "\
+Examples:
+  hystctl compare train.csv --test test.csv
+  hystctl compare train.csv --models pi,bouc-wen,tanh --picture compare.svg
+  hystctl compare slow.csv 20hz.csv 60hz.csv --test test.csv --json";
 
 pub(super) const SIMULATE: &str = "\
 Example:

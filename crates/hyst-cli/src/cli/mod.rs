@@ -1,5 +1,6 @@
 //! The command line: what clap parses, and nothing else.
 
+mod compare;
 mod excite;
 mod help;
 mod linear;
@@ -17,6 +18,7 @@ use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 
 use crate::output::Target;
+pub(crate) use compare::CompareArgs;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
 pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
@@ -35,6 +37,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Fit(FitArgs),
+    Compare(CompareArgs),
     Simulate(SimulateArgs),
     Diagnose(DiagnoseArgs),
     Compensate(CompensateArgs),
@@ -90,6 +93,12 @@ pub(crate) struct FitArgs {
     /// Model file to write; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Target,
+    /// Table of how the search went, to write: every generation of every trial (CSV)
+    #[arg(long, value_name = "CSV")]
+    pub(crate) trace: Option<Target>,
+    /// Picture of how the search went, to write (SVG)
+    #[arg(long, value_name = "SVG")]
+    pub(crate) picture: Option<Target>,
     #[command(flatten)]
     pub(crate) search: SearchArgs,
     #[command(flatten)]

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+mod convergence;
 mod surface;
 
 use std::ops::ControlFlow;
@@ -75,8 +76,9 @@ enum BaseSummary {
 /// Runs the command.
 pub(super) fn run(args: &FitArgs) -> CommandResult {
     let read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
-    output::check(&read, &[&args.output])?;
-    let report = Report::new(args.json.json, &[&args.output])?;
+    let written: Vec<_> = [&args.output].into_iter().chain(&args.trace).chain(&args.picture).collect();
+    output::check(&read, &written)?;
+    let report = Report::new(args.json.json, &written)?;
     let record = input::training(&args.train, &args.map.map)?;
     let zero = args.zero.get();
 
@@ -86,11 +88,16 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let Identified { fit, surface, dynamics } = identify(args, &record, &options, &|done, budget| {
         progress.say(&format!("{doing}: {done} of at most {budget} evaluations"));
     })?;
+    convergence::check(args, &fit)?;
     let Fit { model, how, estimate, trials, evaluations } = fit;
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
 
     args.output.write(|out| out.write_all(model.to_json().as_bytes()))?;
+    if let Some(trials) = &trials {
+        let polished = estimate.as_ref().map(|e| e.left);
+        convergence::write(args, trials, polished, text::symbol(&model.output.unit))?;
+    }
     let notes = surface::notes(surface.as_ref(), dynamics.as_ref(), &model);
     notes.iter().for_each(|note| output::say(note));
     if args.model == Kind::Preisach && args.from.is_none() && shows_only_curves(&record) {

@@ -1,5 +1,6 @@
 //! The commands, and the one place where they are dispatched.
 
+mod compare;
 mod compensate;
 mod diagnose;
 mod excite;
@@ -22,6 +23,7 @@ use crate::output::Target;
 pub(crate) fn dispatch(command: Command) -> CommandResult {
     match command {
         Command::Fit(args) => fit::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Compensate(args) => compensate::run(&args),

@@ -25,4 +25,5 @@ pub use families::Form;
 pub(crate) use families::family_of;
 pub(crate) use family::{Family, Linear};
 pub(crate) use search::{Identified, SearchOptions, identify};
+pub(crate) use uncertainty::parameters_of;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

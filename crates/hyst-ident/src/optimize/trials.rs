@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{Cost, Found, Method, Progress, SearchError, Space, Stop, minimize};
+use super::{Cost, Found, Method, Progress, SearchError, Space, Stop, Variable, minimize};
 
 /// How one number scatters over trials: what a box plot shows.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -43,6 +43,8 @@ impl Spread {
 /// Several searches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trials {
+    /// What is searched; the values of a [`Found`] are in this order.
+    pub variables: Vec<Variable>,
     /// What each found, in the order of their seeds.
     pub found: Vec<Found>,
 }
@@ -78,5 +80,5 @@ pub fn trials(
         let mut search = method.build(space.dimensions(), stop.evaluations, seed.wrapping_add(trial as u64))?;
         found.push(minimize(space, cost, search.as_mut(), stop, &mut |p| watch(trial, p))?);
     }
-    Ok(Trials { found })
+    Ok(Trials { variables: space.variables().to_vec(), found })
 }

@@ -1,0 +1,100 @@
+//! Arguments of `compare`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use hyst_ident::fit::{FITTED, FitOptions};
+use hyst_ident::model::Kind;
+
+use super::help::{COMPARE, RECORDS};
+use super::{JsonArg, MapArg, ZeroArg};
+use crate::output::Target;
+
+/// Fit every model to a record and show them side by side
+///
+/// Models are fitted to the training records alone; the test record is only simulated. All are judged by the same rows:
+/// those that are a start-up transient for one of them count for none. A model that the records do not suit is
+/// listed with the reason.
+#[derive(Debug, Args)]
+#[command(after_help = format!("{COMPARE}\n\n{RECORDS}"))]
+pub(crate) struct CompareArgs {
+    /// Records to fit, as one
+    #[arg(required = true)]
+    pub(crate) train: Vec<PathBuf>,
+    /// Record to judge and sort the models by, never fitted; without it they are sorted by what is left of the training record
+    #[arg(long)]
+    pub(crate) test: Option<PathBuf>,
+    /// Kinds of models, with commas between them; all that there are if not given
+    #[arg(long, value_name = "all|KIND,KIND…", default_value = "all")]
+    pub(crate) models: Kinds,
+    /// Seed of what is drawn at random
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How often to repeat a search with other draws; the best is taken
+    #[arg(long, default_value_t = 1)]
+    pub(crate) trials: usize,
+    /// Most evaluations of a trial; 1500 for each searched variable if not given
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) evaluations: Option<u64>,
+    /// Picture to write: errors of all, and what each leaves (SVG)
+    #[arg(long, value_name = "SVG")]
+    pub(crate) picture: Option<Target>,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+impl CompareArgs {
+    /// As options of every fit.
+    pub(crate) fn options(&self, zero_per_record: bool) -> FitOptions {
+        FitOptions {
+            seed: self.seed,
+            zero_per_record,
+            trials: self.trials,
+            evaluations: self.evaluations,
+            ..FitOptions::default()
+        }
+    }
+}
+
+/// Kinds of models, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Kinds(pub(crate) Vec<Kind>);
+
+impl FromStr for Kinds {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "all" {
+            return Ok(Self(FITTED.to_vec()));
+        }
+        let mut kinds = Vec::new();
+        for name in text.split(',') {
+            let known = name.trim().parse::<Kind>().ok().filter(|kind| FITTED.contains(kind));
+            let all = || FITTED.map(Kind::name).join(", ");
+            let kind =
+                known.ok_or_else(|| format!("{:?} is no kind of model: give all, or some of {}", name, all()))?;
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        Ok(Self(kinds))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_a_list_without_repetition() {
+        assert_eq!("pi, tanh,pi".parse(), Ok(Kinds(vec![Kind::Pi, Kind::Tanh])));
+        assert_eq!("all".parse(), Ok(Kinds(Kind::ALL.to_vec())));
+        for text in ["", "pi,,tanh", "pi;tanh", "pii", "all,pi"] {
+            assert!(text.parse::<Kinds>().unwrap_err().contains("bouc-wen"), "{text}");
+        }
+    }
+}

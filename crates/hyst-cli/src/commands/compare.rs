@@ -1,0 +1,150 @@
+//! `compare`: every model on a record, side by side.
+
+mod picture;
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use hyst_ident::compare::{Compared, Comparison, Figures, Skipped, SortedBy, Step, compare};
+use hyst_ident::record::Need;
+use hyst_ident::simulate::Zero;
+use serde::Serialize;
+
+use crate::cli::CompareArgs;
+use crate::exit::CommandResult;
+use crate::output::{self, Report};
+use crate::progress::Progress;
+use crate::{input, text};
+
+/// What is said about a comparison.
+#[derive(Debug, Serialize)]
+struct Summary {
+    train: String,
+    rows: usize,
+    /// Rows that are a start-up transient for one of the models, and count for none.
+    settling_rows: usize,
+    test: Option<String>,
+    test_rows: Option<usize>,
+    test_settling_rows: Option<usize>,
+    unit: String,
+    zero: Zero,
+    seed: u64,
+    #[serde(flatten)]
+    comparison: Comparison,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &CompareArgs) -> CommandResult {
+    let read: Vec<&Path> = args.train.iter().chain(&args.test).map(AsRef::as_ref).collect();
+    let written: Vec<_> = args.picture.iter().collect();
+    output::check(&read, &written)?;
+    let report = Report::new(args.json.json, &written)?;
+    let train = input::training(&args.train, &args.map.map)?;
+    let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let zero = args.zero.get();
+    let options = args.options(zero == Zero::PerRecord);
+
+    let progress = Progress::bar("comparing", args.models.0.len());
+    let comparison = compare(&train, test.as_ref(), &args.models.0, &options, &mut |step: Step| {
+        progress.at(step.done);
+        progress.say(&match step.evaluations {
+            (0, _) => format!("fitting {}", step.kind),
+            (done, budget) => format!("fitting {}: {done} of at most {budget} evaluations", step.kind),
+        });
+        ControlFlow::Continue(())
+    })?;
+    drop(progress);
+
+    if let Some(target) = &args.picture {
+        let (record, predicted): (_, fn(&Compared) -> &[f64]) = match &test {
+            Some(test) => (test, |model| &model.test_predicted),
+            None => (&train, |model| &model.train_predicted),
+        };
+        let svg = picture::draw(&comparison, record, predicted)?;
+        target.write(|out| out.write_all(svg.as_bytes()))?;
+    }
+    let settling = |rows: &[bool]| rows.iter().filter(|settling| **settling).count();
+    let summary = Summary {
+        train: train.name(),
+        rows: train.rows(),
+        settling_rows: settling(&comparison.train_settling),
+        test_rows: test.as_ref().map(hyst_ident::record::Record::rows),
+        test_settling_rows: test.as_ref().map(|_| settling(&comparison.test_settling)),
+        test: test.map(|test| test.name()),
+        unit: train.output_unit().map_or("", |unit| unit.suffix()).to_owned(),
+        zero,
+        seed: args.seed,
+        comparison,
+    };
+    report.print(&summary.text(), &summary)
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let unit = text::symbol(&self.unit);
+        let rows = |name: &str, rows: usize, settling: usize| {
+            format!(
+                "{name}: {} ({settling} settling for one of the models and left out for all)",
+                text::count(rows, "row")
+            )
+        };
+        let mut lines = vec![format!("fitted to {}", rows(&self.train, self.rows, self.settling_rows))];
+        if let (Some(name), Some(count), Some(settling)) = (&self.test, self.test_rows, self.test_settling_rows) {
+            lines.push(format!("tested on {}", rows(name, count, settling)));
+        }
+        lines.push(String::new());
+        lines.push(table(&self.comparison, unit));
+        lines.push(match self.comparison.sorted_by {
+            SortedBy::TestRmse => "sorted by RMSE on the test record, which no model was fitted to".to_owned(),
+            SortedBy::TrainRmse => {
+                "sorted by RMSE on the training record, of which more parameters always leave less; --test RECORD shows what holds"
+                    .to_owned()
+            }
+        });
+        for m in &self.comparison.models {
+            if let Some(names) = m.undetermined.as_ref().filter(|names| !names.is_empty()) {
+                lines.push(format!("{}: not determined by the record: {}", m.kind, text::listed(names)));
+            }
+        }
+        for Skipped { kind, reason } in &self.comparison.skipped {
+            lines.push(format!("skipped {kind}: {reason}"));
+        }
+        lines.join("\n")
+    }
+}
+
+/// One line for each model and record.
+fn table(comparison: &Comparison, unit: &str) -> String {
+    let head = ["model", "on", "RMSE", "of span", "max", "PV", "MAPE", "left out", "SMAPE", "params", "undet.", "fit"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.push(["", "", unit, "", unit, unit, "", "rows", "", "", "", "s"].map(str::to_owned).to_vec());
+    for m in &comparison.models {
+        let undetermined = m.undetermined.as_ref().map_or_else(|| "–".to_owned(), |names| names.len().to_string());
+        let once = [m.parameters.to_string(), undetermined, format!("{:.2}", m.fit_seconds)];
+        match &m.test {
+            Some(test) => {
+                rows.push(line(m.kind.name(), "test", test, &once));
+                rows.push(line("", "train", &m.train, &[]));
+            }
+            None => rows.push(line(m.kind.name(), "train", &m.train, &once)),
+        }
+    }
+    text::table(&rows)
+}
+
+fn line(name: &str, on: &str, figures: &Figures, more: &[String]) -> Vec<String> {
+    let Figures { errors, mape, smape, peak_to_valley } = figures;
+    let mut cells = vec![
+        name.to_owned(),
+        on.to_owned(),
+        text::short(errors.rmse),
+        text::percent(errors.nrmse_percent),
+        text::short(errors.max_abs),
+        text::short(*peak_to_valley),
+        mape.ratio.map_or_else(|| "none".to_owned(), |ratio| text::percent(100.0 * ratio)),
+        mape.left_out.to_string(),
+        text::percent(100.0 * smape),
+    ];
+    cells.extend(more.iter().cloned());
+    cells
+}

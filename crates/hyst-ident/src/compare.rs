@@ -1,0 +1,247 @@
+//! `compare`: every model that can be fitted to a record, side by side.
+//!
+//! Each is fitted to the training record alone and simulated on it and on the test record. All are judged by the same rows:
+//! those that are a start-up transient for any of them count for none.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use hyst_core::PreisachParams;
+use serde::{Serialize, Serializer};
+
+use crate::fit::{Fit, FitError, FitOptions, fit_with};
+use crate::identify::parameters_of;
+use crate::metrics::{Errors, Mape, MetricsError, mape, peak_to_valley, smape};
+use crate::model::{Base, Kind};
+use crate::record::Record;
+use crate::simulate::{Simulation, Zero, simulate};
+
+/// What the models are sorted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SortedBy {
+    /// RMSE on the training record: a model with more parameters has less of it, whatever it is worth.
+    TrainRmse,
+    /// RMSE on the test record, which no model has seen.
+    TestRmse,
+}
+
+/// How far a model's prediction is from a record.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// RMSE, its share of the span, largest error.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Mean absolute error relative to the measurement, rows near zero left out.
+    pub mape: Mape,
+    /// Symmetric mean absolute error, a ratio between 0 and 2.
+    pub smape: f64,
+    /// Largest error minus smallest, signs included \[output unit\].
+    pub peak_to_valley: f64,
+}
+
+impl Figures {
+    /// Compares; `settling` flags the rows that do not count.
+    ///
+    /// # Errors
+    /// As [`Errors::of`].
+    pub fn of(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Self, MetricsError> {
+        Ok(Self {
+            errors: Errors::of(measured, predicted, settling)?,
+            mape: mape(measured, predicted, settling)?,
+            smape: smape(measured, predicted, settling)?,
+            peak_to_valley: peak_to_valley(measured, predicted, settling)?,
+        })
+    }
+}
+
+/// One model on the records.
+#[derive(Clone, Debug, Serialize)]
+pub struct Compared {
+    /// Its kind.
+    #[serde(rename = "model", serialize_with = "as_name")]
+    pub kind: Kind,
+    /// Numbers that were identified; the sensor's zero is not among them.
+    pub parameters: usize,
+    /// Those that the record does not determine, or only together with others; `None` where nobody has looked, as among the
+    /// weights of a convex fit.
+    pub undetermined: Option<Vec<String>>,
+    /// On the training record.
+    pub train: Figures,
+    /// On the test record, if there is one.
+    pub test: Option<Figures>,
+    /// In words, how it was fitted.
+    pub how: String,
+    /// Evaluations of the model.
+    pub evaluations: u64,
+    /// Time that the fit took \[s\]: the only field that differs between two runs.
+    pub fit_seconds: f64,
+    /// The fit.
+    #[serde(skip)]
+    pub fit: Fit,
+    /// What it predicts of the training record, row by row \[output unit\].
+    #[serde(skip)]
+    pub train_predicted: Vec<f64>,
+    /// What it predicts of the test record.
+    #[serde(skip)]
+    pub test_predicted: Vec<f64>,
+}
+
+impl Compared {
+    /// What it is sorted by.
+    fn rmse(&self) -> f64 {
+        self.test.unwrap_or(self.train).errors.rmse
+    }
+}
+
+/// A model that does not suit the records.
+#[derive(Clone, Debug, Serialize)]
+pub struct Skipped {
+    /// Its kind.
+    #[serde(rename = "model", serialize_with = "as_name")]
+    pub kind: Kind,
+    /// Why it was left out, and what it takes.
+    pub reason: String,
+}
+
+/// Models side by side.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// What the models are sorted by.
+    pub sorted_by: SortedBy,
+    /// The models, best first.
+    pub models: Vec<Compared>,
+    /// Models that were left out, with the reason.
+    pub skipped: Vec<Skipped>,
+    /// Rows of the training record that count for no model.
+    #[serde(skip)]
+    pub train_settling: Vec<bool>,
+    /// Rows of the test record that count for no model.
+    #[serde(skip)]
+    pub test_settling: Vec<bool>,
+}
+
+/// How far a comparison is.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The model that is being fitted.
+    pub kind: Kind,
+    /// Models that are done.
+    pub done: usize,
+    /// Models in all.
+    pub of: usize,
+    /// Evaluations of its present search, and the most that there will be; 0 of 0 before it begins.
+    pub evaluations: (u64, u64),
+}
+
+fn as_name<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(kind.name())
+}
+
+/// A model that was fitted and simulated, not yet judged.
+struct Run {
+    kind: Kind,
+    fit: Fit,
+    seconds: f64,
+    train: Simulation,
+    test: Option<Simulation>,
+}
+
+/// Fits each of `kinds` to `train` with the same options and simulates it on both records. One that the records do not suit is skipped
+/// with the reason. `watch` is told of every step and may end it; a search that is under way then ends with its best so far,
+/// and no other is begun.
+///
+/// # Errors
+/// If none can be fitted: the reason of the first.
+pub fn compare(
+    train: &Record,
+    test: Option<&Record>,
+    kinds: &[Kind],
+    options: &FitOptions,
+    watch: &mut dyn FnMut(Step) -> ControlFlow<()>,
+) -> Result<Comparison, FitError> {
+    let zero = if options.zero_per_record { Zero::PerRecord } else { Zero::None };
+    let (mut runs, mut skipped, mut first) = (Vec::new(), Vec::new(), None);
+    for (done, kind) in kinds.iter().copied().enumerate() {
+        let mut step = Step { kind, done, of: kinds.len(), evaluations: (0, 0) };
+        if watch(step).is_break() {
+            break;
+        }
+        let began = Instant::now();
+        let fitted = fit_with(train, kind, options, &mut |p| {
+            step.evaluations = (p.evaluations, p.budget);
+            watch(step)
+        });
+        let seconds = began.elapsed().as_secs_f64();
+        let run = fitted.and_then(|fit| {
+            let test = test.map(|test| simulate(&fit.model, test, zero)).transpose()?;
+            Ok(Run { kind, seconds, train: simulate(&fit.model, train, zero)?, test, fit })
+        });
+        match run {
+            Ok(run) => runs.push(run),
+            Err(error) => {
+                skipped.push(Skipped { kind, reason: error.to_string() });
+                first.get_or_insert(error);
+            }
+        }
+    }
+    if let (true, Some(error)) = (runs.is_empty(), first) {
+        return Err(error);
+    }
+    let train_settling = for_any(train.rows(), runs.iter().map(|r| &r.train));
+    let test_settling = for_any(test.map_or(0, Record::rows), runs.iter().filter_map(|r| r.test.as_ref()));
+    let figures = |record: &Record, predicted: &[f64], settling: &[bool]| {
+        Figures::of(record.output().unwrap_or_default(), predicted, settling)
+            .map_err(|source| FitError::Compare { record: record.name(), source })
+    };
+    let judged = |run: Run| -> Result<Compared, FitError> {
+        let test_predicted = run.test.map_or_else(Vec::new, |s| s.predicted);
+        Ok(Compared {
+            kind: run.kind,
+            parameters: identified(&run.fit),
+            undetermined: undetermined(&run.fit),
+            train: figures(train, &run.train.predicted, &train_settling)?,
+            test: test.map(|test| figures(test, &test_predicted, &test_settling)).transpose()?,
+            how: run.fit.how.clone(),
+            evaluations: run.fit.evaluations,
+            fit_seconds: run.seconds,
+            fit: run.fit,
+            train_predicted: run.train.predicted,
+            test_predicted,
+        })
+    };
+    let mut models = runs.into_iter().map(judged).collect::<Result<Vec<_>, _>>()?;
+    models.sort_by(|a, b| a.rmse().total_cmp(&b.rmse()));
+    let sorted_by = if test.is_some() { SortedBy::TestRmse } else { SortedBy::TrainRmse };
+    Ok(Comparison { sorted_by, models, skipped, train_settling, test_settling })
+}
+
+/// Rows that are a start-up transient for any of the models.
+fn for_any<'a>(rows: usize, simulated: impl Iterator<Item = &'a Simulation>) -> Vec<bool> {
+    let mut settling = vec![false; rows];
+    for own in simulated {
+        settling.iter_mut().zip(&own.settling).for_each(|(any, own)| *any |= *own);
+    }
+    settling
+}
+
+/// Numbers that a fit chose: those with an estimate, or the weights of a convex fit, whose thresholds and grid are given.
+fn identified(fit: &Fit) -> usize {
+    if let Some(estimate) = &fit.estimate {
+        return estimate.parameters.len();
+    }
+    // Relays that never switch back are identified only where there are such.
+    let cells = |p: &PreisachParams<Vec<f64>>| {
+        p.density.len() + if p.once.iter().any(|w| *w != 0.0) { p.once.len() } else { 0 }
+    };
+    match &fit.model.base {
+        Base::Pi(p) => 1 + p.weights.len(),
+        Base::Preisach(p) => cells(p),
+        Base::Dpm(p) => cells(&p.preisach) + p.mirror.weights.len(),
+        other => parameters_of(other).len(),
+    }
+}
+
+fn undetermined(fit: &Fit) -> Option<Vec<String>> {
+    fit.estimate.as_ref().map(|e| e.undetermined().into_iter().map(str::to_owned).collect())
+}

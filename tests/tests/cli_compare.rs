@@ -1,0 +1,143 @@
+//! `compare`: every model on a record, side by side.
+
+use hyst_tests::{Lab, WARM};
+use serde_json::Value;
+
+/// A lab with `train.csv` and, of another drive, `test.csv`.
+fn lab(more: &str) -> Lab {
+    let lab = Lab::with_train(more);
+    lab.excite("v.csv", 9);
+    lab.ok("run --daq sim:plant.toml --drive v.csv --record test.csv");
+    lab
+}
+
+fn names(list: &Value) -> Vec<&str> {
+    list.as_array().unwrap().iter().map(|m| m["model"].as_str().unwrap()).collect()
+}
+
+fn number(v: &Value) -> f64 {
+    v.as_f64().unwrap_or_else(|| panic!("{v} is no number"))
+}
+
+/// The report without the times, the only thing that differs from run to run.
+fn without_times(mut report: Value) -> Value {
+    for m in report["models"].as_array_mut().unwrap() {
+        assert!(number(&m.as_object_mut().unwrap().remove("fit_seconds").unwrap()) >= 0.0);
+    }
+    report
+}
+
+#[test]
+fn every_model_is_fitted_or_skipped_with_the_reason() {
+    let lab = lab("");
+    let report = lab.ok("compare train.csv --test test.csv --evaluations 200 --json").json();
+    let (models, skipped) = (names(&report["models"]), names(&report["skipped"]));
+    assert_eq!(models.len() + skipped.len(), 16, "{models:?} {skipped:?}");
+    // One rate and no temperature.
+    for (kind, reason) in [("td-pi", "temperature_degc"), ("td-em", "temperature_degc"), ("dpm", "rate")] {
+        let entry = report["skipped"].as_array().unwrap().iter().find(|s| s["model"] == kind);
+        let said = entry.unwrap_or_else(|| panic!("{kind} is not skipped: {skipped:?}"))["reason"].as_str().unwrap();
+        assert!(said.contains(reason), "{kind}: {said}");
+    }
+    assert_eq!(report["sorted_by"], "test-rmse");
+    let rmse: Vec<f64> = report["models"].as_array().unwrap().iter().map(|m| number(&m["test"]["rmse"])).collect();
+    assert!(rmse.is_sorted(), "{rmse:?}");
+    for m in report["models"].as_array().unwrap() {
+        for record in ["train", "test"] {
+            let f = &m[record];
+            let [rmse, most, pv] = ["rmse", "max_abs", "peak_to_valley"].map(|key| number(&f[key]));
+            assert!(0.0 < rmse && rmse <= most && most <= pv && pv <= 2.0 * most, "{m}");
+            assert!(number(&f["nrmse_percent"]) > 0.0 && number(&f["mape"]["ratio"]) > 0.0, "{m}");
+            assert!((0.0..2.0).contains(&number(&f["smape"])) && f["mape"]["left_out"].is_u64(), "{m}");
+        }
+        assert!(m["parameters"].as_u64().unwrap() >= 3, "{m}");
+    }
+    let find = |kind: &str| &report["models"].as_array().unwrap()[models.iter().position(|m| *m == kind).unwrap()];
+    assert_eq!(find("tanh")["parameters"], 4);
+    assert_eq!(find("bouc-wen")["parameters"], 4);
+    // Weights of a convex fit: nobody has looked.
+    assert_eq!(find("pi")["undetermined"], Value::Null);
+    assert!(find("tanh")["undetermined"].is_array());
+}
+
+#[test]
+fn temperature_makes_the_models_of_it_take_part() {
+    let lab = lab(WARM);
+    let report = lab.ok("compare train.csv --models td-pi,pi --evaluations 300 --json").json();
+    let mut models = names(&report["models"]);
+    models.sort_unstable();
+    assert_eq!(models, ["pi", "td-pi"]);
+    assert_eq!(report["skipped"], Value::Array(Vec::new()));
+}
+
+#[test]
+fn figures_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
+    let lab = lab("");
+    let models = "--models bouc-wen,tanh,pi";
+    let tested = without_times(lab.ok(&format!("compare train.csv --test test.csv {models} --json")).json());
+    assert_eq!(tested, without_times(lab.ok(&format!("compare train.csv --test test.csv {models} --json")).json()));
+    let alone = without_times(lab.ok(&format!("compare train.csv {models} --json")).json());
+    assert_eq!(alone["sorted_by"], "train-rmse");
+    for m in alone["models"].as_array().unwrap() {
+        assert_eq!(m["test"], Value::Null);
+        let same = tested["models"].as_array().unwrap().iter().find(|t| t["model"] == m["model"]).unwrap();
+        assert_eq!((&m["train"], &m["evaluations"], &m["how"]), (&same["train"], &same["evaluations"], &same["how"]));
+        let kind = m["model"].as_str().unwrap();
+        let fit = lab.ok(&format!("fit train.csv --model {kind} -o {kind}.json --json")).json();
+        let test = lab.ok(&format!("simulate --model {kind}.json test.csv -o out.csv --json")).json();
+        // Where nothing settles, all are judged by all rows.
+        assert_eq!((&tested["settling_rows"], &tested["test_settling_rows"]), (&0.into(), &0.into()));
+        for key in ["rmse", "nrmse_percent", "max_abs", "rmse_all_rows"] {
+            assert_eq!(m["train"][key], fit["errors"][key], "{kind} {key}");
+            assert_eq!(same["test"][key], test["errors"][key], "{kind} {key}");
+        }
+        assert_eq!(same["test"]["mape"], test["mape"], "{kind}");
+    }
+    let other = lab.ok(&format!("compare train.csv {models} --seed 2 --json")).json();
+    assert_eq!(other["seed"], 2);
+}
+
+#[test]
+fn the_text_says_what_it_is_sorted_by_and_what_is_left_out() {
+    let lab = lab("");
+    let ran = lab.ok("compare train.csv --test test.csv --models tanh,pi,dpm --evaluations 200");
+    assert_eq!(ran.stderr, "");
+    for part in ["RMSE", "SMAPE", "MAPE", "PV", "params", "sorted by RMSE on the test record", "skipped dpm: train.csv"]
+    {
+        assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
+    }
+    let at = |name: &str| ran.stdout.lines().position(|line| line.starts_with(&format!("{name} "))).unwrap();
+    assert!(at("pi") < at("tanh"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("tanh: not determined by the record: "), "{}", ran.stdout);
+    let alone = lab.ok("compare train.csv --models pi").stdout;
+    assert!(alone.contains("sorted by RMSE on the training record"), "{alone}");
+}
+
+#[test]
+fn the_picture_has_a_panel_for_every_model() {
+    let lab = lab("");
+    for test in ["", "--test test.csv"] {
+        lab.ok(&format!("compare train.csv {test} --models pi,tanh,bouc-wen --evaluations 200 --picture c.svg"));
+        let svg = lab.read("c.svg");
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+        for name in ["pi, RMS", "tanh, RMS", "bouc-wen, RMS", "pi (", "RMSE [µm]"] {
+            assert!(svg.contains(name), "{name} is not in the picture");
+        }
+        assert_eq!(svg.contains("test record"), !test.is_empty());
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused_by_name() {
+    let lab = Lab::with_train("");
+    let message = lab.refuses("compare train.csv --models pi,preisch", 2);
+    assert!(message.contains("preisch") && message.contains("preisach"), "{message}");
+    let message = lab.refuses("compare train.csv --models td-pi,dpm", 2);
+    assert!(message.contains("temperature_degc"), "{message}");
+    let message = lab.refuses("compare train.csv --models pi --picture train.csv", 2);
+    assert!(message.contains("train.csv"), "{message}");
+    let message = lab.refuses("compare train.csv --test u.csv --models pi", 2);
+    assert!(message.contains("displacement_um"), "{message}");
+    let message = lab.refuses("compare train.csv --models pi --picture - --json", 2);
+    assert!(message.contains("stdout"), "{message}");
+}
