@@ -1,1 +1,4 @@
-//! Helpers that the benches share.
+//! What the benches share: tasks with a known answer, and clocks.
+
+pub mod clock;
+pub mod task;

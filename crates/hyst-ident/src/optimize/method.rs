@@ -51,8 +51,8 @@ impl MethodError {
 pub enum Method {
     /// [`Shade`].
     Shade {
-        /// Members at the beginning.
-        population: usize,
+        /// Members at the beginning; `None` for as many as suit the evaluations.
+        population: Option<usize>,
     },
     /// [`De`].
     De {
@@ -89,7 +89,8 @@ impl Method {
 
     /// A search by its name, set up for a number of variables:
     ///
-    /// - `de`: L-SHADE with 18 members a variable, but at most 120; the best choice for all models here.
+    /// - `de`: L-SHADE with a member for each 300 evaluations, at least 20 and at most 18 a variable or 120; the best choice for all
+    ///   models here.
     /// - `de-rand-1-bin`: ten members a variable, F = 0.5, CR = 0.9 (Storn & Price).
     /// - `pso`: 40 particles, Clerc's constriction (w = 0.7298, c = 1.49618).
     /// - `pso-xie`: 30 particles, w = 0.8, c = 1.5, as in the paper on activation functions (200 iterations there). Just beyond the
@@ -101,7 +102,7 @@ impl Method {
     /// If there is no such name.
     pub fn named(name: &str, dimensions: usize) -> Result<Self, MethodError> {
         Ok(match name {
-            "de" => Self::Shade { population: (18 * dimensions).clamp(20, 120) },
+            "de" => Self::Shade { population: None },
             "de-rand-1-bin" => Self::De { population: 10 * dimensions.max(1), factor: 0.5, crossover: 0.9 },
             "pso" => Self::Pso { population: 40, inertia: 0.7298, own: 1.49618, common: 1.49618 },
             "pso-xie" => Self::Pso { population: 30, inertia: 0.8, own: 1.5, common: 1.5 },
@@ -111,22 +112,12 @@ impl Method {
         })
     }
 
-    /// Members, particles or wolves at the beginning.
-    pub fn population(&self) -> usize {
-        match self {
-            Self::Shade { population }
-            | Self::De { population, .. }
-            | Self::Pso { population, .. }
-            | Self::Gwo { population, .. } => *population,
-        }
-    }
-
     /// The same with another population.
     #[must_use]
     pub fn with_population(mut self, wanted: usize) -> Self {
         match &mut self {
-            Self::Shade { population }
-            | Self::De { population, .. }
+            Self::Shade { population } => *population = Some(wanted),
+            Self::De { population, .. }
             | Self::Pso { population, .. }
             | Self::Gwo { population, .. } => *population = wanted,
         }
@@ -144,7 +135,10 @@ impl Method {
         seed: u64,
     ) -> Result<Box<dyn Optimizer + Send>, MethodError> {
         Ok(match *self {
-            Self::Shade { population } => Box::new(Shade::new(dimensions, population, evaluations, seed)?),
+            Self::Shade { population } => {
+                let population = population.unwrap_or_else(|| suitable(dimensions, evaluations));
+                Box::new(Shade::new(dimensions, population, evaluations, seed)?)
+            }
             Self::De { population, factor, crossover } => {
                 Box::new(De::new(dimensions, population, factor, crossover, seed)?)
             }
@@ -157,4 +151,11 @@ impl Method {
             }
         })
     }
+}
+
+/// Members for [`Shade`]. The 18 a variable of its authors are for 10,000 evaluations a variable; with fewer they have too few
+/// generations to come together, and with a member for each 300 evaluations there are about 600.
+fn suitable(dimensions: usize, evaluations: u64) -> usize {
+    let most = (18 * dimensions).clamp(20, 120);
+    usize::try_from(evaluations / 300).unwrap_or(most).clamp(20, most)
 }

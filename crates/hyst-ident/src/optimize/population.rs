@@ -1,5 +1,6 @@
 //! What the searches share: points with costs, and random numbers.
 
+use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -91,6 +92,17 @@ impl Points {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by(|a, b| self.costs[*a].total_cmp(&self.costs[*b]).then(a.cmp(b)));
         order
+    }
+
+    /// Principal axes of some of the points, each of length one.
+    pub(super) fn axes(&self, of: &[usize]) -> Vec<Vec<f64>> {
+        let mean = |d: usize| of.iter().map(|i| self.point(*i)[d]).sum::<f64>() / of.len().max(1) as f64;
+        let mean: Vec<f64> = (0..self.dimensions).map(mean).collect();
+        let product = |i: &usize, r: usize, c: usize| (self.point(*i)[r] - mean[r]) * (self.point(*i)[c] - mean[c]);
+        let scatter = DMatrix::from_fn(self.dimensions, self.dimensions, |r, c| {
+            of.iter().map(|i| product(i, r, c)).sum::<f64>()
+        });
+        SymmetricEigen::new(scatter).eigenvectors.column_iter().map(|axis| axis.iter().copied().collect()).collect()
     }
 
     /// Largest range of a coordinate.

@@ -9,6 +9,10 @@ use super::{Asked, MethodError, Optimizer, SearchError};
 /// Rivals are `v = xᵢ + F (x_p − xᵢ) + F (x_a − x_b)`, x_p one of the best `p N`, x_b also from an archive of members that were
 /// beaten; F and CR are drawn about means that follow what succeeded. Settings of the paper: memory of 6, p = 0.11, archive 2.6 N,
 /// 4 members at the end. The population shrinks with the evaluations spent, so it has to be told how many there will be.
+///
+/// Half of the rivals are crossed along the principal axes of the better half of the members instead of the coordinates (Guo & Yang
+/// 2015, IEEE Trans. Evol. Comput. 19): the parameters of a hysteresis model trade against each other, and a valley that lies
+/// across the coordinates is closed to steps along them.
 #[derive(Clone, Debug)]
 pub struct Shade {
     members: Points,
@@ -30,6 +34,8 @@ const MEMORY: usize = 6;
 const BEST: f64 = 0.11;
 const ARCHIVE: f64 = 2.6;
 const FEWEST: usize = 4;
+/// Share of the rivals that are crossed along the axes.
+const TURNED: f64 = 0.5;
 /// Width of both distributions about their means.
 const WIDTH: f64 = 0.1;
 
@@ -73,7 +79,7 @@ impl Shade {
         }
     }
 
-    fn rival(&mut self, i: usize, ranked: &[usize]) -> Vec<f64> {
+    fn rival(&mut self, i: usize, ranked: &[usize], axes: &[Vec<f64>]) -> Vec<f64> {
         let n = self.members.len();
         let (factor, crossover) = self.settings();
         self.trial.push((factor, crossover));
@@ -93,12 +99,25 @@ impl Shade {
         };
         let certain = self.draws.index(self.members.dimensions);
         let mut rival = self.members.point(i).to_vec();
-        for (d, x) in rival.iter_mut().enumerate() {
-            if self.draws.uniform() < crossover || d == certain {
-                let beaten = if b < n { self.members.point(b)[d] } else { self.archive[b - n][d] };
-                let towards = factor * (self.members.point(leader)[d] - *x);
-                *x = inside(*x + towards + factor * (self.members.point(a)[d] - beaten), *x);
+        let (leader, a) = (self.members.point(leader), self.members.point(a));
+        let beaten = if b < n { self.members.point(b) } else { &self.archive[b - n] };
+        let step = |d: usize| factor * (leader[d] - rival[d]) + factor * (a[d] - beaten[d]);
+        let mut step: Vec<f64> = (0..rival.len()).map(step).collect();
+        let turned = self.draws.uniform() < TURNED;
+        if turned {
+            step = axes.iter().map(|axis| axis.iter().zip(&step).map(|(a, s)| a * s).sum()).collect();
+        }
+        for (d, s) in step.iter_mut().enumerate() {
+            if self.draws.uniform() >= crossover && d != certain {
+                *s = 0.0;
             }
+        }
+        if turned {
+            let back = |d: usize| axes.iter().zip(&step).map(|(axis, s)| axis[d] * s).sum();
+            step = (0..rival.len()).map(back).collect();
+        }
+        for (x, s) in rival.iter_mut().zip(step) {
+            *x = inside(*x + s, *x);
         }
         rival
     }
@@ -161,9 +180,10 @@ impl Optimizer for Shade {
         if self.pending.is_empty() {
             self.trial.clear();
             let ranked = self.members.ranked();
+            let axes = self.members.axes(&ranked[..ranked.len().div_ceil(2)]);
             for i in 0..self.members.len() {
                 let (point, hopeless) = if self.started {
-                    (self.rival(i, &ranked), self.members.costs[i])
+                    (self.rival(i, &ranked, &axes), self.members.costs[i])
                 } else {
                     (self.members.point(i).to_vec(), f64::INFINITY)
                 };

@@ -118,7 +118,7 @@ fn a_model_that_is_never_finite_says_so_with_its_bounds() {
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
     let said = |m: Method| m.build(3, 1000, 1).err().unwrap().to_string();
-    assert!(said(Method::Shade { population: 0 }).starts_with("population = 0"));
+    assert!(said(Method::Shade { population: Some(0) }).starts_with("population = 0"));
     assert!(said(Method::De { population: 20, factor: 3.0, crossover: 0.5 }).starts_with("factor = 3"));
     assert!(
         said(Method::Pso { population: 20, inertia: f64::NAN, own: 1.0, common: 1.0 }).starts_with("inertia = NaN")

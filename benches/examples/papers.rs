@@ -1,0 +1,90 @@
+//! Time of the papers' own identifications, with their own settings, and what a second core is worth.
+//!
+//! `cargo run --release -p hyst-benches --example papers`
+
+use std::hint::black_box;
+use std::ops::ControlFlow;
+
+use hyst_benches::clock::{shortest, timed};
+use hyst_benches::task::Task;
+use hyst_core::Kind;
+use hyst_ident::fit::{FitOptions, fit_with};
+use hyst_ident::optimize::{Found, Method, Stop, minimize};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn search(task: &Task, name: &str, evaluations: u64, seed: u64) -> Found {
+    let dimensions = task.space.dimensions();
+    let method = Method::named(name, dimensions).expect("a search of that name");
+    let mut search = method.build(dimensions, evaluations, seed).expect("sound settings");
+    // To the last generation, as in the papers.
+    let stop = Stop { tolerance: -1.0, ..Stop::after(evaluations) };
+    minimize(&task.space, &*task.cost(), search.as_mut(), &stop, &mut |_| ControlFlow::Continue(())).expect("a search")
+}
+
+fn main() {
+    let cores = rayon::current_num_threads();
+    println!("{cores} threads; times are the shortest of some runs\n");
+    activation();
+    wolves(cores);
+    second_core();
+}
+
+/// Xie et al., table 7: 30 particles, 200 iterations, all four parameters searched.
+fn activation() {
+    let task = Task::tanh();
+    let seconds = shortest(5, || {
+        black_box(search(&task, "pso-xie", 6000, 1));
+    });
+    println!(
+        "activation functions, tanh: 30 particles × 200 iterations × {} samples: {:.4} s (the paper: 52 … 84 s)",
+        task.rows().rows.len(),
+        seconds
+    );
+}
+
+/// Grey wolves of the paper on temperature-dependent models: 100 wolves, 3000 generations, three temperatures.
+fn wolves(cores: usize) {
+    let task = Task::td_pi();
+    let (wolves, generations, samples) = (100u64, 3000u64, task.rows().rows.len());
+    let (found, spent) = timed(|| search(&task, "gwo-paper", wolves * generations, 1));
+    println!(
+        "TD-PI: {wolves} wolves × {generations} generations × {samples} samples: {:.1} s, \
+         {} of them on cores; it ends at {:.3} noise floors",
+        spent.wall,
+        spent.cpu.map_or("an unknown share".into(), |s| format!("{s:.1} s")),
+        found.cost / task.floor
+    );
+    // The search gives up on what cannot win; here every candidate sees the whole record.
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let point = || task.truth.iter().map(|x| x * rng.random_range(0.9..1.1)).collect::<Vec<f64>>();
+    let points: Vec<f64> = std::iter::repeat_with(point).take(96).flatten().collect();
+    let (cost, never, mut costs) = (task.cost(), vec![f64::INFINITY; 96], vec![0.0; 96]);
+    let each = 1e9 / (96 * samples) as f64;
+    let whole = each * shortest(15, || cost.costs(black_box(&points), &never, &mut costs));
+    let core = spent.cpu.unwrap_or(spent.wall * cores as f64) * 1e9 / (wolves * generations * samples as u64) as f64;
+    println!(
+        "    a candidate and sample: {core:.2} ns of a core in this search, {whole:.2} ns where no candidate is given up"
+    );
+}
+
+/// A Bouc-Wen fit of 50,000 samples on one thread and on two, turn by turn so that both see the machine as it is.
+fn second_core() {
+    const RUNS: usize = 5;
+    let record = Task::bouc_wen(50_000).record();
+    let options = FitOptions { seed: 1, ..FitOptions::default() };
+    let pool = |n: usize| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads");
+    let pools = [pool(1), pool(2)];
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..RUNS {
+        for (pool, least) in pools.iter().zip(&mut least) {
+            let (fit, spent) = timed(|| {
+                pool.install(|| fit_with(&record, Kind::BoucWen, &options, &mut |_| ControlFlow::Continue(())))
+            });
+            fit.expect("a fit");
+            *least = least.min(spent.wall);
+        }
+    }
+    let [one, two] = least;
+    println!("Bouc-Wen fit of 50000 samples: {one:.2} s on one thread, {two:.2} s on two, {:.2} times as fast", one / two);
+}
