@@ -65,7 +65,9 @@ def pygmo_search(name, make, members):
     return ("pygmo", f"{name}, population {members}", search)
 
 
-def pyswarms_search(options, particles):
+def pyswarms_search(options, particles, bounds="periodic"):
+    """`bounds`: what becomes of a particle that leaves the box; periodic is the default."""
+
     def search(objective, seed):
         np.random.seed(seed)
         swarm = pyswarms.single.GlobalBestPSO(
@@ -73,11 +75,12 @@ def pyswarms_search(options, particles):
             dimensions=objective.dimensions,
             options=options,
             bounds=(objective.lower, objective.upper),
+            bh_strategy=bounds,
         )
         swarm.optimize(objective.costs, iters=objective.evaluations // particles, verbose=False)
 
     w, c1, c2 = options["w"], options["c1"], options["c2"]
-    return ("pyswarms", f"global best, w {w}, c1 {c1}, c2 {c2}, {particles} particles, all cores", search)
+    return ("pyswarms", f"global best, w {w}, c1 {c1}, c2 {c2}, {particles} particles, {bounds} bounds, all cores", search)
 
 
 def mealpy_search(name, kind, members, **settings):
@@ -111,6 +114,7 @@ def tools():
     for particles in (20, 50, 100):
         list_.append(pyswarms_search({"c1": 0.5, "c2": 0.3, "w": 0.9}, particles))
         list_.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles))
+        list_.append(pyswarms_search({"c1": 1.49618, "c2": 1.49618, "w": 0.7298}, particles, "nearest"))
     for members in (20, 50, 100):
         list_.append(mealpy_search("L_SHADE", mealpy.SHADE.L_SHADE, members))
         list_.append(mealpy_search("OriginalSHADE", mealpy.SHADE.OriginalSHADE, members))
