@@ -86,5 +86,8 @@ fn second_core() {
         }
     }
     let [one, two] = least;
-    println!("Bouc-Wen fit of 50000 samples: {one:.2} s on one thread, {two:.2} s on two, {:.2} times as fast", one / two);
+    println!(
+        "Bouc-Wen fit of 50000 samples: {one:.2} s on one thread, {two:.2} s on two, {:.2} times as fast",
+        one / two
+    );
 }

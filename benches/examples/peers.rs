@@ -149,7 +149,11 @@ fn fitted(task: &Task) -> Run {
         let left = fit.estimate.map_or(f64::NAN, |e| e.left);
         Outcome { cost: left, evaluations: fit.evaluations, spent }
     };
-    Run { tool: "hystctl fit", setting: "variable projection, then Levenberg-Marquardt".into(), results: SEEDS.map(fit).into() }
+    Run {
+        tool: "hystctl fit",
+        setting: "variable projection, then Levenberg-Marquardt".into(),
+        results: SEEDS.map(fit).into(),
+    }
 }
 
 /// The objective as one writes it for a library: one candidate through the model of the core.

@@ -76,7 +76,8 @@ impl Task {
         ];
         let length = 1e-3 * rows as f64;
         let input = move |t: f64| {
-            50.0 * (1.0 - (-2.0 * t / length).exp() * (40.0 * PI * t / length).cos()) + 4.0 * (TAU * 70.0 * t / length).sin()
+            50.0 * (1.0 - (-2.0 * t / length).exp() * (40.0 * PI * t / length).cos())
+                + 4.0 * (TAU * 70.0 * t / length).sin()
         };
         Self::new("bouc-wen", Model::BoucWen, variables, vec![0.12, -0.05, 0.06, 0.02], 1e-3, rows, &[23.0], input)
     }
@@ -113,8 +114,7 @@ impl Task {
                 before = u;
             }
         }
-        let segments: Vec<Range<usize>> =
-            (0..temperatures.len()).map(|i| i * rows_each..(i + 1) * rows_each).collect();
+        let segments: Vec<Range<usize>> = (0..temperatures.len()).map(|i| i * rows_each..(i + 1) * rows_each).collect();
         let (output, counts) = (vec![0.0; rows.len()], vec![true; rows.len()]);
         let space = Space::new(variables).unwrap_or_else(|e| panic!("{name}: {e}"));
         let mut task = Self { name, model, space, truth, floor: 0.0, rows, output, counts, segments, period };

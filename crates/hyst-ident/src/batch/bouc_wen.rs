@@ -9,6 +9,17 @@ use super::{Kernel, Lanes, Row};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BoucWenKernel;
 
+/// k₀, α, and the rates of approach β ± γ above and below zero with their reciprocals.
+#[derive(Clone, Copy, Debug)]
+pub struct BoucWenCoefficients {
+    k0: Lanes,
+    alpha: Lanes,
+    above: Lanes,
+    below: Lanes,
+    one_over_above: Lanes,
+    one_over_below: Lanes,
+}
+
 /// Last input and g.
 #[derive(Clone, Copy, Debug)]
 pub struct BoucWenLanes {
@@ -17,7 +28,7 @@ pub struct BoucWenLanes {
 }
 
 impl Kernel for BoucWenKernel {
-    type Coefficients = [Lanes; 4];
+    type Coefficients = BoucWenCoefficients;
     type State = BoucWenLanes;
 
     fn parameters(&self) -> usize {
@@ -25,14 +36,16 @@ impl Kernel for BoucWenKernel {
     }
 
     #[inline(always)]
-    fn coefficients(&self, p: &[Lanes]) -> [Lanes; 4] {
-        let mut k0 = p[0];
-        for ((k0, beta), gamma) in k0.0.iter_mut().zip(p[2].0).zip(p[3].0) {
+    fn coefficients(&self, p: &[Lanes]) -> BoucWenCoefficients {
+        let (mut k0, [alpha, beta, gamma]) = (p[0], [p[1], p[2], p[3]]);
+        for ((k0, beta), gamma) in k0.0.iter_mut().zip(beta.0).zip(gamma.0) {
             if gamma.abs() > beta {
                 *k0 = f64::NAN;
             }
         }
-        [k0, p[1], p[2], p[3]]
+        let one = Lanes::all(1.0);
+        let (above, below) = (beta + gamma, beta - gamma);
+        BoucWenCoefficients { k0, alpha, above, below, one_over_above: one / above, one_over_below: one / below }
     }
 
     #[inline(always)]
@@ -41,41 +54,52 @@ impl Kernel for BoucWenKernel {
     }
 
     #[inline(always)]
-    fn step(&self, [k0, alpha, beta, gamma]: &[Lanes; 4], s: &mut BoucWenLanes, row: &Row) -> Lanes {
+    fn step(&self, c: &BoucWenCoefficients, s: &mut BoucWenLanes, row: &Row) -> Lanes {
         let way = row.input - s.input;
         s.input = row.input;
         if way != 0.0 {
             let sign = if way < 0.0 { -1.0 } else { 1.0 };
             let sigma = way.abs();
-            for l in 0..super::LANES {
-                s.g.0[l] = sign * travel(alpha.0[l], beta.0[l], gamma.0[l], sign * s.g.0[l], sigma);
+            let q = s.g * sign;
+            let mut to = c.approach(q, sigma);
+            // Where q passes zero the rate changes on the way: once after each reversal.
+            let (before, after) = (q * c.alpha, to * c.alpha);
+            if before.0.iter().zip(after.0).any(|(before, after)| *before < 0.0 && after >= 0.0) {
+                for l in 0..super::LANES {
+                    if before.0[l] < 0.0 && after.0[l] >= 0.0 {
+                        to.0[l] = c.through_zero(l, q.0[l], sigma);
+                    }
+                }
             }
+            s.g = to * sign;
         }
-        *k0 * row.input + s.g
+        c.k0 * row.input + s.g
     }
 }
 
-/// g in the direction of travel after the distance `sigma`: `dq/dσ = α − β q − γ |q|`, piecewise an exponential approach.
-#[inline(always)]
-fn travel(alpha: f64, beta: f64, gamma: f64, q: f64, sigma: f64) -> f64 {
-    let same = (q >= 0.0) == (alpha >= 0.0);
-    let (here, beyond) = if q >= 0.0 { (beta + gamma, beta - gamma) } else { (beta - gamma, beta + gamma) };
-    if same || q == 0.0 {
-        // Away from zero, on the side on which α pulls.
-        let rate = if alpha >= 0.0 { beta + gamma } else { beta - gamma };
-        return approach(alpha, rate, q, sigma);
+impl BoucWenCoefficients {
+    /// q after a way σ with `dq/dσ = α − rate q`, the rate that of the side of zero on which q is, or to which α pulls it.
+    #[inline(always)]
+    fn approach(&self, q: Lanes, sigma: f64) -> Lanes {
+        let side = q.choose(q, |q, _| q == 0.0, self.alpha, q);
+        let above = |a: Lanes, b: Lanes| side.choose(side, |side, _| side >= 0.0, a, b);
+        let rate = above(self.above, self.below);
+        // (1 − e^(−x)) / rate, also where the rate vanishes.
+        let x = rate * sigma;
+        let exact = x.fallen() * above(self.one_over_above, self.one_over_below);
+        let length = x.choose(x, |x, _| x > 1e-12, exact, Lanes::all(sigma));
+        (self.alpha - rate * q).times_plus(length, q)
     }
-    // Towards zero: q(σ) = q∞ + (q − q∞) e^(−rate σ) reaches it at σ₀.
-    let to_zero = if here * sigma > 1e-12 { libm::log1p(-here * q / alpha) / here } else { -q / alpha };
-    if sigma < to_zero { approach(alpha, here, q, sigma) } else { approach(alpha, beyond, 0.0, sigma - to_zero) }
-}
 
-/// q after σ with `dq/dσ = α − rate q`.
-#[inline(always)]
-fn approach(alpha: f64, rate: f64, q: f64, sigma: f64) -> f64 {
-    // (1 − e^(−x)) / rate without cancellation, also where the rate vanishes.
-    let x = rate * sigma;
-    let share = -libm::expm1(-x);
-    let length = if x.abs() > 1e-12 { share / rate } else { sigma };
-    q + (alpha - rate * q) * length
+    /// q of one candidate after a way on which it passes zero.
+    #[inline(never)]
+    fn through_zero(&self, lane: usize, q: f64, sigma: f64) -> f64 {
+        let (alpha, above, below) = (self.alpha.0[lane], self.above.0[lane], self.below.0[lane]);
+        let (here, beyond) = if q >= 0.0 { (above, below) } else { (below, above) };
+        // q(σ) = q∞ + (q − q∞) e^(−rate σ) reaches zero at σ₀.
+        let to_zero = if here * sigma > 1e-12 { libm::log1p(-here * q / alpha) / here } else { -q / alpha };
+        let left = (sigma - to_zero).max(0.0);
+        let x = beyond * left;
+        alpha * if x > 1e-12 { -libm::expm1(-x) / beyond } else { left }
+    }
 }

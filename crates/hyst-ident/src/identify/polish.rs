@@ -82,17 +82,23 @@ pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64]) 
 
 /// Slopes of the residual, one column for each variable; zero where no model is on either side.
 fn jacobian(x: &[f64], now: &Projected, at: &(dyn Fn(&[f64]) -> Option<Projected> + Sync)) -> DMatrix<f64> {
-    let column = |d: usize| -> DVector<f64> {
-        let side = |sign: f64| {
-            let mut to = x.to_vec();
-            to[d] = (to[d] + sign * STEP).clamp(0.0, 1.0);
-            Some((to[d], at(&to)?.residual))
+    // All sides at once: pairs of them would leave a core without work at the end.
+    let sides: Vec<(f64, Option<DVector<f64>>)> = (0..2 * x.len())
+        .into_par_iter()
+        .map(|i| {
+            let (mut to, d) = (x.to_vec(), i / 2);
+            to[d] = (to[d] + if i % 2 == 0 { STEP } else { -STEP }).clamp(0.0, 1.0);
+            (to[d], at(&to).map(|there| there.residual))
+        })
+        .collect();
+    let column = |(d, pair): (usize, &[(f64, Option<DVector<f64>>)])| {
+        let side = |i: usize| match &pair[i] {
+            (there, Some(residual)) => (*there, residual),
+            (_, None) => (x[d], &now.residual),
         };
-        let (up, down) = (side(1.0), side(-1.0));
-        let middle = (x[d], now.residual.clone());
-        let ((high, a), (low, b)) = (up.unwrap_or_else(|| middle.clone()), down.unwrap_or(middle));
+        let ((high, a), (low, b)) = (side(0), side(1));
         if high > low { (a - b) / (high - low) } else { DVector::zeros(now.residual.len()) }
     };
-    let columns: Vec<DVector<f64>> = (0..x.len()).into_par_iter().map(column).collect();
+    let columns: Vec<DVector<f64>> = sides.chunks(2).enumerate().map(column).collect();
     DMatrix::from_columns(&columns)
 }

@@ -43,6 +43,6 @@ pub(crate) fn interval(
         }
         (inside, false)
     };
-    let ((low, at_low), (high, at_high)) = (end(0.0), end(1.0));
+    let ((low, at_low), (high, at_high)) = rayon::join(|| end(0.0), || end(1.0));
     Some(Interval { low: at(low)[d], high: at(high)[d], open: at_low || at_high })
 }

@@ -2,6 +2,8 @@
 
 use std::ops::ControlFlow;
 
+use rayon::prelude::*;
+
 use super::Family;
 use super::polish::polish;
 use super::profile::interval;
@@ -79,11 +81,10 @@ pub(crate) fn identify(
             // Two standard errors of noise like what is left.
             let freedom = projection.rows.len().saturating_sub(space.dimensions() + projection.unknowns()).max(1);
             let rise = 4.0 * best.projected.squares() / freedom as f64;
-            for (d, variable) in space.variables().iter().enumerate() {
-                if let Some(interval) = interval(&projection, &space, &best.point, d, rise) {
-                    intervals.push((variable.name.clone(), interval));
-                }
-            }
+            let section = |d: usize| interval(&projection, &space, &best.point, d, rise);
+            let sections: Vec<_> = (0..space.dimensions()).into_par_iter().map(section).collect();
+            let named = space.variables().iter().zip(sections);
+            intervals.extend(named.filter_map(|(variable, section)| Some((variable.name.clone(), section?))));
             (space.values(&best.point), best.projected, Some(found), evaluations)
         }
     };

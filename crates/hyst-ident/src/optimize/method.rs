@@ -117,9 +117,9 @@ impl Method {
     pub fn with_population(mut self, wanted: usize) -> Self {
         match &mut self {
             Self::Shade { population } => *population = Some(wanted),
-            Self::De { population, .. }
-            | Self::Pso { population, .. }
-            | Self::Gwo { population, .. } => *population = wanted,
+            Self::De { population, .. } | Self::Pso { population, .. } | Self::Gwo { population, .. } => {
+                *population = wanted
+            }
         }
         self
     }

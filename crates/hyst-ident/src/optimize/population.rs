@@ -99,9 +99,8 @@ impl Points {
         let mean = |d: usize| of.iter().map(|i| self.point(*i)[d]).sum::<f64>() / of.len().max(1) as f64;
         let mean: Vec<f64> = (0..self.dimensions).map(mean).collect();
         let product = |i: &usize, r: usize, c: usize| (self.point(*i)[r] - mean[r]) * (self.point(*i)[c] - mean[c]);
-        let scatter = DMatrix::from_fn(self.dimensions, self.dimensions, |r, c| {
-            of.iter().map(|i| product(i, r, c)).sum::<f64>()
-        });
+        let scatter =
+            DMatrix::from_fn(self.dimensions, self.dimensions, |r, c| of.iter().map(|i| product(i, r, c)).sum::<f64>());
         SymmetricEigen::new(scatter).eigenvectors.column_iter().map(|axis| axis.iter().copied().collect()).collect()
     }
 
