@@ -13,6 +13,7 @@ pub mod batch;
 pub mod compare;
 pub mod compensate;
 pub mod diagnose;
+mod drive;
 pub mod everett;
 pub mod excite;
 pub mod export;
@@ -31,4 +32,5 @@ mod samples;
 mod settle;
 pub mod simulate;
 
+pub use drive::BetweenSamples;
 pub use samples::Samples;

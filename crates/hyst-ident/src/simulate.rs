@@ -1,8 +1,8 @@
 //! `simulate`: what a model says about a record.
 
-use hyst_core::Stage;
 use serde::{Deserialize, Serialize};
 
+use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::metrics::Errors;
 use crate::model::Model;
@@ -28,6 +28,8 @@ pub struct SimulateOptions {
     pub zero: Zero,
     /// Temperature \[°C\] where the record has no column of it.
     pub temperature: Option<f64>,
+    /// Whether each segment is one period of a steady state: it is passed twice through the model, and the second pass counts.
+    pub periodic: bool,
 }
 
 /// Inputs beyond those that a model was fitted to: what it says of them, its record did not show.
@@ -77,30 +79,21 @@ pub struct Simulation {
 /// # Errors
 /// As [`simulate_with`].
 pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation, FitError> {
-    simulate_with(model, record, &SimulateOptions { zero, temperature: None })
+    simulate_with(model, record, &SimulateOptions { zero, ..SimulateOptions::default() })
 }
 
-/// Runs a model over a record. Memory starts virgin in each segment.
+/// Runs a model over a record. Memory starts virgin in each segment; the drive goes on between samples as the model's file says.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
 pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) -> Result<Simulation, FitError> {
     let mut samples = Samples::from_record(record).at_temperature(options.temperature);
     check(model, record, &samples)?;
-    let chain = model.build(samples.period).map_err(|source| FitError::Stage { record: record.name(), source })?;
-    let chain = Box::new(chain);
-    let mut state = Box::new(chain.state());
-    let mut predicted = Vec::with_capacity(samples.len());
-    for segment in &samples.segments {
-        for k in segment.clone() {
-            let (env, u) = (samples.env(k), samples.input[k]);
-            predicted.push(if k == segment.start {
-                chain.reset(&mut state, &env, u)
-            } else {
-                chain.step(&mut state, &env, u)
-            });
-        }
-    }
+    let passes = if options.periodic { Passes::Periodic } else { Passes::Once };
+    let drive = Drive::new(&samples, model.between_samples, passes);
+    let chain = model.build(drive.period()).map_err(|source| FitError::Stage { record: record.name(), source })?;
+    let mut predicted = vec![0.0; samples.len()];
+    drive.run(&*Box::new(chain), &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
     if record.output().is_some() {

@@ -121,6 +121,12 @@ impl Model {
         self.0.zero
     }
 
+    /// How the drive goes on between samples: ``linear`` or ``band-limited``. ``simulate`` knows the whole record and goes by it.
+    #[getter]
+    fn between_samples(&self) -> &'static str {
+        self.0.between_samples.name()
+    }
+
     /// The input's column, unit included.
     #[getter]
     fn input_column(&self) -> &str {
@@ -154,6 +160,8 @@ impl Model {
     ///     Whether one constant per file is taken from its measured output.
     /// temperature : float, optional
     ///     Temperature [°C], where the record has no column of it.
+    /// periodic : bool
+    ///     Whether each segment is one period of a steady state: it is passed twice, and the second pass counts.
     ///
     /// Raises
     /// ------
@@ -164,16 +172,17 @@ impl Model {
     /// -----
     /// RangeWarning
     ///     If the input leaves ``input_range``: in how many rows, and by how much.
-    #[pyo3(signature = (record, *, zero="none", temperature=None))]
+    #[pyo3(signature = (record, *, zero="none", temperature=None, periodic=false))]
     fn simulate(
         &self,
         py: Python<'_>,
         record: &Bound<'_, PyAny>,
         zero: &str,
         temperature: Option<f64>,
+        periodic: bool,
     ) -> PyResult<Simulation> {
         let (record, zero) = (any_record(py, record, "input")?, zero_of(zero)?);
-        let options = SimulateOptions { zero, temperature: finite("temperature", temperature)? };
+        let options = SimulateOptions { zero, temperature: finite("temperature", temperature)?, periodic };
         let simulated = py.detach(|| simulate_with(&self.0, &record, &options)).map_err(errors::fit)?;
         let (beyond, (low, high)) = (simulated.extrapolated, self.input_range());
         if beyond.rows > 0 {
@@ -229,6 +238,8 @@ impl Model {
     }
 
     /// The model as an operator on arrays at a sample period [s]: ``simulate``, ``step``, ``inverse``, ``compensate``.
+    ///
+    /// It takes one sample after the other and sees the drive as linear between them, whatever ``between_samples`` says.
     fn operator(&self, period: f64) -> PyResult<Operator> {
         let effects = &self.0.effects;
         let needs = Needs {

@@ -26,8 +26,9 @@ Examples:
   hystctl compare slow.csv 20hz.csv 60hz.csv --test test.csv --json";
 
 pub(super) const SIMULATE: &str = "\
-Example:
-  hystctl simulate --model model.json test.csv -o predicted.csv";
+Examples:
+  hystctl simulate --model model.json test.csv -o predicted.csv
+  hystctl simulate --model model.json multisine-period.csv --periodic -o predicted.csv";
 
 pub(super) const DIAGNOSE: &str = "\
 Examples:

@@ -163,6 +163,9 @@ pub(crate) struct SimulateArgs {
     pub(crate) model: PathBuf,
     /// Record with the input; its output is compared, if it has one
     pub(crate) input: PathBuf,
+    /// Take each segment as one period of a steady state: it is passed twice through the model, and the second pass counts
+    #[arg(long)]
+    pub(crate) periodic: bool,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
     /// CSV file to write; stdout if not given

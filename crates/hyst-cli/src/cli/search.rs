@@ -3,6 +3,7 @@
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use hyst_core::SlipReading;
+use hyst_ident::BetweenSamples;
 use hyst_ident::fit::{FitOptions, Optimizer, VariableBounds};
 use hyst_ident::identify::Form;
 
@@ -32,6 +33,10 @@ pub(crate) struct SearchArgs {
     /// Form of bouc-wen (zhu: n = 1; xie: n is searched) or of an element of maxwell-slip (backlash, elasto-slip)
     #[arg(long, value_enum)]
     pub(crate) form: Option<FormArg>,
+    /// How the drive of bouc-wen-oscillator goes on between samples: on straight lines, or as the band-limited signal through
+    /// them; both are tried if not given, and the one that leaves less of the records is taken and kept in the model
+    #[arg(long, value_enum)]
+    pub(crate) between_samples: Option<BetweenArg>,
     /// Plays of gpi and td-pi, of pi when it is searched; elements of maxwell-slip and td-em
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
@@ -50,6 +55,15 @@ pub(crate) enum FormArg {
     ElastoSlip,
 }
 
+/// How a drive goes on between samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BetweenArg {
+    /// On straight lines
+    Linear,
+    /// As the signal without frequencies above half the sample rate
+    BandLimited,
+}
+
 impl SearchArgs {
     /// As options of a fit.
     pub(crate) fn options(&self, zero_per_record: bool) -> Result<FitOptions, CommandError> {
@@ -63,6 +77,10 @@ impl SearchArgs {
             (_, None) => 1,
         };
         let mut form = Form { elements: self.elements, ..Form::default() };
+        form.between_samples = self.between_samples.map(|way| match way {
+            BetweenArg::Linear => BetweenSamples::Linear,
+            BetweenArg::BandLimited => BetweenSamples::BandLimited,
+        });
         match self.form {
             Some(FormArg::Xie) => form.bouc_wen_n = None,
             Some(FormArg::ElastoSlip) => form.slip = SlipReading::ElastoSlip,

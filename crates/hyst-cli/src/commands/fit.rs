@@ -8,6 +8,7 @@ mod surface;
 use std::ops::ControlFlow;
 
 use hyst_core::PiParams;
+use hyst_ident::BetweenSamples;
 use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
 use hyst_ident::fit::{Fit, FitOptions, fit_with};
 use hyst_ident::identify::{Determined, Estimate, TradeOff};
@@ -37,6 +38,8 @@ struct Summary {
     base: Option<BaseSummary>,
     sensor_zero: f64,
     how: String,
+    /// How the drive goes on between samples.
+    between_samples: BetweenSummary,
     seed: u64,
     evaluations: u64,
     /// Standard errors, correlations and what the record does not determine.
@@ -53,6 +56,20 @@ struct Summary {
     input_unit: String,
     #[serde(skip)]
     seen: String,
+}
+
+/// How the drive goes on between samples.
+#[derive(Debug, Serialize)]
+struct BetweenSummary {
+    taken: BetweenSamples,
+    /// RMSE of each way that was tried; empty if it was not a question.
+    tried: Vec<TriedBetween>,
+}
+
+#[derive(Debug, Serialize)]
+struct TriedBetween {
+    between_samples: BetweenSamples,
+    rmse: f64,
 }
 
 /// Searches with different draws.
@@ -89,7 +106,8 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         progress.say(&format!("{doing}: {done} of at most {budget} evaluations"));
     })?;
     convergence::check(args, &fit)?;
-    let Fit { model, how, estimate, trials, evaluations } = fit;
+    let Fit { model, how, estimate, trials, evaluations, between_samples } = fit;
+    let tried = |(between_samples, rmse)| TriedBetween { between_samples, rmse };
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
 
@@ -116,6 +134,10 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         base: base_summary(&model),
         sensor_zero: model.zero,
         how,
+        between_samples: BetweenSummary {
+            taken: model.between_samples,
+            tried: between_samples.into_iter().map(tried).collect(),
+        },
         seed: options.seed,
         evaluations,
         trials: trials.map(|t| TrialsSummary {
@@ -236,6 +258,7 @@ impl Summary {
         lines.extend(self.dynamics.as_ref().map(|d| surface::dynamics(d, unit, &self.input_unit)));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
         lines.push(self.how.clone());
+        lines.extend(self.between_samples.text(unit));
         if let Some(TrialsSummary { count, costs: Some(costs), .. }) = self.trials.as_ref().filter(|t| t.count > 1) {
             lines.push(format!(
                 "{count} trials: what they left from {} to {}, median {} {unit}",
@@ -246,6 +269,15 @@ impl Summary {
         }
         lines.extend(self.estimate.as_ref().map(parameters));
         lines.join("\n")
+    }
+}
+
+impl BetweenSummary {
+    /// What was taken and why, if it was a question.
+    fn text(&self, unit: &str) -> Option<String> {
+        let left = |t: &TriedBetween| format!("{} leaves {} {unit}", t.between_samples, text::short(t.rmse));
+        let left: Vec<String> = self.tried.iter().map(left).collect();
+        (!left.is_empty()).then(|| format!("drive between samples: {}, taken: {}", left.join(", "), self.taken))
     }
 }
 

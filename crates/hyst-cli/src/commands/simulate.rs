@@ -1,5 +1,6 @@
 //! `simulate`: what a model says about a record.
 
+use hyst_ident::BetweenSamples;
 use hyst_ident::metrics::{Errors, Mape, mape};
 use hyst_ident::model::Channel;
 use hyst_ident::record::{Extra, Need};
@@ -20,6 +21,10 @@ struct Summary {
     rows: usize,
     settling_rows: usize,
     zero: Zero,
+    /// Whether the segments were passed twice.
+    periodic: bool,
+    /// How the drive goes on between samples, as the model's file says.
+    between_samples: BetweenSamples,
     /// Constant that was added for the record, with `--zero per-record`.
     zeros: Vec<f64>,
     /// None without a measured output.
@@ -39,7 +44,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     let record = input::record(&args.input, &args.map.map, Need::Input)?;
     let zero = args.zero.get();
     let temperature = input::temperature(args.temperature, &model, &record);
-    let simulated = simulate_with(&model, &record, &SimulateOptions { zero, temperature })?;
+    let simulated = simulate_with(&model, &record, &SimulateOptions { zero, temperature, periodic: args.periodic })?;
 
     let replaced = input::present(&args.input, &[&predicted_column, "settling"])?;
     let extra =
@@ -67,6 +72,8 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         rows: record.rows(),
         settling_rows: simulated.settling.iter().filter(|settling| **settling).count(),
         zero,
+        periodic: args.periodic,
+        between_samples: model.between_samples,
         zeros: simulated.zeros,
         errors: simulated.errors,
         // People and JSON count rows from 1, where there is one.

@@ -4,8 +4,9 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, check, fitted_on, model_of};
-use crate::identify::{Family, Identified, SearchOptions, family_of, identify};
+use super::{Fit, FitError, FitOptions, Optimizer, check, model_of};
+use crate::BetweenSamples;
+use crate::identify::{Family, Form, Identification, Located, SearchOptions, family_of};
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -15,6 +16,8 @@ use crate::settle::start_up_rows;
 const SEARCHED: usize = 12_000;
 /// Rows for each unknown that a fit needs.
 const ROWS_EACH: usize = 3;
+/// Share of what a linear drive leaves that a band-limited one has to stay below: what makes no difference is linear.
+const LESS: f64 = 0.99;
 
 pub(super) fn fit(
     record: &Record,
@@ -31,16 +34,18 @@ pub(super) fn fit(
             advice: format!("{} is a model of it", kind.name()),
         });
     }
-    let name = || record.name();
-    let all = run(&samples, kind, options, &name, watch)?;
+    let name = record.name();
+    let setup = Setup { kind, options, name: &name };
+    let Searched { best, left, how } = setup.search(&samples, watch)?;
     // What is still ringing or remembers what was before the record says nothing about the model.
-    let centred: Vec<f64> = all.0.residual.iter().map(|r| if r.is_finite() { *r } else { 0.0 }).collect();
-    samples.settling = start_up_rows(&samples, &centred);
-    let (found, how) =
-        if samples.settling.iter().any(|s| *s) { run(&samples, kind, options, &name, watch)? } else { all };
+    samples.settling = best.settling;
+    let family = setup.family(&samples, best.between)?;
+    let identification = Identification::new(&family, &samples, options.zero_per_record, &name)?;
+    let starts_up = samples.settling.iter().any(|s| *s);
+    let found = identification.conclude(if starts_up { identification.polish(&best.located)? } else { best.located });
     let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
-    model.fitted_on = fitted_on(record, &samples);
+    model.between_samples = best.between;
     let key = |name: &str| format!("{}.{name}", kind.name());
     for p in &found.estimate.parameters {
         if p.std_error.is_finite() {
@@ -48,91 +53,178 @@ pub(super) fn fit(
         }
     }
     model.undetermined = found.estimate.undetermined().into_iter().map(key).collect();
-    Ok(Fit { model, how, estimate: Some(found.estimate), trials: found.trials, evaluations: found.evaluations })
+    let (trials, evaluations) = (found.trials, found.evaluations);
+    Ok(Fit { model, how, estimate: Some(found.estimate), trials, evaluations, between_samples: left })
 }
 
 fn kind_needs_temperature(kind: Kind) -> bool {
     matches!(kind, Kind::TdPi | Kind::TdEm)
 }
 
-/// One identification over the rows that count, and in words how it was done.
-fn run(
-    samples: &Samples,
-    kind: Kind,
-    options: &FitOptions,
-    name: &dyn Fn() -> String,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<(Identified, String), FitError> {
-    if matches!(kind, Kind::Preisach | Kind::Dpm) {
-        let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
-        return Err(FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice });
-    }
-    let unsupported = FitError::Unsupported { what: kind.name(), done: "fitted" };
-    let family = family_of(kind, samples, &options.form).ok_or(unsupported)?;
-    let family = Bounded { family, options };
-    let variables = family.variables();
-    let unknowns = variables.len() + family.linear().len() + 1;
-    let settled = samples.settling.iter().filter(|s| !**s).count();
-    let needed = ROWS_EACH * unknowns;
-    if settled < needed {
-        return Err(FitError::TooShort { record: name(), rows: settled, unknowns, needed });
-    }
-    for bound in &options.bounds {
-        if !variables.iter().any(|v| v.name == bound.name) {
-            let names: Vec<&str> = variables.iter().map(|v| v.name.as_str()).collect();
-            let names = if names.is_empty() { "nothing".into() } else { names.join(", ") };
-            return Err(FitError::UnknownBounds { name: bound.name.clone(), kind: kind.name(), names });
-        }
-    }
-    let (method, how) = method(kind, options, variables.len(), family.linear().len())?;
-    let method = options.population.map_or(method, |p| method.with_population(p));
-    let search = SearchOptions {
-        method,
-        evaluations: options.evaluations.unwrap_or(1500 * variables.len().max(1) as u64),
-        seed: options.seed,
-        trials: options.trials,
-        zero_per_record: options.zero_per_record,
-    };
-    let setup = |source| FitError::Search { record: name(), source: SearchError::Method(source) };
-    method.build(variables.len().max(1), search.evaluations, search.seed).map_err(setup)?;
-    // The valley shows in a part of the record.
-    // An oscillator is an equation of motion in many substeps, and periods of it are short.
-    let searched = if kind == Kind::BoucWenOscillator { SEARCHED / 6 } else { SEARCHED };
-    let beginnings = (samples.len() > searched).then(|| samples.beginnings(searched));
-    let quick = beginnings.as_ref().and_then(|b| Some((family_of(kind, b, &options.form)?, b)));
-    let quick = quick.as_ref().map(|(family, rows)| (family.as_ref(), *rows));
-    let found = identify(&family, samples, quick, &search, name, watch)?;
-    Ok((found, how))
+/// A fit to all rows with one way of the drive between them.
+struct Tried {
+    between: BetweenSamples,
+    located: Located,
+    residual: Vec<f64>,
+    settling: Vec<bool>,
 }
 
-/// The search, and why it.
-fn method(kind: Kind, options: &FitOptions, variables: usize, linear: usize) -> Result<(Method, String), FitError> {
-    let wrong =
-        |optimizer: &str, advice| Err(FitError::Optimizer { kind: kind.name(), optimizer: optimizer.into(), advice });
-    let name = match &options.optimizer {
-        Optimizer::Convex if variables > 0 => {
-            return wrong("convex", "it is not linear in all its parameters: use auto, de, pso or gwo");
+impl Tried {
+    fn new(between: BetweenSamples, identification: &Identification<'_>, located: Located) -> Self {
+        let residual = identification.residual(&located);
+        Self { between, settling: start_up_rows(identification.samples, &residual), residual, located }
+    }
+
+    /// The other one, if that leaves less; and what each leaves \[y\], over the rows that are a start-up for neither.
+    fn or(self, other: Self) -> (Self, Vec<(BetweenSamples, f64)>) {
+        let counts = |k: &usize| !self.settling[*k] && !other.settling[*k];
+        let rmse = |t: &Self| {
+            let kept: Vec<f64> = (0..t.residual.len()).filter(counts).map(|k| t.residual[k] * t.residual[k]).collect();
+            (kept.iter().sum::<f64>() / kept.len().max(1) as f64).sqrt()
+        };
+        let (own, others) = (rmse(&self), rmse(&other));
+        let left = vec![(self.between, own), (other.between, others)];
+        (if others < LESS * own { other } else { self }, left)
+    }
+}
+
+/// The best fit to all rows.
+struct Searched {
+    best: Tried,
+    /// What each way leaves, if several were tried.
+    left: Vec<(BetweenSamples, f64)>,
+    /// In words, how it was found.
+    how: String,
+}
+
+/// What is to be fitted, and how.
+struct Setup<'a> {
+    kind: Kind,
+    options: &'a FitOptions,
+    /// What errors call the record.
+    name: &'a str,
+}
+impl<'a> Setup<'a> {
+    /// How the drive may go on between samples.
+    fn ways(&self) -> (BetweenSamples, Option<BetweenSamples>) {
+        match (self.kind, self.options.form.between_samples) {
+            (Kind::BoucWenOscillator, None) => (BetweenSamples::Linear, Some(BetweenSamples::BandLimited)),
+            (_, way) => (way.unwrap_or_default(), None),
         }
-        Optimizer::Search(name) if variables == 0 => {
-            return wrong(name, "it is linear in all its parameters, there is nothing to search: use auto or convex");
+    }
+
+    /// The family over these rows, with the caller's bounds.
+    fn family<'s>(&self, samples: &'s Samples, between: BetweenSamples) -> Result<Bounded<'s>, FitError>
+    where
+        'a: 's,
+    {
+        let Self { kind, options, .. } = *self;
+        if matches!(kind, Kind::Preisach | Kind::Dpm) {
+            let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
+            return Err(FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice });
         }
-        Optimizer::Search(name) => name.as_str(),
-        Optimizer::Auto | Optimizer::Convex => "de",
-    };
-    let method = Method::named(name, variables)
-        .map_err(|e| FitError::Search { record: String::new(), source: SearchError::Method(e) })?;
-    let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
-    let how = if variables == 0 {
-        format!("convex: {} solved for at once", count(linear, "weight"))
-    } else {
-        let chosen = if options.optimizer == Optimizer::Auto { " (auto: not linear in these)" } else { "" };
-        format!(
-            "{name}: {} searched{chosen}, {} solved for at each trial, then Levenberg-Marquardt",
-            count(variables, "variable"),
-            count(linear, "parameter")
-        )
-    };
-    Ok((method, how))
+        let form = Form { between_samples: Some(between), ..options.form };
+        let unsupported = FitError::Unsupported { what: kind.name(), done: "fitted" };
+        let family = Bounded { family: family_of(kind, samples, &form).ok_or(unsupported)?, options };
+        let variables = family.variables();
+        let unknowns = variables.len() + family.linear().len() + 1;
+        let (settled, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * unknowns);
+        if settled < needed {
+            return Err(FitError::TooShort { record: self.name.into(), rows: settled, unknowns, needed });
+        }
+        for bound in &options.bounds {
+            if !variables.iter().any(|v| v.name == bound.name) {
+                let names: Vec<&str> = variables.iter().map(|v| v.name.as_str()).collect();
+                let names = if names.is_empty() { "nothing".into() } else { names.join(", ") };
+                return Err(FitError::UnknownBounds { name: bound.name.clone(), kind: kind.name(), names });
+            }
+        }
+        Ok(family)
+    }
+
+    /// The rows that a global search looks at, if they are not all: the valley shows in a part of the record.
+    fn beginnings(&self, samples: &Samples) -> Option<Samples> {
+        // An oscillator is an equation of motion in many substeps, and periods of it are short.
+        let most = if self.kind == Kind::BoucWenOscillator { SEARCHED / 6 } else { SEARCHED };
+        (samples.len() > most).then(|| samples.beginnings(most))
+    }
+
+    /// A search over all rows, and every way of the drive between them from where it has ended.
+    fn search(
+        &self,
+        samples: &Samples,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Searched, FitError> {
+        let (first, other) = self.ways();
+        let family = self.family(samples, first)?;
+        let (search, how) = self.search_of(&family)?;
+        let identification = Identification::new(&family, samples, self.options.zero_per_record, self.name)?;
+        let beginnings = self.beginnings(samples);
+        let shorter = beginnings.as_ref().map(|rows| self.family(rows, first)).transpose()?;
+        let quick = shorter.as_ref().zip(beginnings.as_ref()).map(|(family, rows)| (family as &dyn Family, rows));
+        let located = identification.search(quick, &search, watch)?;
+        let linear = Tried::new(first, &identification, located);
+        let (best, left) = match other {
+            None => (linear, Vec::new()),
+            Some(other) => {
+                let family = self.family(samples, other)?;
+                let identification = Identification::new(&family, samples, self.options.zero_per_record, self.name)?;
+                let located = identification.polish(&linear.located)?;
+                linear.or(Tried::new(other, &identification, located))
+            }
+        };
+        Ok(Searched { best, left, how })
+    }
+
+    /// The search of a family's variables, and in words what it is and why it.
+    fn search_of(&self, family: &dyn Family) -> Result<(SearchOptions, String), FitError> {
+        let Self { options, .. } = *self;
+        let variables = family.variables().len();
+        let (method, how) = self.method(variables, family.linear().len())?;
+        let method = options.population.map_or(method, |p| method.with_population(p));
+        let search = SearchOptions {
+            method,
+            evaluations: options.evaluations.unwrap_or(1500 * variables.max(1) as u64),
+            seed: options.seed,
+            trials: options.trials,
+        };
+        let setup = |source| FitError::Search { record: self.name.into(), source: SearchError::Method(source) };
+        method.build(variables.max(1), search.evaluations, search.seed).map_err(setup)?;
+        Ok((search, how))
+    }
+
+    fn method(&self, variables: usize, linear: usize) -> Result<(Method, String), FitError> {
+        let wrong = |optimizer: &str, advice| {
+            Err(FitError::Optimizer { kind: self.kind.name(), optimizer: optimizer.into(), advice })
+        };
+        let name = match &self.options.optimizer {
+            Optimizer::Convex if variables > 0 => {
+                return wrong("convex", "it is not linear in all its parameters: use auto, de, pso or gwo");
+            }
+            Optimizer::Search(name) if variables == 0 => {
+                return wrong(
+                    name,
+                    "it is linear in all its parameters, there is nothing to search: use auto or convex",
+                );
+            }
+            Optimizer::Search(name) => name.as_str(),
+            Optimizer::Auto | Optimizer::Convex => "de",
+        };
+        let method = Method::named(name, variables)
+            .map_err(|e| FitError::Search { record: String::new(), source: SearchError::Method(e) })?;
+        let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+        let how = if variables == 0 {
+            format!("convex: {} solved for at once", count(linear, "weight"))
+        } else {
+            let chosen = if self.options.optimizer == Optimizer::Auto { " (auto: not linear in these)" } else { "" };
+            format!(
+                "{name}: {} searched{chosen}, {} solved for at each trial, then Levenberg-Marquardt",
+                count(variables, "variable"),
+                count(linear, "parameter")
+            )
+        };
+        Ok((method, how))
+    }
 }
 
 /// A family with the caller's bounds.
@@ -166,6 +258,10 @@ impl Family for Bounded<'_> {
 
     fn scale(&self, base: &crate::model::Base, name: &str) -> Option<f64> {
         self.family.scale(base, name)
+    }
+
+    fn between_samples(&self) -> BetweenSamples {
+        self.family.between_samples()
     }
 
     fn identified(&self, name: &str) -> bool {

@@ -1,12 +1,13 @@
 //! What a model has to say to be identified by search.
 
-use hyst_core::{Env, Error, Stage};
+use hyst_core::{Error, Stage};
 use nalgebra::DMatrix;
 
-use crate::Samples;
+use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
 use crate::model::Base;
 use crate::optimize::Variable;
+use crate::{BetweenSamples, Samples};
 
 /// A parameter that the output is linear in.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,26 +48,29 @@ pub(crate) trait Family: Sync {
         None
     }
 
+    /// How the drive that the model sees goes on between samples.
+    fn between_samples(&self) -> BetweenSamples {
+        BetweenSamples::Linear
+    }
+
     /// Whether a parameter of the model was identified, and not given.
     fn identified(&self, _name: &str) -> bool {
         true
     }
 }
 
-/// Output of a stage over the rows, one segment after the other.
+/// Output of a stage over the rows, one segment after the other; the drive is linear between samples.
 pub(crate) fn run<S: Stage<f64>>(samples: &Samples, stage: &S, out: &mut [f64]) {
-    let mut state = stage.state();
-    for segment in &samples.segments {
-        for k in segment.clone() {
-            let (env, u): (Env<f64>, f64) = (samples.env(k), samples.input[k]);
-            out[k] =
-                if k == segment.start { stage.reset(&mut state, &env, u) } else { stage.step(&mut state, &env, u) };
-        }
-    }
+    Drive::new(samples, BetweenSamples::Linear, Passes::Once).run(stage, out);
 }
 
 /// [`run`] into a column.
 pub(crate) fn run_into<S: Stage<f64>>(samples: &Samples, stage: &S, columns: &mut DMatrix<f64>, column: usize) {
+    run(samples, stage, rows_of(columns, column));
+}
+
+/// A column's rows.
+pub(crate) fn rows_of(columns: &mut DMatrix<f64>, column: usize) -> &mut [f64] {
     let rows = columns.nrows();
-    run(samples, stage, &mut columns.as_mut_slice()[column * rows..(column + 1) * rows]);
+    &mut columns.as_mut_slice()[column * rows..(column + 1) * rows]
 }

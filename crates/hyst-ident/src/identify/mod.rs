@@ -24,6 +24,6 @@ mod uncertainty;
 pub use families::Form;
 pub(crate) use families::family_of;
 pub(crate) use family::{Family, Linear};
-pub(crate) use search::{Identified, SearchOptions, identify};
+pub(crate) use search::{Identification, Located, SearchOptions};
 pub(crate) use uncertainty::parameters_of;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

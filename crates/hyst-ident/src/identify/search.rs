@@ -5,14 +5,14 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::Family;
-use super::polish::polish;
+use super::polish::{Polished, polish};
 use super::profile::interval;
-use super::projection::{Left, Projection, space};
+use super::projection::{Left, Projected, Projection, space};
 use super::uncertainty::{Estimate, estimate};
 use crate::Samples;
 use crate::fit::FitError;
 use crate::model::Base;
-use crate::optimize::{Method, Progress, Stop, Trials, trials};
+use crate::optimize::{Method, Progress, Space, Stop, Trials, trials};
 
 /// How to search.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,6 @@ pub(crate) struct SearchOptions {
     pub(crate) evaluations: u64,
     pub(crate) seed: u64,
     pub(crate) trials: usize,
-    pub(crate) zero_per_record: bool,
 }
 
 /// What was identified.
@@ -33,70 +32,136 @@ pub(crate) struct Identified {
     /// The global searches; `None` if nothing had to be searched.
     pub(crate) trials: Option<Trials>,
     pub(crate) evaluations: u64,
-    /// Measured minus predicted in every row, `NaN` in those that do not count.
-    pub(crate) residual: Vec<f64>,
+}
+
+/// Where a search and its polish have ended.
+#[derive(Clone, Debug)]
+pub(crate) struct Located {
+    values: Vec<f64>,
+    projected: Projected,
+    trials: Option<Trials>,
+    evaluations: u64,
 }
 
 /// Points from which a polish starts, besides the best: ends of trials are many, valleys few.
 const STARTS: usize = 3;
 
-/// Identifies a family from the settled rows. Where `beginnings` of the record are given, with the same model over them, the
-/// global search looks at those alone; the polish sees all.
-///
-/// # Errors
-/// If the bounds are no box, the search is set up wrongly, or no parameters within the bounds give a finite output.
-pub(crate) fn identify(
-    family: &dyn Family,
-    samples: &Samples,
-    beginnings: Option<(&dyn Family, &Samples)>,
-    how: &SearchOptions,
-    name: &dyn Fn() -> String,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Identified, FitError> {
-    let projection = Projection::new(family, samples, how.zero_per_record);
-    let unsolvable = || FitError::Unsolvable { record: name() };
-    let mut intervals = Vec::new();
-    let (values, projected, searched, evaluations) = match space(family) {
-        None => (Vec::new(), projection.at(&[]).ok_or_else(unsolvable)?, None, 1),
-        Some(space) => {
-            let space = space.map_err(|source| FitError::Space { record: name(), source })?;
-            let quick = beginnings.map(|(family, rows)| Projection::new(family, rows, how.zero_per_record));
-            let cost = Left { projection: quick.as_ref().unwrap_or(&projection), dimensions: space.dimensions() };
-            let stop = Stop { tolerance: 1e-6, stall: 60, ..Stop::after(how.evaluations) };
-            let found = trials(&space, &cost, &how.method, &stop, how.seed, how.trials, &mut |_, p| watch(p))
-                .map_err(|source| FitError::Search { record: name(), source })?;
-            let mut order: Vec<usize> = (0..found.found.len()).collect();
-            order.sort_by(|a, b| found.found[*a].cost.total_cmp(&found.found[*b].cost));
-            let mut best = None;
-            let mut evaluations: u64 = found.found.iter().map(|f| f.evaluations).sum();
-            for trial in order.iter().take(STARTS) {
-                let Some(p) = polish(&projection, &space, &space.point(&found.found[*trial].values)) else { continue };
-                evaluations += p.evaluations;
-                let better = |b: &super::polish::Polished| p.projected.squares() < b.projected.squares();
-                if best.as_ref().is_none_or(better) {
-                    best = Some(p);
+/// A family and the settled rows that it is identified from.
+pub(crate) struct Identification<'a> {
+    family: &'a dyn Family,
+    pub(crate) samples: &'a Samples,
+    zero_per_record: bool,
+    projection: Projection<'a>,
+    /// `None` if nothing has to be searched.
+    space: Option<Space>,
+    name: &'a str,
+}
+
+impl<'a> Identification<'a> {
+    /// `name` is what errors call the record.
+    ///
+    /// # Errors
+    /// If the bounds are no box.
+    pub(crate) fn new(
+        family: &'a dyn Family,
+        samples: &'a Samples,
+        zero_per_record: bool,
+        name: &'a str,
+    ) -> Result<Self, FitError> {
+        let space = space(family).transpose().map_err(|source| FitError::Space { record: name.into(), source })?;
+        let projection = Projection::new(family, samples, zero_per_record);
+        Ok(Self { family, samples, zero_per_record, projection, space, name })
+    }
+
+    fn unsolvable(&self) -> FitError {
+        FitError::Unsolvable { record: self.name.into() }
+    }
+
+    /// Searches globally and polishes where the best trials have ended. Where `beginnings` of the record are given, with the same model
+    /// over them, the global search looks at those alone; the polish sees all.
+    ///
+    /// # Errors
+    /// If the search is set up wrongly, or no parameters within the bounds give a finite output.
+    pub(crate) fn search(
+        &self,
+        beginnings: Option<(&dyn Family, &Samples)>,
+        how: &SearchOptions,
+        watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Located, FitError> {
+        let Some(space) = &self.space else { return self.at_once() };
+        let quick = beginnings.map(|(family, rows)| Projection::new(family, rows, self.zero_per_record));
+        let cost = Left { projection: quick.as_ref().unwrap_or(&self.projection), dimensions: space.dimensions() };
+        let stop = Stop { tolerance: 1e-6, stall: 60, ..Stop::after(how.evaluations) };
+        let found = trials(space, &cost, &how.method, &stop, how.seed, how.trials, &mut |_, p| watch(p))
+            .map_err(|source| FitError::Search { record: self.name.into(), source })?;
+        let mut order: Vec<usize> = (0..found.found.len()).collect();
+        order.sort_by(|a, b| found.found[*a].cost.total_cmp(&found.found[*b].cost));
+        let mut best: Option<Polished> = None;
+        let mut evaluations: u64 = found.found.iter().map(|f| f.evaluations).sum();
+        for trial in order.iter().take(STARTS) {
+            let start = space.point(&found.found[*trial].values);
+            let Some(p) = polish(&self.projection, space, &start) else { continue };
+            evaluations += p.evaluations;
+            if best.as_ref().is_none_or(|b| p.projected.squares() < b.projected.squares()) {
+                best = Some(p);
+            }
+        }
+        let best = best.ok_or_else(|| self.unsolvable())?;
+        let values = space.values(&best.point);
+        Ok(Located { values, projected: best.projected, trials: Some(found), evaluations })
+    }
+
+    /// Polishes from where another identification with the same variables has ended: of other rows, or of a drive that goes on
+    /// otherwise between them.
+    ///
+    /// # Errors
+    /// If there is no finite output at that point.
+    pub(crate) fn polish(&self, from: &Located) -> Result<Located, FitError> {
+        let Some(space) = &self.space else { return self.at_once() };
+        let start = space.point(&from.values);
+        let p = polish(&self.projection, space, &start).ok_or_else(|| self.unsolvable())?;
+        Ok(Located {
+            values: space.values(&p.point),
+            projected: p.projected,
+            trials: from.trials.clone(),
+            evaluations: from.evaluations + p.evaluations,
+        })
+    }
+
+    /// Where there is nothing to search.
+    fn at_once(&self) -> Result<Located, FitError> {
+        let projected = self.projection.at(&[]).ok_or_else(|| self.unsolvable())?;
+        Ok(Located { values: Vec::new(), projected, trials: None, evaluations: 1 })
+    }
+
+    /// Measured minus predicted in every row, `NaN` in those that do not count.
+    pub(crate) fn residual(&self, at: &Located) -> Vec<f64> {
+        let mut residual = vec![f64::NAN; self.samples.len()];
+        for (k, r) in self.projection.rows.iter().zip(at.projected.residual.as_slice()) {
+            residual[*k] = *r;
+        }
+        residual
+    }
+
+    /// The model there, and what the rows say about its parameters.
+    pub(crate) fn conclude(&self, at: Located) -> Identified {
+        let base = self.family.base(&at.values, &at.projected.linear);
+        let left = at.projected.residual.as_slice();
+        let mut estimate = estimate(self.family, &base, self.samples, self.zero_per_record, left);
+        if let Some(space) = &self.space {
+            // Two standard errors of noise like what is left.
+            let unknowns = space.dimensions() + self.projection.unknowns();
+            let freedom = self.projection.rows.len().saturating_sub(unknowns).max(1);
+            let rise = 4.0 * at.projected.squares() / freedom as f64;
+            let point = space.point(&at.values);
+            let section = |d: usize| interval(&self.projection, space, &point, d, rise);
+            let sections: Vec<_> = (0..space.dimensions()).into_par_iter().map(section).collect();
+            for (variable, section) in space.variables().iter().zip(sections) {
+                if let Some(section) = section {
+                    estimate.widen(&variable.name, section);
                 }
             }
-            let best = best.ok_or_else(unsolvable)?;
-            // Two standard errors of noise like what is left.
-            let freedom = projection.rows.len().saturating_sub(space.dimensions() + projection.unknowns()).max(1);
-            let rise = 4.0 * best.projected.squares() / freedom as f64;
-            let section = |d: usize| interval(&projection, &space, &best.point, d, rise);
-            let sections: Vec<_> = (0..space.dimensions()).into_par_iter().map(section).collect();
-            let named = space.variables().iter().zip(sections);
-            intervals.extend(named.filter_map(|(variable, section)| Some((variable.name.clone(), section?))));
-            (space.values(&best.point), best.projected, Some(found), evaluations)
         }
-    };
-    let base = family.base(&values, &projected.linear);
-    let left = projected.residual.as_slice();
-    let mut estimate = estimate(family, &base, samples, how.zero_per_record, left);
-    for (name, interval) in intervals {
-        estimate.widen(&name, interval);
+        Identified { base, zeros: at.projected.zeros, estimate, trials: at.trials, evaluations: at.evaluations }
     }
-    let mut residual = vec![f64::NAN; samples.len()];
-    for (k, r) in projection.rows.iter().zip(left) {
-        residual[*k] = *r;
-    }
-    Ok(Identified { base, zeros: projected.zeros, estimate, trials: searched, evaluations, residual })
 }

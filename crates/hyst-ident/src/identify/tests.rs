@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::search::Identified;
 use super::*;
 use crate::Samples;
 use crate::model::{Base, Operator};
@@ -60,18 +61,20 @@ fn record(
 
 fn search(method: &str, dimensions: usize) -> SearchOptions {
     let method = Method::named(method, dimensions).unwrap();
-    SearchOptions { method, evaluations: 1500 * dimensions as u64, seed: 1, trials: 1, zero_per_record: false }
+    SearchOptions { method, evaluations: 1500 * dimensions as u64, seed: 1, trials: 1 }
 }
 
 fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Identified {
     let family = family_of(kind, samples, form).unwrap();
     let how = search(method, family.variables().len().max(1));
-    identify(family.as_ref(), samples, None, &how, &|| "record".into(), &mut |_| ControlFlow::Continue(())).unwrap()
+    let identification = Identification::new(family.as_ref(), samples, false, "record").unwrap();
+    let located = identification.search(None, &how, &mut |_| ControlFlow::Continue(())).unwrap();
+    identification.conclude(located)
 }
 
 /// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.
-fn agrees(found: &Identified, truth: &Base, sigma: f64) {
-    let true_values = uncertainty::parameters_of(truth);
+fn agrees(found: &Identified, truth: &Base, samples: &Samples, sigma: f64) {
+    let true_values = parameters_of(truth);
     for p in &found.estimate.parameters {
         let (_, true_value) = true_values.iter().find(|(n, _)| *n == p.name).unwrap();
         let off = (p.value - true_value).abs();
@@ -79,7 +82,7 @@ fn agrees(found: &Identified, truth: &Base, sigma: f64) {
             assert!(off <= 3.0 * p.std_error, "{}: {} ± {}, {true_value} expected", p.name, p.value, p.std_error);
         }
     }
-    let (left, rows) = (found.estimate.left, found.residual.len() as f64);
+    let (left, rows) = (found.estimate.left, samples.len() as f64);
     assert!((left / sigma - 1.0).abs() < 4.0 / (2.0 * rows).sqrt(), "left {left}, noise {sigma}");
 }
 
@@ -89,7 +92,7 @@ fn bouc_wen_of_the_paper_by_particle_swarm() {
     let drive = |t: f64| 10.0 + 8.0 * (62.0 * t).sin() * (5.0 * t).sin() - 10.0 * (-30.0 * t).exp();
     let (samples, sigma) = record(&truth, 1e-3, 4000, &[23.0], drive, 3);
     let found = identified(Kind::BoucWen, &samples, &Form::default(), "pso");
-    agrees(&found, &truth, sigma);
+    agrees(&found, &truth, &samples, sigma);
     // Γ is printed as nothing, and found to be.
     assert_eq!(found.estimate.parameter("gamma").unwrap().determined, Determined::NearZero);
 }
@@ -101,14 +104,14 @@ fn activation_functions_at_10_hz_by_particle_swarm() {
     let tanh = ActivationParams { k0: 0.1461, alpha: -9e-5, beta: 0.3857, gamma: 500_032.0 };
     let (samples, sigma) = record(&Base::Tanh(tanh), 1e-3, 500, &[23.0], drive, 5);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Tanh(tanh), sigma);
+    agrees(&found, &Base::Tanh(tanh), &samples, sigma);
     // Saturated over the whole range: γ leaves no trace, and says so.
     assert!(found.estimate.undetermined().contains(&"gamma"), "{:?}", found.estimate.parameters);
 
     let softsign = ActivationParams::from_scaled_softsign(0.1516, -0.00017, 100.0, 318.2799);
     let (samples, sigma) = record(&Base::Softsign(softsign), 1e-3, 500, &[23.0], drive, 6);
     let found = identified(Kind::Softsign, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Softsign(softsign), sigma);
+    agrees(&found, &Base::Softsign(softsign), &samples, sigma);
     // Its long tails tell a γ that tanh hides.
     let gamma = found.estimate.parameter("gamma").unwrap();
     assert!(gamma.determined == Determined::Yes && gamma.std_error > 0.05 * gamma.value, "{gamma:?}");
@@ -116,7 +119,7 @@ fn activation_functions_at_10_hz_by_particle_swarm() {
     let bent = ActivationParams { gamma: 0.05, ..tanh };
     let (samples, sigma) = record(&Base::Tanh(bent), 1e-3, 500, &[23.0], drive, 7);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Tanh(bent), sigma);
+    agrees(&found, &Base::Tanh(bent), &samples, sigma);
     assert!(found.estimate.undetermined().is_empty());
 }
 
@@ -136,7 +139,7 @@ fn linear_fractional_model_by_particle_swarm() {
     let truth = LfdmParams::PRINTED;
     let (samples, sigma) = record(&Base::Lfdm(truth), 1e-3, 3000, &[23.0], five_sines, 8);
     let found = identified(Kind::Lfdm, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Lfdm(truth), sigma);
+    agrees(&found, &Base::Lfdm(truth), &samples, sigma);
     let Base::Lfdm(p) = found.base else { panic!() };
     let off = apart(|hz| p.response(hz), |hz| truth.response(hz));
     assert!(off < 1e-3, "{off}");
@@ -147,7 +150,7 @@ fn improved_fractional_model_by_differential_evolution() {
     let truth = IfmParams::PRINTED;
     let (samples, sigma) = record(&Base::Ifm(truth), 2e-4, 10_000, &[23.0], five_sines, 9);
     let found = identified(Kind::Ifm, &samples, &Form::default(), "de");
-    agrees(&found, &Base::Ifm(truth), sigma);
+    agrees(&found, &Base::Ifm(truth), &samples, sigma);
     let undetermined = found.estimate.undetermined();
     for name in ["a", "b", "c", "alpha"] {
         assert!(undetermined.contains(&name), "{name} not in {undetermined:?}: {:?}", found.estimate.parameters);
@@ -253,7 +256,7 @@ fn electromechanical_model_and_its_products() {
 fn standard_errors_are_the_scatter_of_repeated_records() {
     let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
-    let true_values = uncertainty::parameters_of(&truth);
+    let true_values = parameters_of(&truth);
     let mut squares = [0.0; 4];
     for seed in 0..12 {
         let (samples, _) = record(&truth, 1e-3, 3000, &[23.0], drive, seed);
@@ -273,6 +276,6 @@ fn the_exponent_of_bouc_wen_is_found_too() {
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
     let (samples, sigma) = record(&truth, 1e-3, 2000, &[23.0], drive, 2);
     let found = identified(Kind::BoucWen, &samples, &Form { bouc_wen_n: None, ..Form::default() }, "de");
-    agrees(&found, &truth, sigma);
+    agrees(&found, &truth, &samples, sigma);
     assert_eq!(found.estimate.parameter("n").unwrap().determined, Determined::Yes);
 }

@@ -4,9 +4,10 @@ use hyst_core::{Params, Sampling};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::family::{Family, run};
+use super::family::Family;
 use super::profile::Interval;
 use crate::Samples;
+use crate::drive::{Drive, Passes};
 use crate::model::{Base, Operator};
 
 /// Relative step of the difference quotients.
@@ -148,11 +149,12 @@ pub(crate) fn estimate(
     let all = parameters_of(base);
     let which: Vec<usize> = (0..all.len()).filter(|i| family.identified(&all[*i].0)).collect();
     let (low, high) = samples.input_range();
-    let cx = Sampling { period: samples.period };
+    let drive = Drive::new(samples, family.between_samples(), Passes::Once);
+    let cx = Sampling { period: drive.period() };
     let simulated = |base: &Base| {
         let operator = Operator::new(base, [low, high], &cx).ok()?;
         let mut y = vec![0.0; samples.len()];
-        run(samples, &operator, &mut y);
+        drive.run(&operator, &mut y);
         Some(y)
     };
     let scale = |i: usize| {

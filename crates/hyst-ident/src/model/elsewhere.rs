@@ -6,6 +6,7 @@ use hyst_core::{Env, Error, Stage};
 
 use super::operator::ROOM;
 use super::{Base, Channel, Effect, Effects, Model, units};
+use crate::BetweenSamples;
 use crate::record::{OutputUnit, is_input_column};
 
 /// The two ends of an actuator whose parameters come from elsewhere.
@@ -48,6 +49,7 @@ impl Model {
                 low,
                 high,
             },
+            between_samples: BetweenSamples::Linear,
             output: Channel { column: output.column().into(), unit: output.suffix().into(), low: 0.0, high: 0.0 },
             zero: 0.0,
             base,

@@ -9,7 +9,7 @@ use serde_json::error::Category;
 
 use super::operator::inverse_ends;
 use super::{Base, Compensator, Effects, HostChain, Operator, stages, units};
-use crate::samples::Samples;
+use crate::{BetweenSamples, Samples};
 
 /// Schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
@@ -47,6 +47,17 @@ pub struct FittedOn {
     pub settling_rows: usize,
 }
 
+/// The input's end, with what only it has.
+#[derive(Serialize, Deserialize)]
+struct Input {
+    column: String,
+    unit: String,
+    low: f64,
+    high: f64,
+    #[serde(default, skip_serializing_if = "BetweenSamples::is_linear")]
+    between_samples: BetweenSamples,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File<S> {
@@ -54,7 +65,7 @@ struct File<S> {
     kind: Kind,
     version: String,
     seed: u64,
-    input: Channel,
+    input: Input,
     output: Channel,
     zero: f64,
     /// Sample period of the record; the parameters do not depend on it.
@@ -68,6 +79,9 @@ struct File<S> {
 pub struct Model {
     /// The input.
     pub input: Channel,
+    /// How the drive goes on between samples: a whole record is simulated so. A [`chain`](Self::build) that takes one sample after
+    /// the other sees it linear.
+    pub between_samples: BetweenSamples,
     /// The output.
     pub output: Channel,
     /// What the sensor shows at rest \[output unit\].
@@ -210,12 +224,13 @@ impl Model {
 
     /// The file's text.
     pub fn to_json(&self) -> String {
+        let Channel { column, unit, low, high } = self.input.clone();
         let file = File {
             schema: SCHEMA.into(),
             kind: self.base.kind(),
             version: self.version.clone(),
             seed: self.seed,
-            input: self.input.clone(),
+            input: Input { column, unit, low, high, between_samples: self.between_samples },
             output: self.output.clone(),
             zero: self.zero,
             recorded_at_hz: self.recorded_at_hz,
@@ -286,7 +301,9 @@ impl Model {
         if base.kind() != file.kind {
             return Err(format!("the kind is {}, but the hysteresis stage is {}", file.kind, base.kind()));
         }
-        for (name, channel) in [("input", &file.input), ("output", &file.output)] {
+        let Input { column, unit, low, high, between_samples } = file.input;
+        let input = Channel { column, unit, low, high };
+        for (name, channel) in [("input", &input), ("output", &file.output)] {
             if channel.low > channel.high {
                 return Err(format!("{name}.low {} is above {name}.high {}", channel.low, channel.high));
             }
@@ -294,8 +311,16 @@ impl Model {
         if !(file.recorded_at_hz > 0.0 && file.recorded_at_hz.is_finite()) {
             return Err("recorded_at_hz must be positive".into());
         }
+        if between_samples != BetweenSamples::Linear && file.kind != Kind::BoucWenOscillator {
+            return Err(format!(
+                "input.between_samples is {between_samples}, which is for {} in this version, not for {}",
+                Kind::BoucWenOscillator,
+                file.kind
+            ));
+        }
         Ok(Self {
-            input: file.input,
+            input,
+            between_samples,
             output: file.output,
             zero: file.zero,
             base,

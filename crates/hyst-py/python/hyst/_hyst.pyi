@@ -663,6 +663,8 @@ class Model:
     @property
     def zero(self) -> float: ...
     @property
+    def between_samples(self) -> str: ...
+    @property
     def input_column(self) -> str: ...
     @property
     def input_range(self) -> tuple[float, float]: ...
@@ -671,7 +673,12 @@ class Model:
     @property
     def output_range(self) -> tuple[float, float]: ...
     def simulate(
-        self, record: _AnyRecord, *, zero: _Zero = "none", temperature: float | None = None
+        self,
+        record: _AnyRecord,
+        *,
+        zero: _Zero = "none",
+        temperature: float | None = None,
+        periodic: bool = False,
     ) -> Simulation: ...
     def compensate(
         self,

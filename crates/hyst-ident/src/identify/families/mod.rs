@@ -14,7 +14,7 @@ mod td_pi;
 use hyst_core::{Kind, SlipReading};
 
 use super::Family;
-use crate::Samples;
+use crate::{BetweenSamples, Samples};
 
 /// Forms of models that have more than one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,11 +25,13 @@ pub struct Form {
     pub elements: Option<usize>,
     /// What an element of `maxwell-slip` is.
     pub slip: SlipReading,
+    /// How the drive of `bouc-wen-oscillator` goes on between samples; `None` tries both ways and keeps the one that leaves less.
+    pub between_samples: Option<BetweenSamples>,
 }
 
 impl Default for Form {
     fn default() -> Self {
-        Self { bouc_wen_n: Some(1.0), elements: None, slip: SlipReading::Backlash }
+        Self { bouc_wen_n: Some(1.0), elements: None, slip: SlipReading::Backlash, between_samples: None }
     }
 }
 
@@ -48,7 +50,9 @@ pub(crate) fn family_of<'a>(kind: Kind, samples: &'a Samples, form: &Form) -> Op
         Kind::TdPi => Box::new(td_pi::TdPiFamily::new(samples, elements(9))),
         Kind::MaxwellSlip => Box::new(maxwell::SlipFamily::new(samples, elements(16), form.slip)),
         Kind::TdEm => Box::new(maxwell::TdEmFamily::new(samples, elements(10))),
-        Kind::BoucWenOscillator => Box::new(oscillator::OscillatorFamily::new(samples)),
+        Kind::BoucWenOscillator => {
+            Box::new(oscillator::OscillatorFamily::new(samples, form.between_samples.unwrap_or_default()))
+        }
         _ => return None,
     })
 }

@@ -4,22 +4,25 @@ use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error, Sampli
 use nalgebra::DMatrix;
 
 use super::largest_input;
-use crate::Samples;
-use crate::identify::family::run_into;
+use crate::drive::{Drive, Passes};
+use crate::identify::family::rows_of;
 use crate::identify::{Family, Linear};
 use crate::model::Base;
 use crate::optimize::Variable;
+use crate::{BetweenSamples, Samples};
 
 /// With y = Y ỹ for any Y the equation keeps its form; Y is the one linear parameter, so that mass, damping and stiffness are
 /// searched relative to the stiffness at rest. Only the products of β with γ and δ leave a trace; β is chosen so that γ and δ are of
 /// the order of one where the hysteretic force is as large as the largest input.
 pub(super) struct OscillatorFamily<'a> {
     samples: &'a Samples,
+    drive: Drive<'a>,
+    between: BetweenSamples,
 }
 
 impl<'a> OscillatorFamily<'a> {
-    pub(super) fn new(samples: &'a Samples) -> Self {
-        Self { samples }
+    pub(super) fn new(samples: &'a Samples, between: BetweenSamples) -> Self {
+        Self { samples, drive: Drive::new(samples, between, Passes::Once), between }
     }
 
     /// From the frequency of small motions, the damping ratio, the share of the spring without memory, the two terms that bend the
@@ -65,13 +68,17 @@ impl Family for OscillatorFamily<'_> {
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
         let model: BoucWenOscillator<f64> =
-            self.params(values, 1.0).build(&Sampling { period: self.samples.period })?;
-        run_into(self.samples, &model, columns, 0);
+            self.params(values, 1.0).build(&Sampling { period: self.drive.period() })?;
+        self.drive.run(&model, rows_of(columns, 0));
         Ok(())
     }
 
     fn base(&self, values: &[f64], linear: &[f64]) -> Base {
         Base::BoucWenOscillator(self.params(values, linear[0].max(f64::MIN_POSITIVE)))
+    }
+
+    fn between_samples(&self) -> BetweenSamples {
+        self.between
     }
 
     /// β is a convention.
