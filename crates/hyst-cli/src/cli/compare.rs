@@ -34,7 +34,7 @@ pub(crate) struct CompareArgs {
     /// How often to repeat a search with other draws; the best is taken
     #[arg(long, default_value_t = 1)]
     pub(crate) trials: usize,
-    /// Most evaluations of a trial; 1500 for each searched variable if not given
+    /// Most evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
     /// Picture to write: errors of all, and what each leaves (SVG)

@@ -19,5 +19,9 @@ pub(super) fn run(args: &ExportArgs) -> CommandResult {
         ExportFormat::Rust => export::rust(&model).into_bytes(),
         ExportFormat::C => export::c(&model, &args.name.clone().unwrap_or_default())?.into_bytes(),
     };
-    args.output.write(|out| out.write_all(&bytes))
+    args.output.write(|out| out.write_all(&bytes))?;
+    if let Some(lost) = export::lost(&model) {
+        output::say(&format!("note: the model was {lost}"));
+    }
+    Ok(())
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use hyst_core::BlockError;
 use serde_json::Value;
 
-use super::{block, harmless, origin, words};
+use super::{block, harmless, lost, origin, words};
 use crate::model::Model;
 
 /// What the symbols of a C header begin with; its macros have it in capitals.
@@ -97,10 +97,11 @@ fn about(model: &Model, name: &str) -> String {
         " * {name}_block is for Rust firmware: hyst_core::read_block (feature block) makes the model of it.\n\
          \x20* The constants are for code of your own: {} -> {} -> + {name}_zero -> {},\n\
          \x20* stage by stage below; in each, u is what enters it and y what leaves it. No constant depends on a sample period.\n\
-         \x20* After each constant stands its unit; NAME_length is the number of a list's elements.",
+         \x20* After each constant stands its unit; NAME_length is the number of a list's elements.{}",
         harmless(&model.input.column),
         chain.join(" -> "),
         harmless(&model.output.column),
+        lost(model).map_or(String::new(), |lost| format!("\n * The model was {lost}.")),
     )
 }
 

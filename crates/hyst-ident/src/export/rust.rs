@@ -5,7 +5,7 @@ use std::fmt;
 use hyst_core::ChainParams;
 use serde::{Deserialize, Serialize};
 
-use super::{harmless, inverse, origin};
+use super::{harmless, inverse, lost, origin};
 use crate::model::{Base, Model};
 
 /// A list of numbers that prints itself as a slice in Rust source.
@@ -76,6 +76,9 @@ pub fn rust(model: &Model) -> String {
     }
     if model.needs_load() {
         surroundings += "// The model yields under load: set env.load [N] at every sample.\n";
+    }
+    if let Some(lost) = lost(model) {
+        surroundings += &format!("// The model was {lost}.\n");
     }
     format!(
         "// Written by hystctl {version}. {origin}\n\

@@ -6,7 +6,7 @@ use hyst_core::Kind;
 
 use super::{Fit, FitError, FitOptions, Optimizer, check, model_of};
 use crate::BetweenSamples;
-use crate::identify::{Family, Form, Identification, Located, SearchOptions, family_of};
+use crate::identify::{Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -35,14 +35,13 @@ pub(super) fn fit(
         });
     }
     let name = record.name();
-    let setup = Setup { kind, options, name: &name };
+    let setup = Setup { kind, options, name: &name, largest: largest_input(&samples) };
     let Searched { best, left, how } = setup.search(&samples, watch)?;
     // What is still ringing or remembers what was before the record says nothing about the model.
     samples.settling = best.settling;
     let family = setup.family(&samples, best.between)?;
     let identification = Identification::new(&family, &samples, options.zero_per_record, &name)?;
-    let starts_up = samples.settling.iter().any(|s| *s);
-    let found = identification.conclude(if starts_up { identification.polish(&best.located)? } else { best.located });
+    let found = identification.conclude(identification.polish(&best.located)?);
     let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
     model.between_samples = best.between;
@@ -103,7 +102,10 @@ struct Setup<'a> {
     options: &'a FitOptions,
     /// What errors call the record.
     name: &'a str,
+    /// Largest |input| of the record.
+    largest: f64,
 }
+
 impl<'a> Setup<'a> {
     /// How the drive may go on between samples.
     fn ways(&self) -> (BetweenSamples, Option<BetweenSamples>) {
@@ -118,14 +120,14 @@ impl<'a> Setup<'a> {
     where
         'a: 's,
     {
-        let Self { kind, options, .. } = *self;
+        let Self { kind, options, largest, .. } = *self;
         if matches!(kind, Kind::Preisach | Kind::Dpm) {
             let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
             return Err(FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice });
         }
         let form = Form { between_samples: Some(between), ..options.form };
         let unsupported = FitError::Unsupported { what: kind.name(), done: "fitted" };
-        let family = Bounded { family: family_of(kind, samples, &form).ok_or(unsupported)?, options };
+        let family = Bounded { family: family_of(kind, samples, largest, &form).ok_or(unsupported)?, options };
         let variables = family.variables();
         let unknowns = variables.len() + family.linear().len() + 1;
         let (settled, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * unknowns);
@@ -169,7 +171,7 @@ impl<'a> Setup<'a> {
             Some(other) => {
                 let family = self.family(samples, other)?;
                 let identification = Identification::new(&family, samples, self.options.zero_per_record, self.name)?;
-                let located = identification.polish(&linear.located)?;
+                let located = identification.roughly_from(&linear.located)?;
                 linear.or(Tried::new(other, &identification, located))
             }
         };
@@ -178,13 +180,15 @@ impl<'a> Setup<'a> {
 
     /// The search of a family's variables, and in words what it is and why it.
     fn search_of(&self, family: &dyn Family) -> Result<(SearchOptions, String), FitError> {
-        let Self { options, .. } = *self;
+        let Self { options, kind, .. } = *self;
+        // From anywhere near, Levenberg-Marquardt finds an oscillator: its output is smooth in all variables.
+        let each = if kind == Kind::BoucWenOscillator { 200 } else { 1500 };
         let variables = family.variables().len();
         let (method, how) = self.method(variables, family.linear().len())?;
         let method = options.population.map_or(method, |p| method.with_population(p));
         let search = SearchOptions {
             method,
-            evaluations: options.evaluations.unwrap_or(1500 * variables.max(1) as u64),
+            evaluations: options.evaluations.unwrap_or(each * variables.max(1) as u64),
             seed: options.seed,
             trials: options.trials,
         };

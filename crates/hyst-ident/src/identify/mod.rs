@@ -22,7 +22,7 @@ mod tests;
 mod uncertainty;
 
 pub use families::Form;
-pub(crate) use families::family_of;
+pub(crate) use families::{family_of, largest_input};
 pub(crate) use family::{Family, Linear};
 pub(crate) use search::{Identification, Located, SearchOptions};
 pub(crate) use uncertainty::parameters_of;

@@ -11,7 +11,7 @@ const STEP: f64 = 1e-4;
 /// Most iterations.
 const ITERATIONS: usize = 60;
 /// Relative fall of the sum of squares below which it has converged.
-const SETTLED: f64 = 1e-12;
+pub(crate) const SETTLED: f64 = 1e-12;
 
 /// Where a local search ended.
 #[derive(Clone, Debug)]
@@ -23,10 +23,10 @@ pub(crate) struct Polished {
     pub(crate) evaluations: u64,
 }
 
-/// Goes downhill from `point` (in the unit cube) until nothing is gained: Levenberg-Marquardt with Marquardt's scaling
+/// Goes downhill from `point` (in the unit cube) until the sum of squares falls by no more than its `settled`th part: Levenberg-Marquardt with Marquardt's scaling
 /// on the residual after projection (Golub & Pereyra's functional, its derivative by central differences); variables at a
 /// side of the box stay there while they are pushed outwards. Never ends higher than it began.
-pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64]) -> Option<Polished> {
+pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64], settled: f64) -> Option<Polished> {
     let at = |x: &[f64]| projection.at(&space.values(x));
     let mut x = point.to_vec();
     let mut now = at(&x)?;
@@ -71,7 +71,7 @@ pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64]) 
         }
         let Some((to, there)) = better else { break };
         let fall = now.squares() - there.squares();
-        let converged = fall <= SETTLED * now.squares();
+        let converged = fall <= settled * now.squares();
         (x, now) = (to, there);
         if converged {
             break;
@@ -80,10 +80,13 @@ pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64]) 
     Some(Polished { point: x, projected: now, evaluations })
 }
 
+/// A place of one variable, and the residual there, if there is a model.
+type Side = (f64, Option<DVector<f64>>);
+
 /// Slopes of the residual, one column for each variable; zero where no model is on either side.
 fn jacobian(x: &[f64], now: &Projected, at: &(dyn Fn(&[f64]) -> Option<Projected> + Sync)) -> DMatrix<f64> {
     // All sides at once: pairs of them would leave a core without work at the end.
-    let sides: Vec<(f64, Option<DVector<f64>>)> = (0..2 * x.len())
+    let sides: Vec<Side> = (0..2 * x.len())
         .into_par_iter()
         .map(|i| {
             let (mut to, d) = (x.to_vec(), i / 2);
@@ -91,7 +94,7 @@ fn jacobian(x: &[f64], now: &Projected, at: &(dyn Fn(&[f64]) -> Option<Projected
             (to[d], at(&to).map(|there| there.residual))
         })
         .collect();
-    let column = |(d, pair): (usize, &[(f64, Option<DVector<f64>>)])| {
+    let column = |(d, pair): (usize, &[Side])| {
         let side = |i: usize| match &pair[i] {
             (there, Some(residual)) => (*there, residual),
             (_, None) => (x[d], &now.residual),

@@ -4,7 +4,7 @@ use super::projection::Projection;
 use crate::optimize::Space;
 
 /// Halvings with which the end of an interval is found.
-const HALVINGS: usize = 12;
+const HALVINGS: i32 = 12;
 
 /// The values of one variable that the record allows, the other searched ones held.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,11 @@ pub(crate) fn interval(
             return (side, true);
         }
         let (mut inside, mut outside) = (point[d], side);
+        // Most intervals are narrower than what halvings come to.
+        let nearest = inside + (outside - inside) / f64::from(1 << HALVINGS);
+        if !allowed(nearest) {
+            return (inside, false);
+        }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (inside + outside);
             if allowed(middle) { inside = middle } else { outside = middle }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::Family;
-use super::polish::{Polished, polish};
+use super::polish::{Polished, SETTLED, polish};
 use super::profile::interval;
 use super::projection::{Left, Projected, Projection, space};
 use super::uncertainty::{Estimate, estimate};
@@ -43,6 +43,8 @@ pub(crate) struct Located {
     evaluations: u64,
 }
 
+/// Relative fall of the sum of squares at which a polish ends that another one follows.
+const ROUGHLY: f64 = 1e-6;
 /// Points from which a polish starts, besides the best: ends of trials are many, valleys few.
 const STARTS: usize = 3;
 
@@ -77,7 +79,7 @@ impl<'a> Identification<'a> {
         FitError::Unsolvable { record: self.name.into() }
     }
 
-    /// Searches globally and polishes where the best trials have ended. Where `beginnings` of the record are given, with the same model
+    /// Searches globally and polishes, roughly, where the best trials have ended. Where `beginnings` of the record are given, with the same model
     /// over them, the global search looks at those alone; the polish sees all.
     ///
     /// # Errors
@@ -100,7 +102,11 @@ impl<'a> Identification<'a> {
         let mut evaluations: u64 = found.found.iter().map(|f| f.evaluations).sum();
         for trial in order.iter().take(STARTS) {
             let start = space.point(&found.found[*trial].values);
-            let Some(p) = polish(&self.projection, space, &start) else { continue };
+            // Most of the way costs little over few rows.
+            let nearer = quick.as_ref().and_then(|quick| polish(quick, space, &start, ROUGHLY));
+            evaluations += nearer.as_ref().map_or(0, |p| p.evaluations);
+            let start = nearer.map_or(start, |p| p.point);
+            let Some(p) = polish(&self.projection, space, &start, ROUGHLY) else { continue };
             evaluations += p.evaluations;
             if best.as_ref().is_none_or(|b| p.projected.squares() < b.projected.squares()) {
                 best = Some(p);
@@ -111,15 +117,27 @@ impl<'a> Identification<'a> {
         Ok(Located { values, projected: best.projected, trials: Some(found), evaluations })
     }
 
-    /// Polishes from where another identification with the same variables has ended: of other rows, or of a drive that goes on
-    /// otherwise between them.
+    /// Polishes, roughly, from where another identification with the same variables has ended: of a drive that goes on otherwise
+    /// between its samples.
+    ///
+    /// # Errors
+    /// If there is no finite output at that point.
+    pub(crate) fn roughly_from(&self, from: &Located) -> Result<Located, FitError> {
+        self.from(from, ROUGHLY)
+    }
+
+    /// Polishes to the end from where another identification with the same variables has ended: of other rows.
     ///
     /// # Errors
     /// If there is no finite output at that point.
     pub(crate) fn polish(&self, from: &Located) -> Result<Located, FitError> {
+        self.from(from, SETTLED)
+    }
+
+    fn from(&self, from: &Located, settled: f64) -> Result<Located, FitError> {
         let Some(space) = &self.space else { return self.at_once() };
         let start = space.point(&from.values);
-        let p = polish(&self.projection, space, &start).ok_or_else(|| self.unsolvable())?;
+        let p = polish(&self.projection, space, &start, settled).ok_or_else(|| self.unsolvable())?;
         Ok(Located {
             values: space.values(&p.point),
             projected: p.projected,

@@ -65,11 +65,11 @@ fn search(method: &str, dimensions: usize) -> SearchOptions {
 }
 
 fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Identified {
-    let family = family_of(kind, samples, form).unwrap();
+    let family = family_of(kind, samples, largest_input(samples), form).unwrap();
     let how = search(method, family.variables().len().max(1));
     let identification = Identification::new(family.as_ref(), samples, false, "record").unwrap();
     let located = identification.search(None, &how, &mut |_| ControlFlow::Continue(())).unwrap();
-    identification.conclude(located)
+    identification.conclude(identification.polish(&located).unwrap())
 }
 
 /// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.

@@ -118,7 +118,7 @@ impl Method {
         match &mut self {
             Self::Shade { population } => *population = Some(wanted),
             Self::De { population, .. } | Self::Pso { population, .. } | Self::Gwo { population, .. } => {
-                *population = wanted
+                *population = wanted;
             }
         }
         self

@@ -35,8 +35,14 @@ impl Default for Form {
     }
 }
 
-/// How a kind of model is identified by search; `None` if it is not.
-pub(crate) fn family_of<'a>(kind: Kind, samples: &'a Samples, form: &Form) -> Option<Box<dyn Family + 'a>> {
+/// How a kind of model is identified by search; `None` if it is not. `largest` is the largest |input| of the whole record, of which
+/// `samples` may be a part: variables that are relative to it mean the same over both.
+pub(crate) fn family_of<'a>(
+    kind: Kind,
+    samples: &'a Samples,
+    largest: f64,
+    form: &Form,
+) -> Option<Box<dyn Family + 'a>> {
     let elements = |most: usize| form.elements.unwrap_or(most);
     Some(match kind {
         Kind::Pi => Box::new(pi::PiFamily::new(samples, elements(6))),
@@ -51,14 +57,14 @@ pub(crate) fn family_of<'a>(kind: Kind, samples: &'a Samples, form: &Form) -> Op
         Kind::MaxwellSlip => Box::new(maxwell::SlipFamily::new(samples, elements(16), form.slip)),
         Kind::TdEm => Box::new(maxwell::TdEmFamily::new(samples, elements(10))),
         Kind::BoucWenOscillator => {
-            Box::new(oscillator::OscillatorFamily::new(samples, form.between_samples.unwrap_or_default()))
+            Box::new(oscillator::OscillatorFamily::new(samples, form.between_samples.unwrap_or_default(), largest))
         }
         _ => return None,
     })
 }
 
 /// Largest |input| of a record, at least a hair.
-fn largest_input(samples: &Samples) -> f64 {
+pub(crate) fn largest_input(samples: &Samples) -> f64 {
     let (low, high) = samples.input_range();
     low.abs().max(high.abs()).max(f64::MIN_POSITIVE)
 }

@@ -3,7 +3,6 @@
 use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error, Sampling};
 use nalgebra::DMatrix;
 
-use super::largest_input;
 use crate::drive::{Drive, Passes};
 use crate::identify::family::rows_of;
 use crate::identify::{Family, Linear};
@@ -18,11 +17,13 @@ pub(super) struct OscillatorFamily<'a> {
     samples: &'a Samples,
     drive: Drive<'a>,
     between: BetweenSamples,
+    /// Largest input \[u\].
+    size: f64,
 }
 
 impl<'a> OscillatorFamily<'a> {
-    pub(super) fn new(samples: &'a Samples, between: BetweenSamples) -> Self {
-        Self { samples, drive: Drive::new(samples, between, Passes::Once), between }
+    pub(super) fn new(samples: &'a Samples, between: BetweenSamples, size: f64) -> Self {
+        Self { samples, drive: Drive::new(samples, between, Passes::Once), between, size }
     }
 
     /// From the frequency of small motions, the damping ratio, the share of the spring without memory, the two terms that bend the
@@ -31,7 +32,6 @@ impl<'a> OscillatorFamily<'a> {
         let [hz, zeta, share, out, back, nu] = [0, 1, 2, 3, 4, 5].map(|i| values.get(i).copied().unwrap_or(1.0));
         let omega = std::f64::consts::TAU * hz;
         // In units in which k + α = 1.
-        let size = largest_input(self.samples);
         let (stiffness, alpha) = (share, 1.0 - share);
         // dz/dy = α (1 − out |z/size|^ν) on the way out, α (1 + back |z/size|^ν) on the way back.
         let (gamma, delta) = (0.5 * (out + back), 0.5 * (out - back));
@@ -40,7 +40,7 @@ impl<'a> OscillatorFamily<'a> {
             damping: 2.0 * zeta / omega / y,
             stiffness: stiffness / y,
             alpha: alpha / y,
-            beta: size.powf(-nu) * alpha / y,
+            beta: self.size.powf(-nu) * alpha / y,
             gamma,
             delta,
             nu,
