@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, check, fitted_on, model_of};
+use super::{Fit, FitError, FitOptions, Optimizer, check, fitted_on, model_of, with_errors};
 use crate::identify::{Family, Identified, SearchOptions, family_of, identify};
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
@@ -41,14 +41,8 @@ pub(super) fn fit(
     let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
     model.fitted_on = fitted_on(record, &samples);
-    let key = |name: &str| format!("{}.{name}", kind.name());
-    for p in &found.estimate.parameters {
-        if p.std_error.is_finite() {
-            model.std_errors.insert(key(&p.name), p.std_error);
-        }
-    }
-    model.undetermined = found.estimate.undetermined().into_iter().map(key).collect();
-    Ok(Fit { model, how, estimate: Some(found.estimate), trials: found.trials, evaluations: found.evaluations })
+    let fit = Fit::at_once(with_errors(model, &found.estimate), &how);
+    Ok(Fit { estimate: Some(found.estimate), trials: found.trials, evaluations: found.evaluations, ..fit })
 }
 
 fn kind_needs_temperature(kind: Kind) -> bool {

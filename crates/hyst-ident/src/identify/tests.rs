@@ -71,7 +71,7 @@ fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Ident
 
 /// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.
 fn agrees(found: &Identified, truth: &Base, sigma: f64) {
-    let true_values = uncertainty::parameters_of(truth);
+    let true_values = parameters_of(truth);
     for p in &found.estimate.parameters {
         let (_, true_value) = true_values.iter().find(|(n, _)| *n == p.name).unwrap();
         let off = (p.value - true_value).abs();
@@ -253,7 +253,7 @@ fn electromechanical_model_and_its_products() {
 fn standard_errors_are_the_scatter_of_repeated_records() {
     let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
-    let true_values = uncertainty::parameters_of(&truth);
+    let true_values = parameters_of(&truth);
     let mut squares = [0.0; 4];
     for seed in 0..12 {
         let (samples, _) = record(&truth, 1e-3, 3000, &[23.0], drive, seed);
