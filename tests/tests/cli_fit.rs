@@ -77,6 +77,33 @@ fn what_the_record_says_of_each_weight_is_told_and_kept() {
 }
 
 #[test]
+fn thresholds_and_widths_are_chosen_by_the_record() {
+    let lab = Lab::with_train("");
+    let plain = lab.ok("fit train.csv --model pi -o plain.json --json").json();
+    // A smooth density: even thresholds, as ever.
+    assert_eq!(plain["base"]["plays"], 20);
+    let report = lab.ok("fit train.csv --model pi --thresholds 3 -o few.json --json").json();
+    let plays = report["base"]["plays"].as_u64().unwrap();
+    assert!((1..=3).contains(&plays), "{report}");
+    assert!(report["how"].as_str().unwrap().contains("thresholds chosen by the record (3 at most)"), "{report}");
+    let estimate = report["estimate"]["parameters"].as_array().unwrap();
+    assert!(estimate.iter().any(|p| p["name"].as_str().unwrap().starts_with("thresholds")), "{report}");
+    for (line, part) in [
+        ("--model preisach --thresholds 3", "preisach: a number of thresholds is for the convex fit of pi"),
+        ("--model pi --optimizer de --seed 1 --thresholds 3", "elements"),
+        ("--model pi --thresholds 0", "1 to 64"),
+        ("--model dpm --thresholds 4", "dpm: a number of thresholds"),
+    ] {
+        let message = lab.refuses(&format!("fit train.csv {line} -o no.json"), 2);
+        assert!(message.contains(part), "{line}: {message}");
+    }
+    let report = lab.ok("fit train.csv --model maxwell-slip --elements 3 -o slip.json --json").json();
+    assert!(report["how"].as_str().unwrap().contains("widths chosen by the record"), "{report}");
+    let model: Value = serde_json::from_str(&lab.read("slip.json")).unwrap();
+    assert!((1..=3).contains(&model["stages"][0]["widths"].as_array().unwrap().len()), "{model}");
+}
+
+#[test]
 fn a_dash_sends_the_model_to_stdout_and_the_report_to_stderr() {
     let lab = Lab::with_train("");
     let ran = lab.ok("fit train.csv --model pi -o -");

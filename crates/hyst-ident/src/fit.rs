@@ -24,7 +24,7 @@ pub(crate) const CELLS: usize = 24;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
-const ROWS: usize = 40_000;
+pub(crate) const ROWS: usize = 40_000;
 
 /// Why a fit is impossible.
 #[derive(Debug, thiserror::Error)]
@@ -142,6 +142,14 @@ pub enum FitError {
         /// Which there are.
         advice: &'static str,
     },
+    /// Thresholds chosen where there are none to choose.
+    #[error("{kind}: a number of thresholds is for the convex fit of pi; {advice}")]
+    Thresholds {
+        /// The kind of model.
+        kind: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
     /// First-order descent curves that give no surface.
     #[error(transparent)]
     Everett(#[from] crate::everett::EverettError),
@@ -210,7 +218,8 @@ pub fn fit_with(
     options: &FitOptions,
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
-    let convex = matches!(options.optimizer, Optimizer::Auto | Optimizer::Convex);
+    options.suits(kind)?;
+    let convex = options.convex();
     match kind {
         Kind::Pi | Kind::Preisach if convex => convex::fit(record, kind, options),
         Kind::Dpm if convex => Ok(crate::everett::fit_dpm(record, options)?.into()),
@@ -328,15 +337,7 @@ pub(crate) fn fit_settled(
     options: &FitOptions,
     name: &dyn Fn() -> String,
 ) -> Result<(Fitted, Vec<f64>), FitError> {
-    let run = |samples: &Samples| -> Result<(Fitted, Vec<f64>), FitError> {
-        let blocks = Blocks::new(samples, BLOCKS, ROWS);
-        let problem = Problem::new(samples, basis, &blocks, options.zero_per_record);
-        let stage = |source| FitError::Stage { record: name(), source };
-        let fitted =
-            problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
-        let residual = problem.residual(&fitted).map_err(stage)?;
-        Ok((fitted, residual))
-    };
+    let run = |samples: &Samples| everywhere(samples, basis, options.zero_per_record, name);
     let all = run(samples)?;
     let windows = windows(samples);
     let mut without = samples.clone();
@@ -356,10 +357,40 @@ pub(crate) fn fit_settled(
     let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > 0.1 * low.abs().max(high.abs()));
     let residual = if away || rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
     samples.settling = start_up_rows(samples, residual);
-    let (fitted, residual) = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
+    let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
+    Ok(within(samples, found))
+}
+
+/// A fit to the rows that count, and what it leaves in every row.
+fn everywhere(
+    samples: &Samples,
+    basis: &dyn Basis,
+    zero_per_file: bool,
+    name: &dyn Fn() -> String,
+) -> Result<(Fitted, Vec<f64>), FitError> {
     let blocks = Blocks::new(samples, BLOCKS, ROWS);
-    let left = blocks.all_used(samples).map(|k| residual[k]).collect();
-    Ok((fitted, left))
+    let problem = Problem::new(samples, basis, &blocks, zero_per_file);
+    let stage = |source| FitError::Stage { record: name(), source };
+    let fitted =
+        problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+    let residual = problem.residual(&fitted).map_err(stage)?;
+    Ok((fitted, residual))
+}
+
+/// A fit and what it leaves in the rows that it used.
+fn within(samples: &Samples, (fitted, residual): (Fitted, Vec<f64>)) -> (Fitted, Vec<f64>) {
+    let left = Blocks::new(samples, BLOCKS, ROWS).all_used(samples).map(|k| residual[k]).collect();
+    (fitted, left)
+}
+
+/// A fit to the rows that count, and what it leaves in the rows that it used.
+fn solved(
+    samples: &Samples,
+    basis: &dyn Basis,
+    zero_per_file: bool,
+    name: &dyn Fn() -> String,
+) -> Result<(Fitted, Vec<f64>), FitError> {
+    Ok(within(samples, everywhere(samples, basis, zero_per_file, name)?))
 }
 
 /// A model with standard errors, and with the names of what its record does not determine.

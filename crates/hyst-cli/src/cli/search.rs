@@ -32,9 +32,13 @@ pub(crate) struct SearchArgs {
     /// Form of bouc-wen (zhu: n = 1; xie: n is searched) or of an element of maxwell-slip (backlash, elasto-slip)
     #[arg(long, value_enum)]
     pub(crate) form: Option<FormArg>,
-    /// Plays of gpi and td-pi, of pi when it is searched; elements of maxwell-slip and td-em
+    /// Plays of gpi and td-pi, of pi when it is searched; elements of td-em; most elements of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
+    /// Most thresholds of pi, chosen where the record calls for them; not given, they are even ones unless some that are no
+    /// more predict parts of the record clearly better
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) thresholds: Option<usize>,
 }
 
 /// Forms of models that have more than one.
@@ -77,6 +81,7 @@ impl SearchArgs {
             population: self.population,
             bounds: self.bounds.clone(),
             form,
+            thresholds: self.thresholds,
         })
     }
 }

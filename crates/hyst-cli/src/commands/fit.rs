@@ -86,6 +86,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let zero = args.zero.get();
 
     let options = args.search.options(zero == Zero::PerRecord)?;
+    options.suits(args.model)?;
     let doing = format!("fitting {} to {}", args.model, text::count(record.rows(), "row"));
     let progress = Progress::spinner(&doing);
     let Identified { fit, surface, dynamics } = identify(args, &record, &options, &|done, budget| {

@@ -1,65 +1,88 @@
 //! Fits that are one convex problem: weights over plays or cells.
 
-use super::{Fit, FitError, FitOptions, basis_for, check, fit_settled, sign_matters, to_model, with_errors};
+use super::{
+    BasisOf, Fit, FitError, FitOptions, basis_for, check, fit_settled, sign_matters, solved, to_model, with_errors,
+};
+use crate::base::SlidingPlays;
 use crate::identify::{Estimate, TableEstimate, TableOf, convex, parameters_of};
 use crate::lsq::Gram;
-use crate::model::{Base, Kind, ZERO};
+use crate::model::{Base, Kind, Model, ZERO};
 use crate::nested::Fitted;
 use crate::record::Record;
 use crate::samples::Samples;
 
 /// Rows below which no model of this version can be fitted, whatever they show.
 const FEWEST: usize = 45;
+/// Rows for each unknown that a fit needs.
+const ROWS_EACH: usize = 3;
 /// How it is done, in words.
 const HOW: &str = "convex: weights that are not negative, one optimum";
 
 /// Non-negative weights over plays or cells.
 pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Fit, FitError> {
     let mut samples = Samples::from_record(record);
-    if samples.len() < FEWEST {
-        return Err(FitError::TooShort {
-            record: record.name(),
-            rows: samples.len(),
-            unknowns: FEWEST / 3,
-            needed: FEWEST,
-        });
-    }
+    let name = || record.name();
+    let enough = |rows: usize, unknowns: usize| match ROWS_EACH * unknowns {
+        needed if rows < needed => Err(FitError::TooShort { record: name(), rows, unknowns, needed }),
+        _ => Ok(()),
+    };
+    enough(samples.len(), FEWEST / ROWS_EACH)?;
     check(record, &samples, sign_matters(kind))?;
     let basis = basis_for(kind, &samples)?;
-    let name = || record.name();
-    let needed = 3 * basis.len();
-    if samples.len() < needed {
-        return Err(FitError::TooShort { record: name(), rows: samples.len(), unknowns: basis.len(), needed });
-    }
+    enough(samples.len(), basis.len())?;
     let (fitted, left) = fit_settled(&mut samples, basis.as_ref(), options, &name)?;
     let settled = samples.settling.iter().filter(|s| !**s).count();
-    if settled < needed {
-        return Err(FitError::TooShort { record: name(), rows: settled, unknowns: basis.len(), needed });
-    }
-    let model = to_model(record, &samples, &basis, &fitted, options.seed);
-    Ok(match kind {
-        Kind::Pi => {
-            let estimate = plays(&model.base, &fitted, &samples, &left);
-            Fit { estimate: Some(estimate.clone()), ..Fit::at_once(with_errors(model, &estimate), HOW) }
+    enough(settled, basis.len())?;
+    let BasisOf::Pi(even) = &basis else {
+        let model = to_model(record, &samples, &basis, &fitted, options.seed);
+        return Ok(Fit { tables: vec![cells(&fitted, &left)], ..Fit::at_once(model, HOW) });
+    };
+    let Some(chosen) = even.chosen(&samples, options.thresholds) else {
+        if options.thresholds.is_some() {
+            return Err(FitError::Unsolvable { record: name() });
         }
-        _ => Fit { tables: vec![cells(&fitted, &left)], ..Fit::at_once(model, HOW) },
-    })
+        let model = to_model(record, &samples, &basis, &fitted, options.seed);
+        let estimate = plays(&model.base, &fitted, &fitted, &samples, &left);
+        return Ok(with_estimate(model, estimate, HOW));
+    };
+    let count = chosen.thresholds.len();
+    enough(settled, 2 * (1 + count))?;
+    let (fitted, left) = solved(&samples, &chosen, options.zero_per_record, &name)?;
+    let sliding = SlidingPlays { plays: &chosen, weights: &fitted.weights };
+    let slopes = solved(&samples, &sliding, options.zero_per_record, &name)?.0;
+    let model = to_model(record, &samples, &BasisOf::Pi(chosen.clone()), &fitted, options.seed);
+    let estimate = plays(&model.base, &fitted, &slopes, &samples, &left);
+    let why = match options.thresholds {
+        Some(most) => format!("{most} at most"),
+        None => "clearly better than even ones on parts left out".into(),
+    };
+    Ok(with_estimate(model, estimate, &format!("{HOW}; {count} thresholds chosen by the record ({why})")))
 }
 
-/// Standard errors of the weights of a Prandtl-Ishlinskii operator and of the sensor's zeros; its thresholds are given.
-fn plays(base: &Base, fitted: &Fitted, samples: &Samples, left: &[f64]) -> Estimate {
-    let weights = parameters_of(base).into_iter().filter(|(name, _)| !name.starts_with("thresholds"));
-    let zeros = fitted.zeros.iter().enumerate().map(|(i, zero)| {
-        let name = if fitted.zeros.len() == 1 { ZERO.into() } else { format!("{ZERO}[{i}]") };
-        (name, *zero)
-    });
-    // Weights are parts of one curve.
-    let scale = fitted.weights.iter().sum();
-    let mut scales = vec![scale; fitted.weights.len()];
-    scales.resize(scales.len() + fitted.zeros.len(), samples.output_span());
-    let (total, parameters): (_, Vec<_>) = (total(fitted), weights.chain(zeros).collect());
-    let values: Vec<f64> = parameters.iter().map(|(_, value)| *value).collect();
-    convex::estimate(parameters, &scales, &total, &convex::free(&values, &total, &fitted.bounds), left)
+fn with_estimate(model: Model, estimate: Estimate, how: &str) -> Fit {
+    let model = with_errors(model, &estimate);
+    Fit { estimate: Some(estimate), ..Fit::at_once(model, how) }
+}
+
+/// Standard errors of the weights of a Prandtl-Ishlinskii operator and of the sensor's zeros, and of its thresholds where
+/// `columns`, at the same optimum, has their slopes too.
+fn plays(base: &Base, fitted: &Fitted, columns: &Fitted, samples: &Samples, left: &[f64]) -> Estimate {
+    let (thresholds, mut parameters): (Vec<_>, Vec<_>) =
+        parameters_of(base).into_iter().partition(|(name, _)| name.starts_with("thresholds"));
+    let (low, high) = samples.input_range();
+    // Weights are parts of one curve; thresholds have their places along it.
+    let whole = parameters.iter().map(|(_, weight)| weight).sum();
+    let mut scales = vec![whole; parameters.len()];
+    if columns.weights.len() > parameters.len() {
+        scales.extend(vec![0.5 * (high - low) / thresholds.len() as f64; thresholds.len()]);
+        parameters.extend(thresholds);
+    }
+    let name = |i: usize| if fitted.zeros.len() == 1 { ZERO.into() } else { format!("{ZERO}[{i}]") };
+    parameters.extend(fitted.zeros.iter().enumerate().map(|(i, zero)| (name(i), *zero)));
+    scales.resize(parameters.len(), samples.output_span());
+    let (total, values): (_, Vec<f64>) = (total(columns), parameters.iter().map(|(_, value)| *value).collect());
+    let free = convex::free(&values, &total, &columns.bounds);
+    convex::estimate(parameters, &scales, &total, &free, left)
 }
 
 /// What the record says of each cell of a Preisach triangle.
@@ -143,6 +166,40 @@ mod tests {
                 assert!((1.0 / 1.5..1.5).contains(&(scatter / stated)), "{remembered} {i}: {scatter} {stated}");
             }
         }
+    }
+
+    #[test]
+    fn chosen_thresholds_scatter_as_stated_too() {
+        let truth = PiParams { gain: 0.1, thresholds: vec![3.3, 11.7, 37.2], weights: vec![0.03, 0.05, 0.02] };
+        let expected: Vec<f64> = [&[truth.gain], &truth.weights[..], &truth.thresholds[..], &[2.5]].concat();
+        let (mut squares, mut stated) = (vec![0.0; expected.len()], vec![0.0; expected.len()]);
+        for seed in 0..30 {
+            let options = FitOptions { thresholds: Some(8), ..FitOptions::default() };
+            let estimate =
+                fit(&record(&truth, drive(), 0.02, 0.0, seed), Kind::Pi, &options).unwrap().estimate.unwrap();
+            assert_eq!(estimate.parameters.len(), expected.len(), "{:?}", estimate.parameters);
+            for (i, p) in estimate.parameters.iter().enumerate() {
+                squares[i] += (p.value - expected[i]).powi(2) / 30.0;
+                stated[i] += p.std_error / 30.0;
+            }
+        }
+        for (i, (scatter, stated)) in squares.iter().map(|s| s.sqrt()).zip(stated).enumerate() {
+            assert!((1.0 / 1.5..1.5).contains(&(scatter / stated)), "{i}: {scatter} {stated}");
+        }
+    }
+
+    #[test]
+    fn thresholds_are_chosen_for_the_convex_fit_of_pi_alone() {
+        let record = record(&plays(), drive(), 0.02, 0.0, 1);
+        let refused = |kind, thresholds, optimizer: &str| {
+            let optimizer = optimizer.parse().unwrap();
+            let options = FitOptions { thresholds: Some(thresholds), optimizer, ..FitOptions::default() };
+            crate::fit::fit(&record, kind, &options).unwrap_err().to_string()
+        };
+        assert!(refused(Kind::Preisach, 4, "auto").starts_with("preisach: a number of thresholds"));
+        assert!(refused(Kind::MaxwellSlip, 4, "auto").contains("elements"));
+        assert!(refused(Kind::Pi, 4, "de").contains("elements"));
+        assert!(refused(Kind::Pi, 0, "auto").contains("1 to 64") && refused(Kind::Pi, 65, "auto").contains("1 to 64"));
     }
 
     #[test]

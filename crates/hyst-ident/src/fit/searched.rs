@@ -92,7 +92,7 @@ fn run(
     // The valley shows in a part of the record.
     // An oscillator is an equation of motion in many substeps, and periods of it are short.
     let searched = if kind == Kind::BoucWenOscillator { SEARCHED / 6 } else { SEARCHED };
-    let beginnings = (samples.len() > searched).then(|| samples.beginnings(searched));
+    let beginnings = (!variables.is_empty() && samples.len() > searched).then(|| samples.beginnings(searched));
     let quick = beginnings.as_ref().and_then(|b| Some((family_of(kind, b, &options.form)?, b)));
     let quick = quick.as_ref().map(|(family, rows)| (family.as_ref(), *rows));
     let found = identify(&family, samples, quick, &search, name, watch)?;
@@ -117,7 +117,8 @@ fn method(kind: Kind, options: &FitOptions, variables: usize, linear: usize) -> 
         .map_err(|e| FitError::Search { record: String::new(), source: SearchError::Method(e) })?;
     let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
     let how = if variables == 0 {
-        format!("convex: {} solved for at once", count(linear, "weight"))
+        let chosen = if kind == Kind::MaxwellSlip { ", widths chosen by the record" } else { "" };
+        format!("convex: {} solved for at once{chosen}", count(linear, "weight"))
     } else {
         let chosen = if options.optimizer == Optimizer::Auto { " (auto: not linear in these)" } else { "" };
         format!(

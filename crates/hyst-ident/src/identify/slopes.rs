@@ -67,10 +67,11 @@ pub(crate) fn estimate(
     };
     // Slopes per scale, the mean of each file (or of all) taken off: the zeros are fitted too.
     let slope = |i: &usize| -> Vec<f64> {
-        let step = STEP * scale(*i);
+        let scale = scale(*i);
+        let step = STEP * scale;
         let side = |sign: f64| simulated(&changed(base, *i, all[*i].1 + sign * step));
         let (up, down) = (side(1.0), side(-1.0));
-        let of = |a: &[f64], b: &[f64], width: f64| a.iter().zip(b).map(|(a, b)| (a - b) / width * scale(*i)).collect();
+        let of = |a: &[f64], b: &[f64], width: f64| a.iter().zip(b).map(|(a, b)| (a - b) / width * scale).collect();
         let mut slope: Vec<f64> = match (up, down) {
             (Some(a), Some(b)) => of(&a, &b, 2.0 * step),
             // At a bound of the model there is one side only.
