@@ -33,11 +33,10 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     let report = lab.ok("compare train.csv --test test.csv --evaluations 200 --json").json();
     let (models, skipped) = (names(&report["models"]), names(&report["skipped"]));
     assert_eq!(models.len() + skipped.len(), 16, "{models:?} {skipped:?}");
-    // One rate and no temperature.
-    for (kind, reason) in [("td-pi", "temperature_degc"), ("td-em", "temperature_degc"), ("dpm", "rate")] {
+    for kind in ["td-pi", "td-em"] {
         let entry = report["skipped"].as_array().unwrap().iter().find(|s| s["model"] == kind);
         let said = entry.unwrap_or_else(|| panic!("{kind} is not skipped: {skipped:?}"))["reason"].as_str().unwrap();
-        assert!(said.contains(reason), "{kind}: {said}");
+        assert!(said.contains("temperature_degc"), "{kind}: {said}");
     }
     assert_eq!(report["sorted_by"], "test-rmse");
     let rmse: Vec<f64> = report["models"].as_array().unwrap().iter().map(|m| number(&m["test"]["rmse"])).collect();
@@ -55,9 +54,15 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     let find = |kind: &str| &report["models"].as_array().unwrap()[models.iter().position(|m| *m == kind).unwrap()];
     assert_eq!(find("tanh")["parameters"], 4);
     assert_eq!(find("bouc-wen")["parameters"], 4);
-    // Weights of a convex fit: nobody has looked.
-    assert_eq!(find("pi")["undetermined"], Value::Null);
-    assert!(find("tanh")["undetermined"].is_array());
+    assert_eq!(find("pi")["parameters"], 21);
+    for kind in ["tanh", "pi"] {
+        assert!(find(kind)["undetermined"].is_array() && find(kind)["tables"].is_null(), "{}", find(kind));
+    }
+    // Cells are counted, not named.
+    assert_eq!(find("preisach")["undetermined"], Value::Null);
+    let cells = &find("preisach")["tables"][0];
+    let sum = ["determined", "held", "untouched"].map(|key| cells[key].as_u64().unwrap()).iter().sum::<u64>();
+    assert!(cells["of"] == "cells" && cells["elements"] == find("preisach")["parameters"] && sum <= 324, "{cells}");
 }
 
 #[test]
@@ -100,10 +105,18 @@ fn figures_are_those_of_fit_and_simulate_and_the_test_record_changes_no_fit() {
 #[test]
 fn the_text_says_what_it_is_sorted_by_and_what_is_left_out() {
     let lab = lab("");
-    let ran = lab.ok("compare train.csv --test test.csv --models tanh,pi,dpm --evaluations 200");
+    let ran = lab.ok("compare train.csv --test test.csv --models tanh,pi,preisach,td-pi --evaluations 200");
     assert_eq!(ran.stderr, "");
-    for part in ["RMSE", "SMAPE", "MAPE", "PV", "params", "sorted by RMSE on the test record", "skipped dpm: train.csv"]
-    {
+    for part in [
+        "RMSE",
+        "SMAPE",
+        "MAPE",
+        "PV",
+        "params",
+        "sorted by RMSE on the test record",
+        "skipped td-pi: train.csv",
+        "preisach: the record determines",
+    ] {
         assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
     }
     let at = |name: &str| ran.stdout.lines().position(|line| line.starts_with(&format!("{name} "))).unwrap();
@@ -132,7 +145,7 @@ fn what_cannot_be_compared_is_refused_by_name() {
     let lab = Lab::with_train("");
     let message = lab.refuses("compare train.csv --models pi,preisch", 2);
     assert!(message.contains("preisch") && message.contains("preisach"), "{message}");
-    let message = lab.refuses("compare train.csv --models td-pi,dpm", 2);
+    let message = lab.refuses("compare train.csv --models td-pi,td-em", 2);
     assert!(message.contains("temperature_degc"), "{message}");
     let message = lab.refuses("compare train.csv --models pi --picture train.csv", 2);
     assert!(message.contains("train.csv"), "{message}");

@@ -87,6 +87,11 @@ fn a_dynamic_model_comes_from_records_at_several_rates() {
     assert_eq!(found["slow_segments"], 1);
     assert_eq!(found["classical"]["fod"]["families"][0]["curves"], 15);
     assert!(found["rmse"].as_f64().unwrap() < 0.6 * found["rmse_classical"].as_f64().unwrap(), "{found}");
+    // The classical part was measured: its surface has errors of its own.
+    let [nodes] = &report["tables"].as_array().unwrap()[..] else { panic!("{report}") };
+    let known = ["determined", "held", "untouched"].map(|key| nodes[key].as_u64().unwrap());
+    assert!(nodes["of"] == "nodes" && nodes["elements"] == 72 && known[0] > 10, "{nodes}");
+    assert_eq!([&found["bound"], &found["untouched"].as_array().unwrap().len().into()], [known[1], known[2]]);
     let rmse = |model: &str| {
         let report = lab.ok(&format!("simulate --model {model} test.csv -o out.csv --json")).json();
         report["errors"]["rmse_all_rows"].as_f64().unwrap()

@@ -44,6 +44,66 @@ fn the_report_as_json_agrees_with_a_simulation() {
 }
 
 #[test]
+fn what_the_record_says_of_each_weight_is_told_and_kept() {
+    let lab = Lab::with_train("");
+    let report = lab.ok("fit train.csv --model pi -o pi.json --json").json();
+    let estimate = &report["estimate"];
+    let (parameters, held) = (estimate["parameters"].as_array().unwrap(), estimate["held"].as_array().unwrap());
+    let plays = report["base"]["plays"].as_u64().unwrap() as usize;
+    assert_eq!(parameters.len() + held.len(), 1 + plays + 1, "gain, weights and the zero: {estimate}");
+    assert_eq!(estimate["correlations"].as_array().unwrap().len(), parameters.len());
+    let model: Value = serde_json::from_str(&lab.read("pi.json")).unwrap();
+    for p in parameters {
+        let kept = match p["name"].as_str().unwrap() {
+            "zero" => &model["zero_std_error"],
+            name => &model["stages"][0]["std_errors"][name],
+        };
+        assert!(*kept == p["std_error"] && kept.as_f64().unwrap() > 0.0, "{p}: {kept}");
+    }
+    // The file with them is read again.
+    lab.ok("simulate --model pi.json train.csv -o out.csv");
+    let ran = lab.ok("fit train.csv --model pi -o pi.json");
+    for part in ["  weights[0] ", "  zero ", " ± ", "held at a bound: "] {
+        assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
+    }
+
+    let report = lab.ok("fit train.csv --model preisach -o preisach.json --json").json();
+    let cells = &report["tables"][0];
+    assert_eq!(report["estimate"], Value::Null);
+    assert_eq!(cells["std_errors"].as_array().unwrap().len() as u64, cells["elements"].as_u64().unwrap());
+    let ran = lab.ok("fit train.csv --model preisach -o preisach.json");
+    let said = format!("the record determines {} of {} cells", cells["determined"], cells["elements"]);
+    assert!(ran.stdout.contains(&said), "{said}: {}", ran.stdout);
+}
+
+#[test]
+fn thresholds_and_widths_are_chosen_by_the_record() {
+    let lab = Lab::with_train("");
+    let plain = lab.ok("fit train.csv --model pi -o plain.json --json").json();
+    // A smooth density: even thresholds, as ever.
+    assert_eq!(plain["base"]["plays"], 20);
+    let report = lab.ok("fit train.csv --model pi --thresholds 3 -o few.json --json").json();
+    let plays = report["base"]["plays"].as_u64().unwrap();
+    assert!((1..=3).contains(&plays), "{report}");
+    assert!(report["how"].as_str().unwrap().contains("thresholds chosen by the record (3 at most)"), "{report}");
+    let estimate = report["estimate"]["parameters"].as_array().unwrap();
+    assert!(estimate.iter().any(|p| p["name"].as_str().unwrap().starts_with("thresholds")), "{report}");
+    for (line, part) in [
+        ("--model preisach --thresholds 3", "preisach: a number of thresholds is for the convex fit of pi"),
+        ("--model pi --optimizer de --seed 1 --thresholds 3", "elements"),
+        ("--model pi --thresholds 0", "1 to 64"),
+        ("--model dpm --thresholds 4", "dpm: a number of thresholds"),
+    ] {
+        let message = lab.refuses(&format!("fit train.csv {line} -o no.json"), 2);
+        assert!(message.contains(part), "{line}: {message}");
+    }
+    let report = lab.ok("fit train.csv --model maxwell-slip --elements 3 -o slip.json --json").json();
+    assert!(report["how"].as_str().unwrap().contains("widths chosen by the record"), "{report}");
+    let model: Value = serde_json::from_str(&lab.read("slip.json")).unwrap();
+    assert!((1..=3).contains(&model["stages"][0]["widths"].as_array().unwrap().len()), "{model}");
+}
+
+#[test]
 fn a_dash_sends_the_model_to_stdout_and_the_report_to_stderr() {
     let lab = Lab::with_train("");
     let ran = lab.ok("fit train.csv --model pi -o -");
@@ -123,10 +183,10 @@ fn the_way_of_a_search_is_written_trial_by_trial() {
         trace.lines().next().unwrap().split(',').take(4).collect::<Vec<_>>(),
         ["trial", "generation", "evaluations", "cost"]
     );
-    let columns = ["trial", "generation", "evaluations", "cost", "beta"].map(|name| column(&trace, name));
-    let [trial, generation, evaluations, cost, beta] = &columns;
+    let columns = ["trial", "generation", "evaluations", "cost", "gamma/beta"].map(|name| column(&trace, name));
+    let [trial, generation, evaluations, cost, ratio] = &columns;
     assert!(trial.is_sorted() && trial.last() == Some(&2.0));
-    assert!(beta.windows(2).any(|w| w[0] != w[1]), "the search has moved");
+    assert!(ratio.windows(2).any(|w| w[0] != w[1]), "the search has moved");
     let mut ends = Vec::new();
     for k in 0..trial.len() {
         if k + 1 < trial.len() && trial[k + 1] == trial[k] {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use hyst_ident::identify::{TableEstimate, TableOf};
 use hyst_ident::metrics::{Errors, Mape};
 use hyst_ident::record::{OutputUnit, Record};
 
@@ -33,6 +34,22 @@ fn rounded(x: f64, decimals: i32) -> String {
 /// `2.31 %`, or what stands for a span of zero.
 pub(crate) fn percent(x: f64) -> String {
     if x.is_finite() { format!("{} %", rounded(x, digits_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
+}
+
+/// How much a record says of a table of weights.
+pub(crate) fn known(table: &TableEstimate) -> String {
+    let (what, mean) = match table.of {
+        TableOf::Cells => ("cells", "cell"),
+        TableOf::Nodes => ("nodes", "node"),
+    };
+    format!(
+        "the record determines {} of {} {what} (error below half of the mean {mean}), {} too little, {} not at all; {} at a bound",
+        table.determined,
+        table.elements,
+        table.vague(),
+        table.untouched,
+        table.held
+    )
 }
 
 /// `1 row`, `2 rows`.

@@ -10,9 +10,9 @@ use hyst_core::PreisachParams;
 use serde::{Serialize, Serializer};
 
 use crate::fit::{Fit, FitError, FitOptions, fit_with};
-use crate::identify::parameters_of;
+use crate::identify::{Estimate, TableEstimate, parameters_of};
 use crate::metrics::{Errors, Mape, MetricsError, mape, peak_to_valley, smape};
-use crate::model::{Base, Kind};
+use crate::model::{Base, Kind, ZERO};
 use crate::record::Record;
 use crate::simulate::{Simulation, Zero, simulate};
 
@@ -63,9 +63,11 @@ pub struct Compared {
     pub kind: Kind,
     /// Numbers that were identified; the sensor's zero is not among them.
     pub parameters: usize,
-    /// Those that the record does not determine, or only together with others; `None` where nobody has looked, as among the
-    /// weights of a convex fit.
+    /// Those that the record does not determine, or only together with others; `None` where they are elements of `tables`.
     pub undetermined: Option<Vec<String>>,
+    /// How much the record says of each element of a table of weights: cells, nodes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<TableEstimate>,
     /// On the training record.
     pub train: Figures,
     /// On the test record, if there is one.
@@ -200,6 +202,7 @@ pub fn compare(
             kind: run.kind,
             parameters: identified(&run.fit),
             undetermined: undetermined(&run.fit),
+            tables: run.fit.tables.clone(),
             train: figures(train, &run.train.predicted, &train_settling)?,
             test: test.map(|test| figures(test, &test_predicted, &test_settling)).transpose()?,
             how: run.fit.how.clone(),
@@ -225,17 +228,17 @@ fn for_any<'a>(rows: usize, simulated: impl Iterator<Item = &'a Simulation>) -> 
     settling
 }
 
-/// Numbers that a fit chose: those with an estimate, or the weights of a convex fit, whose thresholds and grid are given.
+/// Numbers that a fit chose: those with an estimate or held at a bound, or the cells and nodes of a convex fit, whose grid is given.
 fn identified(fit: &Fit) -> usize {
-    if let Some(estimate) = &fit.estimate {
-        return estimate.parameters.len();
+    if let Some(Estimate { parameters, held, .. }) = &fit.estimate {
+        let own = parameters.iter().filter(|p| !p.name.starts_with(ZERO));
+        return own.count() + held.len();
     }
     // Relays that never switch back are identified only where there are such.
     let cells = |p: &PreisachParams<Vec<f64>>| {
         p.density.len() + if p.once.iter().any(|w| *w != 0.0) { p.once.len() } else { 0 }
     };
     match &fit.model.base {
-        Base::Pi(p) => 1 + p.weights.len(),
         Base::Preisach(p) => cells(p),
         Base::Dpm(p) => cells(&p.preisach) + p.mirror.weights.len(),
         other => parameters_of(other).len(),

@@ -1,5 +1,6 @@
 //! `fit`: a base model from a record.
 
+pub(crate) mod convex;
 mod options;
 mod searched;
 
@@ -10,9 +11,9 @@ use hyst_core::{Grid, PiParams};
 
 use crate::BetweenSamples;
 use crate::base::{Basis, PiBasis, PreisachBasis};
-use crate::identify::Estimate;
+use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
-use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError};
+use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError, ZERO};
 use crate::nested::{Fitted, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::Record;
@@ -24,10 +25,7 @@ pub(crate) const CELLS: usize = 24;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
-const ROWS: usize = 40_000;
-
-/// Rows below which no model of this version can be fitted, whatever they show.
-const FEWEST: usize = 45;
+pub(crate) const ROWS: usize = 40_000;
 
 /// Why a fit is impossible.
 #[derive(Debug, thiserror::Error)]
@@ -153,6 +151,14 @@ pub enum FitError {
         /// The kind of model.
         kind: &'static str,
     },
+    /// Thresholds chosen where there are none to choose.
+    #[error("{kind}: a number of thresholds is for the convex fit of pi; {advice}")]
+    Thresholds {
+        /// The kind of model.
+        kind: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
     /// First-order descent curves that give no surface.
     #[error(transparent)]
     Everett(#[from] crate::everett::EverettError),
@@ -185,8 +191,10 @@ pub struct Fit {
     pub model: Model,
     /// In words: what was searched, what was solved for, and why so.
     pub how: String,
-    /// What the record says about each parameter; `None` for the Preisach triangle, whose cells are too many.
+    /// What the record says about each parameter; `None` where they are elements of a table, which are too many.
     pub estimate: Option<Estimate>,
+    /// How much the record says of the cells of a Preisach triangle, of the nodes of a mirror function.
+    pub tables: Vec<TableEstimate>,
     /// The searches, if there was something to search.
     pub trials: Option<Trials>,
     /// Evaluations of the model.
@@ -199,7 +207,8 @@ pub struct Fit {
 impl Fit {
     /// A fit in which nothing was searched.
     pub fn at_once(model: Model, how: &str) -> Self {
-        Self { model, how: how.into(), estimate: None, trials: None, evaluations: 1, between_samples: Vec::new() }
+        let (estimate, tables, trials, between_samples) = (None, Vec::new(), None, Vec::new());
+        Self { model, how: how.into(), estimate, tables, trials, evaluations: 1, between_samples }
     }
 }
 
@@ -225,16 +234,11 @@ pub fn fit_with(
     if options.form.between_samples == Some(BetweenSamples::BandLimited) && kind != Kind::BoucWenOscillator {
         return Err(FitError::BandLimited { kind: kind.name() });
     }
-    let convex = matches!(options.optimizer, Optimizer::Auto | Optimizer::Convex);
+    options.suits(kind)?;
+    let convex = options.convex();
     match kind {
-        Kind::Pi | Kind::Preisach if convex => {
-            let model = convex_fit(record, kind, options)?;
-            Ok(Fit::at_once(model, "convex: weights that are not negative, one optimum"))
-        }
-        Kind::Dpm if convex => {
-            let model = crate::everett::fit_dpm(record, options)?.model;
-            Ok(Fit::at_once(model, "convex: the classical part from the slow rows, then the mirror's nodes"))
-        }
+        Kind::Pi | Kind::Preisach if convex => convex::fit(record, kind, options),
+        Kind::Dpm if convex => Ok(crate::everett::fit_dpm(record, options)?.into()),
         _ => searched::fit(record, kind, options, watch),
     }
 }
@@ -243,32 +247,6 @@ pub fn fit_with(
 fn sign_matters(kind: Kind) -> bool {
     // The oscillator lags by up to half a turn.
     kind != Kind::BoucWenOscillator
-}
-
-/// Non-negative weights over plays or cells.
-fn convex_fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, FitError> {
-    let mut samples = Samples::from_record(record);
-    if samples.len() < FEWEST {
-        return Err(FitError::TooShort {
-            record: record.name(),
-            rows: samples.len(),
-            unknowns: FEWEST / 3,
-            needed: FEWEST,
-        });
-    }
-    check(record, &samples, sign_matters(kind))?;
-    let basis = basis_for(kind, &samples)?;
-    let name = || record.name();
-    let needed = 3 * basis.len();
-    if samples.len() < needed {
-        return Err(FitError::TooShort { record: name(), rows: samples.len(), unknowns: basis.len(), needed });
-    }
-    let fitted = fit_settled(&mut samples, basis.as_ref(), options, &name)?;
-    let settled = samples.settling.iter().filter(|s| !**s).count();
-    if settled < needed {
-        return Err(FitError::TooShort { record: name(), rows: settled, unknowns: basis.len(), needed });
-    }
-    Ok(to_model(record, &samples, &basis, &fitted, options.seed))
 }
 
 /// A base of a kind, with the grid or thresholds that the record calls for.
@@ -367,22 +345,15 @@ pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<()
     Ok(())
 }
 
-/// Fits the base and finds the start-up rows while it does: sets `samples.settling`.
+/// Fits the base and finds the start-up rows while it does: sets `samples.settling`. Gives the fit and what it has left in the rows
+/// that it used.
 pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,
     name: &dyn Fn() -> String,
-) -> Result<Fitted, FitError> {
-    let run = |samples: &Samples| -> Result<(Fitted, Vec<f64>), FitError> {
-        let blocks = Blocks::new(samples, BLOCKS, ROWS);
-        let problem = Problem::new(samples, basis, &blocks, options.zero_per_record);
-        let stage = |source| FitError::Stage { record: name(), source };
-        let fitted =
-            problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
-        let residual = problem.residual(&fitted).map_err(stage)?;
-        Ok((fitted, residual))
-    };
+) -> Result<(Fitted, Vec<f64>), FitError> {
+    let run = |samples: &Samples| everywhere(samples, basis, options.zero_per_record, name);
     let all = run(samples)?;
     let windows = windows(samples);
     let mut without = samples.clone();
@@ -402,7 +373,51 @@ pub(crate) fn fit_settled(
     let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > 0.1 * low.abs().max(high.abs()));
     let residual = if away || rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
     samples.settling = start_up_rows(samples, residual);
-    if samples.settling.iter().any(|s| *s) { Ok(run(samples)?.0) } else { Ok(all.0) }
+    let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
+    Ok(within(samples, found))
+}
+
+/// A fit to the rows that count, and what it leaves in every row.
+fn everywhere(
+    samples: &Samples,
+    basis: &dyn Basis,
+    zero_per_file: bool,
+    name: &dyn Fn() -> String,
+) -> Result<(Fitted, Vec<f64>), FitError> {
+    let blocks = Blocks::new(samples, BLOCKS, ROWS);
+    let problem = Problem::new(samples, basis, &blocks, zero_per_file);
+    let stage = |source| FitError::Stage { record: name(), source };
+    let fitted =
+        problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+    let residual = problem.residual(&fitted).map_err(stage)?;
+    Ok((fitted, residual))
+}
+
+/// A fit and what it leaves in the rows that it used.
+fn within(samples: &Samples, (fitted, residual): (Fitted, Vec<f64>)) -> (Fitted, Vec<f64>) {
+    let left = Blocks::new(samples, BLOCKS, ROWS).all_used(samples).map(|k| residual[k]).collect();
+    (fitted, left)
+}
+
+/// A fit to the rows that count, and what it leaves in the rows that it used.
+fn solved(
+    samples: &Samples,
+    basis: &dyn Basis,
+    zero_per_file: bool,
+    name: &dyn Fn() -> String,
+) -> Result<(Fitted, Vec<f64>), FitError> {
+    Ok(within(samples, everywhere(samples, basis, zero_per_file, name)?))
+}
+
+/// A model with standard errors, and with the names of what its record does not determine.
+fn with_errors(mut model: Model, estimate: &Estimate) -> Model {
+    let stage = model.base.kind().name();
+    // The sensor's zero belongs to no stage.
+    let key = |name: &str| if name == ZERO { name.into() } else { format!("{stage}.{name}") };
+    let finite = estimate.parameters.iter().filter(|p| p.std_error.is_finite());
+    model.std_errors = finite.map(|p| (key(&p.name), p.std_error)).collect();
+    model.undetermined = estimate.undetermined().into_iter().filter(|name| *name != ZERO).map(key).collect();
+    model
 }
 
 /// Puts a fit into a model.

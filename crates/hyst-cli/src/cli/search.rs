@@ -37,9 +37,13 @@ pub(crate) struct SearchArgs {
     /// them; both are tried if not given, and the one that leaves less of the records is taken and kept in the model
     #[arg(long, value_enum)]
     pub(crate) between_samples: Option<BetweenArg>,
-    /// Plays of gpi and td-pi, of pi when it is searched; elements of maxwell-slip and td-em
+    /// Plays of gpi and td-pi, of pi when it is searched; elements of td-em; most elements of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
+    /// Most thresholds of pi, chosen where the record calls for them; not given, they are even ones unless some that are no
+    /// more predict parts of the record clearly better
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) thresholds: Option<usize>,
 }
 
 /// Forms of models that have more than one.
@@ -95,6 +99,7 @@ impl SearchArgs {
             population: self.population,
             bounds: self.bounds.clone(),
             form,
+            thresholds: self.thresholds,
         })
     }
 }

@@ -106,6 +106,9 @@ impl Summary {
                 lines.push(format!("{}: not determined by the record: {}", m.kind, text::listed(names)));
             }
         }
+        for m in &self.comparison.models {
+            lines.extend(m.tables.iter().map(|table| format!("{}: {}", m.kind, text::known(table))));
+        }
         for Skipped { kind, reason } in &self.comparison.skipped {
             lines.push(format!("skipped {kind}: {reason}"));
         }
@@ -119,7 +122,8 @@ fn table(comparison: &Comparison, unit: &str) -> String {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.push(["", "", unit, "", unit, unit, "", "rows", "", "", "", "s"].map(str::to_owned).to_vec());
     for m in &comparison.models {
-        let undetermined = m.undetermined.as_ref().map_or_else(|| "–".to_owned(), |names| names.len().to_string());
+        let of_tables = m.tables.iter().map(|t| t.vague() + t.untouched).sum::<usize>().to_string();
+        let undetermined = m.undetermined.as_ref().map_or(of_tables, |names| names.len().to_string());
         let once = [m.parameters.to_string(), undetermined, format!("{:.2}", m.fit_seconds)];
         match &m.test {
             Some(test) => {

@@ -11,7 +11,7 @@ use hyst_core::PiParams;
 use hyst_ident::BetweenSamples;
 use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
 use hyst_ident::fit::{Fit, FitOptions, fit_with};
-use hyst_ident::identify::{Determined, Estimate, TradeOff};
+use hyst_ident::identify::{Determined, Estimate, TableEstimate, TradeOff};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::{Base, Kind, Model};
 use hyst_ident::optimize::{Spread, Stopped};
@@ -44,6 +44,9 @@ struct Summary {
     evaluations: u64,
     /// Standard errors, correlations and what the record does not determine.
     estimate: Option<Estimate>,
+    /// How much the record says of each cell of a Preisach triangle, of each node of a mirror function.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tables: Vec<TableEstimate>,
     /// How the searches ended, and how their costs scatter.
     trials: Option<TrialsSummary>,
     /// What first-order descent curves show, with `--from fod`.
@@ -100,13 +103,14 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let zero = args.zero.get();
 
     let options = args.search.options(zero == Zero::PerRecord)?;
+    options.suits(args.model)?;
     let doing = format!("fitting {} to {}", args.model, text::count(record.rows(), "row"));
     let progress = Progress::spinner(&doing);
     let Identified { fit, surface, dynamics } = identify(args, &record, &options, &|done, budget| {
         progress.say(&format!("{doing}: {done} of at most {budget} evaluations"));
     })?;
     convergence::check(args, &fit)?;
-    let Fit { model, how, estimate, trials, evaluations, between_samples } = fit;
+    let Fit { model, how, estimate, tables, trials, evaluations, between_samples } = fit;
     let tried = |(between_samples, rmse)| TriedBetween { between_samples, rmse };
     let simulated = simulate(&model, &record, zero)?;
     drop(progress);
@@ -146,6 +150,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
             stopped: t.found.iter().map(|f| f.stopped).collect(),
         }),
         estimate,
+        tables,
         surface,
         dynamics,
         input_unit: model.input.unit.clone(),
@@ -187,8 +192,8 @@ fn identify(
     }
     if args.model == Kind::Dpm {
         let found = fit_dpm(record, options)?;
-        let fit = Fit::at_once(found.model, "convex: the classical part from the slow rows, then the mirror's nodes");
-        return Ok(Identified { fit, surface: None, dynamics: Some(found.report) });
+        let dynamics = Some(found.report.clone());
+        return Ok(Identified { fit: found.into(), surface: None, dynamics });
     }
     let fit = fit_with(record, args.model, options, &mut |p| {
         tell(p.evaluations, p.budget);
@@ -268,6 +273,7 @@ impl Summary {
             ));
         }
         lines.extend(self.estimate.as_ref().map(parameters));
+        lines.extend(self.tables.iter().map(text::known));
         lines.join("\n")
     }
 }
@@ -293,6 +299,9 @@ fn parameters(estimate: &Estimate) -> String {
             Determined::No => "  (NOT determined by this record)",
         };
         lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
+    }
+    if !estimate.held.is_empty() {
+        lines.push(format!("  held at a bound: {}", text::listed(&estimate.held)));
     }
     for TradeOff { changes, std_error } in estimate.trade_offs.iter().take(3) {
         let part = |(name, share): &(String, f64)| format!("{name} {share:+.2}");

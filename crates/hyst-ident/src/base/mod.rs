@@ -4,7 +4,7 @@ mod pi;
 mod preisach;
 mod screening;
 
-pub(crate) use pi::{PiBasis, plays as play_column};
+pub(crate) use pi::{PiBasis, SlidingPlays, plays as play_column};
 pub(crate) use preisach::PreisachBasis;
 pub(crate) use screening::ScreeningBasis;
 

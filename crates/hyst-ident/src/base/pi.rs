@@ -7,6 +7,8 @@ use nalgebra::DMatrix;
 
 use super::Basis;
 use crate::Samples;
+use crate::fit;
+use crate::identify::choice::{self, Bank, CANDIDATES};
 use crate::lsq::Bounds;
 
 /// Plays whose loops lie inside the record's swing.
@@ -15,6 +17,8 @@ const LOOPS: usize = 15;
 const VIRGIN: usize = 5;
 /// p₀ is at least this share of the mean gain: the inverse then amplifies by 20 at most.
 const FLOOR: f64 = 0.05;
+/// Step of the difference quotients along a threshold, as a share of the input.
+const STEP: f64 = 1e-6;
 
 /// Thresholds and the floor of p₀.
 #[derive(Clone, Debug)]
@@ -28,16 +32,36 @@ impl PiBasis {
     /// the first rise from rest its largest magnitude.
     pub(crate) fn for_samples(samples: &Samples) -> Self {
         let (low, high) = samples.input_range();
-        let (half, reach) = ((high - low) / 2.0, low.abs().max(high.abs()));
-        let mut thresholds: Vec<f64> = (1..=LOOPS).map(|i| half * i as f64 / (LOOPS + 1) as f64).collect();
-        // Only segments that start below the record's full swing show the virgin curve.
-        let starts_at_rest = samples.segments.iter().any(|s| samples.input[s.start].abs() < 0.1 * reach);
-        if starts_at_rest && reach > 1.05 * half {
-            thresholds.extend((0..VIRGIN).map(|i| half + (reach - half) * i as f64 / VIRGIN as f64));
-        }
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
-        Self { thresholds, floor: FLOOR * gain }
+        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain }
     }
+
+    /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
+    /// are left out clearly better than these do and are no more. `None` if there are none.
+    pub(crate) fn chosen(&self, samples: &Samples, most: Option<usize>) -> Option<Self> {
+        let element = |r: f64| plays(&samples.input, &samples.segments, r);
+        let bank = |rows| {
+            let identity = (samples.input.clone(), Bounds::above(self.floor));
+            Bank::new(samples, vec![identity], even(samples, CANDIDATES, CANDIDATES / 4), &element, rows)
+        };
+        let quick = bank(choice::ROWS);
+        let thresholds = most.map_or_else(|| quick.better_than(&self.thresholds), |most| quick.at_most(most))?;
+        let thresholds = bank(fit::ROWS).from(thresholds)?;
+        Some(Self { thresholds, ..*self })
+    }
+}
+
+/// Even thresholds: `loops` inside the swing of a record and, where it shows a first rise from rest beyond that, `virgin` there.
+fn even(samples: &Samples, loops: usize, virgin: usize) -> Vec<f64> {
+    let (low, high) = samples.input_range();
+    let (half, reach) = ((high - low) / 2.0, low.abs().max(high.abs()));
+    let mut thresholds: Vec<f64> = (1..=loops).map(|i| half * i as f64 / (loops + 1) as f64).collect();
+    // Only segments that start below the record's full swing show the virgin curve.
+    let starts_at_rest = samples.segments.iter().any(|s| samples.input[s.start].abs() < 0.1 * reach);
+    if starts_at_rest && reach > 1.05 * half {
+        thresholds.extend((0..virgin).map(|i| half + (reach - half) * i as f64 / virgin as f64));
+    }
+    thresholds
 }
 
 impl Basis for PiBasis {
@@ -55,6 +79,37 @@ impl Basis for PiBasis {
 
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         // Thresholds that the record hardly tells apart share their weight instead of alternating.
+        let n = self.len();
+        Some(DMatrix::from_diagonal_element(n, n, 1e-9 * level))
+    }
+}
+
+/// Plays with weights, and how their output changes where their thresholds do: the columns of a fit of both around an optimum.
+pub(crate) struct SlidingPlays<'a> {
+    pub(crate) plays: &'a PiBasis,
+    /// p₀, then the weights.
+    pub(crate) weights: &'a [f64],
+}
+
+impl Basis for SlidingPlays<'_> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let step = STEP * drive.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
+        let slope = |(r, w): (&f64, &f64)| -> Vec<f64> {
+            let (up, down) = (plays(drive, segments, r + step), plays(drive, segments, r - step));
+            up.iter().zip(down).map(|(up, down)| 0.5 * w * (up - down) / step).collect()
+        };
+        let mut columns = self.plays.columns(drive, segments);
+        columns.extend(self.plays.thresholds.iter().zip(&self.weights[1..]).map(slope));
+        columns
+    }
+
+    fn bounds(&self) -> Vec<Bounds> {
+        let mut bounds = self.plays.bounds();
+        bounds.extend(vec![Bounds::FREE; self.plays.thresholds.len()]);
+        bounds
+    }
+
+    fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let n = self.len();
         Some(DMatrix::from_diagonal_element(n, n, 1e-9 * level))
     }

@@ -6,7 +6,9 @@ use serde::Serialize;
 use super::mirror::{MirrorFit, MirrorProblem};
 use super::{EverettError, FodReport, Surface, fod};
 use crate::base::PreisachBasis;
-use crate::fit::{CELLS, FitError, FitOptions, check, fit_settled, model_of};
+use crate::fit::convex::cells;
+use crate::fit::{CELLS, Fit, FitError, FitOptions, check, fit_settled, model_of};
+use crate::identify::TableEstimate;
 use crate::model::{Base, Model};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -72,6 +74,15 @@ pub struct DpmFit {
     pub model: Model,
     /// What was found.
     pub report: DpmReport,
+    /// How much the records say of the cells of the classical part, unless that was measured, and of the mirror's nodes.
+    pub tables: Vec<TableEstimate>,
+}
+
+impl From<DpmFit> for Fit {
+    fn from(found: DpmFit) -> Self {
+        let how = "convex: the classical part from the slow rows, then the mirror's nodes";
+        Self { tables: found.tables, ..Self::at_once(found.model, how) }
+    }
 }
 
 /// Fits a dynamic Preisach model: its classical part to the slow segments, its mirror function to the others.
@@ -95,6 +106,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         return Err(EverettError::OneRate { record: name(), slowest, fastest }.into());
     }
     let mut quiet = samples.segments_only(&slow);
+    let mut tables = Vec::new();
     let (preisach, classical) = match Surface::measure(&name(), &quiet, None) {
         Ok(surface) => {
             let (valid, report) = fod::checked(&surface, &name(), false)?;
@@ -102,7 +114,8 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         }
         Err(_) => {
             let basis = PreisachBasis::for_samples(&quiet, CELLS);
-            let fitted = fit_settled(&mut quiet, &basis, options, &name)?;
+            let (fitted, left) = fit_settled(&mut quiet, &basis, options, &name)?;
+            tables.push(cells(&fitted, &left));
             for (s, own) in slow.iter().zip(&quiet.segments) {
                 samples.settling[samples.segments[*s].clone()].copy_from_slice(&quiet.settling[own.clone()]);
             }
@@ -155,7 +168,8 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
     let base = Base::Dpm(DpmParams { preisach, mirror: fit.mirror, fade });
     let model = model_of(record, &samples, base, zero, options.seed);
     model.build(samples.period).map_err(stage)?;
-    Ok(DpmFit { model, report })
+    tables.push(fit.table);
+    Ok(DpmFit { model, report, tables })
 }
 
 /// Mean rate of a segment while the input moves \[input unit/s\].

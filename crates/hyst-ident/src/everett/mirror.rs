@@ -10,6 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::Samples;
+use crate::identify::convex::untouched;
+use crate::identify::{TableEstimate, TableOf};
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::model::capacity::{MIRROR, NODES};
 
@@ -24,8 +26,6 @@ const USUAL: f64 = 1e-3;
 /// Weight of `(ξ(D, P) − ξ(D, −P))²`, of that between neighbours: a ξ that differs between rising and falling branches makes
 /// the model wander while loops are open, so it takes data to show that it does.
 const TO_IMAGE: f64 = 10.0;
-/// A node whose column has less than this share of the mean square is touched by no data.
-const UNTOUCHED: f64 = 1e-6;
 /// Rows that a fit uses at most.
 const ROWS: usize = 40_000;
 
@@ -41,6 +41,8 @@ pub(super) struct MirrorFit {
     pub(super) untouched: Vec<usize>,
     /// Nodes at a bound.
     pub(super) bound: usize,
+    /// How much the rows say of each node.
+    pub(super) table: TableEstimate,
 }
 
 /// What a mirror function is fitted with.
@@ -81,7 +83,7 @@ impl MirrorProblem<'_> {
         let classical = self.output(vec![1.0; n], fade)?;
         // Only the rows that count are kept of each column; blocks come in the order of the rows.
         let blocks = Blocks::new(self.samples, 1, ROWS);
-        let used: Vec<usize> = (0..blocks.rows.len()).flat_map(|b| blocks.used(b, self.samples)).collect();
+        let used: Vec<usize> = blocks.all_used(self.samples).collect();
         let column = |node: usize| -> Result<Vec<f64>, hyst_core::Error> {
             let mut weights = vec![1.0; n];
             weights[node] = 2.0;
@@ -91,14 +93,11 @@ impl MirrorProblem<'_> {
         let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(column).collect::<Result<_, _>>()?;
         let grams = self.grams(&columns, &used, &classical, zeros);
         let total = Gram::sum(n + zeros + 1, grams.iter());
-        let squares: Vec<f64> = (0..n).map(|c| total.matrix[(c, c)]).collect();
-        let level = squares.iter().sum::<f64>() / n as f64;
-        let solved = |gram: &Gram, weight: f64| {
-            // Unknowns are ξ − 1.
-            let mut bounds = vec![Bounds { lower: BOUNDS.lower - 1.0, upper: BOUNDS.upper - 1.0 }; n];
-            bounds.extend(vec![Bounds::FREE; zeros]);
-            solve(gram, Some(&self.penalty(weight * level, n + zeros)), &bounds)
-        };
+        let level = (0..n).map(|c| total.matrix[(c, c)]).sum::<f64>() / n as f64;
+        // Unknowns are ξ − 1.
+        let mut bounds = vec![Bounds { lower: BOUNDS.lower - 1.0, upper: BOUNDS.upper - 1.0 }; n];
+        bounds.extend(vec![Bounds::FREE; zeros]);
+        let solved = |gram: &Gram, weight: f64| solve(gram, Some(&self.penalty(weight * level, n + zeros)), &bounds);
         let mut best = (f64::INFINITY, USUAL);
         if grams.len() > 1 {
             for weight in TO_NEIGHBOURS {
@@ -117,6 +116,10 @@ impl MirrorProblem<'_> {
         let Some(z) = solved(&total, best.1) else { return Ok(None) };
         let rmse = (total.error(&z) / total.rows.max(1) as f64).sqrt();
         let weights: Vec<f64> = z.iter().take(n).map(|z| (1.0 + z).clamp(BOUNDS.lower, BOUNDS.upper)).collect();
+        let untouched = untouched(&total, n);
+        let mean = weights.iter().sum::<f64>() / n as f64;
+        let left = self.left(&columns, &used, &classical, z.as_slice());
+        let table = TableEstimate::of(TableOf::Nodes, &z.as_slice()[..n], mean, &total, &bounds, &left);
         let near = |w: &&f64| **w < BOUNDS.lower + 1e-6 || **w > BOUNDS.upper - 1e-6;
         Ok(Some(MirrorFit {
             bound: weights.iter().filter(near).count(),
@@ -124,7 +127,8 @@ impl MirrorProblem<'_> {
             zeros: z.iter().skip(n).copied().collect(),
             rmse,
             left_out: (grams.len() > 1).then(|| (best.0 / total.rows.max(1) as f64).sqrt()),
-            untouched: (0..n).filter(|c| squares[*c] <= UNTOUCHED * level).collect(),
+            untouched: (0..n).filter(|c| untouched[*c]).collect(),
+            table,
         }))
     }
 
@@ -146,6 +150,20 @@ impl MirrorProblem<'_> {
             Gram { matrix: x.tr_mul(&x), rows: end - first }
         };
         self.samples.segments.iter().zip(self.zero_of_segment).map(of_segment).collect()
+    }
+
+    /// What is left of the output in the rows that were fitted.
+    fn left(&self, columns: &[Vec<f64>], used: &[usize], classical: &[f64], z: &[f64]) -> Vec<f64> {
+        let (nodes, zeros) = z.split_at(columns.len());
+        let mut left: Vec<f64> = used.iter().map(|k| self.samples.output[*k] - classical[*k]).collect();
+        for (column, z) in columns.iter().zip(nodes) {
+            left.iter_mut().zip(column).for_each(|(left, x)| *left -= z * x);
+        }
+        for (rows, zero) in self.samples.segments.iter().zip(self.zero_of_segment) {
+            let own = used.partition_point(|k| *k < rows.start)..used.partition_point(|k| *k < rows.end);
+            left[own].iter_mut().for_each(|left| *left -= zeros[*zero]);
+        }
+        left
     }
 
     /// Ties each node to its neighbours along D, down to ξ = 1 at D = 0, and along P, and to its image at −P.

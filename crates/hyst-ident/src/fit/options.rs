@@ -2,7 +2,10 @@
 
 use std::str::FromStr;
 
+use super::FitError;
 use crate::identify::Form;
+use crate::model::Kind;
+use crate::model::capacity::PLAYS;
 use crate::optimize::{Method, MethodError};
 
 /// How a fit goes about it.
@@ -70,6 +73,30 @@ pub struct FitOptions {
     pub bounds: Vec<VariableBounds>,
     /// Form of a model that has more than one.
     pub form: Form,
+    /// Most thresholds of the convex fit of `pi`, chosen by the record; `None` for even ones, unless some that are no more predict parts
+    /// of the record clearly better.
+    pub thresholds: Option<usize>,
+}
+
+impl FitOptions {
+    /// Whether weights are to be solved for without a search, where that is possible.
+    pub(super) fn convex(&self) -> bool {
+        matches!(self.optimizer, Optimizer::Auto | Optimizer::Convex)
+    }
+
+    /// Whether a model of this kind can be fitted with these options.
+    ///
+    /// # Errors
+    /// [`FitError::Thresholds`] if there are no thresholds to choose.
+    pub fn suits(&self, kind: Kind) -> Result<(), FitError> {
+        let advice = match self.thresholds {
+            None => return Ok(()),
+            Some(1..=PLAYS) if kind == Kind::Pi && self.convex() => return Ok(()),
+            Some(_) if kind == Kind::Pi && self.convex() => "give 1 to 64",
+            Some(_) => "other models, and a search, take a number of elements",
+        };
+        Err(FitError::Thresholds { kind: kind.name(), advice })
+    }
 }
 
 impl Default for FitOptions {
@@ -83,6 +110,7 @@ impl Default for FitOptions {
             population: None,
             bounds: Vec::new(),
             form: Form::default(),
+            thresholds: None,
         }
     }
 }

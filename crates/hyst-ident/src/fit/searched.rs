@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, check, model_of};
+use super::{Fit, FitError, FitOptions, Optimizer, check, model_of, with_errors};
 use crate::BetweenSamples;
 use crate::identify::{Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
 use crate::optimize::{Method, Progress, SearchError};
@@ -45,15 +45,9 @@ pub(super) fn fit(
     let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
     model.between_samples = best.between;
-    let key = |name: &str| format!("{}.{name}", kind.name());
-    for p in &found.estimate.parameters {
-        if p.std_error.is_finite() {
-            model.std_errors.insert(key(&p.name), p.std_error);
-        }
-    }
-    model.undetermined = found.estimate.undetermined().into_iter().map(key).collect();
+    let fit = Fit::at_once(with_errors(model, &found.estimate), &how);
     let (trials, evaluations) = (found.trials, found.evaluations);
-    Ok(Fit { model, how, estimate: Some(found.estimate), trials, evaluations, between_samples: left })
+    Ok(Fit { estimate: Some(found.estimate), trials, evaluations, between_samples: left, ..fit })
 }
 
 fn kind_needs_temperature(kind: Kind) -> bool {
@@ -218,7 +212,8 @@ impl<'a> Setup<'a> {
             .map_err(|e| FitError::Search { record: String::new(), source: SearchError::Method(e) })?;
         let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
         let how = if variables == 0 {
-            format!("convex: {} solved for at once", count(linear, "weight"))
+            let chosen = if self.kind == Kind::MaxwellSlip { ", widths chosen by the record" } else { "" };
+            format!("convex: {} solved for at once{chosen}", count(linear, "weight"))
         } else {
             let chosen = if self.options.optimizer == Optimizer::Auto { " (auto: not linear in these)" } else { "" };
             format!(

@@ -8,22 +8,29 @@
 //! - `projection.rs`: the linear parameters for trial values of the others, and the error that remains.
 //! - `polish.rs`: Levenberg-Marquardt on the projected residual, from where the global search ended.
 //! - `profile.rs`: how far a searched variable can go before the record objects.
+//! - `choice.rs`: where a record calls for plays or slipping elements.
+//! - `slopes.rs`: how the output changes with each parameter.
+//! - `convex.rs`: the same from the normal equations of a fit in which nothing is searched.
 //! - `uncertainty.rs`: standard errors and correlations at the optimum; parameters that the record cannot determine, by name.
 //! - `search.rs`: all of it in a row.
 
+pub(crate) mod choice;
+pub(crate) mod convex;
 pub(crate) mod families;
 mod family;
 mod polish;
 mod profile;
 mod projection;
 mod search;
+mod slopes;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
 
+pub use convex::{TableEstimate, TableOf};
 pub use families::Form;
 pub(crate) use families::{family_of, largest_input};
 pub(crate) use family::{Family, Linear};
 pub(crate) use search::{Identification, Located, SearchOptions};
-pub(crate) use uncertainty::parameters_of;
+pub(crate) use slopes::parameters_of;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

@@ -251,6 +251,30 @@ fn electromechanical_model_and_its_products() {
     assert!(undetermined.contains(&"coupling[0]") && undetermined.contains(&"slip.gains[0]"), "{undetermined:?}");
 }
 
+/// The printed widths and a bank of springs, each with a drive that lets all of them slip.
+#[test]
+fn maxwell_slip_fits_its_own_record_to_the_noise() {
+    let printed = TdEmParams::PRINTED.slip;
+    let banks = [
+        (printed.widths.to_vec(), printed.gains.to_vec(), SlipReading::Backlash),
+        (vec![8.0, 37.0, 121.0], vec![0.08, 0.02, 0.01], SlipReading::ElastoSlip),
+    ];
+    let drive = |t: f64| 200.0 * (0.7 * t).sin() * (11.0 * t).sin();
+    for (widths, gains, reading) in banks {
+        let elements = widths.len();
+        let truth = Base::MaxwellSlip(MaxwellSlipParams { reading, widths: widths.clone(), gains });
+        let (samples, sigma) = record(&truth, 1e-3, 6000, &[23.0], drive, 14);
+        let form = Form { slip: reading, elements: Some(elements), ..Form::default() };
+        let found = identified(Kind::MaxwellSlip, &samples, &form, "de");
+        assert!((found.estimate.left / sigma - 1.0).abs() < 0.03, "left {}, noise {sigma}", found.estimate.left);
+        let Base::MaxwellSlip(p) = &found.base else { panic!() };
+        assert!(p.widths.len() <= elements && p.gains.iter().all(|g| *g > 0.0), "{p:?}");
+        if reading == SlipReading::ElastoSlip {
+            agrees(&found, &truth, &samples, sigma);
+        }
+    }
+}
+
 /// Over twelve draws of the noise the parameters scatter about the truth as their standard errors say.
 #[test]
 fn standard_errors_are_the_scatter_of_repeated_records() {

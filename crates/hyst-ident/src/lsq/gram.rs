@@ -45,6 +45,11 @@ impl Blocks {
         };
         self.rows[b].clone().step_by(self.stride).map(scattered).filter(|k| !samples.settling[*k])
     }
+
+    /// The rows that count, of all blocks, in their order.
+    pub(crate) fn all_used<'a>(&'a self, samples: &'a Samples) -> impl Iterator<Item = usize> + 'a {
+        (0..self.rows.len()).flat_map(|b| self.used(b, samples))
+    }
 }
 
 /// `XᵀX` of one set of rows, the target being X's last column.

@@ -14,6 +14,9 @@ use crate::{BetweenSamples, Samples};
 /// Schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
 
+/// Under which name [`Model::std_errors`] and estimates have the sensor's zero, which belongs to no stage.
+pub const ZERO: &str = "zero";
+
 /// One end of the actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Channel {
@@ -68,6 +71,8 @@ struct File<S> {
     input: Input,
     output: Channel,
     zero: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    zero_std_error: Option<f64>,
     /// Sample period of the record; the parameters do not depend on it.
     recorded_at_hz: f64,
     fitted_on: Vec<FittedOn>,
@@ -90,7 +95,7 @@ pub struct Model {
     pub base: Base,
     /// The stages around it.
     pub effects: Effects,
-    /// Standard errors by `stage.parameter`.
+    /// Standard errors by `stage.parameter`, of the sensor's zero by [`ZERO`].
     pub std_errors: BTreeMap<String, f64>,
     /// Parameters, by `stage.parameter`, that the record does not determine, or only together with others.
     pub undetermined: BTreeSet<String>,
@@ -233,6 +238,7 @@ impl Model {
             input: Input { column, unit, low, high, between_samples: self.between_samples },
             output: self.output.clone(),
             zero: self.zero,
+            zero_std_error: self.std_errors.get(ZERO).copied(),
             recorded_at_hz: self.recorded_at_hz,
             fitted_on: self.fitted_on.clone(),
             stages: self.stages(),
@@ -297,7 +303,8 @@ impl Model {
     }
 
     fn from_file(file: File<serde_json::Value>) -> Result<Self, String> {
-        let stages::Stages { base, effects, std_errors, undetermined } = stages::read(file.stages)?;
+        let stages::Stages { base, effects, mut std_errors, undetermined } = stages::read(file.stages)?;
+        std_errors.extend(file.zero_std_error.map(|error| (ZERO.into(), error)));
         if base.kind() != file.kind {
             return Err(format!("the kind is {}, but the hysteresis stage is {}", file.kind, base.kind()));
         }

@@ -11,7 +11,7 @@ mod units;
 
 pub use effects::{CreepBank, Effect, Effects};
 pub use elsewhere::Ends;
-pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA};
+pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA, ZERO};
 pub use hyst_core::Kind;
 pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState, searchable};
 

@@ -5,7 +5,9 @@ use nalgebra::DMatrix;
 
 use super::largest_input;
 use crate::Samples;
-use crate::identify::family::run_into;
+use crate::fit;
+use crate::identify::choice::{self, Bank, CANDIDATES};
+use crate::identify::family::{run, run_into};
 use crate::identify::{Family, Linear};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
@@ -15,7 +17,7 @@ fn gains(count: usize) -> Vec<Linear> {
     (0..count).map(|i| Linear::not_negative(&format!("gains[{i}]"))).collect()
 }
 
-/// A bank whose widths are even over the range of the input.
+/// A bank whose widths are where the record calls for elements.
 pub(super) struct SlipFamily<'a> {
     samples: &'a Samples,
     widths: Vec<f64>,
@@ -23,14 +25,31 @@ pub(super) struct SlipFamily<'a> {
 }
 
 impl<'a> SlipFamily<'a> {
+    /// At most so many elements. Where the record chooses none, their widths are even over the range of the input.
     pub(super) fn new(samples: &'a Samples, elements: usize, reading: SlipReading) -> Self {
-        let (low, high) = samples.input_range();
         let elements = elements.clamp(1, PLAYS);
-        // The first backlash is as good as none, and carries what has no hysteresis; springs begin with a width of their own.
-        let first = if reading == SlipReading::Backlash { 1e-3 } else { 1.0 };
-        let widths = (0..elements).map(|i| (high - low) * (first + i as f64) / elements as f64).collect();
+        let element = |width: f64| {
+            let mut y = vec![0.0; samples.len()];
+            let element: Result<MaxwellSlip<f64, 1>, Error> =
+                MaxwellSlipParams { reading, widths: [width], gains: [1.0] }.build(&());
+            if let Ok(element) = element {
+                run(samples, &element, &mut y);
+            }
+            y
+        };
+        let bank = |rows| Bank::new(samples, Vec::new(), even(samples, CANDIDATES, reading), &element, rows);
+        let chosen = bank(choice::ROWS).at_most(elements).and_then(|widths| bank(fit::ROWS).from(widths));
+        let widths = chosen.filter(|w| !w.is_empty()).unwrap_or_else(|| even(samples, elements, reading));
         Self { samples, widths, reading }
     }
+}
+
+/// Even widths over the range of the input. The first backlash is as good as none, and carries what has no hysteresis; springs begin
+/// with a width of their own.
+fn even(samples: &Samples, count: usize, reading: SlipReading) -> Vec<f64> {
+    let (low, high) = samples.input_range();
+    let first = if reading == SlipReading::Backlash { 1e-3 } else { 1.0 };
+    (0..count).map(|i| (high - low) * (first + i as f64) / count as f64).collect()
 }
 
 impl Family for SlipFamily<'_> {
@@ -59,13 +78,12 @@ impl Family for SlipFamily<'_> {
         })
     }
 
-    fn identified(&self, name: &str) -> bool {
-        name.starts_with("gains")
-    }
-
-    fn scale(&self, base: &Base, _: &str) -> Option<f64> {
+    /// Gains are parts of one curve, widths have their places along it.
+    fn scale(&self, base: &Base, name: &str) -> Option<f64> {
+        let (low, high) = self.samples.input_range();
         match base {
-            Base::MaxwellSlip(p) => Some(p.gains.iter().sum()),
+            Base::MaxwellSlip(p) if name.starts_with("gains") => Some(p.gains.iter().sum()),
+            Base::MaxwellSlip(p) => Some((high - low) / p.widths.len() as f64),
             _ => None,
         }
     }

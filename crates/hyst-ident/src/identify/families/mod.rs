@@ -21,7 +21,7 @@ use crate::{BetweenSamples, Samples};
 pub struct Form {
     /// Exponent n of a Bouc-Wen model; `None` searches it.
     pub bouc_wen_n: Option<f64>,
-    /// Plays of `gpi` and `td-pi`, elements of `maxwell-slip` and `td-em`.
+    /// Plays of `gpi` and `td-pi`, elements of `td-em`, most elements of `maxwell-slip`.
     pub elements: Option<usize>,
     /// What an element of `maxwell-slip` is.
     pub slip: SlipReading,

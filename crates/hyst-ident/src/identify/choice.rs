@@ -1,0 +1,396 @@
+//! Where a record calls for elements: thresholds of plays, widths of slipping elements.
+//!
+//! Weights that are not negative over many even candidates are sparse, so one convex problem shows about where elements are. Then
+//! those two neighbours are merged whose merging costs least, until there are few enough, and the rest slides to where it fits
+//! best: Gauss-Newton in places and weights together, as in the sliding Frank-Wolfe algorithm (Denoyelle et al. 2019).
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::Samples;
+use crate::lsq::{Blocks, Bounds, Gram, solve};
+use crate::nested::folds_interleaved;
+
+/// Candidates over the range in which elements can be told apart.
+pub(crate) const CANDIDATES: usize = 64;
+/// Rows that a choice looks at; the last slide sees more.
+pub(crate) const ROWS: usize = 12_000;
+/// Pieces that a record is cut into, and folds that these are dealt to, for the error on parts left out.
+const BLOCKS: usize = 64;
+const FOLDS: usize = 8;
+/// Weights below this share of their sum are none.
+const NOTHING: f64 = 1e-9;
+/// Share of the first candidate that a place is at least.
+const LEAST: f64 = 0.05;
+/// Step of the difference quotients along a place, as a share of the range.
+const STEP: f64 = 1e-6;
+/// Most steps of a slide, and the relative fall of the squares at which it ends.
+const SLIDES: usize = 12;
+const SETTLED: f64 = 1e-4;
+/// Places on a record's parts left out are clearly better than others if they leave this share of their RMS at most.
+const CLEARLY: f64 = 0.8;
+/// Fewer places are as good if they leave no more than this share of the RMS.
+const AS_GOOD: f64 = 1.01;
+
+/// Elements of one kind that differ in one number, their place: the threshold of a play, the width of a backlash or spring.
+pub(crate) struct Bank<'a> {
+    samples: &'a Samples,
+    /// Output of one element over all rows.
+    element: &'a (dyn Fn(f64) -> Vec<f64> + Sync),
+    /// Columns that are there in any case, over the rows that count: those of the caller, then one zero for each file.
+    always: Vec<Vec<f64>>,
+    bounds: Vec<Bounds>,
+    candidates: Vec<f64>,
+    rows: Vec<usize>,
+    /// Which of `rows` belong to each block.
+    blocks: Vec<Range<usize>>,
+    folds: Vec<Vec<usize>>,
+}
+
+/// Elements at their places.
+#[derive(Clone)]
+struct Placed {
+    places: Vec<f64>,
+    /// Normal equations: what is always there, the elements, their slopes along the place, the output.
+    gram: Gram,
+    weights: Vec<f64>,
+    squares: f64,
+}
+
+impl<'a> Bank<'a> {
+    /// A bank over at most about `rows` of the rows that count; `always` are columns over all rows that every such model has, with their bounds. Each file
+    /// has a zero of its own here: that takes nothing from a loop.
+    pub(crate) fn new(
+        samples: &'a Samples,
+        always: Vec<(Vec<f64>, Bounds)>,
+        candidates: Vec<f64>,
+        element: &'a (dyn Fn(f64) -> Vec<f64> + Sync),
+        rows: usize,
+    ) -> Self {
+        let cut = Blocks::new(samples, BLOCKS, rows);
+        let (mut rows, mut blocks) = (Vec::new(), Vec::new());
+        for b in 0..cut.rows.len() {
+            let from = rows.len();
+            rows.extend(cut.used(b, samples));
+            blocks.push(from..rows.len());
+        }
+        let zero = |file: usize| -> Vec<f64> {
+            let mut zero = vec![0.0; samples.len()];
+            let own = samples.segments.iter().zip(&samples.file_of_segment).filter(|(_, f)| **f == file);
+            own.for_each(|(s, _)| zero[s.clone()].fill(1.0));
+            zero
+        };
+        let (mut columns, mut bounds): (Vec<_>, Vec<_>) = always.into_iter().unzip();
+        columns.extend((0..samples.files()).map(zero));
+        bounds.resize(columns.len(), Bounds::FREE);
+        let always = columns.iter().map(|c| rows.iter().map(|k| c[*k]).collect()).collect();
+        let folds = folds_interleaved(&cut, FOLDS);
+        Self { samples, element, always, bounds, candidates, rows, blocks, folds }
+    }
+
+    /// At most `most` places in rising order; fewer where the record calls for fewer. `None` if the equations cannot be solved.
+    pub(crate) fn at_most(&self, most: usize) -> Option<Vec<f64>> {
+        let (places, weights) = self.sparse()?;
+        Some(self.fewer(places, weights, most)?.places)
+    }
+
+    /// Places, no more than the `given` ones, that predict parts of the record which are left out clearly better than those do;
+    /// of such, the fewest that are as good. `None` if there are none.
+    pub(crate) fn better_than(&self, given: &[f64]) -> Option<Vec<f64>> {
+        let enough = CLEARLY * CLEARLY * self.left_out(given)?;
+        let (places, weights) = self.sparse()?;
+        let mut best = self.fewer(places, weights, given.len())?;
+        let mut least = self.left_out(&best.places)?;
+        if least > enough {
+            return None;
+        }
+        while best.places.len() > 1 {
+            let fewer = self.fewer(best.places.clone(), best.weights.clone(), best.places.len() - 1)?;
+            let squares = self.left_out(&fewer.places)?;
+            if squares > AS_GOOD * AS_GOOD * least {
+                break;
+            }
+            (best, least) = (fewer, least.min(squares));
+        }
+        Some(best.places)
+    }
+
+    /// Places that slid from given ones to where they fit best.
+    pub(crate) fn from(&self, places: Vec<f64>) -> Option<Vec<f64>> {
+        Some(self.slid(places)?.places)
+    }
+
+    /// Squares that are left of parts of the record by weights that were fitted to the other parts.
+    fn left_out(&self, places: &[f64]) -> Option<f64> {
+        let columns = self.columns(places);
+        let of_fold =
+            |fold: &Vec<usize>| self.gram(&columns, fold.iter().flat_map(|b| self.blocks[*b].clone()).collect());
+        let grams: Vec<Gram> = self.folds.iter().map(of_fold).collect();
+        let total = Gram::sum(grams.first()?.matrix.ncols(), grams.iter());
+        let error = |own: &Gram| {
+            let others = Gram { matrix: &total.matrix - &own.matrix, rows: total.rows - own.rows };
+            Some(own.error(&self.solved(&others, places.len())?))
+        };
+        grams.iter().map(error).sum()
+    }
+
+    /// The candidates that have weight; two neighbours on the grid are one element between them.
+    fn sparse(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        let n = self.candidates.len();
+        let z = self.solved(&self.gram_of(&self.columns(&self.candidates)), n)?;
+        let weights = self.weights(&z, n);
+        let smallest = NOTHING * weights.iter().sum::<f64>();
+        let (mut places, mut kept, mut i) = (Vec::new(), Vec::new(), 0);
+        while i < n {
+            let pair = if i + 1 < n && weights[i] > smallest && weights[i + 1] > smallest { 2 } else { 1 };
+            let (place, weight) = middle(&self.candidates[i..i + pair], &weights[i..i + pair]);
+            if weight > smallest {
+                places.push(place);
+                kept.push(weight);
+            }
+            i += pair;
+        }
+        Some((places, kept))
+    }
+
+    /// Takes elements away until at most `most` are left; then, as long as noise would pay for one with its place and weight
+    /// (Schwarz's criterion), further ones. What is left has slid.
+    fn fewer(&self, mut places: Vec<f64>, mut weights: Vec<f64>, most: usize) -> Option<Placed> {
+        while places.len() > most {
+            (places, weights) = self.one_less(&places, &weights)?;
+        }
+        let rows = self.rows.len() as f64;
+        let mut here = self.slid(places)?;
+        while here.places.len() > 1 {
+            let less = self.slid(self.one_less(&here.places, &here.weights)?.0)?;
+            if less.squares > here.squares * (1.0 + 2.0 * rows.ln() / rows) {
+                break;
+            }
+            here = less;
+        }
+        Some(here)
+    }
+
+    /// Places and weights without one element, merged with its neighbour or left out, whichever costs least.
+    fn one_less(&self, places: &[f64], weights: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let n = places.len();
+        let between: Vec<f64> = (1..n).map(|i| middle(&places[i - 1..=i], &weights[i - 1..=i]).0).collect();
+        let all = [places, &between].concat();
+        let gram = self.gram_of(&self.columns(&all));
+        let without = |i: usize| (0..n).filter(|j| *j != i).collect::<Vec<_>>();
+        let merging = |i: usize| (0..n).map(|j| if j == i { n + i } else { j }).filter(|j| *j != i + 1).collect();
+        let trials: Vec<Vec<usize>> = (0..n).map(without).chain((0..n - 1).map(merging)).collect();
+        let tried = |trial: &Vec<usize>| {
+            let own = self.only(&gram, trial);
+            let z = self.solved(&own, trial.len())?;
+            Some((own.error(&z), self.weights(&z, trial.len())))
+        };
+        let tried: Vec<Option<_>> = trials.par_iter().map(tried).collect();
+        let done = trials.iter().zip(tried).filter_map(|(trial, t)| t.map(|(squares, w)| (squares, trial, w)));
+        let (_, kept, weights) = done.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((kept.iter().map(|i| all[*i]).collect(), weights))
+    }
+
+    /// Slides elements to where they fit best; those that end without weight are left out.
+    fn slid(&self, places: Vec<f64>) -> Option<Placed> {
+        let mut here = self.at(places)?;
+        for _ in 0..SLIDES {
+            let Some(step) = self.step(&here) else { break };
+            let moved = |share: f64| {
+                let to: Vec<f64> = here.places.iter().zip(step.iter()).map(|(place, d)| place + share * d).collect();
+                self.at(to).filter(|there| there.squares < here.squares)
+            };
+            let Some(there) = [1.0, 0.5, 0.25, 0.1].into_iter().find_map(moved) else { break };
+            let fall = here.squares - there.squares;
+            let settled = fall <= SETTLED * here.squares;
+            here = there;
+            if settled {
+                break;
+            }
+        }
+        let smallest = NOTHING * here.weights.iter().sum::<f64>();
+        if here.weights.iter().all(|w| *w > smallest) {
+            return Some(here);
+        }
+        let kept = here.places.iter().zip(&here.weights).filter(|(_, w)| **w > smallest);
+        self.at(kept.map(|(place, _)| *place).collect())
+    }
+
+    /// By how much each place should move: least squares in weights and moves, to half of the way to the next place at most.
+    fn step(&self, here: &Placed) -> Option<Vec<f64>> {
+        let (m, n) = (self.always.len(), here.places.len());
+        let mut gram = here.gram.clone();
+        for (i, w) in here.weights.iter().enumerate() {
+            gram.matrix.column_mut(m + n + i).scale_mut(*w);
+            gram.matrix.row_mut(m + n + i).scale_mut(*w);
+        }
+        let (low, high) = self.limits();
+        let mut bounds = self.bounds.clone();
+        bounds.resize(m + n, Bounds::above(0.0));
+        bounds.extend((0..n).map(|i| {
+            let place = here.places[i];
+            let below = i.checked_sub(1).map_or(low, |i| 0.5 * (place + here.places[i]));
+            let above = here.places.get(i + 1).map_or(high, |next| 0.5 * (place + next));
+            Bounds { lower: (below - place).min(0.0), upper: (above - place).max(0.0) }
+        }));
+        let z = solve(&gram, None, &bounds)?;
+        Some(z.iter().skip(m + n).copied().collect())
+    }
+
+    /// Places that an element can have: from almost nothing to the last candidate.
+    fn limits(&self) -> (f64, f64) {
+        let (first, last) = crate::samples::range(self.candidates.iter().copied());
+        (LEAST * first, last)
+    }
+
+    fn at(&self, places: Vec<f64>) -> Option<Placed> {
+        let n = places.len();
+        let (low, high) = self.limits();
+        let step = STEP * (high - low);
+        let beside = |sign: f64| self.columns(&places.iter().map(|p| p + sign * step).collect::<Vec<_>>());
+        let (up, down) = (beside(1.0), beside(-1.0));
+        let slope = |(up, down): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            up.iter().zip(down).map(|(a, b)| 0.5 * (a - b) / step).collect()
+        };
+        let mut columns = self.columns(&places);
+        columns.extend(up.iter().zip(&down).map(slope));
+        let gram = self.gram_of(&columns);
+        let own = self.only(&gram, &(0..n).collect::<Vec<_>>());
+        let z = self.solved(&own, n)?;
+        Some(Placed { weights: self.weights(&z, n), squares: own.error(&z), places, gram })
+    }
+
+    /// Outputs of elements over the rows that count.
+    fn columns(&self, places: &[f64]) -> Vec<Vec<f64>> {
+        let column = |place: &f64| {
+            let all = (self.element)(*place);
+            self.rows.iter().map(|k| all[*k]).collect()
+        };
+        places.par_iter().map(column).collect()
+    }
+
+    fn gram_of(&self, columns: &[Vec<f64>]) -> Gram {
+        self.gram(columns, (0..self.rows.len()).collect())
+    }
+
+    /// Normal equations over some of the rows that count.
+    fn gram(&self, columns: &[Vec<f64>], rows: Vec<usize>) -> Gram {
+        let m = self.always.len();
+        let x = DMatrix::from_fn(rows.len(), m + columns.len() + 1, |r, c| {
+            let k = rows[r];
+            let own = self.always.get(c).or_else(|| columns.get(c - m));
+            own.map_or_else(|| self.samples.output[self.rows[k]], |column| column[k])
+        });
+        Gram { matrix: x.tr_mul(&x), rows: rows.len() }
+    }
+
+    /// The normal equations with these of its elements only.
+    fn only(&self, gram: &Gram, elements: &[usize]) -> Gram {
+        let m = self.always.len();
+        let kept: Vec<usize> =
+            (0..m).chain(elements.iter().map(|i| m + i)).chain(std::iter::once(gram.unknowns())).collect();
+        Gram { matrix: gram.matrix.select_rows(&kept).select_columns(&kept), rows: gram.rows }
+    }
+
+    fn solved(&self, gram: &Gram, elements: usize) -> Option<DVector<f64>> {
+        let mut bounds = self.bounds.clone();
+        bounds.resize(self.always.len() + elements, Bounds::above(0.0));
+        solve(gram, None, &bounds)
+    }
+
+    fn weights(&self, z: &DVector<f64>, elements: usize) -> Vec<f64> {
+        z.iter().skip(self.always.len()).take(elements).copied().collect()
+    }
+}
+
+/// The weighted mean place of neighbours, and their weight together.
+fn middle(places: &[f64], weights: &[f64]) -> (f64, f64) {
+    let weight: f64 = weights.iter().sum();
+    let moment: f64 = places.iter().zip(weights).map(|(p, w)| p * w).sum();
+    let mean = places.iter().sum::<f64>() / places.len() as f64;
+    (if weight > 0.0 { moment / weight } else { mean }, weight)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::play_column;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Plays of ± 50 V with these thresholds and weights beside a part without hysteresis, and noise of `sigma`.
+    fn samples(plays: &[(f64, f64)], sigma: f64) -> Samples {
+        let rows = 4000;
+        let input: Vec<f64> =
+            (0..rows).map(|k| f64::from(k) / 4000.0).map(|x| 50.0 * (3.0 * x).sin() * (97.0 * x).sin()).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut output: Vec<f64> =
+            input.iter().map(|u| 0.1 * u + sigma * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0)).collect();
+        let whole = 0..input.len();
+        let segments = Vec::from([whole]);
+        for (r, w) in plays {
+            output.iter_mut().zip(play_column(&input, &segments, *r)).for_each(|(y, p)| *y += w * p);
+        }
+        Samples {
+            period: 1e-3,
+            time: (0..rows).map(|k| f64::from(k) * 1e-3).collect(),
+            settling: vec![false; input.len()],
+            temperature: None,
+            load: None,
+            segments,
+            file_of_segment: vec![0],
+            input,
+            output,
+        }
+    }
+
+    /// What `ask` gets of a bank of plays.
+    fn asked<T>(samples: &Samples, ask: impl Fn(&Bank<'_>) -> T) -> T {
+        let element = |r: f64| play_column(&samples.input, &samples.segments, r);
+        let candidates = (1..=CANDIDATES).map(|i| 50.0 * i as f64 / (CANDIDATES + 1) as f64).collect();
+        ask(&Bank::new(samples, vec![(samples.input.clone(), Bounds::above(0.0))], candidates, &element, ROWS))
+    }
+
+    fn even(count: u32) -> Vec<f64> {
+        (1..=count).map(|i| 50.0 * f64::from(i) / f64::from(count + 1)).collect()
+    }
+
+    #[test]
+    fn few_plays_between_candidates_are_found_where_they_are() {
+        let truth = [(3.3, 0.03), (11.7, 0.05), (38.2, 0.02)];
+        let samples = samples(&truth, 0.01);
+        for found in
+            [asked(&samples, |b| b.at_most(10)).unwrap(), asked(&samples, |b| b.better_than(&even(9))).unwrap()]
+        {
+            assert_eq!(found.len(), 3, "{found:?}");
+            for (found, (r, _)) in found.iter().zip(truth) {
+                assert!((found - r).abs() < 0.1, "{found} {r}");
+            }
+        }
+        let two = asked(&samples, |b| b.at_most(2)).unwrap();
+        assert!(two.len() == 2 && (3.3..11.7).contains(&two[0]) && (two[1] - 38.2).abs() < 3.0, "{two:?}");
+    }
+
+    #[test]
+    fn a_smooth_density_keeps_even_thresholds() {
+        let dense: Vec<(f64, f64)> = even(200).into_iter().map(|r| (r, 0.002 * (-r / 30.0).exp())).collect();
+        let samples = samples(&dense, 0.01);
+        assert_eq!(asked(&samples, |b| b.better_than(&even(15))), None);
+        let chosen = asked(&samples, |b| b.at_most(6)).unwrap();
+        assert!(chosen.len() <= 6 && chosen.is_sorted(), "{chosen:?}");
+        let left = |places: &[f64]| asked(&samples, |b| b.left_out(places)).unwrap();
+        assert!(left(&chosen) < left(&even(6)), "{chosen:?}");
+    }
+
+    #[test]
+    fn elements_that_the_record_does_not_tell_apart_are_one() {
+        // All candidates from 20 V on give the same output.
+        let samples = samples(&[(20.0, 0.05)], 0.01);
+        let element = |r: f64| play_column(&samples.input, &samples.segments, r.min(20.0));
+        let candidates = even(CANDIDATES as u32);
+        let bank = Bank::new(&samples, vec![(samples.input.clone(), Bounds::above(0.0))], candidates, &element, ROWS);
+        assert_eq!(bank.at_most(10).unwrap().len(), 1);
+    }
+}
