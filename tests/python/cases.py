@@ -104,6 +104,13 @@ case(
     "viscous pi", "ViscousPi", dict(gain=0.1, thresholds=R, weights=W, seconds=3e-3, period=PERIOD), SWING,
     lambda u: plays.viscous_prandtl_ishlinskii(u, 0.1, R, W, 3e-3, PERIOD), inverse={},
 )  # fmt: skip
+for label, seconds, volt_seconds in [("root", 0.0, 0.02), ("linear and root", 3e-3, 0.005)]:
+    case(
+        f"viscous pi, {label}", "ViscousPi",
+        dict(gain=0.1, thresholds=R, weights=W, seconds=seconds, volt_seconds=volt_seconds, period=PERIOD), SWING,
+        lambda u, s=seconds, j=volt_seconds: plays.root_viscous_prandtl_ishlinskii(u, 0.1, R, W, s, j, PERIOD),
+        inverse={},
+    )  # fmt: skip
 
 # --- Preisach
 

@@ -14,11 +14,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use hyst_core::{
-    ActivationParams, AsymmetryParams, BLOCK_VERSION, BoucWenOscillatorParams, BoucWenParams, ChainParams, CreepParams,
-    Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams, InterferenceParams, Kind,
-    LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams, PiParams, PreisachParams,
-    ResonanceParams, SaturationParams, SlipReading, TdEmParams, TdPiParams, TemperatureParams, ViscousPiParams,
-    read_block, write_block,
+    ActivationParams, AsymmetryParams, BLOCK_VERSION, BlockError, BoucWenOscillatorParams, BoucWenParams, ChainParams,
+    CreepParams, Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
+    InterferenceParams, Kind, LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams,
+    PiParams, PreisachParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams, TdPiParams,
+    TemperatureParams, ViscousPiParams, read_block, write_block,
 };
 use hyst_tests::root;
 
@@ -88,7 +88,7 @@ fn operators() -> Vec<(&'static str, Operator)> {
     };
     vec![
         ("pi", O::Pi(pi())),
-        ("viscous-pi", O::ViscousPi(ViscousPiParams { pi: pi(), seconds: 6.5 })),
+        ("viscous-pi", O::ViscousPi(ViscousPiParams { pi: pi(), seconds: 6.5, volt_seconds: 7.5 })),
         ("gpi", O::Gpi(gpi(linear, tanh))),
         ("gpi, exchanged", O::Gpi(gpi(tanh, linear))),
         ("td-pi", O::TdPi(td_pi)),
@@ -163,13 +163,17 @@ fn file() -> PathBuf {
     root().join("tests/tests/block_format.txt")
 }
 
+fn unhex(digits: &str) -> Vec<u8> {
+    let hex = |digits: &str| u8::from_str_radix(digits, 16).expect("two hexadecimal digits");
+    (0..digits.len() / 2).map(|k| hex(&digits[2 * k..2 * k + 2])).collect()
+}
+
 /// The lines of the file; none before it is first written.
 fn stored() -> Vec<(String, Vec<u8>)> {
     let text = std::fs::read_to_string(file()).unwrap_or_default();
-    let hex = |digits: &str| u8::from_str_radix(digits, 16).expect("two hexadecimal digits");
     let line = |line: &str| {
         let (name, digits) = line.split_once(": ").expect("name: bytes");
-        (name.to_owned(), (0..digits.len() / 2).map(|k| hex(&digits[2 * k..2 * k + 2])).collect())
+        (name.to_owned(), unhex(digits))
     };
     text.lines().map(line).collect()
 }
@@ -206,6 +210,17 @@ fn blocks_have_the_bytes_that_they_always_had() {
         let again = read_block::<Vec<f64>, Vec<f64>>(old).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!((again, board.operator.kind()), (block.clone(), block.operator.kind()), "{name}");
     }
+}
+
+/// A block of version 1, from before `volt_seconds`: its numbers would be misread.
+#[test]
+fn a_block_of_an_older_version_is_refused_by_its_number() {
+    const OLD: &str = "\
+        48595354015600000001000000000000f83f0200000000000004400000000000000c40020000000000001240000000000000\
+        16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
+    let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
+    assert_eq!(error, BlockError::Version { version: 1 });
+    assert!(error.to_string().contains("block version 1, this build reads 2: export the model anew"), "{error}");
 }
 
 /// The head of a block as `hyst_core::read_block` documents it.

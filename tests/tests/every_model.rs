@@ -185,6 +185,7 @@ fn every_causal_inverse_reaches_its_references() {
     pairs! {
         pi_10, pi_10_inverse: 1e-12, 1e-4;
         pi_10_viscous, pi_10_viscous_inverse: 1e-12, 1e-4;
+        pi_10_root_viscous, pi_10_root_viscous_inverse: 1e-12, 1e-4;
         gpi_10, gpi_10_inverse: 1e-12, 1e-4;
         td_pi_9, td_pi_9_inverse: 1e-12, 1e-4;
         everett_24, everett_24_inverse: 1e-12, 1e-4;

@@ -20,7 +20,7 @@
 //! | play and stop | `play.rs` | – |
 //! | Prandtl-Ishlinskii, of plays or of stops | `prandtl/pi.rs` | closed form, the same type |
 //! | … with envelopes, with temperature | `prandtl/gpi.rs` `prandtl/td_pi.rs` | closed form, exact while the temperature changes |
-//! | … rate-dependent: viscous plays | `prandtl/viscous.rs` | exact, one pass over the plays |
+//! | … rate-dependent: viscous plays | `prandtl/viscous/` | exact: one pass over the plays, or Newton's method in a bracket |
 //! | Preisach as an Everett map | `preisach/operator.rs` | exact, cell by cell; approximate by the inverse surface |
 //! | dynamic Preisach | `preisach/dpm/` | search, exact; approximate by the inverse surface |
 //! | Maxwell slip | `maxwell/slip.rs` | closed form |

@@ -87,3 +87,25 @@ def viscous_prandtl_ishlinskii(u, gain, thresholds, weights, drag, period):
             p = np.where(now - r > p, above, np.where(now + r < p, below, p))
         y[k] = gain * now + p @ np.asarray(weights, dtype=float)
     return y
+
+
+def root_viscous_prandtl_ishlinskii(u, gain, thresholds, weights, seconds, volt_seconds, period):
+    """``|u - p| - r = seconds v + sqrt(volt_seconds v)`` by the backward Euler rule, solved by halving the interval in which a sample's
+    end of each play lies: at the end the play has moved at the speed that what is still beyond its threshold asks for."""
+    r, p = np.asarray(thresholds, dtype=float), np.zeros(len(thresholds))
+    y = np.empty(len(u))
+    for k, now in enumerate(u):
+        # Where the play would come to rest.
+        rest = np.clip(p, now - r, now + r)
+        if k == 0:
+            p = rest
+        else:
+            near, far = p.copy(), rest.copy()
+            for _ in range(60):
+                end = 0.5 * (near + far)
+                speed = np.abs(end - p) / period
+                late = seconds * speed + np.sqrt(volt_seconds * speed) < np.abs(rest - end)
+                near, far = np.where(late, end, near), np.where(late, far, end)
+            p = np.where(rest == p, p, 0.5 * (near + far))
+        y[k] = gain * now + p @ np.asarray(weights, dtype=float)
+    return y

@@ -12,7 +12,7 @@ use crate::{
 pub const MAX_RESONANCES: usize = 2;
 
 /// Dead zones that the asymmetry of one chain can hold.
-pub const MAX_DEAD_ZONES: usize = 4;
+pub const MAX_DEAD_ZONES: usize = 8;
 
 /// `u → delay → lag → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
 /// +interference → + zero → y`, every stage but the hysteresis optional.

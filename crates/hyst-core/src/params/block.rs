@@ -13,7 +13,9 @@ use core::fmt;
 use super::ChainParams;
 
 /// Version of the blocks that this version of the library writes and reads.
-pub const BLOCK_VERSION: u8 = 1;
+///
+/// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays.
+pub const BLOCK_VERSION: u8 = 2;
 
 /// A list of at most `N` numbers without heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;

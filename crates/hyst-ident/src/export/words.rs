@@ -10,8 +10,8 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
             "play[i] <- max(u - thresholds[i], min(u + thresholds[i], play[i])), 0 before the first input; thresholds rise",
         ],
         "rate-dependence" => &[
-            "the plays of pi slide with drag: seconds d(play[i])/dt = what u is beyond play[i] -+ thresholds[i]",
-            "a sliding play moves by h / (h + seconds) of that in a sample",
+            "the plays of pi slide with drag: one that u is o = |u - play[i]| - thresholds[i] > 0 ahead of follows at the speed v of",
+            "seconds v + sqrt(volt_seconds v) = o; in a sample it moves by h v, (seconds + h) v + sqrt(volt_seconds v) = o",
         ],
         "gpi" => &[
             "y = gain F(0) + sum over i of weights[i] F(thresholds[i])",

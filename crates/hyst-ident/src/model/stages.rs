@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hyst_core::{Params, ViscousPiParams};
+use hyst_core::{Meta, Params, PiParams, ViscousPiParams};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -21,6 +21,28 @@ pub(super) struct Stages {
 #[derive(Serialize, Deserialize)]
 struct RateDependence {
     seconds: f64,
+    /// Older files have none.
+    #[serde(default)]
+    volt_seconds: f64,
+}
+
+impl RateDependence {
+    fn of(self, pi: PiParams<Vec<f64>>) -> ViscousPiParams<Vec<f64>> {
+        ViscousPiParams { pi, seconds: self.seconds, volt_seconds: self.volt_seconds }
+    }
+}
+
+/// The parameters of dragging plays that are not those of the plays.
+struct Drag<'a>(&'a mut ViscousPiParams<Vec<f64>>);
+
+impl Params for Drag<'_> {
+    fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        self.0.visit(&mut |meta, x| {
+            if !meta.name.starts_with("pi.") {
+                f(meta, x);
+            }
+        });
+    }
 }
 
 /// The stages of a model, in the chain's order.
@@ -61,8 +83,8 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
     match &mut model.base.clone() {
         Base::ViscousPi(p) => {
             push("pi", "pi", value(&p.pi), &mut p.pi);
-            let drag = value(&RateDependence { seconds: p.seconds });
-            push("rate-dependence", "rate-dependence", drag, &mut hyst_core::LagParams { seconds: p.seconds });
+            let drag = value(&RateDependence { seconds: p.seconds, volt_seconds: p.volt_seconds });
+            push("rate-dependence", "rate-dependence", drag, &mut Drag(p));
         }
         base => {
             let name = base.kind().name();
@@ -199,9 +221,7 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
     }
     let base = match (bases.ok_or("there is no hysteresis stage")?, drag) {
         (base, None) => base,
-        (Base::Pi(pi), Some(RateDependence { seconds })) => {
-            Base::ViscousPi(ViscousPiParams::<Vec<f64>> { pi, seconds })
-        }
+        (Base::Pi(pi), Some(drag)) => Base::ViscousPi(drag.of(pi)),
         (other, Some(_)) => {
             let kind = other.kind();
             return Err(format!("rate-dependence is a variant of pi; {kind} has none (of preisach it is dpm)"));
@@ -232,9 +252,14 @@ mod tests {
         let stage = |text: &str| serde_json::from_str::<Value>(text).unwrap();
         let pi = stage(r#"{"stage":"pi","gain":0.1,"thresholds":[1.0],"weights":[0.1]}"#);
         let drag = stage(r#"{"stage":"rate-dependence","seconds":0.002}"#);
-        let both = read(vec![pi.clone(), drag.clone()]).unwrap_or_else(|e| panic!("{e}"));
+        let with = |drag: &Value| read(vec![pi.clone(), drag.clone()]).map(|stages| stages.base);
         let expected = PiParams { gain: 0.1, thresholds: vec![1.0], weights: vec![0.1] };
-        assert_eq!(both.base, Base::ViscousPi(ViscousPiParams { pi: expected, seconds: 0.002 }));
+        let expected = ViscousPiParams { pi: expected, seconds: 0.002, volt_seconds: 0.0 };
+        assert_eq!(with(&drag), Ok(Base::ViscousPi(expected.clone())));
+        let root = stage(r#"{"stage":"rate-dependence","seconds":0.002,"volt_seconds":0.5}"#);
+        assert_eq!(with(&root), Ok(Base::ViscousPi(ViscousPiParams { volt_seconds: 0.5, ..expected })));
+        let misspelt = stage(r#"{"stage":"rate-dependence","seconds":0.002,"voltseconds":0.5}"#);
+        assert!(with(&misspelt).is_err_and(|e| e.contains("no field \"voltseconds\"")));
         let slip = stage(r#"{"stage":"maxwell-slip","reading":"backlash","widths":[1.0],"gains":[0.1]}"#);
         assert!(read(vec![slip, drag]).is_err_and(|e| e.contains("variant of pi")));
         assert!(read(vec![pi.clone(), pi]).is_err_and(|e| e.contains("two hysteresis")));

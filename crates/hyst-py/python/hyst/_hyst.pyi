@@ -136,7 +136,14 @@ class Preisach(Operator):
 
 class ViscousPi(Operator):
     def __new__(
-        cls, *, gain: float, thresholds: _List, weights: _List, seconds: float, period: float
+        cls,
+        *,
+        gain: float,
+        thresholds: _List,
+        weights: _List,
+        seconds: float,
+        period: float,
+        volt_seconds: float = 0.0,
     ) -> ViscousPi: ...
     @property
     def gain(self) -> float: ...
@@ -148,6 +155,8 @@ class ViscousPi(Operator):
     def seconds(self) -> float: ...
     @property
     def period(self) -> float: ...
+    @property
+    def volt_seconds(self) -> float: ...
 
 class Gpi(Operator):
     def __new__(

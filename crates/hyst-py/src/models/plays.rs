@@ -59,10 +59,12 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Prandtl-Ishlinskii operator whose plays slide with viscous drag (rate-dependence):
-    /// ``y = gain·u + Σ weights[i]·pᵢ``, ``seconds·ṗᵢ = dead(u − pᵢ, thresholds[i])``.
+    /// Prandtl-Ishlinskii operator whose plays slide with drag (rate-dependence): ``y = gain·u + Σ weights[i]·pᵢ``, where play i rests
+    /// for ``|u − pᵢ| ≤ thresholds[i]`` and beyond that follows at the speed v of
+    /// ``seconds·v + sqrt(volt_seconds·v) = |u − pᵢ| − thresholds[i]``.
     ///
-    /// ``seconds = 0`` is ``Pi``. Exact inverse.
+    /// Loops widen by ``seconds`` times the rate and by the root of ``volt_seconds`` times the rate; with both 0 it is ``Pi``.
+    /// Exact inverse.
     class ViscousPi {
         /// Gain of the identity [y/u].
         gain: f64,
@@ -70,12 +72,18 @@ models! {
         thresholds: Vec<f64>,
         /// Weights of the plays [y/u], shape (n,).
         weights: Vec<f64>,
-        /// Drag [s].
+        /// Drag in proportion to the rate [s].
         seconds: f64,
         /// Sample period [s].
         period: f64,
+        /// Drag with the root of the rate [u s].
+        volt_seconds: f64 = 0.0,
     }
-    params: |p| Ok(ViscousPiParams { pi: pi(p.gain, &p.thresholds, &p.weights), seconds: p.seconds }),
+    params: |p| Ok(ViscousPiParams {
+        pi: pi(p.gain, &p.thresholds, &p.weights),
+        seconds: p.seconds,
+        volt_seconds: p.volt_seconds,
+    }),
     stage: hyst_core::ViscousPi<f64, PLAYS>,
     period: |p| p.period,
     inverse: closed,

@@ -55,13 +55,13 @@ models! {
     ///
     /// Closed-form inverse, if the curve rises.
     class Asymmetry {
-        /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 4.
+        /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 8.
         thresholds: Vec<f64>,
         /// Changes of slope [ratio], shape (n,).
         weights: Vec<f64>,
     }
     params: |p| Ok(AsymmetryParams { thresholds: p.thresholds.clone(), weights: p.weights.clone() }),
-    stage: hyst_core::Asymmetry<f64, 4>,
+    stage: hyst_core::Asymmetry<f64, { hyst_core::MAX_DEAD_ZONES }>,
     inverse: closed,
     needs: [],
 

@@ -14,6 +14,8 @@ macro_rules! all_cases {
             pi_16: Pi<T, 16>, 0.0..120.0 => pi::<T, 16>();
             pi_10_viscous: ViscousPi<T, 10>, 0.0..120.0 => viscous::<T>();
             pi_10_viscous_inverse: ViscousPiInverse<T, 10>, 0.0..20.0 => viscous::<T>()?.invert();
+            pi_10_root_viscous: ViscousPi<T, 10>, 0.0..120.0 => root_viscous::<T>();
+            pi_10_root_viscous_inverse: ViscousPiInverse<T, 10>, 0.0..20.0 => root_viscous::<T>()?.invert();
             gpi_10: Gpi<T, 10>, 0.0..120.0 => gpi::<T>();
             gpi_10_inverse: GpiInverse<T, 10>, 0.0..20.0 => gpi::<T>()?.invert();
             td_pi_9: TdPi<T, 9>, -200.0..200.0 => given(TdPiParams::PRINTED).build(&());
@@ -48,8 +50,8 @@ macro_rules! all_cases {
             creep_4_inverse: CreepInverse<T, 4>, 0.0..20.0 => Build::<Creep<T, 4>>::build(&given(CREEP), &PERIOD)?.invert();
             resonance: Resonance<T>, 0.0..20.0 => given(MODE).build(&PERIOD);
             temperature: Temperature<T>, 0.0..20.0 => given(WARMTH).build(&());
-            asymmetry: Asymmetry<T, 4>, -20.0..20.0 => given(BENT).build(&());
-            asymmetry_inverse: AsymmetryInverse<T, 4>, -20.0..20.0 => Build::<Asymmetry<T, 4>>::build(&given(BENT), &())?.invert();
+            asymmetry: Asymmetry<T, MAX_DEAD_ZONES>, -20.0..20.0 => given(BENT).build(&());
+            asymmetry_inverse: AsymmetryInverse<T, MAX_DEAD_ZONES>, -20.0..20.0 => Build::<Asymmetry<T, MAX_DEAD_ZONES>>::build(&given(BENT), &())?.invert();
             load: Load<T>, 0.0..20.0 => given(COMPLIANCE).build(&());
             saturation: Saturation<T>, -5.0..25.0 => given(STOPS).build(&());
             saturation_inverse: SaturationInverse<T>, -1.0..19.0 => Build::<Saturation<T>>::build(&given(STOPS), &())?.invert();

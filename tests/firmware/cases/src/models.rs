@@ -45,8 +45,14 @@ const PI_10: PiParams<[f64; 10]> = PiParams {
     weights: [0.01; 10],
 };
 
+/// λ = 2 ms.
 pub(crate) fn viscous<T: Real>() -> Result<ViscousPi<T, 10>, Error> {
-    given(ViscousPiParams { pi: PI_10, seconds: 2e-3 }).build(&PERIOD)
+    given(ViscousPiParams { pi: PI_10, seconds: 2e-3, volt_seconds: 0.0 }).build(&PERIOD)
+}
+
+/// J = 5 mV s.
+pub(crate) fn root_viscous<T: Real>() -> Result<ViscousPi<T, 10>, Error> {
+    given(ViscousPiParams { pi: PI_10, seconds: 0.0, volt_seconds: 5e-3 }).build(&PERIOD)
 }
 
 pub(crate) fn gpi<T: Real>() -> Result<Gpi<T, 10>, Error> {

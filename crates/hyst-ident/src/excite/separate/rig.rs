@@ -89,7 +89,8 @@ impl Rig {
     /// The output with effects and the loop's drag λ \[s\]; `None` where the chain cannot be built.
     pub(super) fn output(&self, drag: f64, effects: &EffectParams<Vec<f64>>) -> Option<Vec<f64>> {
         let cx = Sampling { period: self.period };
-        let plays: ViscousPi<f64, PLAYS> = ViscousPiParams { pi: self.pi.clone(), seconds: drag }.build(&cx).ok()?;
+        let plays = ViscousPiParams { pi: self.pi.clone(), seconds: drag, volt_seconds: 0.0 };
+        let plays: ViscousPi<f64, PLAYS> = plays.build(&cx).ok()?;
         let chain = Box::new(effects.around::<f64, _, DELAY, CREEP>(plays, &cx).ok()?);
         let mut state = Box::new(chain.state());
         let rows = self.starts.iter().zip(&self.env).zip(&self.input);

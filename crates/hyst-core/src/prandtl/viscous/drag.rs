@@ -1,0 +1,71 @@
+//! What holds a sliding play back.
+
+use crate::error::{coefficient, within};
+use crate::{Error, Real};
+
+/// Coefficients of the law `o = λ v + √(J v)` between a play's speed v \[u/s\] and its overdrive o \[u\], at one sample period.
+///
+/// Backward Euler over a sample h: the play moves by `h v`, which takes as much off the overdrive, `(λ + h) v + √(J v) = o`. With
+/// `j = J / (4 (λ + h))` and `x = (λ + h) v` that is `x + 2 √(j x) = o`, so
+///
+/// ```text
+/// √x = √(j + o) − √j = o / (√(j + o) + √j),    the play moves by a x,    a = h / (h + λ).
+/// ```
+///
+/// x rises with o, by less than one for one: a play stays behind its input at any sample period, and plays keep their order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Drag<T> {
+    /// a
+    pub(super) slide: T,
+    /// √j \[√u\]; without it x = o.
+    root: T,
+}
+
+impl<T: Real> Drag<T> {
+    /// λ = `seconds` and J = `volt_seconds` at the sample period `h` \[s\].
+    pub(super) fn new(seconds: f64, volt_seconds: f64, h: f64) -> Result<Self, Error> {
+        const J: &str = "rate-dependence.volt_seconds";
+        let lambda = within("rate-dependence.seconds", seconds, seconds >= 0.0, "zero or positive")?;
+        let impulse = within(J, volt_seconds, volt_seconds >= 0.0, "zero or positive")?;
+        let root = coefficient(J, 0.5 * libm::sqrt(impulse / (h + lambda)))?;
+        Ok(Self { slide: T::from_f64(h / (h + lambda)), root })
+    }
+
+    /// None: what is beyond the threshold is followed at once.
+    pub(super) fn none() -> Self {
+        Self { slide: T::ONE, root: T::ZERO }
+    }
+
+    /// Whether a play moves in proportion to its overdrive.
+    pub(super) fn is_linear(&self) -> bool {
+        self.root == T::ZERO
+    }
+
+    /// How far a sample moves a play whose input is `beyond` its threshold \[u, signed\]; J = 0.
+    #[inline]
+    pub(super) fn linear(&self, beyond: T) -> T {
+        self.slide * beyond
+    }
+
+    /// The same for J > 0, with its derivative by `beyond`: `a` times x, and times `x' = 1 − √j/√(j + o) = √x/√(j + o)`.
+    #[inline]
+    pub(super) fn rooted(&self, beyond: T) -> (T, T) {
+        // Most plays rest; a root is dear.
+        if beyond == T::ZERO {
+            return (T::ZERO, T::ZERO);
+        }
+        let root = (self.root * self.root + beyond.abs()).sqrt();
+        let share = beyond / (root + self.root);
+        (self.slide * share * share.abs(), self.slide * share.abs() / root)
+    }
+
+    /// How far one play alone is overdriven when `push` \[y\] is shared between the input, `gain` \[y/u\], and the play, `weight` \[y/u\]:
+    /// the o with `gain o + weight a x = push`; for J > 0, `gain` > 0 and `gain + weight a` > 0.
+    ///
+    /// In `t = √x` it is `(gain + weight a) t² + 2 gain √j t = push`.
+    pub(super) fn alone(&self, gain: T, weight: T, push: T) -> T {
+        let linear = gain * self.root;
+        let t = push / (linear + (linear * linear + (gain + weight * self.slide) * push).sqrt());
+        t * (t + self.root + self.root)
+    }
+}
