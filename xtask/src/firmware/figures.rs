@@ -24,8 +24,9 @@ its outputs are the host's in every bit, in `f32` and in `f64`.
 - **stack**, in bytes: what a `step` reached at most, the call included (16 to 32), and what building and resetting did.
 
 The number in a name is that of plays, cells along an edge, elements, states or samples of memory. Temperature, load and time
-move at every sample; `td_em_10` computes a matrix exponential whenever the temperature does, `td_em_10_steady` has it constant. `chain` is
-delay, lag, 10 plays, temperature, 4 creep elements, a resonance, drift and a tone, `compensator` its inverse with 129 taps.
+move at every sample. `pi_10_viscous` drags in proportion to the rate, `pi_10_root_viscous` with its root; `td_em_10` computes a
+matrix exponential whenever the temperature moves, `td_em_10_steady` has it constant. `chain` is delay, lag, 10 plays, temperature,
+4 creep elements, a resonance, drift and a tone, `compensator` its inverse with 129 taps.
 
 No function of any model can reach a panic, at opt-level 3 and s: they link with a panic handler that does not.
 ";

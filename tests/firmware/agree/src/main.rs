@@ -148,13 +148,13 @@ fn same<T: Precision>(a: &[T], b: &[T]) -> bool {
 
 /// A line that goes out at once: every write to the host stops the machine.
 struct Line {
-    text: [u8; 32 + 17 * SAMPLES],
+    text: [u8; 64 + 17 * SAMPLES],
     len: usize,
 }
 
 impl Default for Line {
     fn default() -> Self {
-        Self { text: [0; 32 + 17 * SAMPLES], len: 0 }
+        Self { text: [0; 64 + 17 * SAMPLES], len: 0 }
     }
 }
 

@@ -81,7 +81,7 @@ impl<T: Real, const N: usize> ViscousPiInverse<T, N> {
         // The plays leave their bands in order, all on the side on which the first one does.
         let up = self.plays(s).next().is_some_and(|(p, ..)| u > p);
         for (p, r, w) in self.plays(s) {
-            let edge = if up { p + r } else { p - r };
+            let edge = p + if up { r } else { -r };
             if if up { u <= edge } else { u >= edge } {
                 break;
             }
@@ -94,6 +94,7 @@ impl<T: Real, const N: usize> ViscousPiInverse<T, N> {
     }
 
     /// The input for J > 0, from the one that plays at rest would take.
+    #[inline(never)]
     fn search(&self, s: &ViscousPiState<T, N>, y: T, u: T, drag: &Drag<T>) -> T {
         let (gain, four, half) = (self.forward.gain, T::from_f64(4.0), T::from_f64(0.5));
         let Some((p, r, w)) = self.plays(s).next() else { return u };

@@ -113,7 +113,7 @@ fn dead<T: Real>(x: T, r: T) -> T {
 }
 
 impl<T: Real, const N: usize> ViscousPi<T, N> {
-    #[inline]
+    #[inline(always)]
     fn advance(&self, s: &mut ViscousPiState<T, N>, u: T, drag: &Drag<T>) -> T {
         if drag.is_linear() {
             self.pushed(s, u, |beyond| drag.linear(beyond))
@@ -123,7 +123,8 @@ impl<T: Real, const N: usize> ViscousPi<T, N> {
     }
 
     /// The output at input `u`, with which a play moves by `moves` of what is beyond its threshold.
-    #[inline]
+    // Where nobody asks for the output, it need not be computed.
+    #[inline(always)]
     fn pushed(&self, s: &mut ViscousPiState<T, N>, u: T, moves: impl Fn(T) -> T) -> T {
         let u = if u.is_finite() { u } else { s.u };
         s.u = u;
