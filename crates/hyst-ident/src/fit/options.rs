@@ -43,6 +43,9 @@ impl FromStr for Optimizer {
     }
 }
 
+/// Kinds whose fit is one convex problem, unless a search is asked for.
+const CONVEX: [Kind; 3] = [Kind::Pi, Kind::Preisach, Kind::Dpm];
+
 /// Bounds of one searched variable, instead of those that the record suggests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VariableBounds {
@@ -87,8 +90,13 @@ impl FitOptions {
     /// Whether a model of this kind can be fitted with these options.
     ///
     /// # Errors
-    /// [`FitError::Thresholds`] if there are no thresholds to choose.
+    /// [`FitError::Thresholds`] if there are no thresholds to choose, [`FitError::UnknownBounds`] if there are bounds where nothing is
+    /// searched.
     pub fn suits(&self, kind: Kind) -> Result<(), FitError> {
+        if let (true, Some(bound)) = (self.convex() && CONVEX.contains(&kind), self.bounds.first()) {
+            let (name, names) = (bound.name.clone(), "nothing".into());
+            return Err(FitError::UnknownBounds { name, kind: kind.name(), names });
+        }
         let advice = match self.thresholds {
             None => return Ok(()),
             Some(1..=PLAYS) if kind == Kind::Pi && self.convex() => return Ok(()),
