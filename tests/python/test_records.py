@@ -127,6 +127,73 @@ def test_wrong_fits():
         hyst.fit(3)
 
 
+def bouc_wen(n=3000):
+    """Time, drive and output of a Bouc-Wen actuator with n = 1, by its differential equation in small steps."""
+    t = np.arange(n) / 1000.0
+    u = 50.0 + 50.0 * np.sin(31.0 * t) * np.cos(2.0 * t)
+    k0, alpha, beta, gamma = 0.12, -0.05, 0.02, -0.008
+    h, y = 0.0, np.empty(n)
+    before = 0.0
+    for k in range(n):
+        for step in np.full(50, (u[k] - before) / 50.0):
+            h += alpha * step - beta * abs(step) * h - gamma * step * abs(h)
+        before = u[k]
+        y[k] = k0 * u[k] + h
+    return t, u, y
+
+
+def test_a_search_as_the_command_line_has_it():
+    t, u, y = bouc_wen()
+    arrays = dict(timepts=t, inputs=u, outputs=y, model="bouc-wen")
+    searched = dict(optimizer="pso", seed=3, trials=2, evaluations=800, population=20, form="zhu")
+    found = hyst.fit(**arrays, **searched)
+    stage = found.to_dict()["stages"][0]
+    assert found.to_dict()["seed"] == 3 and stage["n"] == 1.0
+    for name, truth in dict(k0=0.12, alpha=-0.05, beta=0.02, gamma=-0.008).items():
+        assert stage[name] == pytest.approx(truth, rel=0.02, abs=2e-4), name
+    assert hyst.fit(**arrays, **searched).to_dict() == found.to_dict()
+    # Bounds that leave the truth out are kept to.
+    within = hyst.fit(**arrays, seed=3, bounds={"gamma/beta": (0.1, 0.5)}).to_dict()["stages"][0]
+    ratio = abs(within["gamma"] / within["beta"])
+    assert 0.1 - 1e-9 <= ratio <= 0.5 + 1e-9
+    # The exponent is another number to search.
+    free = hyst.fit(**arrays, form="xie", evaluations=2000).to_dict()["stages"][0]
+    assert free["n"] == pytest.approx(1.0, abs=0.1)
+    assert "n" in free["std_errors"] and "n" not in stage["std_errors"]
+
+
+def test_thresholds_and_elements_are_chosen():
+    r = record()
+    few = hyst.fit(r, thresholds=4).to_dict()["stages"][0]
+    assert 1 <= len(few["thresholds"]) <= 4 and few["std_errors"]
+    bank = hyst.fit(r, model="maxwell-slip", elements=3, form="backlash").to_dict()["stages"][0]
+    assert bank["reading"] == "backlash" and 1 <= len(bank["widths"]) <= 3
+
+
+def test_searches_that_cannot_be_run():
+    r = record(1000)
+
+    def refused(error, message, **options):
+        with pytest.raises(error, match=message):
+            hyst.fit(r, model=options.pop("model", "bouc-wen"), **options)
+
+    refused(ValueError, "seed=", optimizer="de")
+    refused(ValueError, "annealing", optimizer="annealing", seed=1)
+    refused(ValueError, "no form", form="square")
+    refused(ValueError, "band-limited", model="bouc-wen-oscillator", between_samples="cubic")
+    refused(TypeError, "bounds", bounds=[("gamma/beta", 0.0, 1.0)])
+    refused(hyst.FitError, "gamma/beta", bounds={"gamma/beta": (1.0, -1.0)})
+    refused(hyst.FitError, "it searches", bounds={"alpha": (0.0, 1.0)})
+    refused(hyst.FitError, "finite output", bounds={"gamma/beta": (-3.0, -2.0)})
+    refused(hyst.FitError, "population = 0", population=0)
+    refused(hyst.FitError, "0 evaluations", evaluations=0)
+    refused(hyst.FitError, "trials = 0", trials=0)
+    refused(hyst.FitError, "nothing to search", model="preisach", optimizer="de", seed=1)
+    refused(hyst.FitError, "thresholds", thresholds=3)
+    refused(hyst.RecordError, "temperature_degc", model="td-pi")
+    refused(OverflowError, "negative", trials=-1)
+
+
 def test_files(fitted, tmp_path):
     path = tmp_path / "model.json"
     fitted.save(path)

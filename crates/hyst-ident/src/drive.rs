@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::fmt;
+use std::str::FromStr;
 
 use hyst_core::Stage;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,20 @@ pub enum BetweenSamples {
     /// As the one signal through the samples without frequencies above half the rate: a drive from a filter, or one that was made of
     /// sines. A model runs through eight values of it a sample; it has to know what comes, so whole records only.
     BandLimited,
+}
+
+/// No way of going on between samples has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is no way to go on between samples; there are linear and band-limited")]
+pub struct UnknownBetweenSamples(String);
+
+impl FromStr for BetweenSamples {
+    type Err = UnknownBetweenSamples;
+
+    fn from_str(name: &str) -> Result<Self, UnknownBetweenSamples> {
+        let all = [Self::Linear, Self::BandLimited];
+        all.into_iter().find(|way| way.name() == name).ok_or_else(|| UnknownBetweenSamples(name.into()))
+    }
 }
 
 impl BetweenSamples {

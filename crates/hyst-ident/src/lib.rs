@@ -32,5 +32,5 @@ mod samples;
 mod settle;
 pub mod simulate;
 
-pub use drive::BetweenSamples;
+pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use samples::Samples;

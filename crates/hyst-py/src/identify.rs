@@ -1,9 +1,13 @@
 //! Fits and diagnoses (`hyst_ident::{fit, diagnose}`).
 
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::str::FromStr;
 use std::sync::Mutex;
 
 use hyst_ident::diagnose::{self as diagnosis, DiagnoseOptions};
-use hyst_ident::fit::{self as fitting, FitOptions};
+use hyst_ident::fit::{self as fitting, FitOptions, Optimizer, VariableBounds};
+use hyst_ident::identify::Form;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -13,14 +17,14 @@ use crate::errors;
 use crate::model::{Model, parse, zero_of};
 use crate::record::{any_record, of_arrays};
 
-/// Fits a model to a record or to arrays: convex, start-up rows left out.
+/// Fits a model to a record or to arrays; start-up rows are left out.
 ///
 /// Parameters
 /// ----------
 /// record : Record, path, or list of them
 ///     The training record; or give ``timepts``, ``inputs`` and ``outputs``.
 /// model : str
-///     Kind of the hysteresis: ``pi``, ``preisach``, or ``dpm`` from records at several rates.
+///     Kind of the hysteresis, as ``bouc-wen``; ``dpm`` takes records at several rates.
 /// timepts, inputs, outputs : ndarray of float64, shape (n,)
 ///     Columns in place of a record: time [s], input [V], output in the unit of ``output_column``.
 /// temperature : ndarray of float64, shape (n,), optional
@@ -29,17 +33,38 @@ use crate::record::{any_record, of_arrays};
 ///     As in ``Record``.
 /// zero : {"none", "per-record"}
 ///     One sensor zero for all files, or one for each.
-/// seed : int
-///     Recorded with the model.
+/// optimizer : str
+///     ``auto`` and ``convex`` (weights alone are solved for at once), or a search: ``de``, ``pso``, ``gwo`` and the others that
+///     ``hystctl fit --help`` lists.
+/// seed : int, optional
+///     Of what is drawn at random, recorded with the model. A search that is asked for by its name needs one; 0 otherwise.
+/// trials : int
+///     How often a search is repeated with other draws; the best is taken.
+/// evaluations : int, optional
+///     Most evaluations of a trial; 1500 for each searched variable if not given.
+/// population : int, optional
+///     Members, particles or wolves; the search's own number if not given.
+/// bounds : dict of str to (float, float), optional
+///     Lowest and highest value of searched variables, instead of those that the record suggests.
+/// form : {"zhu", "xie", "backlash", "elasto-slip"}, optional
+///     Form of ``bouc-wen`` (``zhu``: n = 1; ``xie``: n is searched), or of an element of ``maxwell-slip``.
+/// between_samples : {"linear", "band-limited"}, optional
+///     How the drive of ``bouc-wen-oscillator`` goes on between samples; both are tried if not given.
+/// elements : int, optional
+///     Plays of ``gpi`` and ``td-pi``, of ``pi`` when it is searched; elements of ``td-em``; most elements of ``maxwell-slip``.
+/// thresholds : int, optional
+///     Most thresholds of ``pi``, chosen where the record calls for them.
 ///
 /// Raises
 /// ------
 /// FitError
-///     If the record cannot show a hysteresis: too short, constant, falling.
+///     If the record cannot show a hysteresis (too short, constant, falling), or if the search cannot be run or finds nothing.
 /// RecordError
-///     If the record cannot be read or made.
+///     If the record cannot be read or made, or lacks what the model needs.
+/// ValueError
+///     If there is no such model, optimizer or form, or a search has no seed.
 #[pyfunction]
-#[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", seed=0))]
+#[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", optimizer="auto", seed=None, trials=1, evaluations=None, population=None, bounds=None, form=None, between_samples=None, elements=None, thresholds=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -51,9 +76,36 @@ pub(crate) fn fit(
     temperature: Option<&Bound<'_, PyAny>>,
     output_column: &str,
     zero: &str,
-    seed: u64,
+    optimizer: &str,
+    seed: Option<u64>,
+    trials: usize,
+    evaluations: Option<u64>,
+    population: Option<usize>,
+    bounds: Option<BTreeMap<String, (f64, f64)>>,
+    form: Option<&str>,
+    between_samples: Option<&str>,
+    elements: Option<usize>,
+    thresholds: Option<usize>,
 ) -> PyResult<Model> {
-    let kind: Kind = model.parse().map_err(|e: hyst_core::UnknownKind| PyValueError::new_err(e.to_string()))?;
+    let kind: Kind = named(model)?;
+    let optimizer: Optimizer = named(optimizer)?;
+    if let (Optimizer::Search(name), None) = (&optimizer, seed) {
+        let message = format!("optimizer={name:?} draws at random: give seed=, so that it can be repeated");
+        return Err(PyValueError::new_err(message));
+    }
+    let form: Form = form.map_or_else(|| Ok(Form::default()), named)?;
+    let of_variable = |(name, (lower, upper))| VariableBounds { name, lower, upper };
+    let options = FitOptions {
+        seed: seed.unwrap_or(0),
+        zero_per_record: zero_of(zero)? == Zero::PerRecord,
+        optimizer,
+        trials,
+        evaluations,
+        population,
+        bounds: bounds.into_iter().flatten().map(of_variable).collect(),
+        form: Form { elements, between_samples: between_samples.map(named).transpose()?, ..form },
+        thresholds,
+    };
     let record = match (record, timepts, inputs, outputs) {
         (Some(record), None, None, None) => any_record(py, record, "both")?,
         (None, Some(t), Some(u), Some(y)) => {
@@ -61,8 +113,25 @@ pub(crate) fn fit(
         }
         _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
     };
-    let options = FitOptions { seed, zero_per_record: zero_of(zero)? == Zero::PerRecord, ..FitOptions::default() };
-    py.detach(|| fitting::fit(&record, kind, &options)).map(Model).map_err(errors::fit)
+    // A search can take minutes: Ctrl-C ends it.
+    let mut interrupted = None;
+    let mut watch = |_| match Python::attach(|py| py.check_signals()) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(error) => {
+            interrupted = Some(error);
+            ControlFlow::Break(())
+        }
+    };
+    let found = py.detach(|| fitting::fit_with(&record, kind, &options, &mut watch));
+    match interrupted {
+        Some(error) => Err(error),
+        None => found.map(|fit| Model(fit.model)).map_err(errors::fit),
+    }
+}
+
+/// What has this name.
+fn named<T: FromStr<Err: std::fmt::Display>>(name: &str) -> PyResult<T> {
+    name.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
 }
 
 /// What a diagnosis found.

@@ -1,8 +1,7 @@
 //! Arguments of the search behind a fit.
 
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use hyst_core::SlipReading;
 use hyst_ident::BetweenSamples;
 use hyst_ident::fit::{FitOptions, Optimizer, VariableBounds};
 use hyst_ident::identify::Form;
@@ -31,12 +30,12 @@ pub(crate) struct SearchArgs {
     #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Vec<VariableBounds>,
     /// Form of bouc-wen (zhu: n = 1; xie: n is searched) or of an element of maxwell-slip (backlash, elasto-slip)
-    #[arg(long, value_enum)]
-    pub(crate) form: Option<FormArg>,
+    #[arg(long, value_parser = forms())]
+    pub(crate) form: Option<Form>,
     /// How the drive of bouc-wen-oscillator goes on between samples: on straight lines, or as the band-limited signal through
     /// them; both are tried if not given, and the one that leaves less of the records is taken and kept in the model
-    #[arg(long, value_enum)]
-    pub(crate) between_samples: Option<BetweenArg>,
+    #[arg(long, value_parser = between_samples())]
+    pub(crate) between_samples: Option<BetweenSamples>,
     /// Plays of gpi and td-pi, of pi when it is searched; elements of td-em; most elements of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
@@ -44,28 +43,6 @@ pub(crate) struct SearchArgs {
     /// more predict parts of the record clearly better
     #[arg(long, value_name = "COUNT")]
     pub(crate) thresholds: Option<usize>,
-}
-
-/// Forms of models that have more than one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FormArg {
-    /// Bouc-Wen with exponent 1
-    Zhu,
-    /// Bouc-Wen with a searched exponent
-    Xie,
-    /// Maxwell-slip elements as backlash
-    Backlash,
-    /// Maxwell-slip elements as springs that slip
-    ElastoSlip,
-}
-
-/// How a drive goes on between samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BetweenArg {
-    /// On straight lines
-    Linear,
-    /// As the signal without frequencies above half the sample rate
-    BandLimited,
 }
 
 impl SearchArgs {
@@ -80,16 +57,6 @@ impl SearchArgs {
             }
             (_, None) => 1,
         };
-        let mut form = Form { elements: self.elements, ..Form::default() };
-        form.between_samples = self.between_samples.map(|way| match way {
-            BetweenArg::Linear => BetweenSamples::Linear,
-            BetweenArg::BandLimited => BetweenSamples::BandLimited,
-        });
-        match self.form {
-            Some(FormArg::Xie) => form.bouc_wen_n = None,
-            Some(FormArg::ElastoSlip) => form.slip = SlipReading::ElastoSlip,
-            Some(FormArg::Zhu | FormArg::Backlash) | None => {}
-        }
         Ok(FitOptions {
             seed,
             zero_per_record,
@@ -98,7 +65,11 @@ impl SearchArgs {
             evaluations: self.evaluations,
             population: self.population,
             bounds: self.bounds.clone(),
-            form,
+            form: Form {
+                elements: self.elements,
+                between_samples: self.between_samples,
+                ..self.form.unwrap_or_default()
+            },
             thresholds: self.thresholds,
         })
     }
@@ -106,6 +77,15 @@ impl SearchArgs {
 
 fn optimizers() -> impl TypedValueParser<Value = Optimizer> {
     PossibleValuesParser::new(Optimizer::names()).try_map(|name| name.parse::<Optimizer>())
+}
+
+fn forms() -> impl TypedValueParser<Value = Form> {
+    PossibleValuesParser::new(Form::NAMES).try_map(|name| name.parse::<Form>())
+}
+
+fn between_samples() -> impl TypedValueParser<Value = BetweenSamples> {
+    let names = [BetweenSamples::Linear, BetweenSamples::BandLimited].map(BetweenSamples::name);
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<BetweenSamples>())
 }
 
 fn bounds(text: &str) -> Result<VariableBounds, String> {

@@ -28,7 +28,7 @@ mod tests;
 mod uncertainty;
 
 pub use convex::{TableEstimate, TableOf};
-pub use families::Form;
+pub use families::{Form, UnknownForm};
 pub(crate) use families::{family_of, largest_input};
 pub(crate) use family::{Family, Linear};
 pub(crate) use search::{Identification, Located, SearchOptions};

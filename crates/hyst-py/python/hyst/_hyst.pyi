@@ -1,5 +1,5 @@
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -752,7 +752,16 @@ def fit(
     temperature: _Signal | None = None,
     output_column: str = "displacement_um",
     zero: _Zero = "none",
-    seed: int = 0,
+    optimizer: str = "auto",
+    seed: int | None = None,
+    trials: int = 1,
+    evaluations: int | None = None,
+    population: int | None = None,
+    bounds: Mapping[str, _Range] | None = None,
+    form: Literal["zhu", "xie", "backlash", "elasto-slip"] | None = None,
+    between_samples: Literal["linear", "band-limited"] | None = None,
+    elements: int | None = None,
+    thresholds: int | None = None,
 ) -> Model: ...
 def diagnose(
     record: _AnyRecord,

@@ -11,6 +11,8 @@ mod oscillator;
 mod pi;
 mod td_pi;
 
+use std::str::FromStr;
+
 use hyst_core::{Kind, SlipReading};
 
 use super::Family;
@@ -32,6 +34,29 @@ pub struct Form {
 impl Default for Form {
     fn default() -> Self {
         Self { bouc_wen_n: Some(1.0), elements: None, slip: SlipReading::Backlash, between_samples: None }
+    }
+}
+
+impl Form {
+    /// Names of forms: those of `bouc-wen` after the first authors of their papers, those of an element of `maxwell-slip`.
+    pub const NAMES: [&str; 4] = ["zhu", "xie", "backlash", "elasto-slip"];
+}
+
+/// No form has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is no form; there are {names}", names = Form::NAMES.join(", "))]
+pub struct UnknownForm(String);
+
+impl FromStr for Form {
+    type Err = UnknownForm;
+
+    fn from_str(name: &str) -> Result<Self, UnknownForm> {
+        match name {
+            "zhu" | "backlash" => Ok(Self::default()),
+            "xie" => Ok(Self { bouc_wen_n: None, ..Self::default() }),
+            "elasto-slip" => Ok(Self { slip: SlipReading::ElastoSlip, ..Self::default() }),
+            _ => Err(UnknownForm(name.into())),
+        }
     }
 }
 
