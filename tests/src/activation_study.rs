@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-use hyst_hw::{Actuator, Plant, PlantConfig, Sensor, Viscosity};
+use hyst_hw::{Actuator, Bed, Plant, PlantConfig, Sensor, Viscosity};
 use hyst_ident::compare::{Compared, compare};
 use hyst_ident::fit::{FitOptions, Optimizer};
 use hyst_ident::model::Kind;
@@ -38,26 +38,17 @@ pub struct Case {
 
 /// 0.145 µm/V, as the paper's; its loops widen a little with frequency.
 fn actuator(seed: u64) -> PlantConfig {
-    PlantConfig {
-        seed,
-        actuator: Actuator {
-            min_v: 0.0,
-            max_v: 60.0,
-            rest_v: 0.0,
-            gain_um_per_v: 0.145,
-            loop_share: 0.1,
-            relays: 15_000,
-        },
-        sensor: Sensor { range_um: [-2.0, 12.0], bits: 16, noise_um: 0.001, offset_um: 0.0, max_rate_hz: 20_000.0 },
-        viscosity: Some(Viscosity { volt_seconds: 1e-3 }),
-        delay: None,
-        lag: None,
-        temperature: None,
-        creep: None,
-        modes: Vec::new(),
-        drift: None,
-        interference: None,
-    }
+    let actuator = Actuator {
+        min_v: 0.0,
+        max_v: 60.0,
+        rest_v: 0.0,
+        gain_um_per_v: 0.145,
+        loop_share: 0.1,
+        bed: Bed::Relays,
+        relays: 15_000,
+    };
+    let sensor = Sensor { range_um: [-2.0, 12.0], bits: 16, noise_um: 0.001, offset_um: 0.0, max_rate_hz: 20_000.0 };
+    PlantConfig { viscosity: Some(Viscosity { volt_seconds: 1e-3 }), ..PlantConfig::bare(seed, actuator, sensor) }
 }
 
 /// Runs the 24 cases on the actuator of a seed: each model is fitted to each case alone, by the paper's particle swarm over what it is not

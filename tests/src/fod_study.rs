@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use hyst_hw::{Actuator, Mode, Plant, PlantConfig, Sensor};
+use hyst_hw::{Actuator, Bed, Mode, Plant, PlantConfig, Sensor};
 use hyst_ident::compensate::{CompensateOptions, compensate};
 use hyst_ident::everett::{FodOptions, FodReport, Surface, fit_fod};
 use hyst_ident::excite::{Drive, Forc, Limits, Peak, Shape};
@@ -62,31 +62,20 @@ pub struct FodStudy {
 
 /// The paper's kind of actuator: 100 to 900 V, 4 kN, in a structure whose first mode is at 20 Hz.
 fn actuator(seed: u64) -> PlantConfig {
+    let actuator = Actuator {
+        min_v: 100.0,
+        max_v: 900.0,
+        rest_v: 100.0,
+        gain_um_per_v: 5.0,
+        loop_share: 0.13,
+        bed: Bed::Relays,
+        relays: 15_000,
+    };
+    let sensor =
+        Sensor { range_um: [-4000.0, 10_000.0], bits: 16, noise_um: 1.0, offset_um: 20.0, max_rate_hz: 20_000.0 };
     PlantConfig {
-        seed,
-        actuator: Actuator {
-            min_v: 100.0,
-            max_v: 900.0,
-            rest_v: 100.0,
-            gain_um_per_v: 5.0,
-            loop_share: 0.13,
-            relays: 15_000,
-        },
-        sensor: Sensor {
-            range_um: [-4000.0, 10_000.0],
-            bits: 16,
-            noise_um: 1.0,
-            offset_um: 20.0,
-            max_rate_hz: 20_000.0,
-        },
         modes: vec![Mode { hz: 20.0, damping: 0.06, gain: 0.8 }, Mode { hz: 71.0, damping: 0.03, gain: 0.1 }],
-        viscosity: None,
-        delay: None,
-        lag: None,
-        temperature: None,
-        creep: None,
-        drift: None,
-        interference: None,
+        ..PlantConfig::bare(seed, actuator, sensor)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
 
 pub mod activation_study;
+pub mod calibration;
 pub mod dpm_study;
 pub mod fod_study;
 pub mod force_study;
@@ -299,6 +300,7 @@ pub fn measured(plant: &mut Plant, segments: &[&[f64]], rate_hz: f64, output: Ou
         input: Some(samples().map(|s| s.drive_v).collect()),
         output: Some((output, samples().map(|s| s.output).collect())),
         temperature: samples().map(|s| s.temperature_degc).collect(),
+        load: samples().map(|s| s.load_n).collect(),
         ..Columns::default()
     };
     Record::from_samples(columns).expect("a recording is a sound record")

@@ -108,6 +108,8 @@ fn a_header_explains_its_constants() {
     let weights = "weights[i] play[i]";
     let header = says("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
     assert_eq!(header.matches("What the sensor shows at rest").count(), 1, "{header}");
+    lab.write("pi.json", paper(Kind::Pi));
+    says("pi.json", &["sqrt(volt_seconds v) = o", "hyst_rate_dependence_volt_seconds = 0.001; /* V s */"]);
     lab.write("preisach.json", paper(Kind::Preisach));
     says("preisach.json", &["density[a (a + 1) / 2 + b]", "once[a]", "voltage_v -> preisach -> + hyst_zero"]);
     // Newton is N beside seconds, where n would be nano: of a file whose output has the ending of its column.

@@ -261,4 +261,47 @@ fn the_plant_of_the_help_can_be_run() {
     lab.ok("excite sine --rate 500 --high 120 --cycles 1 -o u.csv");
     lab.ok("run --daq sim:plant.toml --drive u.csv --record out.csv");
     assert!(lab.read("out.csv").starts_with("segment,time_s,voltage_v,displacement_um,temperature_degc\n"));
+    // The upper stop of the help, with some jump, drift, interference and noise on it.
+    let highest = column(&lab.read("out.csv"), "displacement_um").into_iter().fold(0.0, f64::max);
+    assert!((23.5..24.5).contains(&highest), "{highest}");
+}
+
+#[test]
+fn a_load_that_is_recorded_is_a_column_and_in_the_log() {
+    let lab = Lab::new();
+    let load = "[load]\nnewtons = 3.0\num_per_n = 0.5\nperiod_s = 1.0\n";
+    lab.write("plant.toml", format!("{}{load}", hyst_tests::PLANT));
+    lab.ok("excite sine --rate 500 --high 50 --cycles 2 -o u.csv");
+    lab.ok("run --daq sim:plant.toml --drive u.csv --record out.csv --log run.mcap");
+    let record = lab.read("out.csv");
+    assert!(record.starts_with("segment,time_s,voltage_v,displacement_um,load_n\n"), "{record}");
+    let loads = column(&record, "load_n");
+    let (low, high) = loads.iter().fold((0.0_f64, 0.0_f64), |(low, high), f| (low.min(*f), high.max(*f)));
+    assert!((-3.0..-2.9).contains(&low) && (2.9..=3.0).contains(&high), "{low} {high}");
+    let samples = log(&lab, "run.mcap");
+    let logged: Vec<f64> =
+        samples.iter().filter(|s| s["phase"] == "record").map(|s| s["load_n"].as_f64().unwrap()).collect();
+    assert_eq!(logged, loads);
+
+    lab.write("plant.toml", format!("{}{load}recorded = false\n", hyst_tests::PLANT));
+    lab.ok("run --daq sim:plant.toml --drive u.csv --record hidden.csv");
+    let hidden = lab.read("hidden.csv");
+    assert!(hidden.starts_with("segment,time_s,voltage_v,displacement_um\n"), "{hidden}");
+    assert_eq!(column(&hidden, "displacement_um"), column(&record, "displacement_um"));
+}
+
+#[test]
+fn a_section_that_makes_no_sense_is_named() {
+    let lab = Lab::new();
+    lab.ok("excite sine --rate 500 --high 50 --cycles 1 -o u.csv");
+    for (section, field) in [
+        ("[load]\nnewtons = 3\num_per_n = 0\nperiod_s = 1\n", "load.um_per_n"),
+        ("[saturation]\nknee_um = 1\n", "saturation.high_um"),
+        ("[asymmetry]\nbend = 2\n", "asymmetry.bend"),
+        ("[[disturbance]]\nkind = \"slip\"\num = 1\nat_v = 500\n", "disturbance[0].at_v"),
+    ] {
+        lab.write("odd.toml", format!("{}{section}", hyst_tests::PLANT));
+        let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+        assert!(message.contains("odd.toml") && message.contains(field) && message.contains("give"), "{message}");
+    }
 }

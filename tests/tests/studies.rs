@@ -1,5 +1,6 @@
 //! The comparisons of the examples, on actuators of other seeds.
 
+use hyst_ident::model::Kind;
 use hyst_tests::{activation_study, dpm_study, fod_study, force_study};
 
 #[test]
@@ -56,12 +57,15 @@ fn a_force_is_seen_through_each_of_the_three_free_models() {
     assert!(rmse.is_sorted(), "{rmse:?}");
     for m in &study.models {
         let (kappa, chi) = m.affine;
-        assert!((kappa - 1.0).abs() < 0.15 && chi.abs() < 0.1 * study.span, "{m:?}");
-        assert!((m.stiffness / force_study::STIFFNESS - 1.0).abs() < 0.1, "{m:?}");
-        // To guess no force at all would miss by the whole of it.
         let (rms, most) = m.force;
-        assert!(rms <= most && most < 0.5 * study.force, "{m:?}");
+        // Two of them are linear: what they miss of the loops they take for force. To guess none would miss by the whole of it.
+        let (room, share) = if m.model.kind == Kind::BoucWen { (0.1, 0.5) } else { (0.4, 1.0) };
+        let what = format!("{}: {:?} {} {:?} of {}", m.model.kind, m.affine, m.stiffness, m.force, study.force);
+        assert!((kappa - 1.0).abs() < room && chi.abs() < room * study.span, "{what}");
+        assert!((m.stiffness / force_study::STIFFNESS - 1.0).abs() < room, "{what}");
+        assert!(rms <= most && most < share * study.force, "{what}");
     }
+    assert_eq!(study.models[0].model.kind, Kind::BoucWen, "loops are best seen by a model that has them");
     let again = force_study::run(12, 9.0, Some(300));
     let numbers = |s: &force_study::ForceStudy| {
         s.models.iter().map(|m| (m.model.kind, m.affine, m.stiffness, m.force)).collect::<Vec<_>>()

@@ -13,7 +13,9 @@ mod log;
 mod output;
 mod progress;
 mod recording;
+mod report;
 mod text;
+mod tracking;
 
 use std::process::ExitCode;
 

@@ -3,7 +3,8 @@
 //!
 //! - [`Daq`]: start a sample clock, exchange drive for measurements, let the device rest, stop.
 //! - [`record`]: plays drive segments on any [`Daq`] and returns what was measured.
-//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file).
+//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file), with any of eleven [`EFFECTS`] and with
+//!   [`Disturbance`]s that are none of them.
 //!
 //! ```
 //! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};
@@ -24,11 +25,11 @@ mod runner;
 
 pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
 pub use plant::config::{
-    Actuator, Creep, Delay, Drift, Interference, Lag, Mode, PlantConfig, Sensor, Temperature, TemperatureShape,
-    Viscosity,
+    Actuator, Asymmetry, Bed, Creep, Delay, Disturbance, Drift, Interference, Lag, Load, LoadShape, Mode, PlantConfig,
+    Saturation, Sensor, Temperature, TemperatureShape, Viscosity,
 };
 pub use plant::error::{ConfigError, PlantError};
-pub use plant::{EFFECTS, Plant};
+pub use plant::{DISTURBANCES, EFFECTS, Plant};
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,
 };

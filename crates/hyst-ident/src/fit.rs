@@ -7,14 +7,14 @@ mod searched;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
-use hyst_core::{Grid, PiParams};
+use hyst_core::{Grid, PiParams, ViscousPiParams};
 
 use crate::BetweenSamples;
-use crate::base::{Basis, PiBasis, PreisachBasis};
+use crate::base::{Basis, DragParams, FixedBasis, PiBasis, PreisachBasis};
 use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
 use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError, ZERO};
-use crate::nested::{Fitted, Problem};
+use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -253,6 +253,8 @@ fn sign_matters(kind: Kind) -> bool {
 pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
+    /// An operator of another kind, kept as it is.
+    Fixed(FixedBasis),
 }
 
 impl BasisOf {
@@ -260,6 +262,7 @@ impl BasisOf {
         match self {
             Self::Pi(b) => b,
             Self::Preisach(b) => b,
+            Self::Fixed(b) => b,
         }
     }
 
@@ -276,6 +279,7 @@ impl BasisOf {
                 Base::Pi(PiParams { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() })
             }
             Self::Preisach(b) => Base::Preisach(b.spec(&clean)),
+            Self::Fixed(b) => b.base.clone(),
         }
     }
 }
@@ -289,12 +293,10 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitErr
 }
 
 /// The base that a model has, for a record that it was fitted to: its own thresholds or grid.
-pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, FitError> {
-    if let Some(what) = model.effects.beyond_diagnosis() {
-        return Err(FitError::Unsupported { what, done: "kept by a diagnosis" });
-    }
+pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst_core::Error> {
     Ok(match &model.base {
-        Base::Pi(PiParams { thresholds, .. }) => {
+        Base::Pi(PiParams { thresholds, .. })
+        | Base::ViscousPi(ViscousPiParams { pi: PiParams { thresholds, .. }, .. }) => {
             BasisOf::Pi(PiBasis { thresholds: thresholds.clone(), ..PiBasis::for_samples(samples) })
         }
         Base::Preisach(spec) => {
@@ -305,10 +307,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, FitE
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-        Base::ViscousPi(_) => {
-            return Err(FitError::Unsupported { what: "rate-dependence", done: "kept by a diagnosis" });
-        }
-        other => return Err(FitError::Unsupported { what: other.kind().name(), done: "extended" }),
+        other => BasisOf::Fixed(FixedBasis::new(other, samples)?),
     })
 }
 
@@ -388,7 +387,7 @@ fn everywhere(
     let problem = Problem::new(samples, basis, &blocks, zero_per_file);
     let stage = |source| FitError::Stage { record: name(), source };
     let fitted =
-        problem.fit(&Effects::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
+        problem.fit(&Hypothesis::default()).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: name() })?;
     let residual = problem.residual(&fitted).map_err(stage)?;
     Ok((fitted, residual))
 }
@@ -423,8 +422,13 @@ fn with_errors(mut model: Model, estimate: &Estimate) -> Model {
 /// Puts a fit into a model.
 pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitted: &Fitted, seed: u64) -> Model {
     let zero = fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64;
-    let base = basis.operator(&fitted.weights);
-    Model { effects: fitted.effects.clone(), ..model_of(record, samples, base, zero, seed) }
+    let base = match (basis.operator(&fitted.weights), fitted.hypothesis.drag) {
+        (Base::Pi(pi), Some(DragParams { seconds, volt_seconds })) => {
+            Base::ViscousPi(ViscousPiParams { pi, seconds, volt_seconds })
+        }
+        (base, _) => base,
+    };
+    Model { effects: fitted.hypothesis.effects.clone(), ..model_of(record, samples, base, zero, seed) }
 }
 
 /// A model without effects, fitted to the settled rows of a record.

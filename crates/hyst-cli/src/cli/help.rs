@@ -19,6 +19,10 @@ Examples:
   hystctl fit slow.csv 20hz.csv 60hz.csv --model dpm -o model.json
   hystctl fit train.csv --model bouc-wen --optimizer gwo --seed 1 --trials 12 --trace t.csv --picture t.svg -o model.json";
 
+pub(super) const CLOSE_LOOP: &str = "\
+Example:
+  hystctl close-loop --daq sim:plant.toml --out loop";
+
 pub(super) const COMPARE: &str = "\
 Examples:
   hystctl compare train.csv --test test.csv
@@ -34,6 +38,7 @@ pub(super) const DIAGNOSE: &str = "\
 Examples:
   hystctl diagnose train.csv --model model.json
   hystctl diagnose train.csv --test test.csv --model model.json -o extended.json
+  hystctl diagnose train.csv --test test.csv --model model.json --report report.html
   hystctl diagnose a.csv b.csv --model model.json --zero per-record --findings findings.json";
 
 pub(super) const COMPENSATE: &str = "\
@@ -53,21 +58,26 @@ hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>
        hystctl run [OPTIONS] --daq <DEVICE> --model <MODEL> --reference <REFERENCE>";
 
 pub(super) const PLANT: &str = "\
-A simulated plant is a file like this; every section after [sensor] is an effect and may be left out:
+A simulated plant is a file like this; every section after [sensor] may be left out. All but the last are effects that a \
+diagnosis can name; a [[disturbance]] is what it cannot:
   seed = 7
   [actuator]
   max_v = 120
   gain_um_per_v = 0.2
   loop_share = 0.12        # opening of the hysteresis loop over its span
+  bed = \"relays\"           # random relays; or \"plays\": symmetric loops
   [sensor]
   range_um = [-12, 43]
   noise_um = 0.007
-  [viscosity]
-  volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
   [delay]
   seconds = 0.002
   [lag]
   seconds = 0.003
+  [asymmetry]
+  bend = 0.05              # slope at the upper end less that at the lower one
+  hook = 0.01              # slope at both ends less that in the middle
+  [viscosity]
+  volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
   [temperature]
   per_k = 0.005
   reference_degc = 22
@@ -78,15 +88,28 @@ A simulated plant is a file like this; every section after [sensor] is an effect
   strength = 0.08
   tau_min_s = 0.05
   tau_max_s = 80
+  [load]
+  newtons = 3
+  um_per_n = 0.05
+  period_s = 8
+  shape = \"steps\"          # or sine, wander
+  recorded = false         # true, or left out: the record has load_n
   [[mode]]
   hz = 100
   damping = 0.02
   gain = 0.9
+  [saturation]
+  high_um = 24             # counted from rest; or low_um, or both
+  knee_um = 0.5            # 0, or left out: a hard stop
   [drift]
   um_per_s = 0.01
   [interference]
   amplitude_um = 0.1
-  hz = 50";
+  hz = 50
+  [[disturbance]]
+  kind = \"jump\"            # um at at_s of the reading; or gain-step (share, at_s),
+  um = 0.2                 # bursts (um, seconds, every_s) of noise, wander (um, period_s)
+  at_s = 12                # of the zero, slip (um, at_v) of the mount";
 
 pub(super) const RECORDS: &str = "\
 Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one \

@@ -1,5 +1,6 @@
 //! The command line: what clap parses, and nothing else.
 
+mod close_loop;
 mod compare;
 mod excite;
 mod help;
@@ -18,6 +19,7 @@ use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 
 use crate::output::Target;
+pub(crate) use close_loop::CloseLoopArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
@@ -40,6 +42,7 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     Simulate(SimulateArgs),
     Diagnose(DiagnoseArgs),
+    CloseLoop(CloseLoopArgs),
     Compensate(CompensateArgs),
     Excite(ExciteArgs),
     Response(ResponseArgs),
@@ -200,6 +203,9 @@ pub(crate) struct DiagnoseArgs {
     /// Findings file to write (JSON); - for stdout
     #[arg(long, value_name = "JSON")]
     pub(crate) findings: Option<Target>,
+    /// Report to write: one page with the evidence in plots, to read, check and hand on (HTML); - for stdout
+    #[arg(long, value_name = "HTML")]
+    pub(crate) report: Option<Target>,
     /// Seed of the bootstrap that judges effects
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,

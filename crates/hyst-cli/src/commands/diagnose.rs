@@ -5,11 +5,13 @@ use std::path::Path;
 use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
+use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
+use crate::report::{self, Contents};
 use crate::{input, text};
 
 mod summary;
@@ -19,10 +21,10 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
     let mut read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
     read.push(&args.model);
     read.extend(args.test.as_deref());
-    let written: Vec<&Target> = args.output.iter().chain(&args.findings).collect();
+    let written: Vec<&Target> = args.output.iter().chain(&args.findings).chain(&args.report).collect();
     output::check(&read, &written)?;
-    let report = Report::new(args.json.json, &written)?;
-    let (model, _) = input::model(&args.model)?;
+    let said_as = Report::new(args.json.json, &written)?;
+    let (model, model_text) = input::model(&args.model)?;
     let train = input::training(&args.train, &args.map.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
     warn(&model, &train, test.as_ref());
@@ -40,13 +42,25 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         let json = output::json(findings)?;
         target.write(|out| out.write_all(json.as_bytes()))?;
     }
+    if let Some(target) = &args.report {
+        let page = report::page(&Contents {
+            diagnosis: &diagnosis,
+            model: &model,
+            model_file: &args.model.file_name().map_or_else(|| "model".into(), |name| name.to_string_lossy()),
+            model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
+            train: &train,
+            test: test.as_ref(),
+            seed: args.seed,
+        })?;
+        target.write(|out| out.write_all(page.as_bytes()))?;
+    }
     let mut said = summary::of(findings);
-    for (target, what) in [(&args.output, "extended model"), (&args.findings, "findings")] {
+    for (target, what) in [(&args.output, "extended model"), (&args.findings, "findings"), (&args.report, "report")] {
         if let Some(Target::File(path)) = target {
             said.push_str(&format!("\n{what}: {}", path.display()));
         }
     }
-    report.print(&said, findings)
+    said_as.print(&said, findings)
 }
 
 /// Warns where the files are not what they should be for the figures to mean something.

@@ -1,5 +1,6 @@
 //! The commands, and the one place where they are dispatched.
 
+mod close_loop;
 mod compare;
 mod compensate;
 mod diagnose;
@@ -26,6 +27,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Compare(args) => compare::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::CloseLoop(args) => close_loop::run(&args),
         Command::Compensate(args) => compensate::run(&args),
         Command::Excite(args) => excite::run(&args),
         Command::Response(args) => response::run(&args),

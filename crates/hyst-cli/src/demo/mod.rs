@@ -5,14 +5,13 @@
 //! one. Only at the very end is the plant's file opened to compare.
 
 mod picture;
-mod tracking;
 
 use std::fs;
 use std::io;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use hyst_hw::{Daq, Plant, PlantConfig, RecordOptions};
+use hyst_hw::{Daq, Plant, PlantConfig, RecordOptions, Sample};
 use hyst_ident::atomic_file::write_atomic;
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
 use hyst_ident::excite::{Drive, Identification, Limits};
@@ -26,6 +25,7 @@ use crate::cli::DemoArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
+use crate::tracking::{Files, Run, Task};
 use crate::{recording, text};
 
 /// Sample rate of the experiments \[Hz\].
@@ -73,7 +73,16 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let diagnosis = diagnose(&train, Some(&test), &model, &options, &|what| progress.say(what))?;
 
     progress.say("compensating a reference on the actuator");
-    let runs = tracking::track(&mut plant, &train, &model, &diagnosis.extended, out)?;
+    let task = Task::of(&diagnosis.extended, RATE_HZ);
+    let judged = |samples: &[Sample]| task.judge(samples, &diagnosis.extended);
+    let files = Files { log: &out.join("run.mcap"), drive: &out.join("drive.csv") };
+    let runs = Runs {
+        plain: judged(&task.by_gain(&mut plant, &train, &model)?),
+        base: judged(&task.through(&mut plant, &model, None)?),
+        extended: judged(&task.through(&mut plant, &diagnosis.extended, Some(&files))?),
+        time: task.time(),
+        travel: task.travel.clone(),
+    };
 
     progress.say("drawing");
     let before = simulate(&model, &test, Zero::None)?;
@@ -116,11 +125,21 @@ fn write_record(folder: &Path, name: &str, record: Record) -> CommandResult<Reco
     Ok(record.kept_as(&file))
 }
 
+/// One reference, three ways to drive it: a plain gain, the base model's inverse, the extended one's.
+struct Runs {
+    time: Vec<f64>,
+    /// Wanted displacement from rest \[output unit\].
+    travel: Vec<f64>,
+    plain: Run,
+    base: Run,
+    extended: Run,
+}
+
 /// What is told at the end.
 struct Story<'a> {
     diagnosis: &'a Diagnosis,
     model: &'a Model,
-    runs: &'a tracking::Runs,
+    runs: &'a Runs,
     config: &'a PlantConfig,
 }
 
@@ -156,7 +175,7 @@ impl Story<'_> {
         ));
         lines.push(format!("left       {}", f.remainder.description));
         lines.push("tracking   of a reference on the actuator, RMS error:".to_owned());
-        let against = |run: &tracking::Run| {
+        let against = |run: &Run| {
             let times = runs.plain.rmse / run.rmse;
             format!("{} {unit}, {times:.1} times better than the plain gain", text::short(run.rmse))
         };

@@ -4,7 +4,7 @@ use hyst_ident::diagnose::Findings;
 use hyst_ident::record::Record;
 use plotters::prelude::*;
 
-use super::tracking::Runs;
+use super::Runs;
 use crate::chart::{Chart, Drawn, drawn};
 use crate::exit::CommandResult;
 use crate::text;

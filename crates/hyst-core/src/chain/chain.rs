@@ -336,4 +336,15 @@ mod tests {
         let two = chain::<f64>().with_resonance(&mode, &cx).unwrap();
         assert!(matches!(two.with_resonance(&mode, &cx), Err(Error::Capacity { holds: MAX_RESONANCES, .. })));
     }
+
+    #[test]
+    fn there_is_room_for_eight_dead_zones_and_an_error_for_a_ninth() {
+        let bent = |zones: u8| {
+            let thresholds: Vec<f64> = (1..=zones).map(f64::from).collect();
+            let weights = std::vec![0.1; thresholds.len()];
+            chain::<f64>().with_asymmetry(&AsymmetryParams { thresholds, weights })
+        };
+        assert!(bent(8).is_ok());
+        assert!(matches!(bent(9), Err(Error::Capacity { needed: 9, holds: MAX_DEAD_ZONES, .. })));
+    }
 }

@@ -2,34 +2,38 @@
 
 use std::f64::consts::TAU;
 
+use super::asymmetry::Curve;
 use super::config::PlantConfig;
 use super::creep::Creep;
+use super::hysteresis::Hysteresis;
 use super::input::InputPath;
-use super::relays::Hysteresis;
+use super::saturation::Stops;
 use super::structure::Structure;
-use super::temperature::Climate;
+use super::surroundings::Surroundings;
 
 /// Fewest fine steps in a sample period.
 const MIN_STEPS: f64 = 8.0;
 /// Fine step times the fastest rate of the chain (`ω` of a mode, `1/τ` of a lag or creep element).
 const MAX_STEP_RATE: f64 = 0.05;
 
-/// Drive → delay → lag → hysteresis → × temperature → + creep → modes, with all their memory.
+/// Drive → delay → lag → hysteresis, asymmetry → × temperature → + creep → + load → modes → stops, with all their memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Fine steps in a sample period.
     steps: u32,
     input: InputPath,
     hysteresis: Hysteresis,
+    asymmetry: Option<Curve>,
     creep: Option<Creep>,
     structure: Structure,
-    /// Outputs of the hysteresis with temperature, and with creep, at the end of the last fine step.
+    stops: Option<Stops>,
+    /// Outputs of the hysteresis with temperature, and with creep and load, at the end of the last fine step.
     before_creep: f64,
-    after_creep: f64,
+    loaded: f64,
 }
 
 impl Chain {
-    /// The chain at rest, for samples at `rate_hz`.
+    /// The chain in the virgin state, for samples at `rate_hz`; [`rest_at`](Self::rest_at) says under which load it rests.
     pub(crate) fn new(config: &PlantConfig, hysteresis: Hysteresis, rate_hz: f64) -> Self {
         Self::with_steps(config, hysteresis, rate_hz, fine_steps(config, rate_hz))
     }
@@ -38,7 +42,7 @@ impl Chain {
         let step_s = 1.0 / (rate_hz * f64::from(steps));
         let mut hysteresis = hysteresis;
         hysteresis.set_step(step_s);
-        let mut chain = Self {
+        Self {
             steps,
             input: InputPath::new(
                 config.actuator.rest_v,
@@ -46,48 +50,50 @@ impl Chain {
                 config.lag.as_ref().map(|lag| step_s / lag.seconds),
             ),
             hysteresis,
+            asymmetry: config.asymmetry.as_ref().map(|asymmetry| Curve::new(asymmetry, &config.actuator)),
             creep: config.creep.as_ref().map(|creep| Creep::new(creep, step_s)),
             structure: Structure::new(&config.modes, step_s),
+            stops: config.saturation.as_ref().map(Stops::new),
             before_creep: 0.0,
-            after_creep: 0.0,
-        };
-        chain.reset();
-        chain
+            loaded: 0.0,
+        }
     }
 
     /// One sample period from lab time `from_s` to `to_s`, in which the drive goes in a straight
     /// line to `drive_v`; returns the displacement at its end (µm).
-    pub(crate) fn advance(&mut self, drive_v: f64, climate: Option<&Climate>, from_s: f64, to_s: f64) -> f64 {
+    pub(crate) fn advance(&mut self, drive_v: f64, around: &Surroundings, from_s: f64, to_s: f64) -> f64 {
         // The temperature is slow: a straight line within a sample period is true to it.
-        let factor = |t| climate.map_or(1.0, |climate| climate.factor(t));
-        let (factor_begin, factor_end) = (factor(from_s), factor(to_s));
+        let (factor_begin, factor_end) = (around.factor(from_s), around.factor(to_s));
         self.input.push(drive_v);
         let mut from = 0.0;
         let mut position = 0.0;
         for j in 1..=self.steps {
             let to = f64::from(j) / f64::from(self.steps);
             let volts = self.input.advance(from, to);
-            let scale = factor_begin + to * (factor_end - factor_begin);
-            let before_creep = self.hysteresis.move_to(volts) * scale;
+            let now_s = from_s + to * (to_s - from_s);
+            let scale = (factor_begin + to * (factor_end - factor_begin)) * around.gain(now_s);
+            let straight = self.hysteresis.move_to(volts);
+            let before_creep = self.asymmetry.as_ref().map_or(straight, |curve| curve.at(straight)) * scale;
             let crept = self.creep.as_mut().map_or(0.0, |creep| creep.advance(self.before_creep, before_creep));
-            let after_creep = before_creep + crept;
-            position = self.structure.advance(self.after_creep, after_creep);
-            (self.before_creep, self.after_creep) = (before_creep, after_creep);
+            let loaded = before_creep + crept + around.deflection(now_s);
+            position = self.structure.advance(self.loaded, loaded);
+            (self.before_creep, self.loaded) = (before_creep, loaded);
             from = to;
         }
-        position
+        self.stops.as_ref().map_or(position, |stops| stops.at(position))
     }
 
-    /// Back to the virgin state at rest.
-    pub(crate) fn reset(&mut self) {
+    /// Back to the virgin state, where the device has rested for long under the load of lab time `t`. Displacement is
+    /// counted from the virgin rest without load.
+    pub(crate) fn rest_at(&mut self, around: &Surroundings, t: f64) {
         self.input.reset();
         self.hysteresis.reset();
         if let Some(creep) = &mut self.creep {
             creep.reset();
         }
-        self.structure.reset();
-        // Displacement is counted from the virgin rest.
-        (self.before_creep, self.after_creep) = (0.0, 0.0);
+        self.before_creep = 0.0;
+        self.loaded = around.deflection(t);
+        self.structure.rest_at(self.loaded);
     }
 }
 
@@ -125,7 +131,7 @@ mod tests {
         let mut alone = Hysteresis::new(config.seed, &config.actuator, None).unwrap();
         let mut chain = Chain::new(&config, alone.clone(), 1000.0);
         for v in [0.0, 30.0, 90.0, 20.0, 60.0, 0.0, 100.0] {
-            assert_eq!(chain.advance(v, None, 0.0, 0.001), alone.move_to(v));
+            assert_eq!(chain.advance(v, &Surroundings::default(), 0.0, 0.001), alone.move_to(v));
         }
     }
 
@@ -140,7 +146,8 @@ mod tests {
             let span = config.actuator.gain_um_per_v * config.actuator.max_v;
             for k in 0..600 {
                 let v = config.actuator.max_v * (0.5 - 0.5 * (0.05 * f64::from(k)).cos());
-                let difference = chain.advance(v, None, 0.0, 0.0) - finer.advance(v, None, 0.0, 0.0);
+                let difference = chain.advance(v, &Surroundings::default(), 0.0, 0.0)
+                    - finer.advance(v, &Surroundings::default(), 0.0, 0.0);
                 // A tenth of the noise that such a plant has.
                 assert!(difference.abs() < 3e-5 * span, "{seed} {k}: {difference}");
             }
@@ -153,7 +160,7 @@ mod tests {
         config.modes = vec![Mode { hz: 100.0, damping: 0.02, gain: 1.0 }];
         let hysteresis = Hysteresis::new(1, &config.actuator, None).unwrap();
         let mut chain = Chain::new(&config, hysteresis, 1000.0);
-        let y: Vec<f64> = (0..200).map(|_| chain.advance(50.0, None, 0.0, 0.0) - 5.0).collect();
+        let y: Vec<f64> = (0..200).map(|_| chain.advance(50.0, &Surroundings::default(), 0.0, 0.0) - 5.0).collect();
         // Free motion obeys y[n+2] = a y[n+1] - b y[n] exactly; two unknowns by least squares.
         let (mut s11, mut s12, mut s22, mut r1, mut r2) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for w in y[1..].windows(3) {

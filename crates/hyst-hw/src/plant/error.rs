@@ -23,6 +23,12 @@ pub enum ConfigError {
         /// The name as given.
         name: String,
     },
+    /// A kind of disturbance that the plant does not know.
+    #[error("no disturbance of the kind `{kind}`; choose among {}", super::DISTURBANCES.join(", "))]
+    UnknownDisturbance {
+        /// The kind as given.
+        kind: String,
+    },
 }
 
 impl ConfigError {

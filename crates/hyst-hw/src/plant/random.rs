@@ -1,14 +1,21 @@
 //! Actuators of an ordinary kind, drawn from a seed.
 
 use super::EFFECTS;
+use super::asymmetry::Curve;
 use super::config::{
-    Actuator, Creep, Delay, Drift, Interference, Lag, Mode, PlantConfig, Sensor, Temperature, TemperatureShape,
+    Actuator, Asymmetry, Bed, Creep, Delay, Drift, Interference, Lag, Load, LoadShape, Mode, PlantConfig, Saturation,
+    Sensor, Temperature, TemperatureShape, Viscosity,
 };
 use super::error::ConfigError;
+use super::hysteresis::Hysteresis;
 use super::rng::{Draws, Purpose};
 
+/// What [`PlantConfig::random`] draws among: never another list, or its seeds would become other plants.
+pub(super) const HIDDEN: [&str; 7] = ["delay", "lag", "temperature", "creep", "resonance", "drift", "interference"];
+
 impl PlantConfig {
-    /// An ordinary piezo actuator with one effect, or two in one case of five; seed by seed the same for ever.
+    /// An ordinary piezo actuator with one effect, or two in one case of five; seed by seed the same for ever. Asymmetry,
+    /// rate-dependence, load and saturation are not among them.
     ///
     /// The number and kind of the effects come from a stream of their own; everything else is as
     /// in [`random_with`](Self::random_with).
@@ -16,10 +23,10 @@ impl PlantConfig {
     pub fn random(seed: u64) -> Self {
         let mut draws = Draws::new(plant_seed(seed), Purpose::Effects);
         let two = draws.unit() < 0.2;
-        let first = draws.index(EFFECTS.len());
+        let first = draws.index(HIDDEN.len());
         // A step of 1 to 6 around the list of 7 is never the first again.
-        let second = (first + 1 + draws.index(EFFECTS.len() - 1)) % EFFECTS.len();
-        draw(seed, |name| name == EFFECTS[first] || (two && name == EFFECTS[second]))
+        let second = (first + 1 + draws.index(HIDDEN.len() - 1)) % HIDDEN.len();
+        draw(Bed::Relays, seed, |name| name == HIDDEN[first] || (two && name == HIDDEN[second]))
     }
 
     /// An ordinary piezo actuator with the effects of the names given, in any order; none is allowed.
@@ -35,9 +42,18 @@ impl PlantConfig {
     /// # Errors
     /// When a name is not in [`EFFECTS`].
     pub fn random_with(seed: u64, effects: &[&str]) -> Result<Self, ConfigError> {
+        Self::random_on(Bed::Relays, seed, effects)
+    }
+
+    /// The actuator of [`random_with`](Self::random_with) with its hysteresis on a bed of the kind given; of plays there are
+    /// a tenth as many.
+    ///
+    /// # Errors
+    /// When a name is not in [`EFFECTS`].
+    pub fn random_on(bed: Bed, seed: u64, effects: &[&str]) -> Result<Self, ConfigError> {
         match effects.iter().find(|name| !EFFECTS.contains(name)) {
             Some(name) => Err(ConfigError::UnknownEffect { name: (*name).to_owned() }),
-            None => Ok(draw(seed, |name| effects.contains(&name))),
+            None => Ok(draw(bed, seed, |name| effects.contains(&name))),
         }
     }
 }
@@ -48,19 +64,22 @@ fn plant_seed(seed: u64) -> u64 {
 
 /// Draws every parameter, in an order that is part of the promise "same seed, same plant": new
 /// draws are added at the end only.
-fn draw(seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
+fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
     let seed = plant_seed(seed);
     let mut draws = Draws::new(seed, Purpose::Parameters);
     let max_v = [100.0, 120.0, 120.0, 150.0][draws.index(4)];
     let mut between = |low, high| rounded(draws.between(low, high));
     let span = between(10.0, 40.0);
+    let loop_share = between(0.10, 0.15);
+    let relays = between(12_000.0, 18_000.0) as usize;
     let actuator = Actuator {
         min_v: 0.0,
         max_v,
         rest_v: 0.0,
         gain_um_per_v: rounded(span / max_v),
-        loop_share: between(0.10, 0.15),
-        relays: between(12_000.0, 18_000.0) as usize,
+        loop_share,
+        bed,
+        relays: if bed == Bed::Plays { relays / 10 } else { relays },
     };
     let sensor = Sensor {
         // Room for overshoot and for minutes of drift either way.
@@ -112,11 +131,41 @@ fn draw(seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
         shape: TemperatureShape::Wander,
         ..temperature.clone()
     };
+    let bend = between(0.03, 0.08) * sign(between(-1.0, 1.0));
+    let hook = between(-0.03, 0.03);
+    let hooked = between(0.0, 1.0) < 0.5;
+    let asymmetry = Asymmetry { bend, hook: if hooked { hook } else { 0.0 } };
+    // Of the stroke's voltage at 20 Hz: loops over all of it open by a fifth to three fifths more than slow ones.
+    let drag = between(0.0265, 0.05);
+    let viscosity = Viscosity { volt_seconds: rounded(max_v / 20.0 * drag * drag) };
+    let newtons = between(1.0, 5.0);
+    let load = Load {
+        newtons,
+        // Half a percent of the span at least: above the noise.
+        um_per_n: f64::max(between(0.02, 0.2), rounded(0.005 * span / newtons)),
+        period_s: between(3.0, 20.0),
+        shape: [LoadShape::Sine, LoadShape::Wander, LoadShape::Steps][between(0.0, 3.0) as usize % 3],
+        recorded: true,
+        noise_n: rounded(newtons * between(0.002, 0.01)),
+    };
+    let cut = span * between(0.03, 0.12);
+    let from_the_top = between(0.0, 1.0) < 0.5;
+    let knee = span * between(0.01, 0.04);
+    let soft = between(0.0, 1.0) < 0.5;
+    let asymmetry = has("asymmetry").then_some(asymmetry);
+    let saturation = has("saturation").then(|| {
+        let (bottom, top) = stroke(seed, &actuator, asymmetry.as_ref());
+        Saturation {
+            low_um: (!from_the_top).then(|| rounded(bottom + cut)),
+            high_um: from_the_top.then(|| rounded(top - cut)),
+            knee_um: if soft { rounded(knee) } else { 0.0 },
+        }
+    });
     PlantConfig {
-        seed,
-        actuator,
-        sensor,
-        viscosity: None,
+        viscosity: has("rate-dependence").then_some(viscosity),
+        asymmetry,
+        load: has("load").then_some(load),
+        saturation,
         delay: has("delay").then_some(delay),
         lag: has("lag").then_some(lag),
         temperature: if has("temperature") { Some(temperature) } else { recorded_without_effect.then_some(idle) },
@@ -124,15 +173,26 @@ fn draw(seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
         modes: if has("resonance") { modes.to_vec() } else { Vec::new() },
         drift: has("drift").then_some(drift),
         interference: has("interference").then_some(interference),
+        ..PlantConfig::bare(seed, actuator, sensor)
     }
 }
 
+/// Lower and upper end of the slow major loop (µm).
+fn stroke(seed: u64, actuator: &Actuator, asymmetry: Option<&Asymmetry>) -> (f64, f64) {
+    let end = |v| asymmetry.map_or(v, |asymmetry| Curve::new(asymmetry, actuator).at(v));
+    // A bed that cannot be built is refused where the plant is.
+    Hysteresis::new(seed, actuator, None).map_or((0.0, 0.0), |mut hysteresis| {
+        let top = hysteresis.move_to(actuator.max_v);
+        (end(hysteresis.move_to(actuator.min_v)), end(top))
+    })
+}
+
 /// Four significant digits, so that the file is pleasant to read; decimal text and back is exact.
-fn rounded(x: f64) -> f64 {
+pub(super) fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-fn sign(x: f64) -> f64 {
+pub(super) fn sign(x: f64) -> f64 {
     if x < 0.0 { -1.0 } else { 1.0 }
 }
 
@@ -154,7 +214,7 @@ mod tests {
     #[test]
     fn every_effect_and_pairs_come_up() {
         let drawn: Vec<_> = (0..300).map(|seed| PlantConfig::random(seed).effects()).collect();
-        for name in EFFECTS {
+        for name in HIDDEN {
             let count = drawn.iter().filter(|effects| effects.contains(&name)).count();
             assert!(count > 20, "{name}: {count}");
         }
@@ -172,6 +232,93 @@ mod tests {
         let some = PlantConfig::random_with(12, &["drift", "lag"]).unwrap();
         assert_eq!(some.effects(), ["lag", "drift"]);
         assert_eq!((some.lag, some.drift), (all.lag, all.drift));
+        let plays = PlantConfig::random_on(Bed::Plays, 12, &EFFECTS).unwrap();
+        assert_eq!(plays.effects(), EFFECTS);
+        assert_eq!((plays.actuator.bed, plays.actuator.loop_share), (Bed::Plays, all.actuator.loop_share));
+        assert_eq!((plays.load, plays.asymmetry, plays.sensor), (all.load, all.asymmetry, all.sensor));
+    }
+
+    #[test]
+    fn strengths_are_ordinary_ones_and_all_kinds_come_up() {
+        let drawn: Vec<_> = (0..200).map(|seed| PlantConfig::random_with(seed, &EFFECTS).unwrap()).collect();
+        for config in &drawn {
+            config.validate().unwrap();
+            let span = config.actuator.gain_um_per_v * config.actuator.max_v;
+            let asymmetry = config.asymmetry.as_ref().unwrap();
+            assert!((0.03..=0.08).contains(&asymmetry.bend.abs()) && asymmetry.hook.abs() <= 0.03);
+            let load = config.load.as_ref().unwrap();
+            assert!(load.recorded && (1.0..=5.0).contains(&load.newtons) && (0.02..=0.2).contains(&load.um_per_n));
+            assert!(load.newtons * load.um_per_n > 0.0049 * span && (3.0..=20.0).contains(&load.period_s));
+            let stops = config.saturation.as_ref().unwrap();
+            assert!(stops.low_um.is_some() != stops.high_um.is_some());
+        }
+        let count = |has: fn(&PlantConfig) -> bool| drawn.iter().filter(|config| has(config)).count();
+        for shape in [LoadShape::Sine, LoadShape::Wander, LoadShape::Steps] {
+            let count = drawn.iter().filter(|c| c.load.as_ref().unwrap().shape == shape).count();
+            assert!((40..=95).contains(&count), "{shape:?}: {count}");
+        }
+        for halves in [
+            count(|c| c.saturation.as_ref().unwrap().knee_um == 0.0),
+            count(|c| c.saturation.as_ref().unwrap().high_um.is_some()),
+            count(|c| c.asymmetry.as_ref().unwrap().hook == 0.0),
+            count(|c| c.asymmetry.as_ref().unwrap().bend > 0.0),
+        ] {
+            assert!((70..=130).contains(&halves), "{halves}");
+        }
+    }
+
+    /// Displacement over two sines of a frequency (Hz) through all voltages: from the lowest to the highest and back.
+    fn full_loop(config: &PlantConfig, hz: f64) -> (Vec<f64>, Vec<f64>) {
+        let mut h = Hysteresis::new(config.seed, &config.actuator, config.viscosity.as_ref()).unwrap();
+        let steps = 2000;
+        h.set_step(1.0 / (hz * f64::from(steps)));
+        let volts = |k: i32| {
+            0.5 * config.actuator.max_v * (1.0 - (std::f64::consts::TAU * f64::from(k) / f64::from(steps)).cos())
+        };
+        let moved: Vec<f64> = (1..=2 * steps).map(|k| h.move_to(volts(k))).collect();
+        let half = steps as usize / 2;
+        (moved[2 * half - 1..3 * half].to_vec(), moved[3 * half - 1..].iter().rev().copied().collect())
+    }
+
+    #[test]
+    fn loops_at_20_hz_are_wider_by_a_fifth_to_three_fifths() {
+        for (seed, bed) in (0..15).flat_map(|seed| [(seed, Bed::Relays), (seed, Bed::Plays)]) {
+            let config = PlantConfig::random_on(bed, seed, &["rate-dependence"]).unwrap();
+            let opening = |hz| {
+                let (rising, falling) = full_loop(&config, hz);
+                rising.iter().zip(&falling).map(|(r, f)| f - r).fold(0.0, f64::max)
+            };
+            let wider = opening(20.0) / opening(0.01) - 1.0;
+            assert!((0.15..=0.65).contains(&wider), "{bed:?}, seed {seed}: {wider}");
+        }
+    }
+
+    #[test]
+    fn stops_cut_a_part_of_the_stroke_off() {
+        for (seed, bed) in (0..30).flat_map(|seed| [(seed, Bed::Relays), (seed, Bed::Plays)]) {
+            let config = PlantConfig::random_on(bed, seed, &["asymmetry", "saturation"]).unwrap();
+            let stops = config.saturation.as_ref().unwrap();
+            let (rising, falling) = full_loop(&config, 1.0);
+            let curve = Curve::new(config.asymmetry.as_ref().unwrap(), &config.actuator);
+            let (bottom, top) = (curve.at(rising[0]), curve.at(falling[falling.len() - 1]));
+            let cut = stops.low_um.map_or_else(|| top - stops.high_um.unwrap(), |low| low - bottom) / (top - bottom);
+            assert!((0.028..=0.123).contains(&cut), "{bed:?}, seed {seed}: {cut}");
+        }
+    }
+
+    /// Files of plants of many seeds, as one number.
+    fn digest(plant: impl Fn(u64) -> PlantConfig) -> u64 {
+        let texts = (0..60).map(|seed| plant(seed).to_toml().unwrap());
+        texts
+            .flat_map(String::into_bytes)
+            .fold(0, |sum: u64, byte| sum.rotate_left(5).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ u64::from(byte))
+    }
+
+    #[test]
+    fn seeds_are_pinned() {
+        // Plants of before stay what they were: `demo --seed` and every study that names a seed rely on it.
+        assert_eq!(digest(PlantConfig::random), 4_215_076_879_974_643_906);
+        assert_eq!(digest(|seed| PlantConfig::random_with(seed, &HIDDEN).unwrap()), 17_307_077_536_925_047_092);
     }
 
     #[test]

@@ -23,8 +23,24 @@ pub(crate) enum Purpose {
     Parameters = 5,
     /// Choice of effects of a random plant.
     Effects = 6,
-    /// Drag of each relay.
+    /// Drag of each relay, or play.
     Viscosity = 7,
+    /// Thresholds and weights of plays.
+    Plays = 8,
+    /// Phases, amplitudes and levels of the load's profile.
+    LoadProfile = 9,
+    /// Noise of the force sensor.
+    LoadNoise = 10,
+    /// When noise bursts.
+    BurstMoments = 11,
+    /// Noise of the bursts.
+    BurstNoise = 12,
+    /// Phases and amplitudes of the sensor's wandering zero.
+    SensorWander = 13,
+    /// Where a mount slips to.
+    Slip = 14,
+    /// Parameters of a random disturbance.
+    Disturbance = 15,
 }
 
 /// A stream of random numbers.
@@ -33,10 +49,15 @@ pub(crate) struct Draws(ChaCha8Rng);
 
 impl Draws {
     pub(crate) fn new(seed: u64, purpose: Purpose) -> Self {
+        Self::numbered(seed, purpose, 0)
+    }
+
+    /// One of many streams of a purpose; the one of number 0 is that of [`new`](Self::new).
+    pub(crate) fn numbered(seed: u64, purpose: Purpose, number: u32) -> Self {
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         let mut rng = ChaCha8Rng::from_seed(key);
-        rng.set_stream(purpose as u64);
+        rng.set_stream(purpose as u64 | (u64::from(number) << 32));
         Self(rng)
     }
 
@@ -83,6 +104,8 @@ mod tests {
     #[test]
     fn purposes_do_not_share_numbers() {
         assert_ne!(Draws::new(7, Purpose::Relays).0.next_u64(), Draws::new(7, Purpose::PositionNoise).0.next_u64());
+        let numbered = |number| Draws::numbered(7, Purpose::Slip, number).0.next_u64();
+        assert_ne!(numbered(0), numbered(1));
     }
 
     #[test]

@@ -48,9 +48,10 @@ impl Structure {
         })
     }
 
-    pub(crate) fn reset(&mut self) {
+    /// At rest under an input that has stood at `input` for long.
+    pub(crate) fn rest_at(&mut self, input: f64) {
         for mode in &mut self.modes {
-            mode.position = 0.0;
+            mode.position = input;
             mode.velocity = 0.0;
         }
     }

@@ -1,9 +1,8 @@
 //! The temperature's course in the lab and what the thermometer reads of it.
 
-use std::f64::consts::TAU;
-
 use super::config::{self, TemperatureShape};
 use super::rng::{Draws, Purpose};
+use super::waves::Waves;
 
 /// Temperature as a function of the lab's time, and the noise of its measurement.
 #[derive(Debug, Clone)]
@@ -11,15 +10,8 @@ pub(crate) struct Climate {
     mean: f64,
     reference: f64,
     per_k: f64,
-    waves: Vec<Wave>,
+    waves: Waves,
     thermometer: Option<Thermometer>,
-}
-
-#[derive(Debug, Clone)]
-struct Wave {
-    amplitude: f64,
-    radian_per_s: f64,
-    phase: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -28,19 +20,14 @@ struct Thermometer {
     draws: Draws,
 }
 
-/// Frequencies of a wander over that of its slowest wave; no ratio of two is a small fraction.
-const WANDER: [f64; 5] = [1.0, 1.617, 2.713, 3.911, 5.233];
-
 impl Climate {
     pub(crate) fn new(seed: u64, config: &config::Temperature) -> Self {
         let mut draws = Draws::new(seed, Purpose::TemperatureProfile);
-        let ratios: &[f64] = match config.shape {
-            TemperatureShape::Sine => &WANDER[..1],
-            TemperatureShape::Wander => &WANDER,
-        };
-        let waves = match config.period_s {
-            Some(period) if config.swing_k > 0.0 => waves(&mut draws, ratios, config.swing_k, period),
-            _ => Vec::new(),
+        let half_swing = 0.5 * config.swing_k;
+        let waves = match (config.period_s.filter(|_| half_swing > 0.0), config.shape) {
+            (None, _) => Waves::default(),
+            (Some(period), TemperatureShape::Sine) => Waves::sine(&mut draws, half_swing, period),
+            (Some(period), TemperatureShape::Wander) => Waves::wander(&mut draws, half_swing, period),
         };
         let thermometer = config
             .recorded
@@ -50,7 +37,7 @@ impl Climate {
 
     /// True temperature at lab time `t` (°C).
     pub(crate) fn at(&self, t: f64) -> f64 {
-        self.waves.iter().fold(self.mean, |sum, w| sum + w.amplitude * libm::sin(w.radian_per_s * t + w.phase))
+        self.waves.on(self.mean, t)
     }
 
     /// Factor on the displacement at lab time `t`.
@@ -67,24 +54,6 @@ impl Climate {
     pub(crate) fn is_recorded(&self) -> bool {
         self.thermometer.is_some()
     }
-}
-
-/// Waves whose amplitudes sum to half of `swing`: the course never leaves the swing.
-fn waves(draws: &mut Draws, ratios: &[f64], swing: f64, period: f64) -> Vec<Wave> {
-    let mut waves: Vec<Wave> = ratios
-        .iter()
-        .map(|ratio| Wave {
-            // Slow waves are larger.
-            amplitude: draws.between(0.5, 1.0) / ratio,
-            radian_per_s: TAU * ratio / period,
-            phase: draws.between(0.0, TAU),
-        })
-        .collect();
-    let sum: f64 = waves.iter().map(|wave| wave.amplitude).sum();
-    for wave in &mut waves {
-        wave.amplitude *= 0.5 * swing / sum;
-    }
-    waves
 }
 
 #[cfg(test)]

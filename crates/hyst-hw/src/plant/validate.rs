@@ -1,6 +1,8 @@
 //! Which descriptions of a plant make sense, and what to say of those that do not.
 
-use super::config::{Actuator, Creep, Mode, PlantConfig, Sensor, Temperature};
+use super::config::{
+    Actuator, Asymmetry, Creep, Disturbance, Load, Mode, PlantConfig, Saturation, Sensor, Temperature,
+};
 use super::error::ConfigError;
 
 type Checked = Result<(), ConfigError>;
@@ -44,13 +46,22 @@ pub(crate) fn check(config: &PlantConfig) -> Checked {
         let advice = "give a time constant from 1e-5 to 10 s, or remove the section [lag]";
         demand("lag.seconds", lag.seconds, (1e-5..=10.0).contains(&lag.seconds), advice)?;
     }
+    if let Some(section) = &config.asymmetry {
+        asymmetry(section)?;
+    }
     if let Some(section) = &config.temperature {
         temperature(section)?;
     }
     if let Some(section) = &config.creep {
         creep(section)?;
     }
+    if let Some(section) = &config.load {
+        load(section)?;
+    }
     modes(&config.modes)?;
+    if let Some(section) = &config.saturation {
+        saturation(section)?;
+    }
     if let Some(drift) = &config.drift {
         let advice = "give a rate in um/s that is not 0, or remove the section [drift]";
         demand("drift.um_per_s", drift.um_per_s, drift.um_per_s != 0.0, advice)?;
@@ -61,7 +72,7 @@ pub(crate) fn check(config: &PlantConfig) -> Checked {
         demand("interference.hz", wave.hz, wave.hz > 0.0, "give a frequency in Hz above 0")?;
         demand("interference.phase_rad", wave.phase_rad, true, "give a finite phase in rad")?;
     }
-    Ok(())
+    disturbances(config)
 }
 
 fn actuator(a: &Actuator) -> Checked {
@@ -71,7 +82,7 @@ fn actuator(a: &Actuator) -> Checked {
     demand("actuator.rest_v", a.rest_v, rest_fits, "give a voltage from actuator.min_v to actuator.max_v")?;
     demand("actuator.gain_um_per_v", a.gain_um_per_v, a.gain_um_per_v > 0.0, "give a gain in um/V above 0")?;
     within("actuator.loop_share", a.loop_share, 0.0, 0.3, "the loop's opening as a share of the span")?;
-    count_within("actuator.relays", a.relays, 1000, 500_000, "a number of relays")
+    count_within("actuator.relays", a.relays, 1000, 500_000, "a number of relays (or plays)")
 }
 
 fn sensor(s: &Sensor) -> Checked {
@@ -83,6 +94,14 @@ fn sensor(s: &Sensor) -> Checked {
     let shown = low < s.offset_um && s.offset_um < high;
     demand("sensor.offset_um", s.offset_um, shown, "give a reading at rest within sensor.range_um")?;
     within("sensor.max_rate_hz", s.max_rate_hz, 1.0, 1e6, "a sample rate in Hz")
+}
+
+fn asymmetry(a: &Asymmetry) -> Checked {
+    // Within these limits the curve rises everywhere, far beyond the stroke too.
+    within("asymmetry.bend", a.bend, -1.0, 1.0, "a difference of slope over the mean slope")?;
+    within("asymmetry.hook", a.hook, -0.5, 0.5, "a difference of slope over the mean slope")?;
+    let advice = "give a difference of slope that is not 0 (or asymmetry.hook), or remove the section [asymmetry]";
+    demand("asymmetry.bend", a.bend, a.bend != 0.0 || a.hook != 0.0, advice)
 }
 
 fn temperature(t: &Temperature) -> Checked {
@@ -117,6 +136,14 @@ fn creep(c: &Creep) -> Checked {
     count_within("creep.elements", c.elements, 2, 1000, "a number of time constants")
 }
 
+fn load(l: &Load) -> Checked {
+    demand("load.newtons", l.newtons, l.newtons > 0.0, "give an amplitude in N above 0, or remove the section [load]")?;
+    let advice = "give a compliance in um/N that is not 0, or remove the section [load]";
+    demand("load.um_per_n", l.um_per_n, l.um_per_n != 0.0, advice)?;
+    demand("load.period_s", l.period_s, l.period_s >= 0.1, "give a period of 0.1 s or more")?;
+    demand("load.noise_n", l.noise_n, l.noise_n >= 0.0, "give a standard deviation in N, 0 or more")
+}
+
 fn modes(modes: &[Mode]) -> Checked {
     for (index, mode) in modes.iter().enumerate() {
         let name = |field: &str| format!("mode[{index}].{field}");
@@ -131,10 +158,62 @@ fn modes(modes: &[Mode]) -> Checked {
     demand("mode[].gain (sum)", sum, sum <= 1.0 + 1e-9, "let the gains of all [[mode]] sum to 1 or less")
 }
 
+fn saturation(s: &Saturation) -> Checked {
+    if s.low_um.is_none() && s.high_um.is_none() {
+        let advice = "give saturation.low_um, saturation.high_um or both, or remove the section [saturation]";
+        return Err(ConfigError::value("saturation.high_um", "none", advice));
+    }
+    let advice = "give a length in um, 0 or more, or remove knee_um";
+    demand("saturation.knee_um", s.knee_um, s.knee_um >= 0.0, advice)?;
+    demand("saturation.low_um", s.low_um.unwrap_or(0.0), true, "give a finite displacement in um")?;
+    let room = s.low_um.map_or(f64::NEG_INFINITY, |low| low + 2.0 * s.knee_um);
+    let advice = "give a displacement in um above saturation.low_um, with room for both knees";
+    s.high_um.map_or(Ok(()), |high| demand("saturation.high_um", high, high > room, advice))
+}
+
+fn disturbances(config: &PlantConfig) -> Checked {
+    for (index, disturbance) in config.disturbances.iter().enumerate() {
+        let is = |field: &str, value: f64, fits: bool, advice: &str| {
+            demand(&format!("disturbance[{index}].{field}"), value, fits, &format!("give {advice}"))
+        };
+        match *disturbance {
+            Disturbance::Jump { um, at_s } => {
+                is("um", um, um != 0.0, "a jump in um that is not 0, or remove this [[disturbance]]")?;
+                is("at_s", at_s, at_s >= 0.0, "a time of the lab's clock in s, 0 or more")?;
+            }
+            Disturbance::GainStep { share, at_s } => {
+                let fits = share != 0.0 && (-0.9..=9.0).contains(&share);
+                is(
+                    "share",
+                    share,
+                    fits,
+                    "a relative change from -0.9 to 9 that is not 0, or remove this [[disturbance]]",
+                )?;
+                is("at_s", at_s, at_s >= 0.0, "a time of the lab's clock in s, 0 or more")?;
+            }
+            Disturbance::Bursts { um, seconds, every_s } => {
+                is("um", um, um > 0.0, "a standard deviation in um above 0")?;
+                is("seconds", seconds, seconds > 0.0, "a duration in s above 0")?;
+                is("every_s", every_s, every_s > seconds, "a time in s that is longer than a burst")?;
+            }
+            Disturbance::Wander { um, period_s } => {
+                is("um", um, um > 0.0, "an amplitude in um above 0")?;
+                is("period_s", period_s, period_s >= 0.1, "a period of 0.1 s or more")?;
+            }
+            Disturbance::Slip { um, at_v } => {
+                is("um", um, um > 0.0, "a distance in um above 0")?;
+                let passed = config.actuator.min_v < at_v && at_v <= config.actuator.max_v;
+                is("at_v", at_v, passed, "a voltage above actuator.min_v, up to actuator.max_v")?;
+            }
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::config::tests::clean;
-    use super::super::config::{Delay, Drift, Interference, Lag, TemperatureShape};
+    use super::super::config::{Delay, Drift, Interference, Lag, LoadShape, TemperatureShape};
     use super::*;
 
     fn complains(field: &str, change: impl FnOnce(&mut PlantConfig)) {
@@ -182,6 +261,8 @@ mod tests {
         complains("lag.seconds", |c| {
             c.lag = Some(Lag { seconds: f64::INFINITY });
         });
+        complains("asymmetry.bend", |c| c.asymmetry = Some(Asymmetry { bend: 0.0, hook: 0.0 }));
+        complains("asymmetry.hook", |c| c.asymmetry = Some(Asymmetry { bend: 0.1, hook: 0.6 }));
         complains("drift.um_per_s", |c| {
             c.drift = Some(Drift { um_per_s: 0.0 });
         });
@@ -197,9 +278,31 @@ mod tests {
         complains("creep.tau_max_s", |c| {
             c.creep = Some(Creep { strength: 0.1, tau_min_s: 1.0, tau_max_s: 0.5, exponent: 0.0, elements: 60 });
         });
+        let load = |newtons, um_per_n, period_s| {
+            Some(Load { newtons, um_per_n, period_s, shape: LoadShape::Sine, recorded: true, noise_n: 0.0 })
+        };
+        complains("load.newtons", |c| c.load = load(0.0, 0.1, 1.0));
+        complains("load.um_per_n", |c| c.load = load(1.0, 0.0, 1.0));
+        complains("load.period_s", |c| c.load = load(1.0, 0.1, 0.0));
         complains("mode[1].damping", |c| {
             c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.5 }, Mode { hz: 300.0, damping: 0.0, gain: 0.5 }];
         });
+        let stops = |low_um, high_um, knee_um| Some(Saturation { low_um, high_um, knee_um });
+        complains("saturation.high_um", |c| c.saturation = stops(None, None, 0.0));
+        complains("saturation.high_um", |c| c.saturation = stops(Some(2.0), Some(3.0), 0.5));
+        complains("saturation.low_um", |c| c.saturation = stops(Some(f64::NAN), None, 0.0));
+        complains("saturation.knee_um", |c| c.saturation = stops(None, Some(3.0), -1.0));
+        complains("disturbance[0].um", |c| c.disturbances = vec![Disturbance::Jump { um: 0.0, at_s: 1.0 }]);
+        complains("disturbance[1].at_s", |c| {
+            c.disturbances = [1.0, -1.0].map(|at_s| Disturbance::GainStep { share: 0.1, at_s }).to_vec();
+        });
+        complains("disturbance[0].every_s", |c| {
+            c.disturbances = vec![Disturbance::Bursts { um: 0.1, seconds: 0.3, every_s: 0.2 }];
+        });
+        complains("disturbance[0].period_s", |c| {
+            c.disturbances = vec![Disturbance::Wander { um: 0.1, period_s: f64::NAN }];
+        });
+        complains("disturbance[0].at_v", |c| c.disturbances = vec![Disturbance::Slip { um: 0.1, at_v: 0.0 }]);
         complains("mode[].gain (sum)", |c| {
             c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.7 }; 2];
         });

@@ -1,10 +1,14 @@
 //! Hysteresis bases as columns: each is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
 
+mod drag;
+mod fixed;
 mod pi;
 mod preisach;
 mod screening;
 
-pub(crate) use pi::{PiBasis, SlidingPlays, plays as play_column};
+pub(crate) use drag::{Drag, DragParams};
+pub(crate) use fixed::FixedBasis;
+pub(crate) use pi::{PiBasis, SlidingPlays, play_column};
 pub(crate) use preisach::PreisachBasis;
 pub(crate) use screening::ScreeningBasis;
 
@@ -19,8 +23,13 @@ use crate::lsq::Bounds;
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
 /// scale the motion and not an arbitrary zero.
 pub(crate) trait Basis: Sync {
-    /// Columns φᵢ over the rows of `drive`, memory reset at the start of each segment.
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>>;
+    /// Columns φᵢ over the rows of `drive`, memory reset at the start of each segment; a base that [cannot drag](Self::drags) does not
+    /// look at `drag`.
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>>;
+    /// Whether there is a drag: a rate-dependent form of the operator.
+    fn drags(&self) -> bool {
+        true
+    }
     /// Bounds of the weights.
     fn bounds(&self) -> Vec<Bounds>;
     /// What regularises the weights, as a matrix to be added to normal equations whose mean

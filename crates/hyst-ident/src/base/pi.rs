@@ -5,7 +5,7 @@ use std::ops::Range;
 use hyst_core::play;
 use nalgebra::DMatrix;
 
-use super::Basis;
+use super::{Basis, Drag};
 use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
@@ -39,7 +39,7 @@ impl PiBasis {
     /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
     /// are left out clearly better than these do and are no more. `None` if there are none.
     pub(crate) fn chosen(&self, samples: &Samples, most: Option<usize>) -> Option<Self> {
-        let element = |r: f64| plays(&samples.input, &samples.segments, r);
+        let element = |r: f64| play_column(&samples.input, &samples.segments, r);
         let bank = |rows| {
             let identity = (samples.input.clone(), Bounds::above(self.floor));
             Bank::new(samples, vec![identity], even(samples, CANDIDATES, CANDIDATES / 4), &element, rows)
@@ -65,9 +65,9 @@ fn even(samples: &Samples, loops: usize, virgin: usize) -> Vec<f64> {
 }
 
 impl Basis for PiBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let mut columns = vec![drive.to_vec()];
-        columns.extend(self.thresholds.iter().map(|r| plays(drive, segments, *r)));
+        columns.extend(self.thresholds.iter().map(|r| plays(drive, segments, *r, drag)));
         columns
     }
 
@@ -92,13 +92,13 @@ pub(crate) struct SlidingPlays<'a> {
 }
 
 impl Basis for SlidingPlays<'_> {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let step = STEP * drive.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
         let slope = |(r, w): (&f64, &f64)| -> Vec<f64> {
-            let (up, down) = (plays(drive, segments, r + step), plays(drive, segments, r - step));
+            let (up, down) = (plays(drive, segments, r + step, drag), plays(drive, segments, r - step, drag));
             up.iter().zip(down).map(|(up, down)| 0.5 * w * (up - down) / step).collect()
         };
-        let mut columns = self.plays.columns(drive, segments);
+        let mut columns = self.plays.columns(drive, segments, drag);
         columns.extend(self.plays.thresholds.iter().zip(&self.weights[1..]).map(slope));
         columns
     }
@@ -116,12 +116,19 @@ impl Basis for SlidingPlays<'_> {
 }
 
 /// The play operator over a drive, virgin at each segment's start.
-pub(crate) fn plays(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
+pub(crate) fn play_column(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
+    plays(drive, segments, r, &Drag::NONE)
+}
+
+/// The play operator with drag over a drive, virgin at each segment's start.
+pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], r: f64, drag: &Drag) -> Vec<f64> {
     let mut out = vec![0.0; drive.len()];
     for segment in segments {
         let mut p = 0.0;
         for k in segment.clone() {
-            p = play(p, drive[k], r);
+            let to = play(p, drive[k], r);
+            // The device has rested at its first input.
+            p = if k == segment.start { to } else { drag.towards(p, to) };
             out[k] = p;
         }
     }

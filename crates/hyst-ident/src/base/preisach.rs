@@ -6,7 +6,7 @@ use std::ops::Range;
 use hyst_core::{Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
 use nalgebra::DMatrix;
 
-use super::Basis;
+use super::{Basis, Drag};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::capacity::NODES;
@@ -109,7 +109,7 @@ impl PreisachBasis {
 }
 
 impl Basis for PreisachBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
         let n = self.len();
         let mut columns = vec![vec![0.0; drive.len()]; n];
         // The operator itself keeps the memory, with an empty map: one rule of wiping out for all.
@@ -161,6 +161,10 @@ impl Basis for PreisachBasis {
             }
         }
         columns
+    }
+
+    fn drags(&self) -> bool {
+        false
     }
 
     fn bounds(&self) -> Vec<Bounds> {

@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::pi::plays;
-use super::{Basis, PiBasis};
+use super::{Basis, Drag, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
 
@@ -35,14 +35,14 @@ impl ScreeningBasis {
 }
 
 impl Basis for ScreeningBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
-        let mut columns = self.linear.columns(drive, segments);
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
+        let mut columns = self.linear.columns(drive, segments, drag);
         let scale = 1.0 / self.half;
         let x0 = -self.middle * scale;
         let cubic = |x: f64| x * (x * x - 0.6);
         let (square0, cubic0) = (x0 * x0, cubic(x0));
         for r in &self.curved {
-            let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r) };
+            let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r, drag) };
             let x = |p: &f64| (p - self.middle) * scale;
             columns.push(p.iter().map(|p| self.half * (x(p) * x(p) - square0)).collect());
             columns.push(p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect());

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use hyst_core::{AsymmetryParams, ViscousPiParams};
 use serde::{Deserialize, Serialize};
 
-use super::search::{Named, Search};
+use super::search::Named;
 pub use crate::metrics::Errors;
-use crate::model::{Effect, Kind, Model};
+use crate::model::{Base, Effect, Kind, Model};
 use crate::record::OutputUnit;
 use crate::samples::Samples;
 use crate::simulate::{Simulation, Zero};
@@ -49,6 +50,25 @@ pub struct Remainder {
     pub variance_share: f64,
     /// In words.
     pub description: String,
+}
+
+/// What is left, and where.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Left {
+    /// What it is.
+    #[serde(flatten)]
+    pub judged: Remainder,
+    /// Where it lives, in sentences; none if it is noise.
+    #[serde(rename = "where", default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<String>,
+}
+
+impl std::ops::Deref for Left {
+    type Target = Remainder;
+
+    fn deref(&self) -> &Remainder {
+        &self.judged
+    }
 }
 
 /// A parameter that was found.
@@ -121,7 +141,7 @@ pub struct Findings {
     /// Effects, in the chain's order.
     pub effects: Vec<Finding>,
     /// What is left.
-    pub remainder: Remainder,
+    pub remainder: Left,
     /// Errors of the extended model.
     pub after: OnRecords,
 }
@@ -129,18 +149,19 @@ pub struct Findings {
 pub(super) struct Material<'a> {
     pub(super) model: &'a Model,
     pub(super) extended: &'a Model,
-    pub(super) found: &'a Search,
+    pub(super) named: &'a [Named],
+    pub(super) noise: f64,
     pub(super) errors: &'a BTreeMap<String, f64>,
     pub(super) before: &'a Simulation,
     pub(super) after: &'a Simulation,
     pub(super) tests: Option<&'a (Simulation, Simulation)>,
-    pub(super) remainder: Remainder,
+    pub(super) remainder: Left,
     pub(super) zero: Zero,
     pub(super) samples: &'a Samples,
 }
 
 pub(super) fn collect(m: &Material<'_>) -> Findings {
-    let effects: Vec<Finding> = m.found.named.iter().map(|n| finding(m, n)).collect();
+    let effects: Vec<Finding> = m.named.iter().map(|n| finding(m, n)).collect();
     let verdict = match (effects.is_empty(), m.remainder.kind) {
         (false, _) => Verdict::Explained,
         (true, RemainderKind::None) => Verdict::NothingMissing,
@@ -155,7 +176,7 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         schema: SCHEMA.into(),
         base: m.model.base.kind(),
         unit: m.model.output.unit.clone(),
-        noise_floor: m.found.noise,
+        noise_floor: m.noise,
         zero: m.zero,
         verdict,
         before: on(m.before, m.tests.map(|t| &t.0)),
@@ -167,7 +188,7 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
 
 fn finding(m: &Material<'_>, named: &Named) -> Finding {
     let unit = symbol(m);
-    let after = m.found.best.cv_rmse();
+    let after = named.cv_with;
     let j = &named.judgement;
     // First what a person can check against the device, then what the statistics say.
     let mut evidence: Vec<String> = signature(m, named.effect).into_iter().collect();
@@ -204,7 +225,7 @@ fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
 
 /// The effect in words that a person can check against the device.
 fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
-    let e = &m.extended.effects;
+    let (e, input) = (&m.extended.effects, m.extended.input.symbol());
     Some(match effect {
         Effect::Delay => format!("the output follows {:.3} ms late at every frequency", 1e3 * e.delay?.seconds),
         Effect::Lag => {
@@ -214,8 +235,33 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                 1.0 / (2.0 * std::f64::consts::PI * tau)
             )
         }
+        Effect::Asymmetry => {
+            let p = e.asymmetry.as_ref()?;
+            let (low, high) = slopes(p);
+            format!(
+                "the curve behind the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
+            )
+        }
+        Effect::RateDependence => match rate_dependence(m.extended) {
+            Some(p) if p.volt_seconds > 0.0 => format!(
+                "loops widen with the rate: at 100 {input}/s a sliding play is {:.3} {input} behind",
+                100.0 * p.seconds + (100.0 * p.volt_seconds).sqrt()
+            ),
+            Some(p) => format!("loops widen with the rate: sliding plays lag by {:.3} ms", 1e3 * p.seconds),
+            None => {
+                "loops widen with the rate; this base has no form that does: fit pi, or dpm to records at several rates"
+                    .into()
+            }
+        },
+        Effect::Load => format!("the output yields by {:+.5} {} for each N", e.load?.per_newton, symbol(m)),
+        Effect::Saturation => {
+            let (name, limit) = limit(m)?;
+            format!("the output stops at {limit:.3} {} at its {name} end while the drive goes on", symbol(m))
+        }
         Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
-        Effect::Creep => format!("after a step the output goes on by {:.1} % of it", 100.0 * e.creep.as_ref()?.total()),
+        Effect::Creep => {
+            format!("after a step the output goes on by {:.1} % of it in the end", 100.0 * e.creep.as_ref()?.total())
+        }
         Effect::Resonance => {
             let r = e.resonances.first()?;
             format!("a mode rings at {:.1} Hz with damping ratio {:.4}", r.hz, r.damping)
@@ -240,8 +286,30 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
     })
 }
 
+/// Slopes of a curve at its two ends.
+fn slopes(p: &AsymmetryParams<Vec<f64>>) -> (f64, f64) {
+    let end = |rising: bool| {
+        let zones = p.thresholds.iter().zip(&p.weights).filter(|(s, _)| (**s >= 0.0) == rising);
+        1.0 + zones.map(|(_, c)| c).sum::<f64>()
+    };
+    (end(false), end(true))
+}
+
+/// The drag of a model's plays.
+fn rate_dependence(model: &Model) -> Option<&ViscousPiParams<Vec<f64>>> {
+    if let Base::ViscousPi(p) = &model.base { Some(p) } else { None }
+}
+
+/// The end at which the motion is stopped, and where the sensor shows it.
+fn limit(m: &Material<'_>) -> Option<(&'static str, f64)> {
+    let (p, zero) = (m.extended.effects.saturation?, m.extended.zero);
+    let (low, high) = (m.extended.output.low - zero, m.extended.output.high - zero);
+    // The one that the output comes nearer to.
+    Some(if p.high - high < low - p.low { ("upper", p.high + zero) } else { ("lower", p.low + zero) })
+}
+
 fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
-    let (e, y) = (&m.extended.effects, &m.model.output.unit);
+    let (e, y, input) = (&m.extended.effects, &m.model.output.unit, m.extended.input.symbol());
     let mut list = BTreeMap::new();
     let mut put = |stage: &str, name: &str, value: f64, unit: &str| {
         let std_error = m.errors.get(&format!("{stage}.{name}")).copied();
@@ -251,6 +319,24 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
     match effect {
         Effect::Delay => e.delay.iter().for_each(|p| put("delay", "seconds", p.seconds, "s")),
         Effect::Lag => e.lag.iter().for_each(|p| put("lag", "seconds", p.seconds, "s")),
+        Effect::Asymmetry => e.asymmetry.iter().for_each(|p| {
+            for (i, (s, c)) in p.thresholds.iter().zip(&p.weights).enumerate() {
+                put("asymmetry", &format!("thresholds[{i}]"), *s, y);
+                put("asymmetry", &format!("weights[{i}]"), *c, "1");
+            }
+        }),
+        Effect::RateDependence => rate_dependence(m.extended).iter().for_each(|p| {
+            put("rate-dependence", "seconds", p.seconds, "s");
+            put("rate-dependence", "volt_seconds", p.volt_seconds, &format!("{input} s"));
+        }),
+        Effect::Load => e.load.iter().for_each(|p| put("load", "per_newton", p.per_newton, &format!("{y}/N"))),
+        Effect::Saturation => e.saturation.iter().for_each(|p| {
+            if let Some((name, _)) = limit(m) {
+                let value = if name == "upper" { p.high } else { p.low };
+                put("saturation", if name == "upper" { "high" } else { "low" }, value, y);
+                put("saturation", "knee", p.knee, "1");
+            }
+        }),
         Effect::Temperature => e.temperature.iter().for_each(|p| {
             put("temperature", "per_kelvin", p.per_kelvin, "1/K");
             put("temperature", "reference_degc", p.reference_degc, "degC");

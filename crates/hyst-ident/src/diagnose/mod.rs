@@ -8,22 +8,28 @@
 //!    and it must matter against the noise floor and against what is left.
 //! 3. **Extend** the user's own model with the effects found, all weights refitted.
 
+mod evidence;
 mod findings;
+mod finer;
 mod remainder;
 mod score;
 mod search;
+mod shape;
 mod spectrum;
 mod starts;
 mod trial;
 mod uncertainty;
 
-pub use findings::{Alternative, Errors as FoundErrors, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
+pub use evidence::{Axis, Breakdown, Curve, MOST_POINTS, Mark, Part, Picture, Role, Style};
+pub use findings::{
+    Alternative, Errors as FoundErrors, Finding, Findings, Found, Left, OnRecords, Remainder, RemainderKind, Verdict,
+};
 
-use crate::base::{Basis, ScreeningBasis};
+use crate::base::{Basis, DragParams, ScreeningBasis};
 use crate::fit::{BLOCKS, FitError, basis_of, check, to_model};
 use crate::lsq::Blocks;
-use crate::model::{Effect, Effects, Model};
-use crate::nested::Problem;
+use crate::model::{Base, Effect, Model};
+use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::simulate::{Zero, simulate};
@@ -50,12 +56,18 @@ pub struct Diagnosis {
     pub extended: Model,
     /// What was found, with evidence.
     pub findings: Findings,
+    /// What a person can check: each named effect's trace in the record, and the whole model before and after.
+    pub pictures: Vec<Picture>,
+    /// Where what is left lives.
+    pub breakdowns: Vec<Breakdown>,
 }
 
 /// Rows that the search needs for each unknown of its base: with fewer, noise looks like an effect.
 const ROWS_PER_UNKNOWN: usize = 10;
 /// Rows that the search uses at most.
 const SEARCH_ROWS: usize = 16_000;
+/// Rows that the search for a curve behind the own base uses at most.
+const SHAPE_ROWS: usize = 8_000;
 /// Rows that the final fit uses at most.
 const FINAL_ROWS: usize = 40_000;
 
@@ -83,58 +95,96 @@ pub fn diagnose(
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
     }
+    let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
-    let base =
-        problem.fit(&model.effects).map_err(stage)?.ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
-    let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+    let own = basis_of(model, &samples).map_err(stage)?;
+    let start = hypothesis_of(model);
+    let base = problem.fit(&start).map_err(stage)?.ok_or_else(unsolvable)?;
+    let mut found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+
+    progress("asking a finer base whether it needs what was found");
+    let finer::Finer { mut hypothesis, mut errors, cv_rmse: richest } =
+        finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed).map_err(stage)?;
+
+    progress("asking whether the model's own base lacks a curve");
+    let own_blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
+    let own_problem = Problem::new(&samples, own.as_ref(), &own_blocks, per_record);
+    let shape = shape::shape(&own_problem, &hypothesis, richest, found.noise, options.seed).map_err(stage)?;
+    if let Some(shape) = shape {
+        let own_errors = uncertainty::standard_errors(&shape.fit);
+        let of_shape = |key: &String| key.split('.').next() == Some(shape.named.effect.name());
+        errors.extend(own_errors.into_iter().filter(|(key, _)| of_shape(key)));
+        hypothesis = shape.hypothesis;
+        found.named.push(shape.named);
+        found.named.sort_by_key(|n| n.effect);
+    }
 
     progress("refitting the model with what was found");
-    let effects = &found.best.fit.effects;
-    let errors = uncertainty::standard_errors(&found.best.fit);
     let mut extended = model.clone();
-    if effects.names() != model.effects.names() {
+    if hypothesis.causes().iter().filter_map(|c| c.effect()).ne(start.causes().iter().filter_map(|c| c.effect())) {
         // The effects keep the parameters that the rich base gave them: refitted on a coarser base
         // they would take up its misfit. Only the base's weights and the zero are solved again.
-        let own = basis_of(model, &samples)?;
-        let motion_only = without_sensor_effects(&samples, effects);
+        let motion_only = without_sensor_effects(&samples, &hypothesis);
         let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
         let final_problem = Problem::new(&motion_only, own.as_ref(), &final_blocks, per_record);
-        let moving = Effects { drift: None, interference: None, ..effects.clone() };
-        let fit = final_problem
-            .fit_linear(&moving)
-            .map_err(stage)?
-            .ok_or_else(|| FitError::Unsolvable { record: train.name() })?;
+        let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
+        (moving.effects.drift, moving.effects.interference) = (None, None);
+        let fit = final_problem.fit_linear(&moving).map_err(stage)?.ok_or_else(unsolvable)?;
         // Its reach is that of the motion, not of the sensor.
         extended = to_model(train, &motion_only, &own, &fit, model.seed);
-        extended.effects.clone_from(effects);
+        extended.effects.drift = hypothesis.effects.drift;
+        extended.effects.interference = hypothesis.effects.interference;
         extended.std_errors.clone_from(&errors);
     }
 
     progress("judging what is left");
     let after = simulate(&extended, train, options.zero)?;
-    let remainder = remainder::judge(&problem, &found, &after, &samples, per_record).map_err(stage)?;
+    let remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
         .transpose()?;
+    let mut named: Vec<Effect> = found.named.iter().map(|n| n.effect).collect();
+    named.dedup();
+    let evidence::Evidence { pictures, breakdowns, places } = evidence::collect(&evidence::Material {
+        extended: &extended,
+        named: &named,
+        train,
+        test,
+        before: &before,
+        after: &after,
+        tests: tests.as_ref(),
+        zero: options.zero,
+        noise: found.noise,
+    })?;
     let findings = findings::collect(&findings::Material {
         model,
         extended: &extended,
-        found: &found,
+        named: &found.named,
+        noise: found.noise,
         errors: &errors,
         before: &before,
         after: &after,
         tests: tests.as_ref(),
-        remainder,
+        remainder: Left { judged: remainder, places },
         zero: options.zero,
         samples: &samples,
     });
-    Ok(Diagnosis { extended, findings })
+    Ok(Diagnosis { extended, findings, pictures, breakdowns })
+}
+
+/// What a model already holds.
+fn hypothesis_of(model: &Model) -> Hypothesis {
+    let drag = match &model.base {
+        Base::ViscousPi(p) => Some(DragParams { seconds: p.seconds, volt_seconds: p.volt_seconds }),
+        _ => None,
+    };
+    Hypothesis { drag, ..Hypothesis::of(model.effects.clone()) }
 }
 
 /// The record with drift and tone taken from its output.
-fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Samples {
-    let mut motion = samples.clone();
+fn without_sensor_effects(samples: &Samples, h: &Hypothesis) -> Samples {
+    let (mut motion, effects) = (samples.clone(), &h.effects);
     for (k, y) in motion.output.iter_mut().enumerate() {
         let t = samples.time[k];
         if let Some(drift) = effects.drift {
@@ -147,13 +197,18 @@ fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Samples {
     motion
 }
 
-/// Whether a record can show an effect at all.
-fn visible(effect: Effect, samples: &Samples) -> bool {
-    match effect {
-        Effect::Temperature => samples.temperature.as_ref().is_some_and(|t| {
-            let (low, high) = crate::samples::range(t.iter().copied());
-            high - low > 0.5
-        }),
+/// Whether a record can show a cause at all.
+fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
+    let varies = |column: &Option<Vec<f64>>, least: f64| {
+        column.as_ref().is_some_and(|c| {
+            let (low, high) = crate::samples::range(c.iter().copied());
+            high - low > least
+        })
+    };
+    match cause {
+        Cause::Effect(Effect::Temperature) => varies(&problem.samples.temperature, 0.5),
+        Cause::Effect(Effect::Load) => varies(&problem.samples.load, 0.0),
+        Cause::Effect(Effect::RateDependence) => problem.basis.drags(),
         _ => true,
     }
 }

@@ -1,32 +1,17 @@
 //! What is left when every effect that was found has been added.
 
-use hyst_core::Error;
-
 use super::findings::{Remainder, RemainderKind};
+use super::finer::AT_FLOOR;
 use super::search::Search;
-use crate::base::PreisachBasis;
-use crate::lsq::Blocks;
-use crate::nested::{Problem, cross_validate, folds_interleaved};
+use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
 
-/// An RMSE of this many noise floors counts as the floor.
-const AT_FLOOR: f64 = 1.3;
 /// A richer base that lowers the variance above the floor by this share shows a lack of capacity.
 const RICHER: f64 = 0.3;
-/// Cells of the richer base.
-const CELLS: usize = 24;
-/// Rows that the comparison uses.
-const ROWS: usize = 8_000;
 
 /// Whether the rest is noise, lack of capacity of the base, or unexplained.
-pub(super) fn judge(
-    problem: &Problem<'_>,
-    found: &Search,
-    after: &Simulation,
-    samples: &Samples,
-    per_record: bool,
-) -> Result<Remainder, Error> {
+pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples: &Samples, richest: f64) -> Remainder {
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
@@ -37,31 +22,30 @@ pub(super) fn judge(
     let share = rmse * rmse / variance.max(f64::MIN_POSITIVE);
     let left = |kind, description: String| Remainder { kind, variance_share: share, description };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
+    if h.zero_wanders || h.gain_wanders {
+        let what = match (h.zero_wanders, h.gain_wanders) {
+            (true, true) => "the zero and the gain wander",
+            (true, false) => "the zero wanders",
+            _ => "the gain wanders",
+        };
+        return left(
+            RemainderKind::Unexplained,
+            format!(
+                "{:.2} % of span: {what} in time as no effect of the list does; look for what was not recorded (a load, a temperature, a mount that slips)",
+                percent(rmse)
+            ),
+        );
+    }
     if rmse <= AT_FLOOR * found.noise {
-        return Ok(left(
+        return left(
             RemainderKind::None,
             format!("what is left is noise: {rmse:.3e} against a floor of {:.3e}", found.noise),
-        ));
+        );
     }
     // The search ran on a richer, rate-independent base: what that one takes is the base's.
-    let richest = {
-        let screening = found.best.cv_rmse();
-        if screening <= AT_FLOOR * found.noise {
-            screening
-        } else {
-            let blocks = Blocks::new(samples, problem.blocks.rows.len(), ROWS);
-            let basis = PreisachBasis::for_samples(samples, CELLS);
-            let preisach = Problem::new(samples, &basis, &blocks, per_record);
-            let cv = preisach.fit_linear(&found.best.fit.effects)?.and_then(|f| {
-                let squares: f64 = cross_validate(&f, &folds_interleaved(&blocks, 4))?.iter().sum();
-                Some((squares / f.rows.max(1) as f64).sqrt())
-            });
-            cv.map_or(screening, |cv| cv.min(screening))
-        }
-    };
     let above = (rmse * rmse - noise2).max(f64::MIN_POSITIVE);
     let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
-    Ok(if taken >= RICHER {
+    if taken >= RICHER {
         left(
             RemainderKind::BaseCapacity,
             format!(
@@ -79,5 +63,5 @@ pub(super) fn judge(
                 percent(found.noise)
             ),
         )
-    })
+    }
 }

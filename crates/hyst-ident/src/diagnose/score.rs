@@ -3,6 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use hyst_core::SaturationParams;
+
 use super::trial::Trial;
 use crate::Samples;
 
@@ -19,6 +21,10 @@ const LEAST_SHARE: f64 = 0.3;
 /// Largest share of a motion that creep may add in the end.
 const MOST_CREEP: f64 = 0.3;
 
+/// Slowest tone of a sensor \[Hz\]: what swings more slowly may as well be a force or the room.
+const SLOWEST_TONE: f64 = 2.0;
+/// Slowest structural mode \[Hz\]: what moves by itself in seconds is no structure of a piezo's size.
+const SLOWEST_MODE: f64 = 1.0;
 /// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
 const MOST_DAMPING: f64 = 0.35;
 
@@ -81,15 +87,35 @@ fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
 
 /// Whether every effect's parameters are physically sensible and away from the bounds of the search.
 pub(super) fn sensible(samples: &Samples, trial: &Trial) -> bool {
-    let e = &trial.fit.effects;
+    let e = &trial.fit.hypothesis.effects;
     let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
-    let time = |seconds: f64| seconds > 0.02 * samples.period && seconds < 0.09 * longest;
+    // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit.
+    let least = if trial.fit.hypothesis.drag.is_some() { 0.3 } else { 0.02 };
+    let time = |seconds: f64| seconds > least * samples.period && seconds < 0.09 * longest;
     e.delay.is_none_or(|p| time(p.seconds))
         && e.lag.is_none_or(|p| time(p.seconds))
+        && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
+        && e.saturation.is_none_or(|p| stops_something(samples, trial, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
-        && e.resonances
-            .iter()
-            .all(|p| p.gain > 1e-3 && p.damping < MOST_DAMPING && p.hz > 2.5 / longest && p.hz < 0.9 * nyquist)
-        && e.interference.is_none_or(|p| p.hz > 2.5 / longest)
+        && e.resonances.iter().all(|p| {
+            p.gain > 1e-3
+                && p.damping < MOST_DAMPING
+                && p.hz > f64::max(2.5 / longest, SLOWEST_MODE)
+                && p.hz < 0.9 * nyquist
+        })
+        && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE))
+}
+
+/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the output's span.
+const TOUCHED: f64 = 0.003;
+const NEAR_LIMIT: f64 = 0.05;
+
+/// Whether the output comes to one of the limits and stays there for some rows.
+fn stops_something(samples: &Samples, trial: &Trial, p: &SaturationParams) -> bool {
+    let zero = trial.fit.zeros.iter().sum::<f64>() / trial.fit.zeros.len().max(1) as f64;
+    let near = NEAR_LIMIT * samples.output_span();
+    let settled = || samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| y - zero);
+    let touched = settled().filter(|y| (p.high - y).min(y - p.low) < near).count();
+    p.knee < 0.2 && touched as f64 > TOUCHED * settled().count() as f64
 }

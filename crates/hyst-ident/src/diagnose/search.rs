@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::trial::Trial;
 use super::{starts, visible};
-use crate::model::{Effect, Effects};
-use crate::nested::{Fitted, Problem};
+use crate::model::Effect;
+use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
 
 /// Sets of effects carried from one round to the next.
@@ -20,6 +20,8 @@ pub(crate) struct Named {
     pub(crate) effect: Effect,
     /// Cross-validated RMSE without it, everything else refitted.
     pub(crate) cv_without: f64,
+    /// Cross-validated RMSE with it.
+    pub(crate) cv_with: f64,
     /// The best that each other candidate does in its place.
     pub(crate) instead: Vec<(Effect, f64, bool)>,
     pub(crate) judgement: Judgement,
@@ -41,9 +43,9 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    fn trials(&self, from: &Fitted, effect: Effect) -> Result<Option<Trial>, Error> {
+    fn trials(&self, from: &Fitted, cause: Cause) -> Result<Option<Trial>, Error> {
         let mut best: Option<Trial> = None;
-        for start in starts::starts(self.problem, from, effect)? {
+        for start in starts::starts(self.problem, from, cause)? {
             let Some(trial) = self.problem.fit(&start)?.and_then(|f| Trial::of(self.problem, f)) else { continue };
             if best.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 best = Some(trial);
@@ -52,7 +54,7 @@ impl Judge<'_> {
         Ok(best)
     }
 
-    fn refit(&self, effects: &Effects) -> Result<Option<Trial>, Error> {
+    fn refit(&self, effects: &Hypothesis) -> Result<Option<Trial>, Error> {
         Ok(self.problem.fit(effects)?.and_then(|f| Trial::of(self.problem, f)))
     }
 
@@ -76,7 +78,7 @@ pub(crate) fn search(
     let steps = quantisation(&problem.samples.output);
     let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments).max(steps);
     let mut judge = Judge { problem, noise, seed };
-    let already = base.effects.names();
+    let already = base.hypothesis.causes();
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
         let nothing = Trial { blocks: vec![base.squares], fit: base };
@@ -90,11 +92,8 @@ pub(crate) fn search(
             break;
         }
         progress(&format!("searching for effects, round {round}"));
-        let jobs: Vec<(&Trial, Effect)> = beam
-            .iter()
-            .flat_map(|t| Effect::ALL.into_iter().map(move |e| (t, e)))
-            .filter(|(t, e)| t.fit.effects.has_room(*e) && visible(*e, problem.samples))
-            .collect();
+        let jobs: Vec<(&Trial, Cause)> =
+            beam.iter().flat_map(|t| candidates(problem, &t.fit).into_iter().map(move |c| (t, c))).collect();
         // Each trial is computed alone and collected in order: threads change nothing.
         let trials: Vec<Result<Option<Trial>, Error>> = jobs
             .par_iter()
@@ -108,8 +107,8 @@ pub(crate) fn search(
         for trial in trials {
             let Some(trial) = trial? else { continue };
             // Two ways to the same set of effects: keep the better.
-            let names = trial.fit.effects.names();
-            match next.iter_mut().find(|t| t.fit.effects.names() == names) {
+            let names = trial.fit.hypothesis.causes();
+            match next.iter_mut().find(|t| t.fit.hypothesis.causes() == names) {
                 Some(same) if same.total() > trial.total() => *same = trial,
                 Some(_) => {}
                 None => next.push(trial),
@@ -128,7 +127,7 @@ pub(crate) fn search(
 
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,
     // so this ends.
-    let mut left: Vec<Vec<Effect>> = Vec::new();
+    let mut left: Vec<Vec<Cause>> = Vec::new();
     let named = loop {
         progress("checking whether each effect is needed");
         let needed = eliminate(&judge, &best, &already)?;
@@ -144,15 +143,25 @@ pub(crate) fn search(
             }
         };
         if let Some(other) = change {
-            left.push(best.fit.effects.names());
+            left.push(best.fit.hypothesis.causes());
             best = other;
         }
     };
     Ok(Search { best, named, noise: judge.noise })
 }
 
-fn candidates_for_removal(best: &Trial, already: &[Effect]) -> Vec<Effect> {
-    let mut names = best.fit.effects.names();
+/// What may be added to a fit. A curve behind the hysteresis is not among it: this base has one of its own, and whether the user's
+/// needs one is asked at the end.
+fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
+    let effects = Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry).map(Cause::Effect);
+    effects
+        .chain([Cause::ZeroWanders, Cause::GainWanders])
+        .filter(|c| fit.hypothesis.has_room(*c) && visible(*c, problem))
+        .collect()
+}
+
+fn candidates_for_removal(best: &Trial, already: &[Cause]) -> Vec<Cause> {
+    let mut names = best.fit.hypothesis.causes();
     for known in already {
         if let Some(at) = names.iter().position(|n| n == known) {
             names.remove(at);
@@ -163,10 +172,10 @@ fn candidates_for_removal(best: &Trial, already: &[Effect]) -> Vec<Effect> {
 }
 
 /// Drops the effect that is needed least, if there is one that is not needed.
-fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Option<Trial>, Error> {
+fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = candidates_for_removal(best, already);
     let reduced: Vec<Result<Option<Trial>, Error>> =
-        names.par_iter().map(|e| judge.refit(&best.fit.effects.without(*e))).collect();
+        names.par_iter().map(|e| judge.refit(&best.fit.hypothesis.without(*e))).collect();
     let mut least: Option<Trial> = None;
     for trial in reduced {
         // Without one effect another may be driven to nonsense: then the first one is needed.
@@ -183,17 +192,14 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Effect]) -> Result<Opti
 fn swaps(
     judge: &Judge<'_>,
     best: &Trial,
-    already: &[Effect],
-    left: &[Vec<Effect>],
+    already: &[Cause],
+    left: &[Vec<Cause>],
 ) -> Result<(Option<Trial>, Vec<Named>), Error> {
     let mut named = Vec::new();
     let mut better: Option<Trial> = None;
-    for effect in candidates_for_removal(best, already) {
-        let Some(without) = judge.refit(&best.fit.effects.without(effect))? else { continue };
-        let others: Vec<Effect> = Effect::ALL
-            .into_iter()
-            .filter(|e| *e != effect && without.fit.effects.has_room(*e) && visible(*e, judge.problem.samples))
-            .collect();
+    for cause in candidates_for_removal(best, already) {
+        let Some(without) = judge.refit(&best.fit.hypothesis.without(cause))? else { continue };
+        let others: Vec<Cause> = candidates(judge.problem, &without.fit).into_iter().filter(|c| *c != cause).collect();
         let trials: Vec<Result<Option<Trial>, Error>> =
             others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
         let mut instead = Vec::new();
@@ -201,16 +207,24 @@ fn swaps(
             let Some(trial) = trial? else { continue };
             let accepted = judge.judge(&without, &trial).accepted();
             let tie = score::sensible(judge.problem.samples, &trial) && tie(judge, best, &trial);
-            instead.push((*other, trial.cv_rmse(), tie));
-            let simpler = tie && other.complexity() < effect.complexity();
+            instead.extend(other.effect().map(|e| (e, trial.cv_rmse(), tie)));
+            let simpler = tie && other.complexity() < cause.complexity();
             let clearly = accepted && !tie && trial.total() < best.total();
-            let fresh = !left.contains(&trial.fit.effects.names());
+            let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 better = Some(trial);
             }
         }
         instead.sort_by(|a, b| a.1.total_cmp(&b.1));
-        named.push(Named { effect, cv_without: without.cv_rmse(), judgement: judge.judge(&without, best), instead });
+        if let Some(effect) = cause.effect() {
+            named.push(Named {
+                effect,
+                cv_without: without.cv_rmse(),
+                cv_with: best.cv_rmse(),
+                judgement: judge.judge(&without, best),
+                instead,
+            });
+        }
     }
     Ok((better, named))
 }

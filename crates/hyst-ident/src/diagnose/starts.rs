@@ -3,11 +3,15 @@
 //! Most effects enter smoothly and can begin near nothing. A frequency cannot: it is looked for over
 //! the whole band first, by how much of the residual a first-order change would take.
 
-use hyst_core::{DelayParams, DriftParams, Error, InterferenceParams, LagParams, ResonanceParams, TemperatureParams};
+use hyst_core::{
+    DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, ResonanceParams, SaturationParams,
+    TemperatureParams,
+};
 
 use super::spectrum::{peaks, tone};
+use crate::base::DragParams;
 use crate::model::{CreepBank, Effect, Effects};
-use crate::nested::{Fitted, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::samples::Samples;
 
 /// Creep elements per decade of time.
@@ -17,17 +21,34 @@ const FOLLOWED: usize = 2;
 /// Frequencies of the coarse scan.
 const SCAN: usize = 48;
 
-/// Effects to begin at: those of `from`, and `effect`.
-pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, effect: Effect) -> Result<Vec<Effects>, Error> {
+/// Hypotheses to begin at: that of `from`, and `cause`.
+pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Result<Vec<Hypothesis>, Error> {
     let samples = problem.samples;
-    let with = |change: &dyn Fn(&mut Effects)| {
-        let mut e = from.effects.clone();
-        change(&mut e);
-        e
+    let also = |change: &dyn Fn(&mut Hypothesis)| {
+        let mut h = from.hypothesis.clone();
+        change(&mut h);
+        h
+    };
+    let with = |change: &dyn Fn(&mut Effects)| also(&|h| change(&mut h.effects));
+    let effect = match cause {
+        Cause::Effect(effect) => effect,
+        Cause::ZeroWanders => return Ok(vec![also(&|h| h.zero_wanders = true)]),
+        Cause::GainWanders => return Ok(vec![also(&|h| h.gain_wanders = true)]),
     };
     Ok(match effect {
         Effect::Delay => vec![with(&|e| e.delay = Some(DelayParams { seconds: samples.period }))],
         Effect::Lag => vec![with(&|e| e.lag = Some(LagParams { seconds: samples.period }))],
+        Effect::RateDependence => {
+            // A drag that grows with the rate, and one that grows with its root.
+            let (low, high) = samples.input_range();
+            let linear = DragParams { seconds: samples.period, volt_seconds: 0.0 };
+            let root = DragParams { seconds: 0.0, volt_seconds: 1e-3 * (high - low) * samples.period };
+            [linear, root].map(|drag| also(&|h| h.drag = Some(drag))).into()
+        }
+        // It is looked for on the user's base.
+        Effect::Asymmetry => Vec::new(),
+        Effect::Load => vec![with(&|e| e.load = Some(LoadParams { per_newton: 0.0 }))],
+        Effect::Saturation => stops(samples, from).map(|stop| with(&|e| e.saturation = Some(stop))).into(),
         Effect::Temperature => {
             let reference_degc = starting_temperature(samples);
             vec![with(&|e| e.temperature = Some(TemperatureParams { per_kelvin: 0.0, reference_degc }))]
@@ -49,6 +70,22 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, effect: Effect) -> Re
         }
     })
 }
+
+/// A stop at either end of what the sensor has shown, the other end far away.
+pub(super) fn stops(samples: &Samples, from: &Fitted) -> [SaturationParams; 2] {
+    let zero = from.zeros.iter().sum::<f64>() / from.zeros.len().max(1) as f64;
+    let settled = samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| y - zero);
+    let mut shown: Vec<f64> = settled.collect();
+    shown.sort_by(f64::total_cmp);
+    let at = |share: f64| shown.get((share * (shown.len() - 1) as f64) as usize).copied().unwrap_or(0.0);
+    // Noise reaches beyond a stop: not the very last value.
+    let (low, high) = (at(0.001), at(0.999));
+    let far = FAR_STOP * (high - low);
+    [SaturationParams { low: high - far, high, knee: 0.01 }, SaturationParams { low, high: low + far, knee: 0.01 }]
+}
+
+/// How far away, in spans of the output, a stop is that nothing reaches.
+const FAR_STOP: f64 = 3.0;
 
 /// Temperature at which the gain counts as 1: where the record began, to a tenth of a degree.
 fn starting_temperature(samples: &Samples) -> f64 {
@@ -75,7 +112,7 @@ fn modes(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<ResonanceParams>, E
     let (low, high) = (3.0 / samples.longest_segment(), 0.45 / samples.period);
     let mut grid: Vec<f64> = (0..SCAN).map(|i| low * (high / low).powf(i as f64 / (SCAN - 1) as f64)).collect();
     grid.extend(peaks(samples, &residual, 4).into_iter().filter(|hz| *hz > low && *hz < high));
-    let motion = problem.motion(&from.effects, &from.weights)?;
+    let motion = problem.motion(&from.hypothesis, &from.solution)?;
     let projector = problem.projector(from)?;
     let mut scored = Vec::new();
     for hz in grid {
@@ -83,7 +120,7 @@ fn modes(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<ResonanceParams>, E
             let mode = ResonanceParams { hz, damping, gain: 1.0 };
             let mut moved = motion.clone();
             let only = Effects { resonances: vec![mode], ..Effects::default() };
-            crate::nested::SignalPath::new(samples, &only)?.output_side(&mut moved);
+            crate::nested::SignalPath::new(samples, &Hypothesis::of(only))?.output_side(&mut moved);
             moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);
             let (gain, amplitude) = projector.gain(&moved, &residual);
             if amplitude > 0.0 {

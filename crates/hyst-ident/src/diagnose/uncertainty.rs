@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::lsq::Gram;
-use crate::nested::Fitted;
+use crate::nested::{Fitted, Layout};
 
 /// Standard error of every effect's parameters, by `stage.parameter`.
 ///
@@ -44,11 +44,10 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
         Some(covariance[(r, r)].max(0.0).sqrt() / scale[r])
     };
 
-    let mut nonlinear = 0;
-    fit.effects.clone().visit_nonlinear(&mut |_| nonlinear += 1);
-    let mut next = n - nonlinear;
-    let mut effects = fit.effects.clone();
-    effects.visit_nonlinear(&mut |p| {
+    let mut hypothesis = fit.hypothesis.clone();
+    let layout = Layout::of(&hypothesis, fit.weights.len(), fit.zeros.len());
+    let mut next = layout.len();
+    hypothesis.visit_nonlinear(&mut |p| {
         if let Some(e) = of(next) {
             let (stage, name) = match p.name.strip_suffix("_2") {
                 Some(name) => (format!("{}_2", p.effect), name.to_owned()),
@@ -58,16 +57,18 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
         }
         next += 1;
     });
-    // Linear ones stand between the zeros and the nonlinear ones.
-    let mut linear = fit.weights.len() + fit.zeros.len();
-    if fit.effects.drift.is_some() {
-        if let Some(e) = of(linear) {
-            errors.insert("drift.per_second".into(), e);
+    let mut put = |name: String, unknown: Option<usize>| {
+        if let Some(e) = unknown.and_then(of) {
+            errors.insert(name, e);
         }
-        linear += 1;
+    };
+    put("drift.per_second".into(), layout.drift.clone().next());
+    put("load.per_newton".into(), layout.load.clone().next());
+    for (i, unknown) in layout.zones.clone().enumerate() {
+        put(format!("asymmetry.weights[{i}]"), Some(unknown));
     }
-    if let Some(tone) = fit.effects.interference
-        && let (Some(a), Some(b)) = (of(linear), of(linear + 1))
+    if let (Some(tone), Some(sine)) = (fit.hypothesis.effects.interference, layout.tone.clone().next())
+        && let (Some(a), Some(b)) = (of(sine), of(sine + 1))
     {
         // Sine and cosine parts are nearly independent over many periods.
         let (s, c) = tone.phase.sin_cos();

@@ -28,3 +28,4 @@ pub use fundamental::{GainPoint, gain_map};
 pub use periodic::periodic_response;
 pub use structure::{Structure, StructureOptions, identify_structure};
 pub use welch::{FrequencyResponse, Method, ResponseLine, WelchOptions, response};
+pub(crate) use welch::{Hann, windows};

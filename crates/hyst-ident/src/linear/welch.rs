@@ -1,5 +1,7 @@
 //! Frequency response with coherence: Welch's averages and the estimate H₁.
 
+use std::ops::Range;
+
 use nalgebra::Complex;
 use realfft::RealFftPlanner;
 use serde::Serialize;
@@ -106,11 +108,8 @@ pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyRe
         return Err(short(200));
     }
     let mut sums = Sums::new(length);
-    for s in &samples.segments {
-        for start in (s.start..(s.end + 1).saturating_sub(length)).step_by((length / 2).max(1)) {
-            let window = start..start + length;
-            sums.add(&samples.input[window.clone()], &samples.output[window]);
-        }
+    for window in windows(&samples.segments, length) {
+        sums.add(&samples.input[window.clone()], &samples.output[window]);
     }
     if sums.count < 2 {
         return Err(short(length + length / 2));
@@ -118,10 +117,44 @@ pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyRe
     sums.finish(samples.period)
 }
 
-/// Summed spectra.
-struct Sums {
+/// Rows of the windows that fit into segments, half overlapped.
+pub(crate) fn windows(segments: &[Range<usize>], length: usize) -> impl Iterator<Item = Range<usize>> {
+    let starts = move |s: &Range<usize>| (s.start..(s.end + 1).saturating_sub(length)).step_by((length / 2).max(1));
+    segments.iter().flat_map(starts).map(move |start| start..start + length)
+}
+
+/// A Hann window and the spectra of what is seen through it.
+pub(crate) struct Hann {
     fft: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
     window: Vec<f64>,
+}
+
+impl Hann {
+    pub(crate) fn new(length: usize) -> Self {
+        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let hann = |k: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos();
+        Self { fft, window: (0..length).map(hann).collect() }
+    }
+
+    /// Σ w²
+    pub(crate) fn energy(&self) -> f64 {
+        self.window.iter().map(|w| w * w).sum()
+    }
+
+    /// Spectrum of as many rows as the window has, their mean removed.
+    pub(crate) fn spectrum(&self, x: &[f64]) -> Vec<Complex<f64>> {
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        let mut windowed: Vec<f64> = x.iter().zip(&self.window).map(|(x, w)| (x - mean) * w).collect();
+        let mut spectrum = self.fft.make_output_vec();
+        // Lengths are the planner's own: this cannot fail.
+        let _ = self.fft.process(&mut windowed, &mut spectrum);
+        spectrum
+    }
+}
+
+/// Summed spectra.
+struct Sums {
+    hann: Hann,
     count: usize,
     uu: Vec<f64>,
     yy: Vec<f64>,
@@ -130,12 +163,9 @@ struct Sums {
 
 impl Sums {
     fn new(length: usize) -> Self {
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-        let hann = |k: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos();
         let lines = length / 2 + 1;
         Self {
-            fft,
-            window: (0..length).map(hann).collect(),
+            hann: Hann::new(length),
             count: 0,
             uu: vec![0.0; lines],
             yy: vec![0.0; lines],
@@ -143,17 +173,8 @@ impl Sums {
         }
     }
 
-    fn spectrum(&self, x: &[f64]) -> Vec<Complex<f64>> {
-        let mean = x.iter().sum::<f64>() / x.len() as f64;
-        let mut windowed: Vec<f64> = x.iter().zip(&self.window).map(|(x, w)| (x - mean) * w).collect();
-        let mut spectrum = self.fft.make_output_vec();
-        // Lengths are the planner's own: this cannot fail.
-        let _ = self.fft.process(&mut windowed, &mut spectrum);
-        spectrum
-    }
-
     fn add(&mut self, u: &[f64], y: &[f64]) {
-        let (u, y) = (self.spectrum(u), self.spectrum(y));
+        let (u, y) = (self.hann.spectrum(u), self.hann.spectrum(y));
         for (i, (u, y)) in u.iter().zip(&y).enumerate() {
             self.uu[i] += u.norm_sqr();
             self.yy[i] += y.norm_sqr();
@@ -163,7 +184,7 @@ impl Sums {
     }
 
     fn finish(self, period: f64) -> Result<FrequencyResponse, LinearError> {
-        let length = self.window.len();
+        let length = self.hann.window.len();
         let strongest = |power: &[f64]| power.iter().skip(2).fold(0.0_f64, |most, p| most.max(*p));
         let (most_u, most_y) = (strongest(&self.uu), strongest(&self.yy));
         for (most, column) in [(most_u, "input"), (most_y, "output")] {

@@ -17,12 +17,20 @@ pub enum Effect {
     Delay,
     /// First-order lag of the amplifier.
     Lag,
+    /// A curve behind the hysteresis: one end of the loop is steeper.
+    Asymmetry,
+    /// Loops that widen with the rate of the drive.
+    RateDependence,
     /// Gain that follows temperature.
     Temperature,
     /// Slow relaxation after the drive has stopped.
     Creep,
+    /// The actuator yields under a force.
+    Load,
     /// A structural mode.
     Resonance,
+    /// A stop of the motion.
+    Saturation,
     /// Drift of the sensor.
     Drift,
     /// A tone in the sensor.
@@ -30,18 +38,33 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// All effects that this version can add, in the chain's order.
-    pub const ALL: [Self; 7] =
-        [Self::Delay, Self::Lag, Self::Temperature, Self::Creep, Self::Resonance, Self::Drift, Self::Interference];
+    /// All effects, in the chain's order.
+    pub const ALL: [Self; 11] = [
+        Self::Delay,
+        Self::Lag,
+        Self::Asymmetry,
+        Self::RateDependence,
+        Self::Temperature,
+        Self::Creep,
+        Self::Load,
+        Self::Resonance,
+        Self::Saturation,
+        Self::Drift,
+        Self::Interference,
+    ];
 
     /// The name that commands and files use.
     pub fn name(self) -> &'static str {
         match self {
             Self::Delay => "delay",
             Self::Lag => "lag",
+            Self::Asymmetry => "asymmetry",
+            Self::RateDependence => "rate-dependence",
             Self::Temperature => "temperature",
             Self::Creep => "creep",
+            Self::Load => "load",
             Self::Resonance => "resonance",
+            Self::Saturation => "saturation",
             Self::Drift => "drift",
             Self::Interference => "interference",
         }
@@ -51,9 +74,11 @@ impl Effect {
     /// fewer is the simpler explanation.
     pub(crate) fn complexity(self) -> usize {
         match self {
-            Self::Delay | Self::Lag | Self::Temperature | Self::Drift => 1,
+            Self::Delay | Self::Lag | Self::RateDependence | Self::Temperature | Self::Load | Self::Drift => 1,
+            Self::Saturation => 2,
             Self::Resonance | Self::Interference => 3,
             Self::Creep => 4,
+            Self::Asymmetry => 5,
         }
     }
 
@@ -96,11 +121,11 @@ pub struct Effects {
     pub drift: Option<DriftParams>,
     /// Tone.
     pub interference: Option<InterferenceParams>,
-    /// Curve behind the hysteresis. No diagnosis looks for it yet.
+    /// Curve behind the hysteresis.
     pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
-    /// Compliance under the load. No diagnosis looks for it yet.
+    /// Compliance under the load.
     pub load: Option<LoadParams>,
-    /// Ends of the motion. No diagnosis looks for them yet.
+    /// Ends of the motion.
     pub saturation: Option<SaturationParams>,
 }
 
@@ -124,11 +149,14 @@ impl Effects {
         };
         push(self.delay.is_some(), Effect::Delay);
         push(self.lag.is_some(), Effect::Lag);
+        push(self.asymmetry.is_some(), Effect::Asymmetry);
         push(self.temperature.is_some(), Effect::Temperature);
         push(self.creep.is_some(), Effect::Creep);
+        push(self.load.is_some(), Effect::Load);
         for _ in &self.resonances {
             push(true, Effect::Resonance);
         }
+        push(self.saturation.is_some(), Effect::Saturation);
         push(self.drift.is_some(), Effect::Drift);
         push(self.interference.is_some(), Effect::Interference);
         names
@@ -151,16 +179,6 @@ impl Effects {
         }
     }
 
-    /// Stages that a diagnosis of this version neither looks for nor keeps.
-    pub(crate) fn beyond_diagnosis(&self) -> Option<&'static str> {
-        let there = [
-            (self.asymmetry.is_some(), "asymmetry"),
-            (self.load.is_some(), "load"),
-            (self.saturation.is_some(), "saturation"),
-        ];
-        there.into_iter().find_map(|(there, name)| there.then_some(name))
-    }
-
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.names().is_empty()
@@ -178,11 +196,16 @@ impl Effects {
         match effect {
             Effect::Delay => less.delay = None,
             Effect::Lag => less.lag = None,
+            Effect::Asymmetry => less.asymmetry = None,
+            // It is the base's.
+            Effect::RateDependence => {}
             Effect::Temperature => less.temperature = None,
             Effect::Creep => less.creep = None,
+            Effect::Load => less.load = None,
             Effect::Resonance => {
                 less.resonances.pop();
             }
+            Effect::Saturation => less.saturation = None,
             Effect::Drift => less.drift = None,
             Effect::Interference => less.interference = None,
         }
@@ -195,7 +218,7 @@ impl Effects {
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// Drift and the amplitude and phase of a tone enter linearly and are not among them.
+    /// Drift, load, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are not among them.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
             params.visit(&mut |meta, value| {
@@ -229,6 +252,9 @@ impl Effects {
         }
         for (i, p) in self.resonances.iter_mut().enumerate() {
             pass(Effect::Resonance, if i == 0 { "" } else { "_2" }, p, f);
+        }
+        if let Some(p) = &mut self.saturation {
+            pass(Effect::Saturation, "", p, f);
         }
         if let Some(p) = &mut self.interference {
             pass(Effect::Interference, "", p, &mut |parameter| {

@@ -22,7 +22,7 @@ pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>
 pub(crate) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>]) -> Option<Vec<f64>> {
     let columns = fit.grams.first()?.matrix.ncols();
     let total = Gram::sum(columns, fit.grams.iter());
-    let nonlinear_from = columns - 1 - count_nonlinear(fit);
+    let nonlinear_from = columns - 1 - fit.hypothesis.nonlinear().len();
     let mut penalty = fit.penalty.clone();
     for i in nonlinear_from..columns - 1 {
         penalty[(i, i)] += 1e-6 * total.matrix[(i, i)];
@@ -40,10 +40,4 @@ pub(crate) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>]) -> Option<Vec<f
         }
     }
     Some(squares)
-}
-
-fn count_nonlinear(fit: &Fitted) -> usize {
-    let mut n = 0;
-    fit.effects.clone().visit_nonlinear(&mut |_| n += 1);
-    n
 }

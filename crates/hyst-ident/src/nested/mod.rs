@@ -5,10 +5,18 @@
 //! zeros, drift, the amplitude of a tone) are solved again (variable projection; Golub and Pereyra
 //! 1973), by damped Gauss-Newton steps.
 
+mod assembly;
+mod bounds;
 mod cross_validation;
+mod hypothesis;
+mod layout;
 mod path;
 mod problem;
+mod projector;
 
 pub(crate) use cross_validation::{cross_validate, folds_interleaved};
+pub(crate) use hypothesis::{Cause, Hypothesis};
+pub(crate) use layout::{HATS, Layout};
 pub(crate) use path::SignalPath;
 pub(crate) use problem::{Fitted, Problem};
+pub(crate) use projector::Projector;

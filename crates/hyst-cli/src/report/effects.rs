@@ -1,0 +1,65 @@
+//! Each effect that was named: parameters, evidence, what else was tried.
+
+use hyst_ident::diagnose::Finding;
+
+use super::html::{Page, Table, escaped};
+use super::{Contents, figures, words};
+use crate::text::short;
+
+/// A part for each effect.
+pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
+    page.section("effects", "What the model lacks");
+    let effects = &c.diagnosis.findings.effects;
+    if effects.is_empty() {
+        page.paragraph("", "No effect was named: none of them explains what is left well enough");
+        return;
+    }
+    page.paragraph(
+        "soft",
+        "Each picture compares the extended model with the same model less that one effect, nothing fitted again: what differs is the \
+         effect's own part. Residuals are measured minus predicted output",
+    );
+    page.raw(
+        "<p class=\"soft hint\">Drag across a plot to zoom, double-click for the whole of it; with fingers: two zoom, one moves, a double \
+         tap resets.</p>",
+    );
+    for (i, finding) in effects.iter().enumerate() {
+        page.raw(&format!("<h3 class=\"effect\">{}</h3>", escaped(finding.name)));
+        page.list(&finding.evidence);
+        page.raw("<div class=\"side\">");
+        page.table(&parameters(finding));
+        page.table(&candidates(finding, c.unit()));
+        page.raw("</div>");
+        for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
+            let text = format!(
+                "This record cannot tell {} from {}; the simpler of the two is named. What would is said under Next",
+                finding.name, other.name
+            );
+            page.paragraph("note", &text);
+        }
+        // A second mode has its pictures with the first.
+        if i == 0 || effects[i - 1].name != finding.name {
+            figures::write(page, &figures::of(&c.diagnosis.pictures, Some(finding.name)));
+        }
+    }
+}
+
+fn parameters(finding: &Finding) -> Table {
+    let mut table = Table::new("Parameters").words("name").numbers("value ± standard error");
+    for (name, value) in words::parameters(&finding.parameters) {
+        table.row(&[name, &value]);
+    }
+    table
+}
+
+/// What stood in its place, by its cross-validated error.
+fn candidates(finding: &Finding, unit: &str) -> Table {
+    let mut table = Table::new("In its place").words("effect").numbers(&format!("cross-validated RMSE [{unit}]"));
+    table.named_row(&[format!("{}, as named", finding.name), short(finding.cv_rmse_after)]);
+    for other in &finding.alternatives {
+        let tie = if other.indistinguishable { ", indistinguishable" } else { "" };
+        table.row(&[format!("{}{tie}", other.name), short(other.cv_rmse)]);
+    }
+    table.row(&["nothing".to_owned(), short(finding.cv_rmse_before)]);
+    table
+}

@@ -1,0 +1,118 @@
+//! The experiment or the fit that would tell more, as a command.
+
+use hyst_ident::diagnose::{RemainderKind, Verdict};
+use hyst_ident::model::{Effect, Kind};
+
+use super::html::Page;
+use super::{Contents, words};
+use crate::text::listed;
+
+/// What to do next.
+pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
+    page.section("next", "Next");
+    let f = &c.diagnosis.findings;
+    let mut said = false;
+    let mut advise = |text: &str, commands: &[String]| {
+        page.paragraph("", text);
+        if !commands.is_empty() {
+            page.command(&commands.join("\n"));
+        }
+        said = true;
+    };
+    for finding in &f.effects {
+        for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
+            let text = format!(
+                "This record cannot tell {} from {}. The drive that leaves most of one that the other cannot imitate:",
+                finding.name, other.name
+            );
+            advise(&text, &[separate(c, finding.name, other.name)]);
+        }
+    }
+    if words::worse_on_test(f) {
+        advise("Record a drive that shows every effect, and fit and diagnose that:", &[identification(c, 1)]);
+    }
+    let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
+    match f.remainder.kind {
+        RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
+            let files = files(c);
+            advise(
+                "Most of what is left is the base's own misfit. A finer base, and its diagnosis:",
+                &[
+                    format!("hystctl fit {files} --model preisach -o finer.json"),
+                    format!("hystctl diagnose {files} --model finer.json -o finer-extended.json --report finer.html"),
+                ],
+            );
+        }
+        RemainderKind::BaseCapacity => {
+            advise(
+                "Most of what is left is the base's own misfit, and there is no finer base that can be diagnosed.",
+                &[],
+            );
+        }
+        RemainderKind::Unexplained => {
+            let missing: Vec<&str> = [
+                (c.train.temperature().is_none(), "the temperature (temperature_degc)"),
+                (c.train.load().is_none(), "the load (load_n)"),
+            ]
+            .into_iter()
+            .filter_map(|(missing, name)| missing.then_some(name))
+            .collect();
+            if !missing.is_empty() {
+                advise(&format!("Record {} too, and fit and diagnose anew.", listed(&missing)), &[]);
+            }
+            advise(
+                "Play the same drive twice. What comes back in both residuals is the device's; what does not is a disturbance that \
+                 no model will take.",
+                &[],
+            );
+        }
+        RemainderKind::None => {}
+    }
+    if f.verdict == Verdict::NothingMissing || (f.verdict == Verdict::Explained && c.test.is_none()) {
+        advise("See what the model is worth on a drive that it has not seen:", &[identification(c, c.seed + 1)]);
+    }
+    if !said {
+        page.paragraph("", "Nothing that another experiment would have to settle");
+    }
+}
+
+/// Names of the training files, as the command line takes them.
+fn files(c: &Contents<'_>) -> String {
+    c.train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
+}
+
+/// A word of the command line.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:=,@".contains(c);
+    if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+}
+
+/// Range and rate of the record's drive.
+fn limits(c: &Contents<'_>) -> String {
+    let rate = 1.0 / c.train.sample_period();
+    // Six digits: a period as printed gives a rate that is a whole number but for rounding.
+    let digits = |x: f64| format!("{x:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    format!("--low {} --high {} --rate {}", digits(c.model.input.low), digits(c.model.input.high), digits(rate))
+}
+
+fn separate(c: &Contents<'_>, one: Effect, other: Effect) -> String {
+    let sensors = [(c.train.temperature().is_some(), " --thermometer"), (c.train.load().is_some(), " --load-cell")];
+    let sensors: String = sensors.into_iter().filter_map(|(has, option)| has.then_some(option)).collect();
+    format!("hystctl excite separate {one} {other} {}{sensors} -o next.csv", limits(c))
+}
+
+fn identification(c: &Contents<'_>, seed: u64) -> String {
+    format!("hystctl excite identification {} --seed {seed} -o next.csv", limits(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_a_command_stay_words() {
+        assert_eq!(quoted("train.csv"), "train.csv");
+        assert_eq!(quoted("my record;rm.csv"), "'my record;rm.csv'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}

@@ -1,0 +1,80 @@
+//! Findings in words, the same on the terminal and in a report.
+
+use std::collections::BTreeMap;
+
+use hyst_ident::diagnose::{Findings, Found, RemainderKind, Verdict};
+
+use crate::text::{listed, symbol, with_error};
+
+/// The diagnosis in a sentence.
+pub(crate) fn verdict(findings: &Findings) -> String {
+    match findings.verdict {
+        Verdict::Explained => {
+            let mut names: Vec<&str> = findings.effects.iter().map(|effect| effect.name.name()).collect();
+            names.dedup();
+            let part = if findings.remainder.kind == RemainderKind::None { "" } else { " in part" };
+            format!("explained{part}: the model lacks {}", listed(&names))
+        }
+        Verdict::NothingMissing => "nothing missing: the model is at the noise floor".to_owned(),
+        Verdict::BaseTooCoarse => {
+            "base too coarse: what is left is a map of the input's history that a richer base would take".to_owned()
+        }
+        Verdict::Unexplained => "unexplained: what is left is none of the effects that are looked for".to_owned(),
+    }
+}
+
+/// What kind of remainder it is.
+pub(crate) fn kind(kind: RemainderKind) -> &'static str {
+    match kind {
+        RemainderKind::None => "noise",
+        RemainderKind::BaseCapacity => "the base's own misfit",
+        RemainderKind::Unexplained => "unexplained",
+    }
+}
+
+/// Whether the error on the test record has grown, so that the extended model should not be used.
+pub(crate) fn worse_on_test(findings: &Findings) -> bool {
+    findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)
+}
+
+/// Name and value of every parameter, the elements of a creep bank in their order.
+pub(crate) fn parameters(parameters: &BTreeMap<String, Found>) -> Vec<(&str, String)> {
+    let mut sorted: Vec<_> = parameters.iter().collect();
+    sorted.sort_by(|a, b| number_in(a.0).total_cmp(&number_in(b.0)));
+    let value = |found: &Found| format!("{} {}", with_error(found.value, found.std_error), unit(&found.unit));
+    sorted.into_iter().map(|(name, found)| (name.as_str(), value(found).trim_end().to_owned())).collect()
+}
+
+/// A unit as a person writes it, `µm/N` of `um/N`; nothing of a ratio.
+fn unit(unit: &str) -> String {
+    let part = |part| if part == "degC" { "°C" } else { symbol(part) };
+    match unit {
+        "1" => String::new(),
+        _ => unit.split('/').map(part).collect::<Vec<_>>().join("/"),
+    }
+}
+
+/// The time constant in `share_1.394s`; names without a number come last.
+fn number_in(name: &str) -> f64 {
+    let number = name.strip_prefix("share_").and_then(|rest| rest.strip_suffix('s'));
+    number.and_then(|number| number.parse().ok()).unwrap_or(f64::INFINITY)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_those_of_people() {
+        assert_eq!(["um/N", "1/K", "degC", "1", "s", "um"].map(unit), ["µm/N", "1/K", "°C", "", "s", "µm"]);
+    }
+
+    #[test]
+    fn creep_elements_stand_in_their_order() {
+        let found = |value| Found { value, std_error: None, unit: "1".into() };
+        let names = ["share_10.000s", "share_2.000s", "total"];
+        let list = BTreeMap::from(names.map(|name| (name.to_owned(), found(0.01))));
+        let order: Vec<&str> = parameters(&list).iter().map(|p| p.0).collect();
+        assert_eq!(order, ["share_2.000s", "share_10.000s", "total"]);
+    }
+}

@@ -1,0 +1,182 @@
+//! A travel that asks for everything, followed on a device: by a plain gain, or through a model's inverse.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use hyst_hw::{Daq, Phase, RecordOptions, Sample};
+use hyst_ident::atomic_file::write_atomic;
+use hyst_ident::compensate::{CompensateOptions, Follower, compensate};
+use hyst_ident::model::Model;
+use hyst_ident::record::{Columns, Extra, OutputUnit, Record};
+
+use crate::exit::{CommandError, CommandResult, Exit};
+use crate::log::{LogError, LoggedModel, LoggedSample, RunInfo, RunLog};
+use crate::output;
+
+/// Length of the reference \[s\].
+const SECONDS: f64 = 12.0;
+
+/// One tracking run.
+pub(crate) struct Run {
+    /// Measured motion minus reference \[output unit\].
+    pub(crate) error: Vec<f64>,
+    pub(crate) rmse: f64,
+    pub(crate) max_abs: f64,
+}
+
+/// What is followed.
+pub(crate) struct Task {
+    /// Samples per second.
+    rate_hz: f64,
+    /// Wanted displacement from rest \[output unit\].
+    pub(crate) travel: Vec<f64>,
+}
+
+/// Where the log and the drive of a run go.
+pub(crate) struct Files<'a> {
+    pub(crate) log: &'a Path,
+    pub(crate) drive: &'a Path,
+}
+
+impl Task {
+    /// For the stroke that a model knows.
+    pub(crate) fn of(model: &Model, rate_hz: f64) -> Self {
+        Self { rate_hz, travel: travel(model, rate_hz) }
+    }
+
+    /// Times of the samples \[s\].
+    pub(crate) fn time(&self) -> Vec<f64> {
+        (0..self.travel.len()).map(|k| k as f64 / self.rate_hz).collect()
+    }
+
+    /// By a gain alone: what somebody without a model would use.
+    pub(crate) fn by_gain<D: Daq>(&self, daq: &mut D, train: &Record, model: &Model) -> CommandResult<Vec<Sample>> {
+        let gain = mean_gain(train, model.zero);
+        let (low, high) = (model.input.low, model.input.high);
+        let drive: Vec<f64> = self.travel.iter().map(|y| (y / gain).clamp(low, high)).collect();
+        self.play(daq, &drive, |_| {}, |_| Ok(()))
+    }
+
+    /// Through a model's inverse. What its gain needs to know of temperature and load is only known while the device runs: the
+    /// plan is made for the reference temperature, and revised with every measured one.
+    pub(crate) fn through<D: Daq>(
+        &self,
+        daq: &mut D,
+        model: &Model,
+        files: Option<&Files<'_>>,
+    ) -> CommandResult<Vec<Sample>> {
+        let reference = self.in_the_sensor(model)?;
+        let temperature = model.effects.temperature.map(|t| t.reference_degc);
+        let options = CompensateOptions { temperature, ..CompensateOptions::default() };
+        let plan = compensate(model, &reference, &options)?;
+        let mut follower = Follower::new(model, &reference, &options)?;
+        let revise = |r: &mut hyst_hw::Revision<'_>| {
+            for v in r.drive_v.iter_mut() {
+                *v = follower.next(r.latest.and_then(|s| s.temperature_degc)).drive;
+            }
+        };
+        let Some(files) = files else { return self.play(daq, &plan.voltage, revise, |_| Ok(())) };
+        let json = model.to_json();
+        let device = daq.capabilities().device.clone();
+        let output = OutputUnit::of_column(&model.output.column).unwrap_or(OutputUnit::Micrometre);
+        let info = RunInfo {
+            device: &device,
+            output,
+            sample_rate_hz: self.rate_hz,
+            model: Some(LoggedModel { model, json: &json }),
+        };
+        let lost = |e: LogError| CommandError::new(Exit::DeviceLost, e);
+        let mut log = RunLog::create(files.log, &info).map_err(lost)?;
+        let mut rows = reference.output().unwrap_or_default().iter();
+        let followed = self.play(daq, &plan.voltage, revise, |s| {
+            let reference = rows.next().copied();
+            log.sample(&LoggedSample::new(0, Phase::Record, s, reference)).map_err(lost)
+        })?;
+        log.finish().map_err(lost)?;
+        let drive: Vec<f64> = followed.iter().map(|s| s.drive_v).collect();
+        write_atomic(files.drive, |file| {
+            reference.write_with(file, &[Extra::numbers("voltage_v", &drive)]).map_err(output::io_error)
+        })?;
+        Ok(followed)
+    }
+
+    /// Error of the motion: drift and tone that a model has found in the sensor are taken out of what it showed.
+    pub(crate) fn judge(&self, samples: &[Sample], model: &Model) -> Run {
+        let sensor = |t: f64| {
+            let drift = model.effects.drift.map_or(0.0, |d| d.per_second * t);
+            let tone = model
+                .effects
+                .interference
+                .map_or(0.0, |i| i.amplitude * (2.0 * std::f64::consts::PI * (i.hz * t).fract() + i.phase).sin());
+            drift + tone
+        };
+        let error: Vec<f64> =
+            samples.iter().zip(&self.travel).map(|(s, y)| s.output - model.zero - sensor(s.time_s) - y).collect();
+        let n = error.len().max(1) as f64;
+        Run {
+            rmse: (error.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
+            max_abs: error.iter().fold(0.0, |m, e| m.max(e.abs())),
+            error,
+        }
+    }
+
+    /// The travel in the sensor's coordinates.
+    fn in_the_sensor(&self, model: &Model) -> CommandResult<Record> {
+        let unit = OutputUnit::of_column(&model.output.column).unwrap_or(OutputUnit::Micrometre);
+        let columns = Columns {
+            name: "reference".into(),
+            time: self.time(),
+            output: Some((unit, self.travel.iter().map(|y| model.zero + y).collect())),
+            // Nobody knows it beforehand.
+            load: model.effects.load.map(|_| vec![0.0; self.travel.len()]),
+            ..Columns::default()
+        };
+        Ok(Record::from_samples(columns)?)
+    }
+
+    fn play<D: Daq>(
+        &self,
+        daq: &mut D,
+        drive: &[f64],
+        revise: impl FnMut(&mut hyst_hw::Revision<'_>),
+        mut each: impl FnMut(&Sample) -> CommandResult,
+    ) -> CommandResult<Vec<Sample>> {
+        // Small blocks, so that a revision is not stale.
+        let options = RecordOptions { block: 50, slew_v_per_s: 1000.0, ..RecordOptions::at(self.rate_hz) };
+        let mut failed = None;
+        let recording = hyst_hw::record_with(daq, &[drive], &options, revise, |news| {
+            if news.phase == Phase::Record {
+                failed = news.samples.iter().find_map(|s| each(s).err());
+            }
+            if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        match (failed, recording) {
+            (Some(error), _) => Err(error),
+            (None, Ok(recording)) => Ok(recording.segments.into_iter().flat_map(|s| s.samples).collect()),
+            (None, Err(failure)) => Err(CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}"))),
+        }
+    }
+}
+
+/// A travel from rest that asks for everything: slow and fast motion, nested loops, a hold; within 85 % of
+/// the stroke \[output unit\].
+fn travel(model: &Model, rate_hz: f64) -> Vec<f64> {
+    let stroke = model.output.high - model.zero;
+    let smooth = |x: f64| 0.5 - 0.5 * (std::f64::consts::PI * x.clamp(0.0, 1.0)).cos();
+    let shape = |t: f64| {
+        let wave = |hz: f64, amplitude: f64| amplitude * (2.0 * std::f64::consts::PI * hz * t).sin();
+        // Moving from the second second to the ninth, then a hold at two thirds.
+        let moving = smooth((t - 1.0) / 0.5) * (1.0 - smooth((t - 8.5) / 0.5));
+        0.48 * smooth(t)
+            + moving * (wave(0.7, 0.19) + wave(4.0, 0.1) + wave(11.0, 0.06))
+            + 0.18 * smooth((t - 9.0) / 0.5)
+    };
+    (0..(SECONDS * rate_hz) as usize).map(|k| stroke * shape(k as f64 / rate_hz)).collect()
+}
+
+/// Slope through the rest point, by least squares: what somebody without a model would use.
+fn mean_gain(record: &Record, zero: f64) -> f64 {
+    let (u, y) = (record.input(), record.output().unwrap_or_default());
+    let (cross, own) = u.iter().zip(y).fold((0.0, 0.0), |(c, o), (u, y)| (c + u * (y - zero), o + u * u));
+    cross / own
+}

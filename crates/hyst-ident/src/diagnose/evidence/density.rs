@@ -1,0 +1,94 @@
+//! How a signal's power lies over frequency.
+
+use crate::Samples;
+use crate::linear::{Hann, windows};
+
+/// Power over frequency, one-sided.
+pub(super) struct Density {
+    /// Frequencies \[Hz\], evenly spaced.
+    pub(super) hz: Vec<f64>,
+    /// Power per Hz \[unit²/Hz\].
+    pub(super) power: Vec<f64>,
+}
+
+/// Windows that are averaged where the record is long enough.
+const WINDOWS: usize = 24;
+
+impl Density {
+    /// Of a signal over the settled rows by Welch's method; windows such that about 24 fit, or of the longest segment.
+    pub(super) fn of(samples: &Samples, signal: &[f64]) -> Option<Self> {
+        Self::with_windows(samples, signal, 2 * samples.len() / (WINDOWS + 1))
+    }
+
+    /// With the finest lines that the longest segment gives.
+    pub(super) fn finest(samples: &Samples, signal: &[f64]) -> Option<Self> {
+        Self::with_windows(samples, signal, usize::MAX)
+    }
+
+    fn with_windows(samples: &Samples, signal: &[f64], length: usize) -> Option<Self> {
+        let segments = super::settled_segments(samples);
+        let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+        // Fast lengths, and never longer than a segment.
+        let length = length.min(longest) / 2 * 2;
+        if length < 32 {
+            return None;
+        }
+        let hann = Hann::new(length);
+        let mut power = vec![0.0; length / 2 + 1];
+        let mut count = 0.0;
+        for window in windows(&segments, length) {
+            let spectrum = hann.spectrum(&signal[window]);
+            power.iter_mut().zip(&spectrum).for_each(|(p, c)| *p += c.norm_sqr());
+            count += 1.0;
+        }
+        let scale = 2.0 * samples.period / (count * hann.energy());
+        let step = 1.0 / (length as f64 * samples.period);
+        // The window smears the removed mean over the first line, and the last stands for half a line.
+        let lines = 2..length / 2;
+        let hz = lines.clone().map(|i| i as f64 * step).collect();
+        Some(Self { hz, power: power[lines].iter().map(|p| p * scale).collect() })
+    }
+
+    /// Distance of the lines \[Hz\].
+    pub(super) fn step(&self) -> f64 {
+        self.hz.get(1).zip(self.hz.first()).map_or(0.0, |(b, a)| b - a)
+    }
+
+    /// Roots of the densities \[unit/√Hz\].
+    pub(super) fn amplitudes(&self) -> Vec<f64> {
+        self.power.iter().map(|p| p.sqrt()).collect()
+    }
+
+    /// Power between two frequencies \[unit²\].
+    pub(super) fn between(&self, low: f64, high: f64) -> f64 {
+        let inside = self.hz.iter().zip(&self.power).filter(|(hz, _)| **hz >= low && **hz < high);
+        inside.map(|(_, p)| p).sum::<f64>() * self.step()
+    }
+}
+
+/// Density of white noise of a standard deviation, sampled every `period` \[unit/√Hz\].
+pub(super) fn white(sigma: f64, period: f64) -> f64 {
+    sigma * (2.0 * period).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{noise, samples_of};
+    use super::*;
+
+    #[test]
+    fn noise_has_its_density_and_a_tone_its_power() {
+        let (h, n, sigma, amplitude) = (1e-3, 20_000, 0.02, 0.3);
+        let samples = samples_of(h, &[vec![0.0; n], vec![0.0; n / 2]]);
+        let tone = |t: f64| amplitude * (std::f64::consts::TAU * 40.3 * t).sin();
+        let signal: Vec<f64> = samples.time.iter().zip(noise(1)).map(|(t, e)| tone(*t) + sigma * e).collect();
+        let density = Density::of(&samples, &signal).unwrap();
+        let floor = density.amplitudes();
+        let far: Vec<f64> = density.hz.iter().zip(&floor).filter(|(hz, _)| **hz > 100.0).map(|(_, a)| *a).collect();
+        let mean = far.iter().sum::<f64>() / far.len() as f64;
+        assert!((mean / white(sigma, h) - 1.0).abs() < 0.03, "{mean}");
+        let power = density.between(38.0, 43.0);
+        assert!((power / (0.5 * amplitude * amplitude) - 1.0).abs() < 0.02, "{power}");
+        assert!(Density::finest(&samples, &signal).unwrap().step() < density.step());
+    }
+}

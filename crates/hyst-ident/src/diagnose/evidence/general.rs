@@ -1,0 +1,126 @@
+//! The whole model before and after: loops, residuals over time, spectra.
+
+use super::density::Density;
+use super::drive::clock;
+use super::frequency::spectrum;
+use super::{Axis, Material, Picture, Role, Scene, View};
+use crate::Samples;
+use crate::record::Record;
+use crate::simulate::Simulation;
+
+/// Names of the model as it was given, and of the extended one.
+const BEFORE: &str = "before";
+const AFTER: &str = "after";
+
+/// All of them; `scene` has the model as it was given as the one without.
+pub(super) fn pictures(m: &Material<'_>, scene: &Scene<'_>) -> Vec<Picture> {
+    let mut pictures = Vec::new();
+    let changed = m.before.predicted != m.after.predicted;
+    let (shown, before, after) = match m.test.zip(m.tests) {
+        Some((record, (before, after))) => (record, before, after),
+        None => (m.train, m.before, m.after),
+    };
+    pictures.extend(loops(shown, before, after, m, scene));
+    pictures.push(over_time(m.train, m.before, m.after, "training record", changed, scene));
+    if let Some((record, (before, after))) = m.test.zip(m.tests) {
+        pictures.push(over_time(record, before, after, "test record", changed, scene));
+    }
+    let caption =
+        "What stands above the noise floor is not noise. Narrow peaks are modes or tones, a rise to the left is slow.";
+    let of = |view: &View| Density::of(&scene.samples, &view.residual);
+    let before = of(&scene.without).filter(|_| changed);
+    let mut picture = spectrum(
+        scene,
+        None,
+        caption,
+        [(Role::Without, BEFORE, before), (Role::With, name(AFTER, changed), of(&scene.with))],
+    );
+    picture.title = "Spectrum of the residual, training record".into();
+    pictures.push(picture);
+    pictures.retain(Picture::shows);
+    pictures
+}
+
+/// Where nothing was added there is one model.
+fn name(name: &'static str, changed: bool) -> &'static str {
+    if changed { name } else { "the model" }
+}
+
+/// Rows of a loop that are shown at most, so that one can follow it.
+const MOST_ROWS: usize = 8000;
+
+/// The segment with the widest motion over the drive, and the residual there.
+fn loops(
+    record: &Record,
+    before: &Simulation,
+    after: &Simulation,
+    m: &Material<'_>,
+    scene: &Scene<'_>,
+) -> Vec<Picture> {
+    let mut samples = Samples::from_record(record);
+    samples.settling.clone_from(&after.settling);
+    let width = |s: &std::ops::Range<usize>| {
+        let (low, high) = crate::samples::range(samples.output[s.clone()].iter().copied());
+        high - low
+    };
+    let segments = super::settled_segments(&samples);
+    let widest = segments.iter().map(&width).fold(0.0, f64::max);
+    // The first of those that are as wide, but for noise.
+    let Some(rows) = segments.iter().find(|s| width(s) >= 0.95 * widest && !s.is_empty()) else { return Vec::new() };
+    let rows = rows.start..rows.end.min(rows.start + MOST_ROWS);
+    let changed = m.before.predicted != m.after.predicted;
+    let which = if m.test.is_some() { "test record" } else { "training record" };
+    let seconds = (samples.time[rows.start], samples.time[rows.end - 1]);
+    let part = format!("{which}, {:.1} to {:.1} s", seconds.0, seconds.1);
+    let drive = || Axis::new("drive", scene.drive_unit);
+    let u = &samples.input[rows.clone()];
+
+    let caption = format!("Measured and predicted output over the drive ({part}).");
+    let mut whole = Picture::new(None, "Loops", drive(), Axis::new("output", scene.unit), caption);
+    whole.path(Role::Measured, "measured", u, &samples.output[rows.clone()]);
+    let caption = format!("What the models miss of the same loops ({part}).");
+    let mut left = Picture::new(None, "Residual over the drive", drive(), scene.residual_axis(), caption);
+    for (role, name, simulation) in [(Role::Without, BEFORE, before), (Role::With, name(AFTER, changed), after)]
+        .into_iter()
+        .skip(usize::from(!changed))
+    {
+        let predicted = &simulation.predicted[rows.clone()];
+        let residual: Vec<f64> = samples.output[rows.clone()].iter().zip(predicted).map(|(y, p)| y - p).collect();
+        whole.path(role, name, u, predicted);
+        left.path(role, name, u, &residual);
+    }
+    vec![whole, left]
+}
+
+/// The residual of a record over lab time.
+fn over_time(
+    record: &Record,
+    before: &Simulation,
+    after: &Simulation,
+    which: &str,
+    changed: bool,
+    scene: &Scene<'_>,
+) -> Picture {
+    let samples = Samples::from_record(record);
+    let clock = clock(&samples);
+    let caption = "Measured less predicted at every row (of many the lowest and the highest), start-up rows left out.";
+    let title = format!("Residual over time, {which}");
+    let mut picture = Picture::new(None, &title, Axis::new("lab time", "s"), scene.residual_axis(), caption);
+    for (role, name, simulation) in [(Role::Without, BEFORE, before), (Role::With, name(AFTER, changed), after)]
+        .into_iter()
+        .skip(usize::from(!changed))
+    {
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for s in &samples.segments {
+            for k in s.clone().filter(|k| !after.settling[*k]) {
+                x.push(clock[k]);
+                y.push(samples.output[k] - simulation.predicted[k]);
+            }
+            // The line is interrupted where the record is.
+            x.push(clock[s.end - 1] + 0.5 * samples.period);
+            y.push(f64::NAN);
+        }
+        picture.line(role, name, &x, &y);
+    }
+    picture
+}

@@ -1,0 +1,185 @@
+//! Where what is left lives: in time, over the drive, on which branch, at which frequencies.
+
+use serde::{Deserialize, Serialize};
+
+use super::Scene;
+use super::bins::Bins;
+use super::density::Density;
+use super::drive::{Branch, branches, clock};
+
+/// One part of a record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Its name, as `12.0 to 18.1 s`.
+    pub name: String,
+    /// Root mean square of the residual in it; of a band of frequencies, of what lies in the band \[output unit\].
+    pub rms: f64,
+    /// Its share of the whole record's Σ residual².
+    pub share: f64,
+}
+
+/// The residual of the extended model on the training record, by one quantity.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Breakdown {
+    /// The quantity: `time`, `drive`, `branch` or `frequency`.
+    pub by: String,
+    /// Its parts, in order.
+    pub parts: Vec<Part>,
+}
+
+/// Segments that are looked at one by one; a record of more, or of one, is cut into even parts.
+const SEGMENTS: std::ops::RangeInclusive<usize> = 2..=12;
+/// Even parts of time, and bands of the drive.
+const PARTS: usize = 8;
+/// Bands of frequency in each decade.
+const PER_DECADE: f64 = 2.0;
+
+/// By time, drive, branch and frequency.
+pub(super) fn breakdowns(scene: &Scene<'_>) -> Vec<Breakdown> {
+    [by_time(scene), by_drive(scene), by_branch(scene), by_frequency(scene)].into_iter().flatten().collect()
+}
+
+/// A breakdown from the part of every row.
+fn by_part(scene: &Scene<'_>, by: &str, names: Vec<String>, part: impl Fn(usize) -> Option<usize>) -> Breakdown {
+    let mut sums = vec![(0.0, 0_usize); names.len()];
+    for k in scene.rows() {
+        if let Some(sum) = part(k).and_then(|i| sums.get_mut(i)) {
+            *sum = (sum.0 + scene.with.residual[k].powi(2), sum.1 + 1);
+        }
+    }
+    let all: f64 = sums.iter().map(|s| s.0).sum();
+    let parts = names.into_iter().zip(sums).filter(|(_, (_, n))| *n > 0).map(|(name, (squares, n))| Part {
+        name,
+        rms: (squares / n as f64).sqrt(),
+        share: share(squares, all),
+    });
+    Breakdown { by: by.into(), parts: parts.collect() }
+}
+
+fn share(part: f64, all: f64) -> f64 {
+    if all > 0.0 { part / all } else { 0.0 }
+}
+
+fn by_time(scene: &Scene<'_>) -> Option<Breakdown> {
+    let (clock, samples) = (clock(&scene.samples), &scene.samples);
+    if SEGMENTS.contains(&samples.segments.len()) {
+        let named = |(i, s): (usize, &std::ops::Range<usize>)| {
+            format!("segment {}, {:.1} to {:.1} s", i + 1, clock[s.start], clock[s.end - 1])
+        };
+        let names = samples.segments.iter().enumerate().map(named).collect();
+        return Some(by_part(scene, "time", names, |k| samples.segments.iter().position(|s| s.contains(&k))));
+    }
+    let bins = Bins::over(clock.iter().copied(), PARTS)?;
+    let names = (0..PARTS).map(|i| format!("{} to {} s", figure(bins.edge(i)), figure(bins.edge(i + 1)))).collect();
+    Some(by_part(scene, "time", names, |k| bins.index(clock[k])))
+}
+
+fn by_drive(scene: &Scene<'_>) -> Option<Breakdown> {
+    let u = &scene.samples.input;
+    let bins = Bins::over(u.iter().copied(), PARTS)?;
+    let name = |i| format!("{} to {} {}", figure(bins.edge(i)), figure(bins.edge(i + 1)), scene.drive_unit);
+    Some(by_part(scene, "drive", (0..PARTS).map(name).collect(), |k| bins.index(u[k])))
+}
+
+const BRANCHES: [(Branch, &str); 3] =
+    [(Branch::Rising, "rising"), (Branch::Falling, "falling"), (Branch::AtRest, "at rest")];
+
+fn by_branch(scene: &Scene<'_>) -> Option<Breakdown> {
+    let branches = branches(&scene.samples);
+    let names = BRANCHES.map(|b| b.1.to_owned()).into();
+    Some(by_part(scene, "branch", names, |k| BRANCHES.iter().position(|b| b.0 == branches[k])))
+}
+
+/// Bands of half a decade. What lies below the slowest line of the spectrum, the mean included, counts for the lowest band.
+fn by_frequency(scene: &Scene<'_>) -> Option<Breakdown> {
+    let density = Density::of(&scene.samples, &scene.with.residual)?;
+    let (n, squares) = scene.rows().fold((0.0, 0.0), |(n, s), k| (n + 1.0, s + scene.with.residual[k].powi(2)));
+    let variance: f64 = squares / f64::max(n, 1.0);
+    let (first, last) = (*density.hz.first()?, *density.hz.last()? + density.step());
+    // Edges at 1 and 3 of each decade, so that they are the same whatever the record.
+    let edge = |i: i32| if i % 2 == 0 { 10f64.powi(i / 2) } else { 3.0 * 10f64.powi((i - 1).div_euclid(2)) };
+    let lowest = (PER_DECADE * first.log10()).floor() as i32;
+    let mut edges: Vec<f64> = (lowest..).map(edge).skip_while(|e| *e <= first).take_while(|e| *e < last).collect();
+    edges.push(last);
+    let powers: Vec<f64> = edges.windows(2).map(|w| density.between(w[0], w[1])).collect();
+    let rest = (variance - powers.iter().sum::<f64>()).max(0.0);
+    let part = |name: String, power: f64| Part { name, rms: power.sqrt(), share: share(power, variance) };
+    let mut parts = vec![part(format!("below {} Hz", round(edges[0])), rest)];
+    for (w, power) in edges.windows(2).zip(powers) {
+        parts.push(part(format!("{} to {} Hz", round(w[0]), round(w[1])), power));
+    }
+    Some(Breakdown { by: "frequency".into(), parts })
+}
+
+/// A part stands out from this multiple of the whole record's root mean square on, a band of frequencies from this share on.
+const STANDS_OUT: f64 = 1.3;
+const MOST_OF_IT: f64 = 0.5;
+
+/// The breakdowns in sentences; nothing where what is left is noise.
+pub(super) fn places(scene: &Scene<'_>, breakdowns: &[Breakdown]) -> Vec<String> {
+    let (n, squares) = scene.rows().fold((0.0, 0.0), |(n, s), k| (n + 1.0, s + scene.with.residual[k].powi(2)));
+    let whole = (squares / f64::max(n, 1.0)).sqrt();
+    if whole <= STANDS_OUT * scene.noise {
+        return Vec::new();
+    }
+    let unit = scene.unit;
+    let mut places = Vec::new();
+    for Breakdown { by, parts } in breakdowns {
+        let Some(most) = parts.iter().max_by(|a, b| a.rms.total_cmp(&b.rms)) else { continue };
+        let against = format!("{} {unit} RMS against {} {unit} over the whole record", figure(most.rms), figure(whole));
+        match by.as_str() {
+            "frequency" if most.share >= MOST_OF_IT => {
+                places.push(format!("{:.0} % of its power lies {}", 100.0 * most.share, between(&most.name)));
+            }
+            "frequency" => {}
+            _ if most.rms < STANDS_OUT * whole => {}
+            "time" => places.push(format!("it is largest in {}: {against}", most.name)),
+            "branch" if most.name == "at rest" => {
+                places.push(format!("it is largest where the drive rests: {against}"))
+            }
+            "branch" => places.push(format!("it is largest where the drive is {}: {against}", most.name)),
+            _ => places.push(format!("it is largest at drives {}: {against}", between(&most.name))),
+        }
+    }
+    if places.is_empty() {
+        places.push("it is spread evenly over time, drive and branch, and over frequency".into());
+    }
+    places
+}
+
+/// `between 1 and 3 Hz` of `1 to 3 Hz`; others as they are.
+fn between(name: &str) -> String {
+    match name.split_once(" to ") {
+        Some((low, high)) => format!("between {low} and {high}"),
+        None => name.into(),
+    }
+}
+
+/// Three significant digits, without zeros at the end of whole numbers.
+fn figure(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let decimals = (2 - x.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{x:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+/// An edge of bands: one significant digit and no more.
+fn round(hz: f64) -> String {
+    let decimals = (-hz.log10().floor() as i32).max(0) as usize;
+    format!("{hz:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_short() {
+        assert_eq!([0.0, 15.0, 0.012_345, -2.5, 1234.4].map(figure), ["0", "15", "0.0123", "-2.5", "1234"]);
+        assert_eq!([0.3, 1.0, 3.0, 30.0, 499.6].map(round), ["0.3", "1", "3", "30", "500"]);
+        assert_eq!(between("1 to 3 Hz"), "between 1 and 3 Hz");
+        assert_eq!(between("below 1 Hz"), "below 1 Hz");
+    }
+}

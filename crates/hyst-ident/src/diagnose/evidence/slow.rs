@@ -1,0 +1,81 @@
+//! What is slow: creep after the drive has stopped, drift on the lab's clock.
+
+use super::bins::Bins;
+use super::drive::{Hold, clock, holds};
+use super::{Axis, Picture, Role, Scene, View, WITH, WITHOUT};
+use crate::model::Effect;
+
+/// Points for each decade of time.
+const PER_DECADE: f64 = 6.0;
+/// Smoothed points over a record at most.
+const MOST_MEANS: f64 = 400.0;
+
+/// What goes on after the drive has stopped, over the logarithm of time, as a share of the step before.
+///
+/// Over all rests the residual's change since the stop is regressed on the step, `Σ r s / Σ s²` at each time: noise and what is left of
+/// earlier steps average out. A record without rests shows its mean over time instead.
+pub(super) fn creep(scene: &Scene<'_>) -> Picture {
+    let found = holds(&scene.samples);
+    let longest = found.iter().map(|h| h.rows.len()).max().unwrap_or(0);
+    // The first stretch is where the others are counted from.
+    let bins = Bins::of_ratio(1.5, longest as f64, PER_DECADE);
+    let (x, y) = (Axis::new("time since the drive stopped", "s").log(), Axis::new("goes on by", "% of the step"));
+    let caption = "Average over all rests of the drive. Creep goes on for decades of time in the direction of the step: the curve \
+        without it rises, the curve with it stays near zero.";
+    let mut picture = Picture::new(Some(Effect::Creep), "After the drive has stopped", x, y, caption);
+    if let Some(bins) = bins {
+        for (role, name, view) in [(Role::Without, WITHOUT, &scene.without), (Role::With, WITH, &scene.with)] {
+            picture.points(role, name, after_steps(scene, &found, &bins, view));
+        }
+    }
+    if picture.shows() {
+        return picture;
+    }
+    let caption = "Means over a second or more. With the drive cycling, creep shows in a mean that moves for minutes, ever \
+        slower: without it the residual bends, with it it stays level.";
+    let mut picture = over_time(scene, Some(Effect::Creep), "Mean over time", caption);
+    for curve in &mut picture.curves {
+        let first = curve.y.first().copied().unwrap_or(0.0);
+        curve.y.iter_mut().for_each(|y| *y -= first);
+    }
+    picture
+}
+
+/// Regression of the residual's change on the step before \[%\] over time \[s\].
+fn after_steps(scene: &Scene<'_>, found: &[Hold], bins: &Bins, view: &View) -> (Vec<f64>, Vec<f64>) {
+    let settling = &scene.samples.settling;
+    let mut sums = vec![(0.0, 0.0, 0.0, 0.0); bins.count()];
+    for hold in found.iter().filter(|h| !settling[h.rows.start]) {
+        let step = scene.without.predicted[hold.rows.start] - scene.without.predicted[hold.before];
+        let means = bins.means(hold.rows.clone().map(|k| ((k - hold.rows.start + 1) as f64, view.residual[k])));
+        let Some(start) = means.1.first().copied() else { continue };
+        for (rows, residual) in means.0.into_iter().zip(means.1) {
+            if let Some(sum) = bins.index(rows).and_then(|i| sums.get_mut(i)) {
+                *sum = (sum.0 + rows, sum.1 + 1.0, sum.2 + (residual - start) * step, sum.3 + step * step);
+            }
+        }
+    }
+    let used = sums.into_iter().filter(|s| s.3 > 0.0);
+    used.map(|(rows, n, rs, ss)| (rows / n * scene.samples.period, 100.0 * rs / ss)).unzip()
+}
+
+/// The sensor's zero over lab time.
+pub(super) fn drift(scene: &Scene<'_>) -> Picture {
+    let caption = "Means over a second or more, on the lab's clock, rests between segments included. Drift goes on at one rate \
+        whatever the drive does: without it the residual lies on a slope, with it it stays level.";
+    over_time(scene, Some(Effect::Drift), "Mean over time", caption)
+}
+
+fn over_time(scene: &Scene<'_>, effect: Option<Effect>, title: &str, caption: &str) -> Picture {
+    let clock = clock(&scene.samples);
+    let seconds = clock.last().zip(clock.first()).map_or(0.0, |(b, a)| b - a);
+    // In a short record a second is long.
+    let width = (seconds / MOST_MEANS).max(f64::min(1.0, seconds / 20.0));
+    let mut picture = Picture::new(effect, title, Axis::new("lab time", "s"), scene.residual_axis(), caption);
+    if let Some(bins) = Bins::over(clock.iter().copied(), (seconds / width).ceil().max(1.0) as usize) {
+        for (role, name, view) in [(Role::Without, WITHOUT, &scene.without), (Role::With, WITH, &scene.with)] {
+            picture.points(role, name, bins.means(scene.rows().map(|k| (clock[k], view.residual[k]))));
+        }
+    }
+    picture
+}

@@ -1,0 +1,116 @@
+//! Whether the user's own base lacks a curve behind it: asymmetry, or a stop.
+//!
+//! The search runs on a rich base that bends in itself, so that a coarse base is not taken for an effect. Here the own base is asked: if
+//! one curve without memory takes most of what separates it from the rich one, that curve is its name; if not, what is
+//! missing has memory, and the base is too coarse.
+
+use hyst_core::{AsymmetryParams, Error, MAX_DEAD_ZONES};
+
+use super::search::Named;
+use super::trial::Trial;
+use super::{score, starts};
+use crate::model::Effect;
+use crate::nested::{Fitted, Hypothesis, Problem};
+
+/// Error of the own base over that of the rich one from which on something is missing.
+const MISSING: f64 = 1.1;
+/// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
+const CLOSED: f64 = 1.7;
+/// Share of what stands above the noise floor that it has to take.
+const TAKEN: f64 = 0.9;
+/// Noise floors that count as near the noise.
+const NEAR_NOISE: f64 = 1.5;
+/// Ends of the curve: share of the motion's range beyond the outermost dead zone.
+const MARGIN: f64 = 0.08;
+
+/// What the own base was found to lack.
+pub(super) struct Shape {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) fit: Fitted,
+    pub(super) named: Named,
+}
+
+/// Looks for a curve behind the own base of `problem`, all that was found before kept; `richest` is the cross-validated error that a
+/// rich base leaves \[y\].
+pub(super) fn shape(
+    problem: &Problem<'_>,
+    found: &Hypothesis,
+    richest: f64,
+    noise: f64,
+    seed: u64,
+) -> Result<Option<Shape>, Error> {
+    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
+    let Some(plain) = plain.filter(|p| p.cv_rmse() > MISSING * richest) else { return Ok(None) };
+    // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave.
+    let least = if found.drag.is_some() { richest.min(NEAR_NOISE * noise) } else { richest };
+    let mut tried: Vec<(Effect, Trial)> = Vec::new();
+    if found.effects.asymmetry.is_none()
+        && let Some(bent) = curve(problem, &plain)
+            .map(|curve| {
+                let mut h = found.clone();
+                h.effects.asymmetry = Some(curve);
+                problem.fit_linear(&h)
+            })
+            .transpose()?
+            .flatten()
+    {
+        tried.extend(Trial::of(problem, bent).map(|t| (Effect::Asymmetry, t)));
+    }
+    if found.effects.saturation.is_none() {
+        for stop in starts::stops(problem.samples, &plain.fit) {
+            let mut h = found.clone();
+            h.effects.saturation = Some(stop);
+            let fitted = problem.fit(&h)?.and_then(|f| {
+                // Everything else as it was found: on this coarser base it would take up the misfit.
+                h.effects.saturation = f.hypothesis.effects.saturation;
+                problem.fit_linear(&h).ok().flatten()
+            });
+            tried.extend(fitted.and_then(|f| Trial::of(problem, f)).map(|t| (Effect::Saturation, t)));
+        }
+    }
+    let judged: Vec<_> = tried
+        .iter()
+        .map(|(effect, t)| {
+            let judgement = score::judge(problem.samples, &plain, t, noise, seed);
+            (*effect, t, judgement, judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= CLOSED * least)
+        })
+        .collect();
+    let accepted = judged.iter().filter(|(.., accepted)| *accepted);
+    // A stop has fewer numbers than a curve: where they are as good as each other it is the stop.
+    let best = accepted.min_by(|a, b| {
+        let weight = |effect: Effect| if effect == Effect::Saturation { 0.95 } else { 1.0 };
+        (weight(a.0) * a.1.cv_rmse()).total_cmp(&(weight(b.0) * b.1.cv_rmse()))
+    });
+    Ok(best.map(|(effect, trial, judgement, _)| {
+        let mut instead: Vec<(Effect, f64, bool)> =
+            tried.iter().filter(|(e, _)| e != effect).map(|(e, t)| (*e, t.cv_rmse(), false)).collect();
+        instead.sort_by(|a, b| a.1.total_cmp(&b.1));
+        instead.dedup_by_key(|(e, ..)| *e);
+        Shape {
+            hypothesis: trial.fit.hypothesis.clone(),
+            fit: trial.fit.clone(),
+            named: Named {
+                effect: *effect,
+                cv_without: plain.cv_rmse(),
+                cv_with: trial.cv_rmse(),
+                judgement: *judgement,
+                instead,
+            },
+        }
+    }))
+}
+
+/// Dead zones spread evenly over the operator's output, moving away from zero.
+fn curve(problem: &Problem<'_>, plain: &Trial) -> Option<AsymmetryParams<Vec<f64>>> {
+    let operator = problem.operator_output(&plain.fit).ok()?;
+    let settled = operator.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
+    let (low, high) = crate::samples::range(settled);
+    let (low, high) = (low + MARGIN * (high - low), high - MARGIN * (high - low));
+    if low >= high {
+        return None;
+    }
+    let mut thresholds: Vec<f64> =
+        (0..MAX_DEAD_ZONES).map(|i| low + (high - low) * i as f64 / (MAX_DEAD_ZONES - 1) as f64).collect();
+    thresholds.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    Some(AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds })
+}

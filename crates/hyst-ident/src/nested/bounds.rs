@@ -1,0 +1,58 @@
+//! Steps and bounds of the nonlinear parameters on a record.
+
+use super::Hypothesis;
+use crate::Samples;
+use crate::lsq::Bounds;
+use crate::model::{Effect, Parameter};
+
+/// Bounds of a nonlinear parameter for this record.
+pub(super) fn box_of(p: &Parameter<'_>, samples: &Samples) -> Bounds {
+    let nyquist = 0.5 / samples.period;
+    let bounds = match (p.effect, p.name.starts_with("hz")) {
+        (Effect::Resonance, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist },
+        (Effect::Interference, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist },
+        (Effect::RateDependence, _) if p.name == "volt_seconds" => {
+            Bounds { lower: 0.0, upper: range_of(samples) * 0.1 * samples.longest_segment() }
+        }
+        (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => {
+            Bounds { lower: 0.0, upper: p.upper.min(0.1 * samples.longest_segment()).min(4000.0 * samples.period) }
+        }
+        _ => Bounds { lower: p.lower, upper: p.upper },
+    };
+    // Segments of a few rows leave no room between the two.
+    Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
+}
+
+/// Highest minus lowest input.
+fn range_of(samples: &Samples) -> f64 {
+    let (low, high) = samples.input_range();
+    high - low
+}
+
+/// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much.
+pub(super) fn stepped(h: &Hypothesis, index: usize, samples: &Samples) -> Option<(Hypothesis, f64, Effect)> {
+    let mut moved = h.clone();
+    let mut found = None;
+    let mut i = 0;
+    let span = samples.output_span();
+    moved.visit_nonlinear(&mut |p| {
+        if i == index {
+            let step = match (p.effect, p.name.trim_end_matches("_2")) {
+                (Effect::RateDependence, "volt_seconds") => {
+                    1e-3 * (1e-4 * range_of(samples) * samples.period).max(*p.value)
+                }
+                (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
+                (Effect::Resonance, "hz") => 1e-5 * *p.value,
+                (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
+                (Effect::Saturation, "low" | "high") => 1e-5 * span,
+                _ => 1e-5,
+            };
+            // Downwards where the upper bound is near: beyond it the stage may not exist.
+            let step = if *p.value + step > p.upper { -step } else { step };
+            *p.value += step;
+            found = Some((step, p.effect));
+        }
+        i += 1;
+    });
+    found.map(|(step, effect)| (moved, step, effect))
+}

@@ -1,0 +1,50 @@
+//! Which unknown stands where.
+
+use std::ops::Range;
+
+use super::Hypothesis;
+
+/// Hats of a wandering over a record.
+pub(crate) const HATS: usize = 32;
+
+/// Places of the unknowns that are solved for, in this order; the nonlinear parameters come behind them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Layout {
+    pub(crate) weights: Range<usize>,
+    pub(crate) zeros: Range<usize>,
+    pub(crate) drift: Range<usize>,
+    /// Sine and cosine.
+    pub(crate) tone: Range<usize>,
+    pub(crate) load: Range<usize>,
+    /// Dead zones of the asymmetry.
+    pub(crate) zones: Range<usize>,
+    pub(crate) zero_hats: Range<usize>,
+    pub(crate) gain_hats: Range<usize>,
+}
+
+impl Layout {
+    pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize) -> Self {
+        let mut end = 0;
+        let mut next = |count: usize| {
+            end += count;
+            end - count..end
+        };
+        let some = |present: bool, count: usize| if present { count } else { 0 };
+        let e = &h.effects;
+        Self {
+            weights: next(weights),
+            zeros: next(zeros),
+            drift: next(some(e.drift.is_some(), 1)),
+            tone: next(some(e.interference.is_some(), 2)),
+            load: next(some(e.load.is_some(), 1)),
+            zones: next(e.asymmetry.as_ref().map_or(0, |a| a.thresholds.len())),
+            zero_hats: next(some(h.zero_wanders, HATS)),
+            gain_hats: next(some(h.gain_wanders, HATS)),
+        }
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.gain_hats.end
+    }
+}

@@ -1,0 +1,46 @@
+//! How much of a residual a new column would take.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Problem;
+
+/// Projects columns off the linear ones of a fit.
+pub(crate) struct Projector<'a> {
+    problem: &'a Problem<'a>,
+    blocks: Vec<DMatrix<f64>>,
+    factor: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
+}
+
+impl<'a> Projector<'a> {
+    pub(super) fn new(problem: &'a Problem<'a>, blocks: Vec<DMatrix<f64>>) -> Self {
+        let n = blocks.first().map_or(0, |x| x.ncols() - 1);
+        let mut h = DMatrix::zeros(n, n);
+        for x in &blocks {
+            let own = x.columns(0, n);
+            h += own.tr_mul(&own);
+        }
+        for i in 0..n {
+            h[(i, i)] *= 1.0 + 1e-9;
+        }
+        Self { problem, blocks, factor: h.cholesky() }
+    }
+
+    /// How much of Σ residual² a column would take, all linear unknowns refitted, and the factor at
+    /// which it does.
+    pub(crate) fn gain(&self, column: &[f64], residual: &[f64]) -> (f64, f64) {
+        let Some(factor) = &self.factor else { return (0.0, 0.0) };
+        let n = factor.l_dirty().ncols();
+        let mut cross = DVector::zeros(n);
+        let (mut own, mut with) = (0.0, 0.0);
+        for (b, x) in self.blocks.iter().enumerate() {
+            let rows = self.problem.blocks.used(b, self.problem.samples);
+            let part = DVector::from_iterator(x.nrows(), rows.map(|k| column[k]));
+            own += part.norm_squared();
+            let rows = self.problem.blocks.used(b, self.problem.samples);
+            with += rows.map(|k| column[k] * residual[k]).sum::<f64>();
+            cross += x.columns(0, n).tr_mul(&part);
+        }
+        let left = own - cross.dot(&factor.solve(&cross));
+        if left <= 1e-9 * own { (0.0, 0.0) } else { (with * with / left, with / left) }
+    }
+}

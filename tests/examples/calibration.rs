@@ -1,0 +1,122 @@
+//! How often a diagnosis is right, on simulated actuators that were drawn at random:
+//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED]`.
+
+use std::collections::BTreeMap;
+
+use hyst_ident::model::Effect;
+use hyst_tests::calibration::{Outcome, draw, right, run};
+
+fn main() {
+    let argument = |i: usize| std::env::args().nth(i).and_then(|s| s.parse::<u64>().ok());
+    let (count, seed) = (argument(1).unwrap_or(40), argument(2).unwrap_or(1));
+    println!("{count} actuators from seed {seed}; what is not exact:");
+    let mut outcomes = Vec::new();
+    for i in argument(3).unwrap_or(0)..count {
+        let outcome = run(&draw(seed, i));
+        if !outcome.exact() {
+            println!("  {}", line(&outcome));
+        } else if std::env::var("VERBOSE").is_ok() {
+            println!("  ok {}", line(&outcome));
+        }
+        outcomes.push(outcome);
+    }
+    summary(&outcomes);
+}
+
+fn names(list: &[Effect]) -> String {
+    if list.is_empty() { "nothing".into() } else { list.iter().map(|e| e.name()).collect::<Vec<_>>().join("+") }
+}
+
+fn line(o: &Outcome) -> String {
+    let beside = o.case.disturbed.as_ref().map_or(String::new(), |d| format!(" ({d})"));
+    format!(
+        "seed {} {}: {}{beside} → {}; left {:?}, error {:.2} × that without the effect, {:.1} s",
+        o.case.seed,
+        o.case.kind.name(),
+        names(&o.truth),
+        names(&o.named),
+        o.remainder,
+        o.ratio(),
+        o.seconds
+    )
+}
+
+/// The value below which a share of some lies.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get((share * (sorted.len().max(1) - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN)
+}
+
+fn rate(what: &str, good: usize, of: usize) {
+    println!("{what}: {good} of {of} ({:.1} %)", 100.0 * good as f64 / of.max(1) as f64);
+}
+
+fn summary(outcomes: &[Outcome]) {
+    let (disturbed, listed): (Vec<&Outcome>, Vec<&Outcome>) = outcomes.iter().partition(|o| o.case.disturbed.is_some());
+    let (free, with): (Vec<&Outcome>, Vec<&Outcome>) = listed.into_iter().partition(|o| o.truth.is_empty());
+    println!();
+    matrix(&with);
+    rate("exact set of names", with.iter().chain(&free).filter(|o| o.exact()).count(), with.len() + free.len());
+    rate(
+        "    with one effect",
+        with.iter().filter(|o| o.truth.len() == 1 && o.exact()).count(),
+        with.iter().filter(|o| o.truth.len() == 1).count(),
+    );
+    rate(
+        "    with two",
+        with.iter().filter(|o| o.truth.len() == 2 && o.exact()).count(),
+        with.iter().filter(|o| o.truth.len() == 2).count(),
+    );
+    rate("false alarms without any effect", free.iter().filter(|o| !o.named.is_empty()).count(), free.len());
+    rate(
+        "wrong names where something acts that is on no list",
+        disturbed.iter().filter(|o| !o.wrong().is_empty()).count(),
+        disturbed.len(),
+    );
+    let ratios: Vec<f64> = with.iter().filter(|o| o.exact()).map(|o| o.ratio()).collect();
+    println!(
+        "test error after, over that of the same actuator without the effect: median {:.2}, 90th percentile {:.2}",
+        quantile(&ratios, 0.5),
+        quantile(&ratios, 0.9)
+    );
+    let parameters: Vec<_> = with.iter().flat_map(|o| o.parameters.iter()).collect();
+    rate(
+        "parameters within three standard errors or 2 %",
+        parameters.iter().filter(|(_, found, truth, error)| right(*found, *truth, *error)).count(),
+        parameters.len(),
+    );
+    for (name, found, truth, error) in
+        parameters.iter().filter(|(_, found, truth, error)| !right(*found, *truth, *error))
+    {
+        println!("    {name}: {found:.6} ± {:.6}, true {truth:.6}", error.unwrap_or(f64::NAN));
+    }
+    let seconds: Vec<f64> = outcomes.iter().map(|o| o.seconds).collect();
+    println!("time of a diagnosis: median {:.1} s, longest {:.1} s", quantile(&seconds, 0.5), quantile(&seconds, 1.0));
+}
+
+/// Rows: switched on. Columns: named.
+fn matrix(with: &[&Outcome]) {
+    let mut counts: BTreeMap<(Effect, Effect), usize> = BTreeMap::new();
+    let mut missed: BTreeMap<Effect, usize> = BTreeMap::new();
+    for o in with {
+        for e in &o.truth {
+            if o.named.contains(e) {
+                *counts.entry((*e, *e)).or_default() += 1;
+            } else {
+                *missed.entry(*e).or_default() += 1;
+            }
+            for wrong in o.wrong() {
+                *counts.entry((*e, wrong)).or_default() += 1;
+            }
+        }
+    }
+    print!("{:16}", "on \\ named");
+    Effect::ALL.iter().for_each(|e| print!("{:>6}", &e.name()[..e.name().len().min(5)]));
+    println!("{:>8}", "missed");
+    for row in Effect::ALL {
+        print!("{:16}", row.name());
+        Effect::ALL.iter().for_each(|c| print!("{:>6}", counts.get(&(row, *c)).copied().unwrap_or(0)));
+        println!("{:>8}", missed.get(&row).copied().unwrap_or(0));
+    }
+}

@@ -1,0 +1,184 @@
+//! How often a diagnosis is right: simulated actuators with known effects, drawn at random.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use hyst_hw::{Bed, DISTURBANCES, EFFECTS, Plant, PlantConfig};
+use hyst_ident::diagnose::{DiagnoseOptions, Findings, RemainderKind, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::{Effect, Kind};
+use hyst_ident::simulate::{Zero, simulate};
+
+use crate::experiment;
+
+/// What an actuator is given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Seed of the actuator and of its drives.
+    pub seed: u64,
+    /// Model that is fitted.
+    pub kind: Kind,
+    /// The actuator.
+    pub plant: PlantConfig,
+    /// The same without its effects.
+    pub bare: PlantConfig,
+    /// Whether something acts that is on no list.
+    pub disturbed: Option<String>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The case.
+    pub case: Case,
+    /// Effects that were switched on.
+    pub truth: Vec<Effect>,
+    /// Effects that were named, in the chain's order, each once.
+    pub named: Vec<Effect>,
+    /// Test RMSE of the extended model, and of the same kind of model on the actuator without its effects \[µm\].
+    pub test: (f64, f64),
+    /// Parameters with a true value: name, found, true, standard error.
+    pub parameters: Vec<(String, f64, f64, Option<f64>)>,
+    /// Why each was named, and what is left.
+    pub evidence: Vec<String>,
+    /// What was said of the rest.
+    pub remainder: RemainderKind,
+    /// Time that the diagnosis took \[s\].
+    pub seconds: f64,
+}
+
+impl Outcome {
+    /// Whether exactly what was switched on was named.
+    pub fn exact(&self) -> bool {
+        self.truth == self.named
+    }
+
+    /// Names of effects that were not switched on.
+    pub fn wrong(&self) -> Vec<Effect> {
+        self.named.iter().copied().filter(|e| !self.truth.contains(e)).collect()
+    }
+
+    /// Test error after, over that of the same actuator without its effects.
+    pub fn ratio(&self) -> f64 {
+        self.test.0 / self.test.1
+    }
+}
+
+/// Whether a parameter is right: within three standard errors or 2 %.
+pub fn right(found: f64, truth: f64, std_error: Option<f64>) -> bool {
+    (found - truth).abs() <= f64::max(3.0 * std_error.unwrap_or(0.0), 0.02 * truth.abs())
+}
+
+/// Measures, fits, diagnoses.
+///
+/// # Panics
+/// When the simulated actuator or the fit refuses: none of these cases should.
+pub fn run(case: &Case) -> Outcome {
+    let records = |config: &PlantConfig| {
+        let mut plant = Plant::new(config.clone()).expect("the actuator is sound");
+        (experiment(&mut plant, case.seed, "train"), experiment(&mut plant, case.seed + 500_000, "test"))
+    };
+    let fitted = |train| fit(train, case.kind, &FitOptions::default()).expect("a fit");
+    let (train, test) = records(&case.bare);
+    let clean = simulate(&fitted(&train), &test, Zero::None).ok().and_then(|s| s.errors).map_or(f64::NAN, |e| e.rmse);
+    let (train, test) = records(&case.plant);
+    let model = fitted(&train);
+    let started = Instant::now();
+    let found = diagnose(&train, Some(&test), &model, &DiagnoseOptions::default(), &|_| {}).expect("a diagnosis");
+    let seconds = started.elapsed().as_secs_f64();
+    let mut named: Vec<Effect> = found.findings.effects.iter().map(|e| e.name).collect();
+    named.sort();
+    named.dedup();
+    let mut truth: Vec<Effect> = case.plant.effects().iter().filter_map(|name| name.parse().ok()).collect();
+    if case.disturbed.is_some() {
+        // What acts unseen cannot be named.
+        truth.clear();
+    }
+    Outcome {
+        truth,
+        named,
+        test: (found.findings.after.test.map_or(f64::NAN, |e| e.rmse), clean),
+        parameters: parameters(&case.plant, &found.findings),
+        evidence: evidence(&found.findings),
+        remainder: found.findings.remainder.kind,
+        seconds,
+        case: case.clone(),
+    }
+}
+
+fn evidence(findings: &Findings) -> Vec<String> {
+    let of = |e: &hyst_ident::diagnose::Finding| {
+        e.evidence.iter().map(|why| format!("{}: {why}", e.name)).collect::<Vec<_>>()
+    };
+    let mut lines: Vec<String> = findings.effects.iter().flat_map(of).collect();
+    lines.push(findings.remainder.description.clone());
+    lines
+}
+
+/// Found parameters beside the true ones, where there is a true one.
+fn parameters(plant: &PlantConfig, findings: &Findings) -> Vec<(String, f64, f64, Option<f64>)> {
+    let mut truth: BTreeMap<(Effect, &str), f64> = BTreeMap::new();
+    let mut put = |effect, name, value: Option<f64>| {
+        truth.extend(value.map(|value| ((effect, name), value)));
+    };
+    put(Effect::Delay, "seconds", plant.delay.as_ref().map(|p| p.seconds));
+    put(Effect::Lag, "seconds", plant.lag.as_ref().map(|p| p.seconds));
+    put(Effect::Temperature, "per_kelvin", plant.temperature.as_ref().map(|p| p.per_k).filter(|k| *k != 0.0));
+    put(Effect::Load, "per_newton", plant.load.as_ref().map(|p| p.um_per_n));
+    put(Effect::Resonance, "hz", plant.modes.first().map(|p| p.hz));
+    put(Effect::Resonance, "damping", plant.modes.first().map(|p| p.damping));
+    put(Effect::Drift, "per_second", plant.drift.as_ref().map(|p| p.um_per_s));
+    put(Effect::Interference, "hz", plant.interference.as_ref().map(|p| p.hz));
+    put(Effect::Interference, "amplitude", plant.interference.as_ref().map(|p| p.amplitude_um));
+    let mut list = Vec::new();
+    for effect in &findings.effects {
+        for (name, found) in &effect.parameters {
+            // A factor of 1 + c (T − T₀) has another c at another T₀: that of the plant's reference.
+            let mut value = found.value;
+            let mut error = found.std_error;
+            if let (Effect::Temperature, Some(t)) = (effect.name, &plant.temperature)
+                && let Some(reference) = effect.parameters.get("reference_degc")
+            {
+                let factor = 1.0 + found.value * (t.reference_degc - reference.value);
+                value /= factor;
+                error = error.map(|e| e / factor);
+            }
+            if let Some(truth) = truth.get(&(effect.name, name.as_str())) {
+                list.push((format!("{}.{name}", effect.name), value, *truth, error));
+            }
+        }
+    }
+    list
+}
+
+/// The case with number `i` of a seed: none, one or two effects, or something that is on no list.
+///
+/// Of twenty cases five have no effect, ten have one, three have two and two a disturbance. Half of the beds are relays and half plays. An
+/// asymmetry is a curve behind a Prandtl-Ishlinskii operator: it is drawn on plays, and `pi` is fitted to it.
+///
+/// # Panics
+/// When an ordinary actuator is refused.
+pub fn draw(seed: u64, i: u64) -> Case {
+    let own = seed * 10_000 + i;
+    let round = (i / 20) as usize;
+    let effect = |k: usize| EFFECTS[k % EFFECTS.len()];
+    let place = (i % 20) as usize;
+    let effects: Vec<&str> = match place {
+        5..15 => vec![effect(round * 10 + place - 5)],
+        15..18 => {
+            let first = round * 3 + place;
+            vec![effect(first), effect(first + 1 + round % (EFFECTS.len() - 1))]
+        }
+        _ => Vec::new(),
+    };
+    let disturbed = (place >= 18).then(|| DISTURBANCES[(2 * round + place) % DISTURBANCES.len()].to_owned());
+    let bed = if effects.contains(&"asymmetry") || (i + round as u64) % 2 == 1 { Bed::Plays } else { Bed::Relays };
+    let plant = |effects: &[&str]| PlantConfig::random_on(bed, own, effects).expect("an ordinary actuator");
+    let bare = plant(&[]);
+    let plant = match &disturbed {
+        Some(kind) => bare.clone().with_disturbance(kind).expect("a disturbance"),
+        None => plant(&effects),
+    };
+    let triangle = bed == Bed::Relays && !effects.contains(&"rate-dependence") && !i.is_multiple_of(4);
+    Case { seed: own, kind: if triangle { Kind::Preisach } else { Kind::Pi }, plant, bare, disturbed }
+}

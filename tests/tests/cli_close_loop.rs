@@ -1,0 +1,44 @@
+//! `close-loop`: measure, find, add, compensate, measure again.
+
+use hyst_tests::Lab;
+
+#[test]
+fn the_loop_closes_on_an_actuator_with_a_lag() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 3 --out loop --json");
+    let summary = ran.json();
+    let turns = summary["turns"].as_array().unwrap();
+    assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
+    // With the lag in the model nothing else is found, however often it is asked.
+    assert!(turns[1..].iter().all(|t| t["base"] == "preisach" || t["found"] == serde_json::json!([])), "{summary:#}");
+    let plain = summary["plain_gain_rmse"].as_f64().unwrap();
+    let base = summary["base_inverse_rmse"].as_f64().unwrap();
+    let last = turns.last().unwrap()["tracking_rmse"].as_f64().unwrap();
+    assert!(last < 0.5 * base && base < plain, "{summary:#}");
+    let files = std::fs::read_dir(lab.path("loop")).unwrap().count();
+    // Record, model, findings, drive and log of each turn, and the summary.
+    assert_eq!(files, 5 * turns.len() + 1);
+}
+
+#[test]
+fn a_folder_with_files_is_left_alone() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    std::fs::create_dir(lab.path("loop")).unwrap();
+    lab.write("loop/mine.txt", "mine");
+    let ran = lab.run("close-loop --daq sim:plant.toml --out loop");
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("not empty"), "{}", ran.stderr);
+    assert_eq!(lab.read("loop/mine.txt"), "mine");
+}
+
+#[test]
+fn other_bases_and_no_turns_are_refused() {
+    let lab = Lab::new();
+    for (options, named) in [("--model tanh", "pi or preisach"), ("--turns 0", "turns"), ("--rate -5", "rate")] {
+        let ran = lab.run(&format!("close-loop --daq sim:plant.toml --out loop {options}"));
+        assert_eq!(ran.code, 2, "{options}");
+        assert!(ran.stderr.contains(named), "{options}: {}", ran.stderr);
+    }
+}
