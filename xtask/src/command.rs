@@ -3,7 +3,7 @@
 use std::env;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -77,4 +77,21 @@ pub(crate) fn wait(mut child: Child, limit: Duration) -> Option<ExitStatus> {
 pub(crate) fn which(program: impl AsRef<OsStr>) -> Option<PathBuf> {
     let path = env::var_os("PATH")?;
     env::split_paths(&path).map(|folder| folder.join(program.as_ref())).find(|file| file.is_file())
+}
+
+/// Installs Debian packages, where that needs nobody's leave.
+pub(crate) fn install(packages: &[&str]) -> bool {
+    let root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
+    if !root || which("apt-get").is_none() {
+        return false;
+    }
+    let apt = |arguments: &[&str]| {
+        let mut command = Command::new("apt-get");
+        command.args(["-qq"]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
+        command.stdin(Stdio::null()).stdout(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    let ask = [&["install", "-y", "--no-install-recommends"], packages].concat();
+    eprintln!("apt-get install {}", packages.join(" "));
+    apt(&ask) || (apt(&["update"]) && apt(&ask))
 }

@@ -3,7 +3,7 @@
 //! The usual way is rustup's target. Where that cannot be downloaded, Debian's packages have a compiler of their own with
 //! the sources of `core`, which is then built along.
 
-use crate::command::{output, wait, which};
+use crate::command::{install, output, wait, which};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -166,21 +166,4 @@ pub(crate) fn emulate(image: &Path, printed: &Path) -> Result<(), NotRun> {
             Err(NotRun::Failed)
         }
     }
-}
-
-/// Installs Debian packages, where that needs nobody's leave.
-fn install(packages: &[&str]) -> bool {
-    let root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
-    if !root || which("apt-get").is_none() {
-        return false;
-    }
-    let apt = |arguments: &[&str]| {
-        let mut command = Command::new("apt-get");
-        command.args(["-qq"]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-        command.stdin(Stdio::null()).stdout(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    };
-    let ask = [&["install", "-y", "--no-install-recommends"], packages].concat();
-    eprintln!("apt-get install {}", packages.join(" "));
-    apt(&ask) || (apt(&["update"]) && apt(&ask))
 }

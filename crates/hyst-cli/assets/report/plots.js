@@ -10,7 +10,7 @@
   const digits = (x, n) => {
     if (x === 0) return "0";
     const size = Math.abs(x);
-    return size < 1e-4 || size >= 1e6 ? x.toExponential(Math.max(0, n - 2)) : String(+x.toPrecision(n));
+    return size < 1e-4 || size >= 1e6 ? x.toExponential(n - 1).replace(/\.?0+e/, "e") : String(+x.toPrecision(n));
   };
   const spaced = (label, unit) => (unit ? `${label} [${unit}]` : label);
   const added = (parent, tag, className, text) => {
@@ -101,6 +101,7 @@
       ctx.fillRect(left - pad / 2, top - pad / 2, width + pad, height);
       ctx.globalAlpha = 1;
       ctx.fillStyle = colour("reference");
+      ctx.textAlign = "left";
       ctx.textBaseline = "top";
       ctx.fillText(name, left, top);
       ctx.restore();
@@ -178,12 +179,12 @@
     // A little room, so that no point at the end is cut.
     const bound = (min, max) => (picture.x.log ? [min / (max / min) ** 0.015, max * (max / min) ** 0.015] : [min - 0.015 * (max - min), max + 0.015 * (max - min)]);
     const options = {
-      width: frame.clientWidth, height: height(frame.clientWidth), mode: functions ? 1 : 2, legend: { show: false }, padding: [8, 12, 0, 0],
+      width: frame.clientWidth, height: height(frame.clientWidth), mode: functions ? 1 : 2, legend: { show: false }, padding: [8, 22, 0, 0],
       scales: {
         x: { ...scale(picture.x.log), range: (u, min, max) => (min == null ? [0, 1] : bound(min, max)) },
         y: scale(picture.y.log),
       },
-      axes: [axis(picture.x.log, { size: 30, space: 60 }), axis(picture.y.log, { size: room, space: 34 })],
+      axes: [axis(picture.x.log, { size: 30, space: 60, ...(picture.x.unit === "°" ? { incrs: [15, 30, 45, 90] } : {}) }), axis(picture.y.log, { size: room, space: 34 })],
       series: [{ label: picture.x.label }, ...series],
       cursor: { drag: { x: true, y: !functions, uni: 20 }, points: { show: functions, size: 7 }, dataIdx: functions ? nearest : undefined },
       hooks: {

@@ -1,5 +1,7 @@
 //! Each effect that was named: parameters, evidence, what else was tried.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use hyst_ident::diagnose::Finding;
 
 use super::html::{Page, Table, escaped};
@@ -44,10 +46,30 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     }
 }
 
+/// One row a parameter; those that are lists, element by element.
 fn parameters(finding: &Finding) -> Table {
-    let mut table = Table::new("Parameters").words("name").numbers("value ± standard error");
-    for (name, value) in words::parameters(&finding.parameters) {
-        table.row(&[name, &value]);
+    let all = words::parameters(&finding.parameters);
+    let element = |name: &str| {
+        let (list, rest) = name.split_once('[')?;
+        Some((list.to_owned(), rest.strip_suffix(']')?.parse::<usize>().ok()?))
+    };
+    let mut lists: BTreeMap<String, BTreeMap<usize, &str>> = BTreeMap::new();
+    for (name, value) in &all {
+        if let Some((list, i)) = element(name) {
+            lists.entry(list).or_default().insert(i, value);
+        }
+    }
+    if lists.is_empty() {
+        let mut table = Table::new("Parameters").words("name").numbers("value ± standard error");
+        all.iter().for_each(|(name, value)| table.row(&[*name, value]));
+        return table;
+    }
+    let head = Table::new("Parameters, with their standard errors").words("element");
+    let mut table = lists.keys().fold(head, |table, list| table.numbers(list));
+    let rows = lists.values().flat_map(|list| list.keys().copied()).collect::<BTreeSet<usize>>();
+    for i in rows {
+        let cells = lists.values().map(|list| list.get(&i).copied().unwrap_or_default().to_owned());
+        table.row(&std::iter::once(i.to_string()).chain(cells).collect::<Vec<_>>());
     }
     table
 }

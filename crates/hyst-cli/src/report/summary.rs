@@ -11,12 +11,13 @@ use crate::text::{percent, short};
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     let (f, unit) = (&c.diagnosis.findings, c.unit());
     page.paragraph("verdict", &words::verdict(f));
+    let changed = !f.effects.is_empty();
     let shown = |errors: &OnRecords| errors.test.or(errors.train);
     if let (Some(before), Some(after)) = (shown(&f.before), shown(&f.after)) {
         let record =
             if f.after.test.is_some() { "the test record, which was never fitted," } else { "the training record" };
         let figure = |e: FoundErrors| format!("{} {unit} ({} of span)", short(e.rmse), percent(e.nrmse_percent));
-        if before.rmse == after.rmse {
+        if !changed {
             page.paragraph("", &format!("On {record} the model errs by {} RMS", figure(after)));
         } else {
             page.paragraph("", &format!("On {record} the RMS error goes from {} to {}", figure(before), figure(after)));
@@ -48,7 +49,11 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
                 let mut cells = vec![record.to_owned(), model.to_owned()];
                 cells.extend([short(e.rmse), percent(e.nrmse_percent), short(e.max_abs)]);
                 cells.extend(start_up.then(|| short(e.rmse_all_rows)));
-                if model == "extended" { table.named_row(&cells) } else { table.row(&cells) }
+                match model {
+                    "extended" if !changed => {}
+                    "extended" => table.named_row(&cells),
+                    _ => table.row(&cells),
+                }
             }
         }
     }

@@ -132,8 +132,7 @@ pub(crate) struct Hann {
 impl Hann {
     pub(crate) fn new(length: usize) -> Self {
         let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-        let hann = |k: usize| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos();
-        Self { fft, window: (0..length).map(hann).collect() }
+        Self { fft, window: hann(length) }
     }
 
     /// Σ w²
@@ -143,13 +142,28 @@ impl Hann {
 
     /// Spectrum of as many rows as the window has, their mean removed.
     pub(crate) fn spectrum(&self, x: &[f64]) -> Vec<Complex<f64>> {
+        self.seen_through(&self.window, x)
+    }
+
+    /// Spectrum, at the same frequencies, of fewer rows through a window as long as they are, and that window's Σ w².
+    pub(crate) fn short(&self, x: &[f64]) -> (Vec<Complex<f64>>, f64) {
+        let window = hann(x.len().min(self.window.len()));
+        (self.seen_through(&window, x), window.iter().map(|w| w * w).sum())
+    }
+
+    fn seen_through(&self, window: &[f64], x: &[f64]) -> Vec<Complex<f64>> {
         let mean = x.iter().sum::<f64>() / x.len() as f64;
-        let mut windowed: Vec<f64> = x.iter().zip(&self.window).map(|(x, w)| (x - mean) * w).collect();
+        let mut windowed: Vec<f64> = x.iter().zip(window).map(|(x, w)| (x - mean) * w).collect();
+        windowed.resize(self.window.len(), 0.0);
         let mut spectrum = self.fft.make_output_vec();
         // Lengths are the planner's own: this cannot fail.
         let _ = self.fft.process(&mut windowed, &mut spectrum);
         spectrum
     }
+}
+
+fn hann(length: usize) -> Vec<f64> {
+    (0..length).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / length as f64).cos()).collect()
 }
 
 /// Summed spectra.

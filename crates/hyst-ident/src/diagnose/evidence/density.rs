@@ -1,5 +1,7 @@
 //! How a signal's power lies over frequency.
 
+use nalgebra::Complex;
+
 use crate::Samples;
 use crate::linear::{Hann, windows};
 
@@ -13,9 +15,11 @@ pub(super) struct Density {
 
 /// Windows that are averaged where the record is long enough.
 const WINDOWS: usize = 24;
+/// Rows that a window has at least.
+const SHORTEST: usize = 32;
 
 impl Density {
-    /// Of a signal over the settled rows by Welch's method; windows such that about 24 fit, or of the longest segment.
+    /// Of a signal over the settled rows by Welch's method; windows such that about 24 fit into the record.
     pub(super) fn of(samples: &Samples, signal: &[f64]) -> Option<Self> {
         Self::with_windows(samples, signal, 2 * samples.len() / (WINDOWS + 1))
     }
@@ -30,18 +34,25 @@ impl Density {
         let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
         // Fast lengths, and never longer than a segment.
         let length = length.min(longest) / 2 * 2;
-        if length < 32 {
+        if length < SHORTEST {
             return None;
         }
         let hann = Hann::new(length);
         let mut power = vec![0.0; length / 2 + 1];
-        let mut count = 0.0;
+        let mut energy = 0.0;
+        let mut add = |spectrum: &[Complex<f64>], of: f64| {
+            power.iter_mut().zip(spectrum).for_each(|(p, c)| *p += c.norm_sqr());
+            energy += of;
+        };
         for window in windows(&segments, length) {
-            let spectrum = hann.spectrum(&signal[window]);
-            power.iter_mut().zip(&spectrum).for_each(|(p, c)| *p += c.norm_sqr());
-            count += 1.0;
+            add(&hann.spectrum(&signal[window]), hann.energy());
         }
-        let scale = 2.0 * samples.period / (count * hann.energy());
+        // Segments that are too short for a window count as they are.
+        for segment in segments.iter().filter(|s| (SHORTEST..length).contains(&s.len())) {
+            let (spectrum, energy) = hann.short(&signal[segment.clone()]);
+            add(&spectrum, energy);
+        }
+        let scale = 2.0 * samples.period / energy;
         let step = 1.0 / (length as f64 * samples.period);
         // The window smears the removed mean over the first line, and the last stands for half a line.
         let lines = 2..length / 2;
@@ -79,7 +90,8 @@ mod tests {
     #[test]
     fn noise_has_its_density_and_a_tone_its_power() {
         let (h, n, sigma, amplitude) = (1e-3, 20_000, 0.02, 0.3);
-        let samples = samples_of(h, &[vec![0.0; n], vec![0.0; n / 2]]);
+        // The last segment is shorter than a window.
+        let samples = samples_of(h, &[vec![0.0; n], vec![0.0; n / 2], vec![0.0; n / 20]]);
         let tone = |t: f64| amplitude * (std::f64::consts::TAU * 40.3 * t).sin();
         let signal: Vec<f64> = samples.time.iter().zip(noise(1)).map(|(t, e)| tone(*t) + sigma * e).collect();
         let density = Density::of(&samples, &signal).unwrap();

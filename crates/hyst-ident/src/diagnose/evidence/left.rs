@@ -92,7 +92,7 @@ fn by_branch(scene: &Scene<'_>) -> Option<Breakdown> {
 
 /// Bands of half a decade. What lies below the slowest line of the spectrum, the mean included, counts for the lowest band.
 fn by_frequency(scene: &Scene<'_>) -> Option<Breakdown> {
-    let density = Density::of(&scene.samples, &scene.with.residual)?;
+    let density = Density::finest(&scene.samples, &scene.with.residual)?;
     let (n, squares) = scene.rows().fold((0.0, 0.0), |(n, s), k| (n + 1.0, s + scene.with.residual[k].powi(2)));
     let variance: f64 = squares / f64::max(n, 1.0);
     let (first, last) = (*density.hz.first()?, *density.hz.last()? + density.step());
@@ -135,16 +135,41 @@ pub(super) fn places(scene: &Scene<'_>, breakdowns: &[Breakdown]) -> Vec<String>
             _ if most.rms < STANDS_OUT * whole => {}
             "time" => places.push(format!("it is largest in {}: {against}", most.name)),
             "branch" if most.name == "at rest" => {
-                places.push(format!("it is largest where the drive rests: {against}"))
+                places.push(format!("it is largest where the drive rests: {against}"));
             }
             "branch" => places.push(format!("it is largest where the drive is {}: {against}", most.name)),
             _ => places.push(format!("it is largest at drives {}: {against}", between(&most.name))),
         }
     }
+    places.extend(jump(scene));
     if places.is_empty() {
         places.push("it is spread evenly over time, drive and branch, and over frequency".into());
     }
     places
+}
+
+/// Means over time in which a jump is looked for, how much of them it must explain, and how much less a slope may leave.
+const MEANS: usize = 100;
+const EXPLAINS: f64 = 0.6;
+const LESS_THAN_A_SLOPE: f64 = 0.5;
+
+/// A jump of the residual's mean, where one explains what is slow in it better than a slope does.
+fn jump(scene: &Scene<'_>) -> Option<String> {
+    let clock = clock(&scene.samples);
+    let bins = Bins::over(clock.iter().copied(), MEANS)?;
+    let (time, mean) = bins.means(scene.rows().map(|k| (clock[k], scene.with.residual[k])));
+    let average = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
+    let spread = |v: &[f64]| v.iter().map(|x| (x - average(v)).powi(2)).sum::<f64>();
+    let left = |at: usize| spread(&mean[..at]) + spread(&mean[at..]);
+    let at = (2..mean.len().saturating_sub(1)).min_by(|a, b| left(*a).total_cmp(&left(*b)))?;
+    let (t, y) = (average(&time), average(&mean));
+    let (ty, tt) =
+        time.iter().zip(&mean).fold((0.0, 0.0), |s, (a, b)| (s.0 + (a - t) * (b - y), s.1 + (a - t).powi(2)));
+    let (whole, sloping) = (spread(&mean), spread(&mean) - ty * ty / tt);
+    let sharp = left(at) < (1.0 - EXPLAINS) * whole && left(at) < LESS_THAN_A_SLOPE * sloping;
+    let height = average(&mean[at..]) - average(&mean[..at]);
+    let (seconds, sign) = (0.5 * (time[at - 1] + time[at]), if height > 0.0 { "+" } else { "" });
+    sharp.then(|| format!("its mean jumps by {sign}{} {} at about {seconds:.1} s", figure(height), scene.unit))
 }
 
 /// `between 1 and 3 Hz` of `1 to 3 Hz`; others as they are.

@@ -2,11 +2,11 @@
 
 use super::bins::Bins;
 use super::drive::{Branch, branches, rates};
-use super::{Axis, Picture, Role, Scene, View, WITH, WITHOUT};
-use crate::model::Effect;
+use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
+use crate::model::{Effect, Model};
 
 /// Points over a quantity's range.
-const POINTS: usize = 24;
+const POINTS: usize = 12;
 /// Points over the output's range.
 const FINE: usize = 40;
 /// Decades of rate that are shown, and points in each.
@@ -17,33 +17,47 @@ fn both<'a>(scene: &'a Scene<'_>) -> [(Role, &'static str, &'a View); 2] {
     [(Role::Without, WITHOUT, &scene.without), (Role::With, WITH, &scene.with)]
 }
 
+/// Draws what was found through the points of a picture's first curve.
+fn named(picture: &mut Picture, of: impl Fn(f64) -> f64) {
+    if let Some(x) = picture.curves.first().map(|c| c.x.clone()) {
+        let y: Vec<f64> = x.iter().map(|x| of(*x)).collect();
+        picture.line(Role::Reference, NAMED, &x, &y);
+    }
+}
+
 /// By how much the measured motion is larger than the predicted one, over temperature.
 ///
 /// In each stretch of temperature the slope of the residual over the motion: the sensor's zero has no part in it.
-pub(super) fn gain_over_temperature(scene: &Scene<'_>) -> Option<Picture> {
+pub(super) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let degc = scene.samples.temperature.as_deref()?;
     let bins = Bins::over(scene.rows().map(|k| degc[k]), POINTS)?;
     let (x, y) = (Axis::new("temperature", "°C"), Axis::new("gain, measured over predicted, less 1", "%"));
-    let caption = "Slope of the residual over the motion, at each temperature. A gain that follows temperature lies on a \
-        straight line without it, and at zero with it.";
+    let caption = "Slope of the residual over the motion, at each temperature. A gain that follows temperature lies along a straight \
+        line without it, and about zero with it; what both share is the base's own misfit.";
     let mut picture = Picture::new(Some(Effect::Temperature), "Gain over temperature", x, y, caption);
     for (role, name, view) in both(scene) {
         let rows = scene.rows().map(|k| (degc[k], scene.without.predicted[k], 100.0 * view.residual[k]));
         picture.points(role, name, bins.slopes(rows));
     }
+    if let Some(p) = model.effects.temperature {
+        named(&mut picture, |t| 100.0 * p.per_kelvin * (t - p.reference_degc));
+    }
     Some(picture)
 }
 
 /// The residual over the load.
-pub(super) fn over_load(scene: &Scene<'_>) -> Option<Picture> {
+pub(super) fn over_load(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let load = scene.samples.load.as_deref()?;
     let bins = Bins::over(scene.rows().map(|k| load[k]), POINTS)?;
-    let caption = "Means at each load. An actuator that yields lies on a straight line without it, whose slope is the \
-        compliance, and level with it.";
+    let caption = "Means at each load. An actuator that yields lies along a straight line without it, whose slope is the compliance, \
+        and level with it; what both share is the base's own misfit.";
     let x = Axis::new("load", "N");
     let mut picture = Picture::new(Some(Effect::Load), "Deflection over load", x, scene.residual_axis(), caption);
     for (role, name, view) in both(scene) {
         picture.points(role, name, bins.means(scene.rows().map(|k| (load[k], view.residual[k]))));
+    }
+    if let Some(p) = model.effects.load {
+        named(&mut picture, |newtons| p.per_newton * newtons);
     }
     Some(picture)
 }

@@ -129,29 +129,29 @@ fn lacking(model: &Model, effect: Effect) -> Model {
 /// The traces that an effect leaves.
 fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
     match effect {
-        Effect::Delay | Effect::Lag => frequency::response_pictures(effect, scene),
+        Effect::Delay | Effect::Lag => frequency::response_pictures(effect, model, scene),
         Effect::RateDependence => {
             let mut pictures = map::trailing(scene).into_iter().collect::<Vec<_>>();
-            pictures.extend(frequency::response_pictures(effect, scene));
+            pictures.extend(frequency::response_pictures(effect, model, scene));
             pictures
         }
         Effect::Asymmetry => map::curve(scene).into_iter().collect(),
-        Effect::Temperature => map::gain_over_temperature(scene).into_iter().collect(),
+        Effect::Temperature => map::gain_over_temperature(model, scene).into_iter().collect(),
         Effect::Creep => vec![slow::creep(scene)],
-        Effect::Load => map::over_load(scene).into_iter().collect(),
+        Effect::Load => map::over_load(model, scene).into_iter().collect(),
         Effect::Resonance => {
             let modes: Vec<(f64, f64)> = model.effects.resonances.iter().map(|m| (m.hz, m.damping)).collect();
             let mut pictures: Vec<Picture> = frequency::ring_down(scene, &modes).into_iter().collect();
             pictures.push(frequency::modes(scene, &modes));
-            pictures.extend(frequency::response_pictures(effect, scene));
+            pictures.extend(frequency::response_pictures(effect, model, scene));
             pictures
         }
         Effect::Saturation => map::stop(scene),
-        Effect::Drift => vec![slow::drift(scene)],
+        Effect::Drift => vec![slow::drift(model, scene)],
         Effect::Interference => {
-            let hz = model.effects.interference.map_or(0.0, |p| p.hz);
-            let mut pictures: Vec<Picture> = frequency::folded(scene, hz).into_iter().collect();
-            pictures.push(frequency::tone(scene, hz));
+            let Some(tone) = model.effects.interference else { return Vec::new() };
+            let mut pictures: Vec<Picture> = frequency::folded(scene, &tone).into_iter().collect();
+            pictures.push(frequency::tone(scene, tone.hz));
             pictures
         }
     }
@@ -161,6 +161,8 @@ fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
 const WITH: &str = "with it";
 /// The name of what the same model leaves without the effect.
 const WITHOUT: &str = "without it";
+/// The name of what the parameters that were found would leave.
+const NAMED: &str = "as named";
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,8 @@
 
 use super::bins::Bins;
 use super::drive::{Hold, clock, holds};
-use super::{Axis, Picture, Role, Scene, View, WITH, WITHOUT};
-use crate::model::Effect;
+use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
+use crate::model::{Effect, Model};
 
 /// Points for each decade of time.
 const PER_DECADE: f64 = 6.0;
@@ -60,10 +60,19 @@ fn after_steps(scene: &Scene<'_>, found: &[Hold], bins: &Bins, view: &View) -> (
 }
 
 /// The sensor's zero over lab time.
-pub(super) fn drift(scene: &Scene<'_>) -> Picture {
+pub(super) fn drift(model: &Model, scene: &Scene<'_>) -> Picture {
     let caption = "Means over a second or more, on the lab's clock, rests between segments included. Drift goes on at one rate \
         whatever the drive does: without it the residual lies on a slope, with it it stays level.";
-    over_time(scene, Some(Effect::Drift), "Mean over time", caption)
+    let mut picture = over_time(scene, Some(Effect::Drift), "Mean over time", caption);
+    if let (Some(p), Some(shown)) = (model.effects.drift, picture.curves.first()) {
+        let x = shown.x.clone();
+        // Files that follow each other here have each their own clock.
+        if scene.samples.files() == 1 {
+            let y: Vec<f64> = x.iter().map(|t| p.per_second * t).collect();
+            picture.line(Role::Reference, NAMED, &x, &y);
+        }
+    }
+    picture
 }
 
 fn over_time(scene: &Scene<'_>, effect: Option<Effect>, title: &str, caption: &str) -> Picture {

@@ -136,6 +136,12 @@ fn level(points: &[(f64, f64)], room: f64) {
     assert!(!points.is_empty() && points.iter().all(|p| p.1.abs() < room), "{points:?}");
 }
 
+/// Points of a curve lie within `room` of those of another at the same places.
+fn along(points: &[(f64, f64)], other: &[(f64, f64)], room: f64) {
+    assert_eq!(points.len(), other.len());
+    assert!(points.iter().zip(other).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < room), "{points:?} {other:?}");
+}
+
 #[test]
 fn a_delay_turns_the_phase_and_leaves_the_gain() {
     let effects = Effects { delay: Some(DelayParams { seconds: 0.004 }), ..Effects::default() };
@@ -145,6 +151,7 @@ fn a_delay_turns_the_phase_and_leaves_the_gain() {
     assert!(high.len() > 5, "{phase:?}");
     close(slope(&high), -360.0 * 0.004, 0.05);
     level(&phase[1], 1.5);
+    along(&phase[0], &phase[2], 3.0);
     let gain = curves(&found, Effect::Delay, "Gain over frequency");
     level(&gain[0].iter().filter(|p| p.0 < 45.0).map(|p| (p.0, p.1 - 1.0)).collect::<Vec<_>>(), 0.05);
 }
@@ -159,6 +166,8 @@ fn a_lag_lets_the_gain_fall() {
     // 1/(2π 8 ms) = 19.9 Hz.
     let (_, phase) = at_corner(&curves(&found, Effect::Lag, "Phase over frequency")[0]);
     close(phase, -45.0, 0.1);
+    let phases = curves(&found, Effect::Lag, "Phase over frequency");
+    along(&phases[0], &phases[2], 3.0);
     let (_, gain) = at_corner(&curves(&found, Effect::Lag, "Gain over frequency")[0]);
     close(gain, 0.5f64.sqrt(), 0.1);
 }
@@ -180,6 +189,7 @@ fn gain_follows_temperature() {
     let found = evidence(&actuator(Base::Pi(pi()), Effects { temperature, ..Effects::default() }), Effect::Temperature);
     let gain = curves(&found, Effect::Temperature, "Gain over temperature");
     close(slope(&gain[0]), 100.0 * per_kelvin, 0.03);
+    along(&gain[0], &gain[2], 0.15);
     level(&gain[1], 0.05);
 }
 
@@ -203,6 +213,7 @@ fn a_load_bends_the_actuator() {
     let over = curves(&found, Effect::Load, "Deflection over load");
     close(slope(&over[0]), 0.05, 0.02);
     level(&over[1], NOISE);
+    along(&over[0], &over[2], NOISE);
 }
 
 #[test]
@@ -223,14 +234,15 @@ fn a_mode_peaks_and_rings() {
     let gain = curves(&found, Effect::Resonance, "Gain over frequency");
     let (hz, at_40) = *gain[0].iter().min_by(|a, b| (a.0 - 40.0).abs().total_cmp(&(b.0 - 40.0).abs())).unwrap();
     close(at_40, 1.0 / (1.0 - (hz / 60.0).powi(2)), 0.1);
+    along(&gain[0], &gain[2], 0.2);
     let marks = found.pictures.iter().find(|p| !p.marks.is_empty()).map(|p| (p.effect, p.marks[0].at));
     assert_eq!(marks, Some((Some(Effect::Resonance), 60.0)));
     let ring = curves(&found, Effect::Resonance, "Ring-down after a stop");
-    // While it stands above the noise.
     let first: Vec<(f64, f64)> = ring[0].iter().copied().filter(|p| p.0 < 120.0).collect();
     let crossings = first.windows(2).filter(|w| w[0].1 * w[1].1 < 0.0).count() as f64;
     assert!((0.5 * crossings / 0.12 - 60.0).abs() < 6.0, "{crossings} crossings: {first:?}");
     level(&ring[1], 3.0 * NOISE);
+    along(&ring[0], &ring[2], 3.0 * NOISE);
 }
 
 #[test]
@@ -268,6 +280,7 @@ fn drift_and_tone_show_on_the_clock() {
     let mean = curves(&found, Effect::Drift, "Mean over time");
     close(slope(&mean[0]), 0.01, 0.02);
     level(&mean[1], NOISE);
+    along(&mean[0], &mean[2], NOISE);
 
     let interference = Some(InterferenceParams { hz: 49.9, amplitude: 0.05, phase: 1.0 });
     let found =
@@ -279,6 +292,8 @@ fn drift_and_tone_show_on_the_clock() {
     let most = folded[0].iter().fold(0.0, |m: f64, p| m.max(p.1));
     close(most, 0.05, 0.05);
     level(&folded[1], NOISE);
+    let sine = |degrees: f64| 0.05 * (degrees.to_radians() + 1.0).sin();
+    assert!(folded[0].iter().chain(&folded[2]).all(|p| (p.1 - sine(p.0)).abs() < NOISE), "{folded:?}");
 }
 
 #[test]
@@ -308,7 +323,6 @@ fn pictures_of_the_whole_and_where_it_lives() {
 
 #[test]
 fn what_is_left_is_found_where_it_is() {
-    let model = actuator(Base::Pi(pi()), Effects::default());
     let mut samples = samples_of(1e-3, &[vec![0.0; 4000], (0..4000).map(|k| (0.003 * f64::from(k)).sin()).collect()]);
     samples.output = samples.time.iter().zip(noise(2)).map(|(t, e)| 0.01 * e + 0.1 * (60.0 * t).sin()).collect();
     let flat = Simulation {
@@ -320,16 +334,26 @@ fn what_is_left_is_found_where_it_is() {
     };
     // The first segment, at rest, is noise alone.
     samples.output[..4000].iter_mut().for_each(|y| *y *= 0.05);
-    let scene = Scene {
+    let mut scene = Scene {
         with: View::of(&samples, &flat),
         without: View::of(&samples, &flat),
         samples,
         unit: "µm",
-        drive_unit: model.input.symbol(),
+        drive_unit: "V",
         noise: 0.01,
     };
     let places = left::places(&scene, &left::breakdowns(&scene));
     assert!(places[0].starts_with("it is largest in segment 2, 5.0 to 9.0 s: 0.07"), "{places:?}");
     assert!(places.iter().any(|p| p.ends_with("% of its power lies between 3 and 10 Hz")), "{places:?}");
-    assert!(!places.iter().any(|p| p.contains("rests")), "{places:?}");
+    assert!(!places.iter().any(|p| p.contains("rests") || p.contains("jumps")), "{places:?}");
+
+    // A jump of the zero is told as such, a slope is not.
+    let mut told = |zero: &dyn Fn(f64) -> f64| {
+        scene.with.residual = scene.samples.time.iter().zip(noise(3)).map(|(t, e)| 0.01 * e + zero(*t)).collect();
+        left::places(&scene, &left::breakdowns(&scene))
+    };
+    let jumps = told(&|t| if t < 6.0 { 0.1 } else { -0.2 });
+    assert!(jumps.iter().any(|p| p.starts_with("its mean jumps by -0.29") && p.ends_with("6.0 s")), "{jumps:?}");
+    let slopes = told(&|t| 0.05 * t);
+    assert!(!slopes.iter().any(|p| p.contains("jumps")), "{slopes:?}");
 }

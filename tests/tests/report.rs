@@ -1,0 +1,247 @@
+//! `diagnose --report`: a page with the figures of the findings, that loads nothing and that a browser draws.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use hyst_ident::diagnose::{MOST_POINTS, Picture};
+use hyst_tests::Lab;
+use serde_json::Value;
+
+/// A lab in which a lag has been diagnosed, with `findings.json` and `report.html`.
+fn diagnosed() -> Lab {
+    let lab = Lab::with_model();
+    lab.excite("u2.csv", 2);
+    lab.ok("run --daq sim:plant.toml --drive u2.csv --record test.csv");
+    // What is there already gives way, as with every output.
+    lab.write("report.html", "old");
+    let ran =
+        lab.ok("diagnose train.csv --test test.csv --model model.json --findings findings.json --report report.html");
+    assert!(ran.stdout.contains("report: report.html"), "{}", ran.stdout);
+    lab
+}
+
+/// `x` as reports print it.
+fn short(x: f64) -> String {
+    let decimals = (3 - x.abs().log10().floor() as i32).max(0) as usize;
+    format!("{x:.decimals$}")
+}
+
+/// The JSON that stands in the page for its plots.
+fn plotted(page: &str) -> &str {
+    let (_, rest) = page.split_once("<script type=\"application/json\" id=\"pictures\">").expect("the plots' numbers");
+    rest.split_once("</script>").expect("their end").0
+}
+
+#[test]
+fn a_page_says_what_the_findings_say_and_loads_nothing() {
+    let lab = diagnosed();
+    says_what_the_findings_say(&lab);
+    loads_nothing(&lab.read("report.html"));
+
+    // The same bytes again, on stdout.
+    let piped = lab.ok("diagnose train.csv --test test.csv --model model.json --report -");
+    assert!(piped.stdout == lab.read("report.html"));
+    assert!(piped.stderr.contains("the model lacks lag"), "{}", piped.stderr);
+    let message = lab.refuses("diagnose train.csv --model model.json --report model.json", 2);
+    assert!(message.contains("read by the same command"), "{message}");
+}
+
+fn says_what_the_findings_say(lab: &Lab) {
+    let (page, findings) = (lab.read("report.html"), lab.read("findings.json"));
+    let findings: Value = serde_json::from_str(&findings).unwrap();
+    let has = |part: &str| assert!(page.contains(part), "{part:?} is missing");
+    // A sentence, whatever its first letter; apostrophes are written as HTML has them.
+    let says = |sentence: &Value| has(&sentence.as_str().unwrap()[1..].replace('\'', "&#39;"));
+    has("<html lang=\"en\">");
+    has("<title>Diagnosis of model.json on train.csv</title>");
+    has("Explained in part: the model lacks lag.");
+    for when in ["before", "after"] {
+        for record in ["train", "test"] {
+            for figure in ["rmse", "max_abs"] {
+                has(&format!(">{}</td>", short(findings[when][record][figure].as_f64().unwrap())));
+            }
+        }
+    }
+    let lag = &findings["effects"][0];
+    assert_eq!(lag["name"], "lag");
+    has("<h3 class=\"effect\">lag</h3>");
+    // A person's digits of value and standard error.
+    let seconds = &lag["parameters"]["seconds"];
+    let (value, error) = (seconds["value"].as_f64().unwrap(), seconds["std_error"].as_f64().unwrap());
+    let decimals = (1.0 - error.log10().floor()) as usize;
+    has(&format!("{value:.decimals$} ± {error:.decimals$} s"));
+    lag["evidence"].as_array().unwrap().iter().for_each(says);
+    let alternatives = lag["alternatives"].as_array().unwrap();
+    assert!(!alternatives.is_empty());
+    for other in alternatives {
+        has(&format!("{}</td>", short(other["cv_rmse"].as_f64().unwrap())));
+    }
+    let remainder = &findings["remainder"];
+    says(&remainder["description"]);
+    remainder["where"].as_array().into_iter().flatten().for_each(says);
+    let model: Value = serde_json::from_str(&lab.read("model.json")).unwrap();
+    has(model["fitted_on"][0]["sha256"].as_str().unwrap());
+    has("load_n");
+    has("hystctl fit train.csv --model preisach");
+
+    // Tables have headings that say what they head.
+    assert_eq!(page.matches("<table>").count(), page.matches("<thead>").count());
+    assert!(page.matches("scope=\"col\"").count() > 10 && page.matches("scope=\"row\"").count() > 10);
+
+    let pictures: Vec<Picture> = serde_json::from_str(plotted(&page)).unwrap();
+    assert_eq!(page.matches("<figure ").count(), pictures.len());
+    let about = |effect: &str| pictures.iter().filter(|p| p.effect.is_some_and(|e| e.name() == effect)).count();
+    assert!(about("lag") >= 2 && pictures.iter().all(|p| p.effect.is_none_or(|e| e.name() == "lag")));
+    assert!(pictures.iter().flat_map(|p| &p.curves).all(|c| c.x.len() <= MOST_POINTS && c.x.len() == c.y.len()));
+}
+
+fn loads_nothing(page: &str) {
+    assert!(page.contains("Content-Security-Policy\" content=\"default-src 'none'"));
+    for scheme in ["http://", "https://", "//cdn"] {
+        for (at, _) in page.match_indices(scheme) {
+            // Where uPlot comes from, in the comment that its licence asks for.
+            let line = page[..at].rfind('\n').map_or(0, |start| start + 1);
+            assert!(page[line..at].ends_with("/*! "), "{}", &page[line..at + 40]);
+        }
+    }
+    for loading in ["src=", "@import", "url(", "fetch(", "XMLHttpRequest", "import(", "WebSocket", "sendBeacon"] {
+        assert!(!page.contains(loading), "{loading}");
+    }
+    let links: Vec<&str> = page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert!(links.iter().all(|link| link.starts_with('#') || *link == "data:,"), "{links:?}");
+}
+
+/// A Chromium, or `None` with a message that says so.
+fn browser() -> Option<PathBuf> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
+    let found = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name))).find(|file| file.is_file());
+    if found.is_none() {
+        println!("skipped: there is no Chromium in which to open the report (Debian: apt-get install chromium)");
+    }
+    found
+}
+
+/// Runs a browser without a window on a page; what it prints to stdout.
+fn browse(browser: &Path, profile: &Path, page: &Path, width: u32, arguments: &[String]) -> String {
+    let output = Command::new(browser)
+        .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"])
+        .args(["--disable-background-networking", "--no-first-run", "--virtual-time-budget=5000"])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .arg(format!("--window-size={width},1600"))
+        .args(arguments)
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .expect("the browser starts");
+    let log = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{log}");
+    let console: Vec<&str> = log.lines().filter(|line| line.contains("CONSOLE")).collect();
+    assert!(console.is_empty(), "the browser's console: {console:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Collects what goes wrong; the first script of the page.
+const LISTEN: &str = "<script>window.problems = [];\
+    window.addEventListener('error', (e) => problems.push(e.message));\
+    for (const kind of ['error', 'warn']) console[kind] = (...words) => problems.push(words.join(' '));</script>";
+
+/// Looks at every plot, zooms into it and back with a mouse and with two fingers; writes what it saw into the page.
+const LOOK: &str = r#"<script>
+addEventListener("load", () => setTimeout(async () => {
+  const seen = { problems, drawn: 0, zoomed: 0, pinched: 0, whole: 0, read: 0, cut: [] };
+  for (const figure of document.querySelectorAll("figure")) {
+    const canvas = figure.querySelector("canvas"), plot = figure.querySelector(".plot"), over = figure.querySelector(".u-over");
+    const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    const colours = new Set();
+    for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3] === 255) colours.add(pixels[i] << 16 | pixels[i + 1] << 8 | pixels[i + 2]);
+    if (colours.size > 3) seen.drawn += 1;
+    const box = over.getBoundingClientRect();
+    const at = (x, y) => ({ clientX: box.left + x * box.width, clientY: box.top + y * box.height, movementX: 9, movementY: 9, bubbles: true, cancelable: true, button: 0 });
+    const mouse = (kind, x, y, target) => (target ?? over).dispatchEvent(new MouseEvent(kind, at(x, y)));
+    const finger = (kind, id, x, y) => over.dispatchEvent(new PointerEvent(kind, { ...at(x, y), pointerId: id, pointerType: "touch" }));
+    const isZoomed = () => plot.classList.contains("zoomed");
+    mouse("mousemove", 0.3, 0.3);
+    mouse("mousedown", 0.3, 0.3); mouse("mousemove", 0.6, 0.6); mouse("mouseup", 0.6, 0.6, document);
+    if (isZoomed()) seen.zoomed += 1;
+    mouse("dblclick", 0.5, 0.5);
+    if (!isZoomed()) seen.whole += 1;
+    finger("pointerdown", 1, 0.4, 0.5); finger("pointerdown", 2, 0.6, 0.5);
+    finger("pointermove", 1, 0.2, 0.5); finger("pointermove", 2, 0.8, 0.5);
+    finger("pointerup", 1, 0.2, 0.5); finger("pointerup", 2, 0.8, 0.5);
+    if (isZoomed()) seen.pinched += 1;
+    plot.querySelector(".reset").click();
+    mouse("mousemove", 0.5, 0.5);
+    if (plot.querySelector(".readout").textContent.includes(":")) seen.read += 1;
+    mouse("mouseleave", 0.5, 0.5);
+    const right = plot.getBoundingClientRect().right;
+    if (canvas.getBoundingClientRect().right > right + 1 || right > innerWidth) seen.cut.push(figure.dataset.picture);
+  }
+  // Paper: white, two columns, plots as wide as those.
+  const widest = () => Math.max(...[...document.querySelectorAll("canvas")].map((c) => c.getBoundingClientRect().width));
+  const screen = widest();
+  const drawn = () => new Promise((then) => setTimeout(then, 20));
+  dispatchEvent(new Event("beforeprint"));
+  await drawn();
+  seen.paper = [widest(), getComputedStyle(document.body).backgroundColor];
+  dispatchEvent(new Event("afterprint"));
+  await drawn();
+  seen.back = widest() === screen;
+  seen.width = innerWidth;
+  seen.across = document.documentElement.scrollWidth;
+  seen.columns = new Set([...document.querySelectorAll("figure")].map((f) => Math.round(f.getBoundingClientRect().left))).size;
+  parent.postMessage(JSON.stringify(seen), "*");
+}, 300));
+</script></body>"#;
+
+#[test]
+fn a_browser_draws_every_plot_and_complains_of_nothing() {
+    let Some(browser) = browser() else { return };
+    let lab = diagnosed();
+    let page = lab.read("report.html");
+    let figures = page.matches("<figure ").count() as u64;
+    // The page with eyes: what is looked at is the same but for them.
+    let head = page.find("<meta charset").expect("a head");
+    let watched = format!("{}{LISTEN}{}", &page[..head], &page[head..]).replace("</body>", LOOK);
+    lab.write("watched.html", watched);
+    let profile = lab.path("profile");
+    for (width, columns) in [(1200, 2), (390, 1)] {
+        // A window has a least width, a frame has none.
+        lab.write(
+            "frame.html",
+            format!(
+                "<!DOCTYPE html><iframe src=\"watched.html\" style=\"width: {width}px; height: 1600px; border: 0\"></iframe><script>\
+                addEventListener('message', (e) => document.documentElement.setAttribute('data-seen', e.data));</script>"
+            ),
+        );
+        let dom = browse(&browser, &profile, &lab.path("frame.html"), 1300, &["--dump-dom".into()]);
+        let seen =
+            dom.split_once("data-seen=\"").and_then(|(_, rest)| rest.split_once('"')).expect("the page was seen").0;
+        let seen: Value = serde_json::from_str(&seen.replace("&quot;", "\"").replace("&amp;", "&")).unwrap();
+        assert_eq!(seen["problems"], Value::Array(Vec::new()), "{width} px: {seen}");
+        for what in ["drawn", "zoomed", "whole", "pinched", "read"] {
+            assert_eq!(seen[what], figures, "{what} at {width} px: {seen}");
+        }
+        assert_eq!(seen["cut"], Value::Array(Vec::new()), "{seen}");
+        assert_eq!(seen["width"], width, "{seen}");
+        assert!(seen["across"].as_u64().unwrap() <= u64::from(width), "the page is wider than the screen: {seen}");
+        assert_eq!(seen["columns"], columns, "{seen}");
+        assert_eq!(seen["paper"], serde_json::json!([320, "rgb(255, 255, 255)"]), "{seen}");
+        assert_eq!(seen["back"], true, "{seen}");
+
+        let shot = lab.path(&format!("{width}.png"));
+        let screenshot = format!("--screenshot={}", shot.display());
+        browse(&browser, &profile, &lab.path("report.html"), width, &[screenshot]);
+        let png = fs::read(&shot).unwrap();
+        assert_eq!(&png[12..16], b"IHDR");
+        assert_eq!(u32::from_be_bytes([png[16], png[17], png[18], png[19]]), width);
+        assert!(png.len() > 30_000, "{} bytes: there is little on it", png.len());
+    }
+    let print = format!("--print-to-pdf={}", lab.path("report.pdf").display());
+    browse(&browser, &profile, &lab.path("report.html"), 1200, &[print]);
+    let pdf = fs::read(lab.path("report.pdf")).unwrap();
+    assert!(pdf.starts_with(b"%PDF"));
+    let pages = pdf.windows(12).filter(|w| w == b"/Type /Page\n").count();
+    assert!((2..=10).contains(&pages), "{pages} pages");
+}
