@@ -28,6 +28,8 @@ pub(crate) struct Run {
 pub(crate) struct Task {
     /// Samples per second.
     rate_hz: f64,
+    /// What the sensor shows at rest \[output unit\]: the same for all that follow it.
+    zero: f64,
     /// Wanted displacement from rest \[output unit\].
     pub(crate) travel: Vec<f64>,
 }
@@ -41,7 +43,7 @@ pub(crate) struct Files<'a> {
 impl Task {
     /// For the stroke that a model knows.
     pub(crate) fn of(model: &Model, rate_hz: f64) -> Self {
-        Self { rate_hz, travel: travel(model, rate_hz) }
+        Self { rate_hz, zero: model.zero, travel: travel(model, rate_hz) }
     }
 
     /// Times of the samples \[s\].
@@ -51,7 +53,7 @@ impl Task {
 
     /// By a gain alone: what somebody without a model would use.
     pub(crate) fn by_gain<D: Daq>(&self, daq: &mut D, train: &Record, model: &Model) -> CommandResult<Vec<Sample>> {
-        let gain = mean_gain(train, model.zero);
+        let gain = mean_gain(train, self.zero);
         let (low, high) = (model.input.low, model.input.high);
         let drive: Vec<f64> = self.travel.iter().map(|y| (y / gain).clamp(low, high)).collect();
         self.play(daq, &drive, |_| {}, |_| Ok(()))
@@ -111,7 +113,7 @@ impl Task {
             drift + tone
         };
         let error: Vec<f64> =
-            samples.iter().zip(&self.travel).map(|(s, y)| s.output - model.zero - sensor(s.time_s) - y).collect();
+            samples.iter().zip(&self.travel).map(|(s, y)| s.output - self.zero - sensor(s.time_s) - y).collect();
         let n = error.len().max(1) as f64;
         Run {
             rmse: (error.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
@@ -126,7 +128,7 @@ impl Task {
         let columns = Columns {
             name: "reference".into(),
             time: self.time(),
-            output: Some((unit, self.travel.iter().map(|y| model.zero + y).collect())),
+            output: Some((unit, self.travel.iter().map(|y| self.zero + y).collect())),
             // Nobody knows it beforehand.
             load: model.effects.load.map(|_| vec![0.0; self.travel.len()]),
             ..Columns::default()

@@ -21,16 +21,17 @@ pub(crate) struct ScreeningBasis {
     curved: Vec<f64>,
     middle: f64,
     half: f64,
+    drags: bool,
 }
 
 impl ScreeningBasis {
-    /// For the input range of a record.
-    pub(crate) fn for_samples(samples: &Samples) -> Self {
+    /// For the input range of a record; with drag only where the base that is extended in the end has one too.
+    pub(crate) fn for_samples(samples: &Samples, drags: bool) -> Self {
         let linear = PiBasis::for_samples(samples);
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();
-        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low) }
+        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), drags }
     }
 }
 
@@ -48,6 +49,10 @@ impl Basis for ScreeningBasis {
             columns.push(p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect());
         }
         columns
+    }
+
+    fn drags(&self) -> bool {
+        self.drags
     }
 
     fn bounds(&self) -> Vec<Bounds> {

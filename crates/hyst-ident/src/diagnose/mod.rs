@@ -90,7 +90,8 @@ pub fn diagnose(
     let stage = |source| FitError::Stage { record: train.name(), source };
     let per_record = options.zero == Zero::PerRecord;
 
-    let screening = ScreeningBasis::for_samples(&samples);
+    let own = basis_of(model, &samples).map_err(stage)?;
+    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags());
     let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
@@ -98,7 +99,6 @@ pub fn diagnose(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
-    let own = basis_of(model, &samples).map_err(stage)?;
     let start = hypothesis_of(model);
     let base = problem.fit(&start).map_err(stage)?.ok_or_else(unsolvable)?;
     let mut found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
