@@ -6,7 +6,7 @@ use hyst_tests::Lab;
 fn the_loop_closes_on_an_actuator_with_a_lag() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 3 --out loop --json");
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 2 --out loop --json");
     let summary = ran.json();
     let turns = summary["turns"].as_array().unwrap();
     assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
