@@ -28,8 +28,9 @@ pub(crate) struct Run {
 pub(crate) struct Task {
     /// Samples per second.
     rate_hz: f64,
-    /// What the sensor shows at rest \[output unit\]: the same for all that follow it.
-    zero: f64,
+    /// What the sensor showed before the actuator first moved \[output unit\]: the same for all that follow it, whatever a model
+    /// takes for its zero.
+    rest: f64,
     /// Wanted displacement from rest \[output unit\].
     pub(crate) travel: Vec<f64>,
 }
@@ -41,9 +42,10 @@ pub(crate) struct Files<'a> {
 }
 
 impl Task {
-    /// For the stroke that a model knows.
-    pub(crate) fn of(model: &Model, rate_hz: f64) -> Self {
-        Self { rate_hz, zero: model.zero, travel: travel(model, rate_hz) }
+    /// For the stroke that a model knows, from where the record of its training began.
+    pub(crate) fn of(model: &Model, train: &Record, rate_hz: f64) -> Self {
+        let rest = rest(train, model);
+        Self { rate_hz, rest, travel: travel(model.output.high - rest, rate_hz) }
     }
 
     /// Times of the samples \[s\].
@@ -53,7 +55,7 @@ impl Task {
 
     /// By a gain alone: what somebody without a model would use.
     pub(crate) fn by_gain<D: Daq>(&self, daq: &mut D, train: &Record, model: &Model) -> CommandResult<Vec<Sample>> {
-        let gain = mean_gain(train, self.zero);
+        let gain = mean_gain(train, self.rest);
         let (low, high) = (model.input.low, model.input.high);
         let drive: Vec<f64> = self.travel.iter().map(|y| (y / gain).clamp(low, high)).collect();
         self.play(daq, &drive, |_| {}, |_| Ok(()))
@@ -67,7 +69,7 @@ impl Task {
         model: &Model,
         files: Option<&Files<'_>>,
     ) -> CommandResult<Vec<Sample>> {
-        let reference = self.in_the_sensor(model)?;
+        let reference = self.reference(model)?;
         let temperature = model.effects.temperature.map(|t| t.reference_degc);
         let options = CompensateOptions { temperature, ..CompensateOptions::default() };
         let plan = compensate(model, &reference, &options)?;
@@ -104,16 +106,11 @@ impl Task {
 
     /// Error of the motion: drift and tone that a model has found in the sensor are taken out of what it showed.
     pub(crate) fn judge(&self, samples: &[Sample], model: &Model) -> Run {
-        let sensor = |t: f64| {
-            let drift = model.effects.drift.map_or(0.0, |d| d.per_second * t);
-            let tone = model
-                .effects
-                .interference
-                .map_or(0.0, |i| i.amplitude * (2.0 * std::f64::consts::PI * (i.hz * t).fract() + i.phase).sin());
-            drift + tone
-        };
-        let error: Vec<f64> =
-            samples.iter().zip(&self.travel).map(|(s, y)| s.output - self.zero - sensor(s.time_s) - y).collect();
+        let error: Vec<f64> = samples
+            .iter()
+            .zip(&self.travel)
+            .map(|(s, y)| s.output - self.rest - in_the_sensor(model, s.time_s) - y)
+            .collect();
         let n = error.len().max(1) as f64;
         Run {
             rmse: (error.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
@@ -123,12 +120,12 @@ impl Task {
     }
 
     /// The travel in the sensor's coordinates.
-    fn in_the_sensor(&self, model: &Model) -> CommandResult<Record> {
+    fn reference(&self, model: &Model) -> CommandResult<Record> {
         let unit = OutputUnit::of_column(&model.output.column).unwrap_or(OutputUnit::Micrometre);
         let columns = Columns {
             name: "reference".into(),
             time: self.time(),
-            output: Some((unit, self.travel.iter().map(|y| self.zero + y).collect())),
+            output: Some((unit, self.travel.iter().map(|y| self.rest + y).collect())),
             // Nobody knows it beforehand.
             load: model.effects.load.map(|_| vec![0.0; self.travel.len()]),
             ..Columns::default()
@@ -160,10 +157,28 @@ impl Task {
     }
 }
 
+/// What a model has found in the sensor, not in the motion: drift and tone \[output unit\].
+fn in_the_sensor(model: &Model, time_s: f64) -> f64 {
+    let drift = model.effects.drift.map_or(0.0, |d| d.per_second * time_s);
+    let tone = model
+        .effects
+        .interference
+        .map_or(0.0, |i| i.amplitude * (2.0 * std::f64::consts::PI * (i.hz * time_s).fract() + i.phase).sin());
+    drift + tone
+}
+
+/// Mean output of the rows before the drive has first gone a thousandth of its range \[output unit\].
+fn rest(train: &Record, model: &Model) -> f64 {
+    let (time, u, y) = (train.time(), train.input(), train.output().unwrap_or_default());
+    let (start, range) = (u.first().copied().unwrap_or(0.0), model.input.high - model.input.low);
+    let still = u.iter().take_while(|u| (*u - start).abs() <= 1e-3 * range).count().min(y.len());
+    let sum: f64 = time[..still].iter().zip(y).map(|(t, y)| y - in_the_sensor(model, *t)).sum();
+    sum / still.max(1) as f64
+}
+
 /// A travel from rest that asks for everything: slow and fast motion, nested loops, a hold; within 85 % of
 /// the stroke \[output unit\].
-fn travel(model: &Model, rate_hz: f64) -> Vec<f64> {
-    let stroke = model.output.high - model.zero;
+fn travel(stroke: f64, rate_hz: f64) -> Vec<f64> {
     let smooth = |x: f64| 0.5 - 0.5 * (std::f64::consts::PI * x.clamp(0.0, 1.0)).cos();
     let shape = |t: f64| {
         let wave = |hz: f64, amplitude: f64| amplitude * (2.0 * std::f64::consts::PI * hz * t).sin();

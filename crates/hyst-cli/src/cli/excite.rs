@@ -1,7 +1,7 @@
 //! Arguments of `excite`.
 
 use clap::{Args, Subcommand, ValueEnum};
-use hyst_ident::excite::Suspect;
+use hyst_ident::model::Effect;
 
 use super::JsonArg;
 use crate::output::Target;
@@ -236,10 +236,10 @@ pub(crate) enum ExciteKind {
 pub(crate) struct SeparateArgs {
     /// One effect
     #[arg(value_name = "EFFECT")]
-    pub(crate) first: Suspect,
+    pub(crate) first: Effect,
     /// The other
     #[arg(value_name = "OTHER")]
-    pub(crate) second: Suspect,
+    pub(crate) second: Effect,
     /// Duration
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     pub(crate) seconds: f64,

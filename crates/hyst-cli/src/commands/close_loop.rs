@@ -101,7 +101,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
         let found = diagnose(&train, None, &start, &options, &told)?;
         progress.say(&format!("turn {turn}: following a reference"));
-        let task = Task::of(&found.extended, args.rate);
+        let task = Task::of(&found.extended, &train, args.rate);
         if turn == 1 {
             plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
             base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;

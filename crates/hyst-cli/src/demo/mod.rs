@@ -73,7 +73,7 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let diagnosis = diagnose(&train, Some(&test), &model, &options, &|what| progress.say(what))?;
 
     progress.say("compensating a reference on the actuator");
-    let task = Task::of(&diagnosis.extended, RATE_HZ);
+    let task = Task::of(&diagnosis.extended, &train, RATE_HZ);
     let judged = |samples: &[Sample]| task.judge(samples, &diagnosis.extended);
     let files = Files { log: &out.join("run.mcap"), drive: &out.join("drive.csv") };
     let runs = Runs {

@@ -151,6 +151,7 @@ impl PlantConfig {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use super::super::EFFECTS;
     use super::*;
 
     /// A linear, noiseless plant of 0.1 µm/V with a converter too fine to see: what a test adds is all there is.
@@ -258,22 +259,7 @@ pub(crate) mod tests {
     #[test]
     fn every_section_is_read_written_and_read_again_alike() {
         let config = PlantConfig::from_toml(FULL).unwrap();
-        assert_eq!(
-            config.effects(),
-            [
-                "delay",
-                "lag",
-                "asymmetry",
-                "rate-dependence",
-                "temperature",
-                "creep",
-                "load",
-                "resonance",
-                "saturation",
-                "drift",
-                "interference"
-            ]
-        );
+        assert_eq!(config.effects(), EFFECTS);
         assert_eq!(config.modes[1].hz, 350.0);
         assert_eq!(config.disturbances[1], Disturbance::GainStep { share: 0.02, at_s: 14.5 });
         let again = PlantConfig::from_toml(&config.to_toml().unwrap()).unwrap();

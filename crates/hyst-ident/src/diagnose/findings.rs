@@ -50,25 +50,9 @@ pub struct Remainder {
     pub variance_share: f64,
     /// In words.
     pub description: String,
-}
-
-/// What is left, and where.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Left {
-    /// What it is.
-    #[serde(flatten)]
-    pub judged: Remainder,
     /// Where it lives, in sentences; none if it is noise.
     #[serde(rename = "where", default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<String>,
-}
-
-impl std::ops::Deref for Left {
-    type Target = Remainder;
-
-    fn deref(&self) -> &Remainder {
-        &self.judged
-    }
 }
 
 /// A parameter that was found.
@@ -141,7 +125,7 @@ pub struct Findings {
     /// Effects, in the chain's order.
     pub effects: Vec<Finding>,
     /// What is left.
-    pub remainder: Left,
+    pub remainder: Remainder,
     /// Errors of the extended model.
     pub after: OnRecords,
 }
@@ -155,7 +139,7 @@ pub(super) struct Material<'a> {
     pub(super) before: &'a Simulation,
     pub(super) after: &'a Simulation,
     pub(super) tests: Option<&'a (Simulation, Simulation)>,
-    pub(super) remainder: Left,
+    pub(super) remainder: Remainder,
     pub(super) zero: Zero,
     pub(super) samples: &'a Samples,
 }

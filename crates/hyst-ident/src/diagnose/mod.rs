@@ -22,7 +22,7 @@ mod uncertainty;
 
 pub use evidence::{Axis, Breakdown, Curve, MOST_POINTS, Mark, Part, Picture, Role, Style};
 pub use findings::{
-    Alternative, Errors as FoundErrors, Finding, Findings, Found, Left, OnRecords, Remainder, RemainderKind, Verdict,
+    Alternative, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
 };
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
@@ -166,7 +166,7 @@ pub fn diagnose(
         before: &before,
         after: &after,
         tests: tests.as_ref(),
-        remainder: Left { judged: remainder, places },
+        remainder: Remainder { places, ..remainder },
         zero: options.zero,
         samples: &samples,
     });

@@ -20,7 +20,7 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     let mean = settled().sum::<f64>() / n;
     let variance = settled().map(|y| (y - mean) * (y - mean)).sum::<f64>() / n;
     let share = rmse * rmse / variance.max(f64::MIN_POSITIVE);
-    let left = |kind, description: String| Remainder { kind, variance_share: share, description };
+    let left = |kind, description: String| Remainder { kind, variance_share: share, description, places: Vec::new() };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     if h.zero_wanders || h.gain_wanders {
         let what = match (h.zero_wanders, h.gain_wanders) {

@@ -16,7 +16,7 @@ use std::io::Write;
 use std::ops::Range;
 
 pub use identification::Identification;
-pub use separate::{SeparateOptions, Separation, Suspect, Tried, Verdict, separate};
+pub use separate::{SeparateOptions, Separation, Tried, Verdict, separate};
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
 pub use waves::{AmSine, MinorLoops, Tone};
 

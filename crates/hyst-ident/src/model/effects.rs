@@ -97,7 +97,9 @@ impl fmt::Display for Effect {
 impl FromStr for Effect {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|e| e.name() == s).ok_or_else(|| format!("no effect is called {s:?}"))
+        let names = || Self::ALL.map(Self::name).join(", ");
+        let found = Self::ALL.into_iter().find(|e| e.name() == s);
+        found.ok_or_else(|| format!("no effect is called {s:?}; it is one of {}", names()))
     }
 }
 

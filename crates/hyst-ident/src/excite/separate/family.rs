@@ -11,7 +11,7 @@ use realfft::RealFftPlanner;
 
 use super::imitation::Node;
 use super::rig::Rig;
-use super::suspect::Suspect;
+use crate::model::Effect;
 
 type Effects = EffectParams<Vec<f64>>;
 
@@ -49,38 +49,38 @@ const ZONES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// One effect on one drive.
 pub(super) struct Family {
-    suspect: Suspect,
+    suspect: Effect,
     mark: DVector<f64>,
     nodes: Vec<Node>,
 }
 
 impl Family {
-    pub(super) fn new(rig: &Rig, suspect: Suspect) -> Self {
+    pub(super) fn new(rig: &Rig, suspect: Effect) -> Self {
         let typical = Typical::at(rig.period);
         let column = |values: Vec<f64>| rig.left_by_the_loop(values);
         let linear = |values: Vec<Vec<f64>>| vec![Node::linear(values.into_iter().map(column).collect())];
         let (mark, nodes) = match suspect {
-            Suspect::Delay | Suspect::Lag | Suspect::RateDependence => {
+            Effect::Delay | Effect::Lag | Effect::RateDependence => {
                 let add = |seconds: f64| timing(rig, suspect, seconds);
                 let grid = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 8.5];
                 (add(typical.time), grid.map(|g| along(&add, g * typical.time)).into_iter().collect())
             }
-            Suspect::Resonance => (resonance(rig, typical.mode), modes(rig, typical.mode)),
-            Suspect::Saturation => {
+            Effect::Resonance => (resonance(rig, typical.mode), modes(rig, typical.mode)),
+            Effect::Saturation => {
                 let top = rig.plain.iter().copied().fold(0.0, f64::max);
                 let add = |high: f64, knee: f64| saturation(rig, high * top, knee);
                 (add(1.0, 0.1), ends(&add))
             }
-            Suspect::Asymmetry => {
+            Effect::Asymmetry => {
                 let columns = zones(rig);
                 (&columns[1] * 0.05 + &columns[2] * 0.05, vec![Node::linear(columns)])
             }
-            Suspect::Creep => {
+            Effect::Creep => {
                 let columns: Vec<_> = CREEP.iter().filter_map(|tau| creep(rig, *tau)).collect();
                 let mark = columns.iter().fold(DVector::zeros(rig.rows()), |sum, c| sum + c * CREEP_SHARE);
                 (mark, vec![Node::linear(columns)])
             }
-            Suspect::Temperature => {
+            Effect::Temperature => {
                 let by = |f: &dyn Fn(usize) -> f64| (0..rig.rows()).map(|t| rig.plain[t] * f(t)).collect::<Vec<f64>>();
                 let kelvin = rig.temperature();
                 let mark = column(by(&|t| PER_KELVIN * kelvin[t]));
@@ -88,19 +88,19 @@ impl Family {
                 let unknown = || (1..=SLOW).map(|k| by(&|t| slow(rig, k, t))).collect();
                 (mark, linear(if rig.thermometer { vec![by(&|t| kelvin[t])] } else { unknown() }))
             }
-            Suspect::Load => {
+            Effect::Load => {
                 let load = rig.load();
                 let unknown =
                     || (1..=SLOW).map(|k| (0..rig.rows()).map(|t| slow(rig, k, t)).collect::<Vec<f64>>()).collect();
                 let mark = column(load.iter().map(|f| LOAD * f).collect());
                 (mark, linear(if rig.load_cell { vec![load] } else { unknown() }))
             }
-            Suspect::Drift => {
+            Effect::Drift => {
                 let end = rig.times.last().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
                 let ramp: Vec<f64> = rig.times.iter().map(|t| t / end).collect();
                 (column(ramp.clone()) * DRIFT, linear(vec![ramp]))
             }
-            Suspect::Interference => {
+            Effect::Interference => {
                 let tone = InterferenceParams { hz: typical.tone_hz, amplitude: TONE, phase: 0.7 };
                 let mark = rig.added(0.0, &Effects { interference: Some(tone), ..Effects::default() });
                 // What it can imitate depends on the frequencies of the other's mark.
@@ -119,7 +119,7 @@ impl Family {
     pub(super) fn cannot_imitate(&self, rig: &Rig, mark: &DVector<f64>) -> f64 {
         let absent = mark.norm() / (mark.len().max(1) as f64).sqrt();
         let least = |nodes: &[Node]| nodes.iter().map(|node| node.misses(mark)).fold(absent, f64::min);
-        if self.suspect == Suspect::Interference { least(&tones(rig, mark)) } else { least(&self.nodes) }
+        if self.suspect == Effect::Interference { least(&tones(rig, mark)) } else { least(&self.nodes) }
     }
 }
 
@@ -144,11 +144,11 @@ fn or_nothing(rig: &Rig, added: Option<DVector<f64>>) -> DVector<f64> {
     added.unwrap_or_else(|| DVector::zeros(rig.rows()))
 }
 
-fn timing(rig: &Rig, suspect: Suspect, seconds: f64) -> DVector<f64> {
+fn timing(rig: &Rig, suspect: Effect, seconds: f64) -> DVector<f64> {
     let none = Effects::default();
     let added = match suspect {
-        Suspect::Delay => rig.added(0.0, &Effects { delay: Some(DelayParams { seconds }), ..none }),
-        Suspect::Lag => rig.added(0.0, &Effects { lag: Some(LagParams { seconds }), ..none }),
+        Effect::Delay => rig.added(0.0, &Effects { delay: Some(DelayParams { seconds }), ..none }),
+        Effect::Lag => rig.added(0.0, &Effects { lag: Some(LagParams { seconds }), ..none }),
         _ => rig.added(seconds, &none),
     };
     or_nothing(rig, added)

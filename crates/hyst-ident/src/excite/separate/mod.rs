@@ -9,16 +9,14 @@ mod drives;
 mod family;
 mod imitation;
 mod rig;
-mod suspect;
 #[cfg(test)]
 mod tests;
 mod words;
 
 use serde::Serialize;
 
-pub use suspect::Suspect;
-
 use super::{Drive, ExciteError, Limits, require};
+use crate::model::Effect;
 use family::Family;
 use rig::Rig;
 
@@ -88,7 +86,7 @@ pub struct Separation {
 ///
 /// # Errors
 /// When the two are the same, an option is out of range, or no drive of the family keeps to the limits.
-pub fn separate(a: Suspect, b: Suspect, limits: &Limits, options: &SeparateOptions) -> Result<Separation, ExciteError> {
+pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions) -> Result<Separation, ExciteError> {
     limits.check()?;
     require("duration_s", options.duration_s, (4.0..=120.0).contains(&options.duration_s), "between 4 and 120")?;
     require("noise", options.noise, options.noise > 0.0 && options.noise < 1.0, "above 0 and below 1")?;

@@ -1,19 +1,20 @@
 //! Tests over all pairs of effects.
 
 use super::*;
+use crate::model::Effect;
 
 const LIMITS: Limits = Limits { rate_hz: 1000.0, lo_v: 0.0, hi_v: 120.0, slew_v_per_s: Some(50_000.0) };
 
 /// Every pair on every drive.
-fn all_pairs(options: &SeparateOptions) -> Vec<((Suspect, Suspect), Vec<Tried>)> {
-    let mut pairs: Vec<((Suspect, Suspect), Vec<Tried>)> = Vec::new();
+fn all_pairs(options: &SeparateOptions) -> Vec<((Effect, Effect), Vec<Tried>)> {
+    let mut pairs: Vec<((Effect, Effect), Vec<Tried>)> = Vec::new();
     for candidate in drives::family(&LIMITS, options.duration_s) {
         candidate.drive(&LIMITS).unwrap_or_else(|error| panic!("{}: {error}", candidate.name));
         let rig = Rig::new(&candidate, &LIMITS, options).unwrap();
-        let families = Suspect::ALL.map(|suspect| Family::new(&rig, suspect));
+        let families = Effect::ALL.map(|suspect| Family::new(&rig, suspect));
         let mut index = 0;
-        for (i, a) in Suspect::ALL.iter().enumerate() {
-            for (j, b) in Suspect::ALL.iter().enumerate().skip(i + 1) {
+        for (i, a) in Effect::ALL.iter().enumerate() {
+            for (j, b) in Effect::ALL.iter().enumerate().skip(i + 1) {
                 let found = compare(candidate.name, &rig, &families[i], &families[j], options.noise);
                 if pairs.len() == index {
                     pairs.push(((*a, *b), Vec::new()));
@@ -36,9 +37,9 @@ const SHORT: SeparateOptions = SeparateOptions { duration_s: 12.0, noise: 1e-3, 
 fn every_pair_has_an_answer_and_only_an_unmeasured_load_hides_a_drift() {
     let pairs = all_pairs(&SHORT);
     assert_eq!(pairs.len(), 55);
-    let hidden: Vec<(Suspect, Suspect)> =
+    let hidden: Vec<(Effect, Effect)> =
         pairs.iter().filter(|(_, tried)| best(tried).left() < 0.1).map(|(pair, _)| *pair).collect();
-    assert_eq!(hidden, [(Suspect::Load, Suspect::Drift)]);
+    assert_eq!(hidden, [(Effect::Load, Effect::Drift)]);
     let measured = SeparateOptions { thermometer: true, load_cell: true, ..SHORT };
     for (pair, tried) in all_pairs(&measured) {
         assert!(best(&tried).left() > 0.1, "{pair:?}: {:?}", best(&tried));
@@ -47,19 +48,19 @@ fn every_pair_has_an_answer_and_only_an_unmeasured_load_hides_a_drift() {
 
 #[test]
 fn slow_loops_hide_what_fast_ones_show() {
-    let left = |a: Suspect, b: Suspect, drive: &str| {
+    let left = |a: Effect, b: Effect, drive: &str| {
         let answer = separate(a, b, &LIMITS, &SHORT).unwrap();
         let of = answer.tried.iter().find(|tried| tried.drive == drive).unwrap().left();
         (of, answer.tried[0].left())
     };
-    let (slow, best) = left(Suspect::Delay, Suspect::Lag, "slow full loops");
+    let (slow, best) = left(Effect::Delay, Effect::Lag, "slow full loops");
     assert!(slow < 0.1 && best > 3.0, "{slow} {best}");
-    let (fast, best) = left(Suspect::Creep, Suspect::Drift, "full loops as fast as the limits allow");
-    let (slow, _) = left(Suspect::Creep, Suspect::Drift, "slow full loops");
+    let (fast, best) = left(Effect::Creep, Effect::Drift, "full loops as fast as the limits allow");
+    let (slow, _) = left(Effect::Creep, Effect::Drift, "slow full loops");
     assert!(fast.min(slow) < 0.1 && best > 1.0, "{fast} {slow} {best}");
     // A thermometer takes from temperature what it could have been.
-    let with = separate(Suspect::Temperature, Suspect::Creep, &LIMITS, &SeparateOptions { thermometer: true, ..SHORT });
-    let without = separate(Suspect::Temperature, Suspect::Creep, &LIMITS, &SHORT).unwrap();
+    let with = separate(Effect::Temperature, Effect::Creep, &LIMITS, &SeparateOptions { thermometer: true, ..SHORT });
+    let without = separate(Effect::Temperature, Effect::Creep, &LIMITS, &SHORT).unwrap();
     assert!(with.unwrap().tried[0].left() > without.tried[0].left());
 }
 
@@ -68,7 +69,7 @@ fn an_effect_imitates_itself() {
     let options = SeparateOptions { thermometer: true, load_cell: true, ..SHORT };
     for candidate in drives::family(&LIMITS, options.duration_s) {
         let rig = Rig::new(&candidate, &LIMITS, &options).unwrap();
-        for suspect in Suspect::ALL {
+        for suspect in Effect::ALL {
             let family = Family::new(&rig, suspect);
             let size = family.mark().norm() / (rig.rows() as f64).sqrt();
             let left = family.cannot_imitate(&rig, family.mark());
@@ -81,10 +82,10 @@ fn an_effect_imitates_itself() {
 #[test]
 fn answers_say_how_and_keep_to_the_limits() {
     for (a, b, words) in [
-        (Suspect::Lag, Suspect::Delay, "high frequency"),
-        (Suspect::Creep, Suspect::Drift, "rests"),
-        (Suspect::Load, Suspect::Drift, "load_n"),
-        (Suspect::Temperature, Suspect::Drift, "temperature_degc"),
+        (Effect::Lag, Effect::Delay, "high frequency"),
+        (Effect::Creep, Effect::Drift, "rests"),
+        (Effect::Load, Effect::Drift, "load_n"),
+        (Effect::Temperature, Effect::Drift, "temperature_degc"),
     ] {
         let answer = separate(a, b, &LIMITS, &SHORT).unwrap();
         for part in [a.name(), b.name(), words, answer.tried[0].drive] {
@@ -95,15 +96,15 @@ fn answers_say_how_and_keep_to_the_limits() {
         let (first, last) = (answer.drive.time()[0], answer.drive.time()[answer.drive.time().len() - 1]);
         assert!((10.0..17.0).contains(&(last - first)), "{last}");
     }
-    assert_eq!(separate(Suspect::Load, Suspect::Drift, &LIMITS, &SHORT).unwrap().verdict, Verdict::NotByADrive);
+    assert_eq!(separate(Effect::Load, Effect::Drift, &LIMITS, &SHORT).unwrap().verdict, Verdict::NotByADrive);
     // Milliseconds cannot be seen with an amplifier that takes seconds.
     let slow = Limits { slew_v_per_s: Some(60.0), ..LIMITS };
-    assert_eq!(separate(Suspect::Delay, Suspect::Lag, &slow, &SHORT).unwrap().verdict, Verdict::NotByADrive);
+    assert_eq!(separate(Effect::Delay, Effect::Lag, &slow, &SHORT).unwrap().verdict, Verdict::NotByADrive);
 }
 
 #[test]
 fn what_makes_no_sense_is_refused() {
-    let pair = (Suspect::Lag, Suspect::Delay);
+    let pair = (Effect::Lag, Effect::Delay);
     let message =
         |limits: &Limits, options: SeparateOptions| separate(pair.0, pair.1, limits, &options).unwrap_err().to_string();
     assert!(message(&LIMITS, SeparateOptions { duration_s: 1.0, ..SHORT }).contains("duration_s = 1"));
@@ -111,8 +112,8 @@ fn what_makes_no_sense_is_refused() {
     assert!(message(&Limits { hi_v: -1.0, ..LIMITS }, SHORT).contains("hi_v = -1"));
     assert!(message(&Limits { rate_hz: 5.0, ..LIMITS }, SHORT).contains("rate_hz = 5"));
     assert!(
-        separate(Suspect::Lag, Suspect::Lag, &LIMITS, &SHORT).unwrap_err().to_string().contains("both effects are lag")
+        separate(Effect::Lag, Effect::Lag, &LIMITS, &SHORT).unwrap_err().to_string().contains("both effects are lag")
     );
-    assert_eq!("rate-dependence".parse(), Ok(Suspect::RateDependence));
-    assert!("noise".parse::<Suspect>().unwrap_err().contains("interference"));
+    assert_eq!("rate-dependence".parse(), Ok(Effect::RateDependence));
+    assert!("noise".parse::<Effect>().unwrap_err().contains("interference"));
 }

@@ -1,9 +1,10 @@
 //! The answer in words.
 
-use super::{SeparateOptions, Suspect, Tried, Verdict};
+use super::{SeparateOptions, Tried, Verdict};
+use crate::model::Effect;
 
 /// How the two differ, what the drive leaves, and what to measure besides.
-pub(super) fn reason(pair: (Suspect, Suspect), verdict: Verdict, best: &Tried, options: &SeparateOptions) -> String {
+pub(super) fn reason(pair: (Effect, Effect), verdict: Verdict, best: &Tried, options: &SeparateOptions) -> String {
     let (a, b) = pair;
     let mut text = format!("{a} {}; {b} {}.", mark(a), mark(b));
     if let Some(difference) = difference(a, b) {
@@ -43,29 +44,29 @@ fn figure(x: f64) -> String {
 }
 
 /// What an effect does to the output.
-fn mark(suspect: Suspect) -> &'static str {
+fn mark(suspect: Effect) -> &'static str {
     match suspect {
-        Suspect::Delay => {
+        Effect::Delay => {
             "moves everything by the same time, so its phase grows in proportion to frequency and the amplitude stays"
         }
-        Suspect::Lag => "rounds what is fast: its phase bends towards 90° and the amplitude falls",
-        Suspect::Asymmetry => "bends the loop by the same curve at any rate and at any time",
-        Suspect::RateDependence => {
+        Effect::Lag => "rounds what is fast: its phase bends towards 90° and the amplitude falls",
+        Effect::Asymmetry => "bends the loop by the same curve at any rate and at any time",
+        Effect::RateDependence => {
             "widens loops with the rate, but only while plays slide: just after a turn nothing is late"
         }
-        Suspect::Temperature => "scales the loop about its zero, following the temperature and not the drive",
-        Suspect::Creep => "goes on after every step, by a share of it, ever more slowly",
-        Suspect::Load => "adds what the external force pushes, whatever the drive does",
-        Suspect::Resonance => "rings after corners and steps and raises the amplitude near its frequency",
-        Suspect::Saturation => "flattens what goes beyond a level at the ends of the motion",
-        Suspect::Drift => "adds a ramp on the lab's clock that goes on while the device rests",
-        Suspect::Interference => "adds a tone on the lab's clock that goes on while nothing is driven",
+        Effect::Temperature => "scales the loop about its zero, following the temperature and not the drive",
+        Effect::Creep => "goes on after every step, by a share of it, ever more slowly",
+        Effect::Load => "adds what the external force pushes, whatever the drive does",
+        Effect::Resonance => "rings after corners and steps and raises the amplitude near its frequency",
+        Effect::Saturation => "flattens what goes beyond a level at the ends of the motion",
+        Effect::Drift => "adds a ramp on the lab's clock that goes on while the device rests",
+        Effect::Interference => "adds a tone on the lab's clock that goes on while nothing is driven",
     }
 }
 
 /// What to look at where two effects are alike.
-fn difference(a: Suspect, b: Suspect) -> Option<&'static str> {
-    use Suspect::{
+fn difference(a: Effect, b: Effect) -> Option<&'static str> {
+    use Effect::{
         Asymmetry, Creep, Delay, Drift, Interference, Lag, Load, RateDependence, Resonance, Saturation, Temperature,
     };
     let (a, b) = if a <= b { (a, b) } else { (b, a) };
@@ -102,17 +103,17 @@ fn difference(a: Suspect, b: Suspect) -> Option<&'static str> {
 }
 
 /// What to measure besides, for an effect that comes from the surroundings.
-fn measure(suspect: Suspect, options: &SeparateOptions) -> Option<&'static str> {
+fn measure(suspect: Effect, options: &SeparateOptions) -> Option<&'static str> {
     match suspect {
-        Suspect::Temperature if !options.thermometer => Some(
+        Effect::Temperature if !options.thermometer => Some(
             "A thermometer (temperature_degc) settles what temperature does at once: without it, it is taken as any slow \
                   function of time.",
         ),
-        Suspect::Temperature => Some("Let the temperature change by a kelvin or more while it plays."),
-        Suspect::Load if !options.load_cell => {
+        Effect::Temperature => Some("Let the temperature change by a kelvin or more while it plays."),
+        Effect::Load if !options.load_cell => {
             Some("Record the load (load_n), or take it off: without that it is taken as any slow function of time.")
         }
-        Suspect::Load => {
+        Effect::Load => {
             Some("No drive makes a load: put a known one on and off while it plays, out of step with the drive.")
         }
         _ => None,
