@@ -5,16 +5,24 @@ use std::collections::BTreeMap;
 
 use hyst_ident::model::Effect;
 use hyst_tests::calibration::{Outcome, draw, right, run};
+use rayon::prelude::*;
+
+/// Actuators that are computed side by side.
+const AT_ONCE: usize = 8;
 
 fn main() {
     let argument = |i: usize| std::env::args().nth(i).and_then(|s| s.parse::<u64>().ok());
     let (count, seed) = (argument(1).unwrap_or(40), argument(2).unwrap_or(1));
     println!("{count} actuators from seed {seed}:");
-    let mut outcomes = Vec::new();
-    for i in 0..count {
-        let outcome = run(&draw(seed, i));
-        println!("  {} {}", if outcome.exact() { "     " } else { "NOT: " }, line(&outcome));
-        outcomes.push(outcome);
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    let numbers: Vec<u64> = (0..count).collect();
+    for some in numbers.chunks(AT_ONCE) {
+        let done: Vec<Outcome> = some.par_iter().map(|i| run(&draw(seed, *i))).collect();
+        for outcome in &done {
+            let mark = if outcome.exact() { "" } else { "NOT: " };
+            println!("  {mark:5} {}", line(outcome));
+        }
+        outcomes.extend(done);
     }
     summary(&outcomes);
 }
@@ -26,11 +34,12 @@ fn names(list: &[Effect]) -> String {
 fn line(o: &Outcome) -> String {
     let beside = o.case.disturbed.as_ref().map_or(String::new(), |d| format!(" ({d})"));
     format!(
-        "seed {} {}: {}{beside} → {}; left {:?}, error {:.2} × that without the effect, {:.1} s",
+        "seed {} {}: {}{beside} → {}{}; left {:?}, error {:.2} × that without the effect, {:.1} s",
         o.case.seed,
         o.case.kind.name(),
         names(&o.truth),
         names(&o.named),
+        if o.true_verdict() { "" } else { " (verdict NOT true)" },
         o.remainder,
         o.ratio(),
         o.seconds
@@ -70,7 +79,8 @@ fn summary(outcomes: &[Outcome]) {
         disturbed.iter().filter(|o| !o.wrong().is_empty()).count(),
         disturbed.len(),
     );
-    let ratios: Vec<f64> = with.iter().filter(|o| o.exact()).map(|o| o.ratio()).collect();
+    rate("verdicts that are true", outcomes.iter().filter(|o| o.true_verdict()).count(), outcomes.len());
+    let ratios: Vec<f64> = with.iter().map(|o| o.ratio()).collect();
     println!(
         "test error after, over that of the same actuator without the effect: median {:.2}, 90th percentile {:.2}",
         quantile(&ratios, 0.5),
@@ -88,7 +98,11 @@ fn summary(outcomes: &[Outcome]) {
         println!("    {name}: {found:.6} ± {:.6}, true {truth:.6}", error.unwrap_or(f64::NAN));
     }
     let seconds: Vec<f64> = outcomes.iter().map(|o| o.seconds).collect();
-    println!("time of a diagnosis: median {:.1} s, longest {:.1} s", quantile(&seconds, 0.5), quantile(&seconds, 1.0));
+    println!(
+        "time of a diagnosis, others beside it: median {:.1} s, longest {:.1} s",
+        quantile(&seconds, 0.5),
+        quantile(&seconds, 1.0)
+    );
 }
 
 /// Rows: switched on. Columns: named.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hyst_hw::{Bed, DISTURBANCES, EFFECTS, Plant, PlantConfig};
-use hyst_ident::diagnose::{DiagnoseOptions, Findings, RemainderKind, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, Findings, RemainderKind, Verdict, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Effect, Kind};
 use hyst_ident::simulate::{Zero, simulate};
@@ -43,6 +43,8 @@ pub struct Outcome {
     pub evidence: Vec<String>,
     /// What was said of the rest.
     pub remainder: RemainderKind,
+    /// The diagnosis in a word.
+    pub verdict: Verdict,
     /// Time that the diagnosis took \[s\].
     pub seconds: f64,
 }
@@ -51,6 +53,15 @@ impl Outcome {
     /// Whether exactly what was switched on was named.
     pub fn exact(&self) -> bool {
         self.truth == self.named
+    }
+
+    /// Whether the verdict is true: something unseen acts, an effect of the list does, or nothing.
+    pub fn true_verdict(&self) -> bool {
+        match (&self.case.disturbed, self.truth.is_empty()) {
+            (Some(_), _) => self.verdict == Verdict::Unexplained,
+            (None, true) => matches!(self.verdict, Verdict::NothingMissing | Verdict::BaseTooCoarse),
+            (None, false) => self.verdict == Verdict::Explained,
+        }
     }
 
     /// Names of effects that were not switched on.
@@ -101,6 +112,7 @@ pub fn run(case: &Case) -> Outcome {
         parameters: parameters(&case.plant, &found.findings),
         evidence: evidence(&found.findings),
         remainder: found.findings.remainder.kind,
+        verdict: found.findings.verdict,
         seconds,
         case: case.clone(),
     }

@@ -1,26 +1,58 @@
 //! Reading what commands are given: records, models, plants.
 
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use hyst_hw::{Plant, PlantConfig};
+use hyst_ident::clipping::clipped;
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
 
 use crate::cli::TemperatureArg;
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::say;
+use crate::text;
 
 /// The records of all files, joined to one.
 pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Record> {
     let map = ColumnMap::parse(map)?;
     let read = |path: &PathBuf| Record::read(path, &map, Need::InputAndOutput);
-    Ok(Record::join(paths.iter().map(read).collect::<Result<_, _>>()?)?)
+    let records: Vec<Record> = paths.iter().map(read).collect::<Result<_, _>>()?;
+    records.iter().for_each(tell_oddities);
+    Ok(Record::join(records)?)
 }
 
 /// One record.
 pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<Record> {
-    Ok(Record::read(path, &ColumnMap::parse(map)?, need)?)
+    let record = Record::read(path, &ColumnMap::parse(map)?, need)?;
+    tell_oddities(&record);
+    Ok(record)
+}
+
+/// Sample rates that actuators are measured at \[Hz\].
+const ORDINARY_RATES: Range<f64> = 5.0..2e6;
+
+/// Says what is legal in a record but is seldom meant.
+fn tell_oddities(record: &Record) {
+    let (name, rate) = (record.name(), 1.0 / record.sample_period());
+    if !ORDINARY_RATES.contains(&rate) {
+        say(&format!(
+            "note: {name} has {} samples per second; if its times are in another unit, name it, as with --map time_ms=COLUMN",
+            text::short(rate)
+        ));
+    }
+    let unit = record.output_unit().map_or("", |unit| unit.symbol());
+    // A reference may stand where it likes.
+    let measured = record.output().filter(|_| !record.input().is_empty());
+    for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
+        say(&format!(
+            "note: {name}: the sensor stands at the end of its range, {} {unit}, in {} (the first at {} s); they are left out: lower the drive or widen the range",
+            text::short(end.at),
+            text::count(end.rows, "row"),
+            text::short(record.time()[end.first])
+        ));
+    }
 }
 
 /// A model and the text of its file.

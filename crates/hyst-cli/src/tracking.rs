@@ -21,6 +21,8 @@ pub(crate) struct Run {
     /// Measured motion minus reference \[output unit\].
     pub(crate) error: Vec<f64>,
     pub(crate) rmse: f64,
+    /// The same of what the sensor showed, with the drift and the tone that a model has found in it.
+    pub(crate) shown_rmse: f64,
     pub(crate) max_abs: f64,
 }
 
@@ -106,14 +108,12 @@ impl Task {
 
     /// Error of the motion: drift and tone that a model has found in the sensor are taken out of what it showed.
     pub(crate) fn judge(&self, samples: &[Sample], model: &Model) -> Run {
-        let error: Vec<f64> = samples
-            .iter()
-            .zip(&self.travel)
-            .map(|(s, y)| s.output - self.rest - in_the_sensor(model, s.time_s) - y)
-            .collect();
-        let n = error.len().max(1) as f64;
+        let shown: Vec<f64> = samples.iter().zip(&self.travel).map(|(s, y)| s.output - self.rest - y).collect();
+        let error: Vec<f64> = shown.iter().zip(samples).map(|(e, s)| e - in_the_sensor(model, s.time_s)).collect();
+        let rms = |e: &[f64]| (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt();
         Run {
-            rmse: (error.iter().map(|e| e * e).sum::<f64>() / n).sqrt(),
+            rmse: rms(&error),
+            shown_rmse: rms(&shown),
             max_abs: error.iter().fold(0.0, |m, e| m.max(e.abs())),
             error,
         }

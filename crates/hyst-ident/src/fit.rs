@@ -70,10 +70,14 @@ pub enum FitError {
         value: f64,
     },
     /// The output falls where the input rises.
-    #[error("{record}: the output falls when the input rises; swap the sensor's sign (these models need a rising one)")]
+    #[error(
+        "{record}: the output falls where the input rises, and these models rise; turn its sign for every command with --map {column}=-COLUMN, where COLUMN is its name in the file"
+    )]
     Falling {
         /// The record.
         record: String,
+        /// The output's name in the record format.
+        column: &'static str,
     },
     /// A column is needed.
     #[error("{record}: column {column} is missing; {advice}")]
@@ -339,7 +343,7 @@ pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<()
     let (u, y) = (mean(&samples.input), mean(&samples.output));
     let together: f64 = samples.input.iter().zip(&samples.output).map(|(a, b)| (a - u) * (b - y)).sum();
     if sign && together <= 0.0 {
-        return Err(FitError::Falling { record: name });
+        return Err(FitError::Falling { record: name, column: unit.column() });
     }
     Ok(())
 }

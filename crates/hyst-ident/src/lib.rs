@@ -10,6 +10,7 @@
 pub mod atomic_file;
 mod base;
 pub mod batch;
+pub mod clipping;
 pub mod compare;
 pub mod compensate;
 pub mod diagnose;
@@ -28,6 +29,7 @@ mod nested;
 mod noise;
 pub mod optimize;
 pub mod record;
+mod repetition;
 mod samples;
 mod settle;
 pub mod simulate;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use hyst_core::Env;
 
+use crate::clipping::clipped_rows;
 use crate::record::Record;
 
 /// Columns of one or more records with the same units and sample period.
@@ -25,13 +26,14 @@ pub struct Samples {
     pub segments: Vec<Range<usize>>,
     /// File that each segment came from.
     pub file_of_segment: Vec<usize>,
-    /// Rows that are a start-up transient: left out of fits and of the settled error.
+    /// Rows that are left out of fits and of the settled error: clipped ones, and a start-up transient once it is found.
     pub settling: Vec<bool>,
 }
 
 impl Samples {
-    /// The columns of a record; no row is settling yet.
+    /// The columns of a record; start-up rows are not looked for yet.
     pub fn from_record(record: &Record) -> Self {
+        let clipped = |y| clipped_rows(y, record.segments());
         Self {
             period: record.sample_period(),
             time: record.time().to_vec(),
@@ -41,7 +43,7 @@ impl Samples {
             load: record.load().map(<[f64]>::to_vec),
             segments: record.segments().to_vec(),
             file_of_segment: record.file_of_segment().to_vec(),
-            settling: vec![false; record.rows()],
+            settling: record.output().map_or_else(|| vec![false; record.rows()], clipped),
         }
     }
 

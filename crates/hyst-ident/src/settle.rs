@@ -5,6 +5,7 @@
 //! its range; until then a misfit says nothing about the model.
 
 use crate::Samples;
+use crate::clipping::clipped_rows;
 use crate::samples::range;
 
 /// Share of a segment's swing after which its memory no longer depends on the past.
@@ -28,17 +29,21 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
-/// Marks the start-up rows, given measured minus predicted output.
+/// Marks the start-up rows and those in which the sensor is clipped, given measured minus predicted output.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let windows = windows(samples);
-    let centred = centre(samples, residual, &windows);
-    let outside = || samples.segments.iter().zip(&windows).flat_map(|(s, w)| centred[s.start + w..s.end].iter());
+    let clipped = clipped_rows(&samples.output, &samples.segments);
+    let centred = centre(samples, residual, &windows, &clipped);
+    let outside = || {
+        let rows = samples.segments.iter().zip(&windows).flat_map(|(s, w)| s.start + w..s.end);
+        rows.filter(|k| !clipped[*k]).map(|k| centred[k])
+    };
     let n = outside().count().max(1) as f64;
     let rms = (outside().map(|r| r * r).sum::<f64>() / n).sqrt();
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
-    let mut settling = vec![false; samples.len()];
+    let mut settling = clipped.clone();
     for (s, window) in samples.segments.iter().zip(&windows) {
-        let rows = &centred[s.start..s.start + window];
+        let rows: Vec<f64> = (s.start..s.start + window).map(|k| if clipped[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
         }
@@ -51,15 +56,17 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
 }
 
 /// Residual minus each file's mean outside the windows: another sensor zero is no transient.
-fn centre(samples: &Samples, residual: &[f64], windows: &[usize]) -> Vec<f64> {
+fn centre(samples: &Samples, residual: &[f64], windows: &[usize], clipped: &[bool]) -> Vec<f64> {
     let mut centred = residual.to_vec();
     for file in 0..samples.files() {
         let own =
             || samples.segments.iter().zip(windows).zip(&samples.file_of_segment).filter(move |(_, f)| **f == file);
         let (mut sum, mut n) = (0.0, 0usize);
         for ((s, w), _) in own() {
-            sum += residual[s.start + w..s.end].iter().sum::<f64>();
-            n += s.len() - w;
+            for k in (s.start + w..s.end).filter(|k| !clipped[*k]) {
+                sum += residual[k];
+                n += 1;
+            }
         }
         let mean = sum / n.max(1) as f64;
         for ((s, _), _) in own() {

@@ -64,7 +64,7 @@ impl Extrapolated {
 pub struct Simulation {
     /// Output \[output unit\], per row.
     pub predicted: Vec<f64>,
-    /// Start-up rows.
+    /// Rows that do not count: start-up rows, and those in which the sensor stands at the end of its range.
     pub settling: Vec<bool>,
     /// Constant that was added per file; empty with [`Zero::None`].
     pub zeros: Vec<f64>,

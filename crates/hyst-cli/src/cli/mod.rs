@@ -305,7 +305,7 @@ pub(crate) struct TemperatureArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct MapArg {
-    /// Take a column of another name, as voltage_v=Vin; may be given several times
+    /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
 }

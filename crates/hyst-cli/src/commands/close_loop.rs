@@ -38,6 +38,8 @@ struct Turn {
     /// Error of the followed reference \[output unit\].
     tracking_rmse: f64,
     tracking_max_abs: f64,
+    /// The same of what the sensor showed: drift and tone that were found in it are not taken out.
+    tracking_shown_rmse: f64,
 }
 
 /// What came of it.
@@ -107,7 +109,8 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;
         }
         let files = Files { log: &file("run", turn, "mcap"), drive: &file("drive", turn, "csv") };
-        let Run { rmse, max_abs, .. } = task.judge(&task.through(daq, &found.extended, Some(&files))?, &found.extended);
+        let Run { rmse, max_abs, shown_rmse, .. } =
+            task.judge(&task.through(daq, &found.extended, Some(&files))?, &found.extended);
         let name = |path: PathBuf| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         write(out, &name(file("model", turn, "json")), &found.extended.to_json())?;
         write(out, &name(file("findings", turn, "json")), &output::json(&found.findings)?)?;
@@ -124,6 +127,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             left: remainder.description.clone(),
             tracking_rmse: rmse,
             tracking_max_abs: max_abs,
+            tracking_shown_rmse: shown_rmse,
         });
         if too_coarse {
             // What is left is a map of the input's history: a richer one is fitted, and the effects are looked for anew on it.
@@ -183,5 +187,15 @@ fn said(summary: &Summary) -> String {
         ]);
     }
     let left = summary.turns.last().map_or("", |t| t.left.as_str());
-    format!("{}\nended: {}\nleft: {left}\nwritten: {}", text::table(&rows), summary.ended, summary.folder.display())
+    let shown = summary.turns.last().filter(|t| (t.tracking_shown_rmse / t.tracking_rmse - 1.0).abs() > 0.01);
+    let sensor = shown.map_or_else(String::new, |t| {
+        let rmse = text::short(t.tracking_shown_rmse);
+        format!("in the sensor: the last error is {rmse} {unit} with the drift and the tone that were found in it\n")
+    });
+    format!(
+        "{}\n{sensor}ended: {}\nleft: {left}\nwritten: {}",
+        text::table(&rows),
+        summary.ended,
+        summary.folder.display()
+    )
 }

@@ -186,7 +186,10 @@ impl Story<'_> {
             f.effects.iter().map(|e| e.name).filter(|e| !e.acts_on_the_motion()).map(Effect::name).collect();
         if !sensor.is_empty() {
             let (effects, verb) = (text::listed(&sensor), if sensor.len() == 1 { "is" } else { "are" });
-            lines.push(format!("           {effects} {verb} in the sensor, not in the motion: taken out of all three errors, not driven against"));
+            lines.push(format!(
+                "           {effects} {verb} in the sensor, not in the motion: taken out of all three errors (the last is {} {unit} with it), not driven against",
+                text::short(runs.extended.shown_rmse)
+            ));
         }
         let (truth, named) = (self.truth(), self.named());
         let had = if truth.is_empty() { "no effect".to_owned() } else { text::listed(&truth) };

@@ -34,7 +34,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         page.raw("</div>");
         for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
             let text = format!(
-                "This record cannot tell {} from {}; the simpler of the two is named. What would is said under Next",
+                "This record cannot tell {} from {}; the simpler of the two is named, and of two that are equally simple the one with the smaller error. What would tell them apart is said under Next",
                 finding.name, other.name
             );
             page.paragraph("note", &text);

@@ -32,7 +32,7 @@ impl FixedBasis {
 }
 
 impl Basis for FixedBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
         let mut column = vec![0.0; drive.len()];
         let mut state = Box::new(self.operator.state());
         for segment in segments {
@@ -45,7 +45,7 @@ impl Basis for FixedBasis {
                 };
             }
         }
-        vec![column]
+        each(0, &mut column);
     }
 
     fn drags(&self) -> bool {

@@ -23,9 +23,10 @@ use crate::lsq::Bounds;
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
 /// scale the motion and not an arbitrary zero.
 pub(crate) trait Basis: Sync {
-    /// Columns φᵢ over the rows of `drive`, memory reset at the start of each segment; a base that [cannot drag](Self::drags) does not
-    /// look at `drag`.
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>>;
+    /// Gives `each` the number and the values of every column φᵢ over the rows of `drive`, in order, memory reset at the start of
+    /// each segment; few of them are in memory at a time, and `each` may change the one that it is given. A base that
+    /// [cannot drag](Self::drags) does not look at `drag`.
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64]));
     /// Whether there is a drag: a rate-dependent form of the operator.
     fn drags(&self) -> bool {
         true

@@ -65,10 +65,11 @@ fn even(samples: &Samples, loops: usize, virgin: usize) -> Vec<f64> {
 }
 
 impl Basis for PiBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
-        let mut columns = vec![drive.to_vec()];
-        columns.extend(self.thresholds.iter().map(|r| plays(drive, segments, *r, drag)));
-        columns
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+        each(0, &mut drive.to_vec());
+        for (i, r) in self.thresholds.iter().enumerate() {
+            each(i + 1, &mut plays(drive, segments, *r, drag));
+        }
     }
 
     fn bounds(&self) -> Vec<Bounds> {
@@ -92,15 +93,16 @@ pub(crate) struct SlidingPlays<'a> {
 }
 
 impl Basis for SlidingPlays<'_> {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
         let step = STEP * drive.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
         let slope = |(r, w): (&f64, &f64)| -> Vec<f64> {
             let (up, down) = (plays(drive, segments, r + step, drag), plays(drive, segments, r - step, drag));
             up.iter().zip(down).map(|(up, down)| 0.5 * w * (up - down) / step).collect()
         };
-        let mut columns = self.plays.columns(drive, segments, drag);
-        columns.extend(self.plays.thresholds.iter().zip(&self.weights[1..]).map(slope));
-        columns
+        self.plays.columns(drive, segments, drag, each);
+        for (i, play) in self.plays.thresholds.iter().zip(&self.weights[1..]).enumerate() {
+            each(self.plays.len() + i, &mut slope(play));
+        }
     }
 
     fn bounds(&self) -> Vec<Bounds> {

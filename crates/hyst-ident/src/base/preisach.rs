@@ -18,6 +18,9 @@ const MARGIN: f64 = 0.02;
 /// Weight of the differences between neighbouring cells against the record.
 const SMOOTHNESS: f64 = 3e-6;
 
+/// Columns that are made in one pass over the drive.
+const TOGETHER: usize = 64;
+
 /// A grid over the record's input.
 #[derive(Clone, Debug)]
 pub(crate) struct PreisachBasis {
@@ -77,8 +80,8 @@ impl PreisachBasis {
         }
     }
 
-    /// Adds `sign` times the share of every cell that lies between β and α.
-    fn add_between(&self, row: &mut [f64], alpha: f64, beta: f64, sign: f64) {
+    /// Adds to the columns `of` a row `sign` times the share of every cell that lies between β and α.
+    fn add_between(&self, row: &mut [f64], of: &Range<usize>, alpha: f64, beta: f64, sign: f64) {
         let width = (self.grid.high - self.grid.low) / self.grid.cells as f64;
         let place = |u: f64| ((u - self.grid.low) / width).clamp(0.0, self.grid.cells as f64);
         let (a, b) = (place(alpha), place(beta));
@@ -88,29 +91,34 @@ impl PreisachBasis {
         let above = |cell: usize| (cell as f64 + 1.0 - b).clamp(0.0, 1.0);
         for i in bottom..=top {
             let rows = sign * below(i);
-            for j in bottom..i {
-                row[preisach_cell(i, j)] += rows * above(j);
+            // The cells (i, 0) to (i, i) stand side by side.
+            let first = preisach_cell(i, 0);
+            let inside = of.start.max(first + bottom)..of.end.min(first + i);
+            for c in inside {
+                row[c - of.start] += rows * above(c - first);
             }
-            row[preisach_cell(i, i)] += sign * (below(i) + above(i) - 1.0).max(0.0);
+            let diagonal = first + i;
+            if of.contains(&diagonal) {
+                row[diagonal - of.start] += sign * (below(i) + above(i) - 1.0).max(0.0);
+            }
         }
     }
 
-    /// Adds the virgin curve at `u`.
-    fn add_virgin(&self, row: &mut [f64], u: f64) {
-        self.add_between(row, u, self.grid.low, 1.0);
+    /// Adds the virgin curve at `u` to the columns `of` a row.
+    fn add_virgin(&self, row: &mut [f64], of: &Range<usize>, u: f64) {
+        self.add_between(row, of, u, self.grid.low, 1.0);
         if self.has_strip() {
             let width = (self.grid.high - self.grid.low) / self.grid.cells as f64;
             let a = (u - self.grid.low) / width;
-            for i in 0..self.grid.cells {
-                row[self.triangle() + i] += (a - i as f64).clamp(0.0, 1.0);
+            for c in of.start.max(self.triangle())..of.end {
+                row[c - of.start] += (a - (c - self.triangle()) as f64).clamp(0.0, 1.0);
             }
         }
     }
-}
 
-impl Basis for PreisachBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        let n = self.len();
+    /// The columns `of` the whole.
+    fn some(&self, of: &Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let n = of.len();
         let mut columns = vec![vec![0.0; drive.len()]; n];
         // The operator itself keeps the memory, with an empty map: one rule of wiping out for all.
         let Ok(map) = Everett::<f64, NODES>::new(self.grid, self.rest, |_, _| 0.0, |_| 0.0) else {
@@ -129,15 +137,15 @@ impl Basis for PreisachBasis {
                 let branch = |levels: &[(f64, Vec<f64>)], to: f64| match levels.last() {
                     None => {
                         let mut row = vec![0.0; n];
-                        self.add_virgin(&mut row, to);
+                        self.add_virgin(&mut row, of, to);
                         row
                     }
                     Some((from, row)) => {
                         let mut row = row.clone();
                         if levels.len() % 2 == 1 {
-                            self.add_between(&mut row, *from, to, -1.0);
+                            self.add_between(&mut row, of, *from, to, -1.0);
                         } else {
-                            self.add_between(&mut row, to, *from, 1.0);
+                            self.add_between(&mut row, of, to, *from, 1.0);
                         }
                         row
                     }
@@ -161,6 +169,18 @@ impl Basis for PreisachBasis {
             }
         }
         columns
+    }
+}
+
+impl Basis for PreisachBasis {
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+        let all = self.len();
+        for first in (0..all).step_by(TOGETHER) {
+            let of = first..(first + TOGETHER).min(all);
+            for (c, column) in of.clone().zip(&mut self.some(&of, drive, segments)) {
+                each(c, column);
+            }
+        }
     }
 
     fn drags(&self) -> bool {

@@ -36,19 +36,19 @@ impl ScreeningBasis {
 }
 
 impl Basis for ScreeningBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
-        let mut columns = self.linear.columns(drive, segments, drag);
+    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+        self.linear.columns(drive, segments, drag, each);
         let scale = 1.0 / self.half;
         let x0 = -self.middle * scale;
         let cubic = |x: f64| x * (x * x - 0.6);
         let (square0, cubic0) = (x0 * x0, cubic(x0));
-        for r in &self.curved {
+        for (i, r) in self.curved.iter().enumerate() {
             let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r, drag) };
             let x = |p: &f64| (p - self.middle) * scale;
-            columns.push(p.iter().map(|p| self.half * (x(p) * x(p) - square0)).collect());
-            columns.push(p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect());
+            let first = self.linear.len() + 2 * i;
+            each(first, &mut p.iter().map(|p| self.half * (x(p) * x(p) - square0)).collect::<Vec<_>>());
+            each(first + 1, &mut p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect::<Vec<_>>());
         }
-        columns
     }
 
     fn drags(&self) -> bool {

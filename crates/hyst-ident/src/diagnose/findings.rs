@@ -194,7 +194,7 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
         alternatives: named
             .instead
             .iter()
-            .map(|(name, cv_rmse, tie)| Alternative { name: *name, cv_rmse: *cv_rmse, indistinguishable: *tie })
+            .map(|i| Alternative { name: i.effect, cv_rmse: i.cv_rmse, indistinguishable: i.tie })
             .collect(),
         cv_rmse_before: named.cv_without,
         cv_rmse_after: after,
@@ -244,7 +244,13 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         }
         Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
         Effect::Creep => {
-            format!("after a step the output goes on by {:.1} % of it in the end", 100.0 * e.creep.as_ref()?.total())
+            let (p, hold) = (e.creep.as_ref()?, longest_hold(m.samples));
+            let shares = p.seconds.iter().zip(&p.shares);
+            let share: f64 = shares.map(|(tau, share)| share * (1.0 - (-hold / tau).exp())).sum();
+            format!(
+                "in the {hold:.2} s of the longest hold after a step the output goes on by {:.1} % of it",
+                100.0 * share
+            )
         }
         Effect::Resonance => {
             let r = e.resonances.first()?;
@@ -269,6 +275,18 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         }
     })
 }
+
+/// The longest time for which the drive stands still \[s\]; the longest segment where it never does.
+fn longest_hold(samples: &Samples) -> f64 {
+    let (low, high) = samples.input_range();
+    let still = |a: f64, b: f64| (a - b).abs() <= 1e-6 * (high - low);
+    let runs = samples.segments.iter().flat_map(|s| samples.input[s.clone()].chunk_by(|a, b| still(*a, *b)));
+    let rows = runs.map(<[f64]>::len).max().unwrap_or(0);
+    if rows > LEAST_HOLD { samples.period * (rows - 1) as f64 } else { samples.longest_segment() }
+}
+
+/// Rows that the drive has to stand still for a hold.
+const LEAST_HOLD: usize = 50;
 
 /// Slopes of a curve at its two ends.
 fn slopes(p: &AsymmetryParams<Vec<f64>>) -> (f64, f64) {

@@ -24,6 +24,8 @@ const BETTER: f64 = 0.9;
 const CELLS: usize = 24;
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
+/// Error of the search up to which the finer base is asked about another effect in the place of one that was named.
+const NEAR: f64 = 3.0;
 /// Beside a wandering that explains much, an effect has to explain at least this share of as much (variance): the wandering is not
 /// modelled to the last digit, and what it leaves sounds like anything.
 const BESIDE_WANDERING: f64 = 0.1;
@@ -47,7 +49,7 @@ pub(super) fn refine(
     beside_wandering(problem, found)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
-        errors: standard_errors(&trial.fit),
+        errors: standard_errors(&trial.fit, samples.time[0]),
         cv_rmse: trial.cv_rmse(),
     };
     // The triangle has no drag.
@@ -62,18 +64,14 @@ pub(super) fn refine(
     if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
         return Ok(of(&found.best));
     }
+    decide_rivals(&triangle, found, &mut best, seed)?;
     loop {
         let mut least: Option<(Cause, Trial)> = None;
         for cause in best.fit.hypothesis.causes().into_iter().filter(|c| !already.contains(c)) {
-            let without = triangle.fit_linear(&best.fit.hypothesis.without(cause))?;
-            let Some(without) = without.and_then(|f| Trial::of(&triangle, f)) else { continue };
-            let judgement = score::judge(samples, &without, &best, found.noise, seed);
-            if judgement.accepted() {
-                if let Some(named) = found.named.iter_mut().find(|n| cause.effect() == Some(n.effect)) {
-                    (named.cv_without, named.cv_with) = (without.cv_rmse(), best.cv_rmse());
-                    named.judgement = judgement;
-                }
-            } else if least.as_ref().is_none_or(|(_, l)| without.total() < l.total()) {
+            let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
+            if !score::judge(&triangle, &without, &best, found.noise, seed).accepted()
+                && least.as_ref().is_none_or(|(_, l)| without.total() < l.total())
+            {
                 least = Some((cause, without));
             }
         }
@@ -82,6 +80,46 @@ pub(super) fn refine(
         best = fitted(&without.fit.hypothesis)?.unwrap_or(without);
     }
     Ok(of(&best))
+}
+
+/// The finer base without one cause, all else refitted; its parameters as they are where that already shows that it is not needed.
+fn without(triangle: &Problem<'_>, best: &Trial, cause: Cause, noise: f64, seed: u64) -> Result<Option<Trial>, Error> {
+    let less = best.fit.hypothesis.without(cause);
+    let Some(kept) = triangle.fit_linear(&less)?.and_then(|f| Trial::of(triangle, f)) else { return Ok(None) };
+    if !score::judge(triangle, &kept, best, noise, seed).accepted() {
+        return Ok(Some(kept));
+    }
+    let refitted = triangle.fit(&less)?.and_then(|f| Trial::of(triangle, f));
+    Ok(Some(refitted.filter(|t| t.total() < kept.total()).unwrap_or(kept)))
+}
+
+/// Asks the finer base about what came near to each effect that was named: the one that it clearly prefers is named.
+fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, seed: u64) -> Result<(), Error> {
+    for n in 0..found.named.len() {
+        for i in 0..found.named[n].instead.len() {
+            let other = found.named[n].instead[i].clone();
+            // The others of its set are those of the best, or another rival has been named since.
+            let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
+                == other.hypothesis.without(Cause::Effect(other.effect)).causes();
+            let near = other.tie || (other.judgement.accepted() && other.cv_rmse <= NEAR * found.named[n].cv_with);
+            if !near || !stands {
+                continue;
+            }
+            let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };
+            let named = &mut found.named[n];
+            named.instead[i].tie = score::undecided(best, &trial, seed);
+            if other.judgement.accepted() && score::clearly_better(best, &trial, seed) {
+                let was = &mut named.instead[i];
+                (was.effect, was.cv_rmse, was.judgement) = (named.effect, named.cv_with, named.judgement);
+                was.hypothesis = best.fit.hypothesis.clone();
+                (named.effect, named.cv_with, named.judgement) = (other.effect, other.cv_rmse, other.judgement);
+                *best = trial;
+            }
+        }
+        found.named[n].instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+    }
+    found.named.sort_by_key(|n| n.effect);
+    Ok(())
 }
 
 /// Takes back what is small beside a wandering that was found.

@@ -26,13 +26,14 @@ pub use findings::{
 };
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
-use crate::fit::{BLOCKS, FitError, basis_of, check, to_model};
+use crate::fit::{BLOCKS, FitError, FitOptions, basis_of, check, fit_settled, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::simulate::{Zero, simulate};
+use crate::settle::start_up_rows;
+use crate::simulate::{Simulation, Zero, simulate};
 
 /// What a diagnosis may be told.
 #[derive(Clone, Copy, Debug)]
@@ -86,33 +87,53 @@ pub fn diagnose(
     let before = simulate(model, train, options.zero)?;
     let mut samples = Samples::from_record(train);
     check(train, &samples, true)?;
-    samples.settling.clone_from(&before.settling);
     let stage = |source| FitError::Stage { record: train.name(), source };
     let per_record = options.zero == Zero::PerRecord;
 
     let own = basis_of(model, &samples).map_err(stage)?;
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags());
+    // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
+    let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
+    fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
     let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
     }
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
-    let problem = Problem::new(&samples, &screening, &blocks, per_record);
     let start = hypothesis_of(model);
-    let base = problem.fit(&start).map_err(stage)?.ok_or_else(unsolvable)?;
-    let mut found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+    let searched = |samples: &Samples| {
+        let problem = Problem::new(samples, &screening, &blocks, per_record);
+        let base = problem.fit(&start).map_err(stage)?.ok_or_else(unsolvable)?;
+        let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+        let residual = problem.residual(&found.best.fit).map_err(stage)?;
+        Ok::<_, FitError>((found, start_up_rows(samples, &residual)))
+    };
+    let (mut found, starting) = searched(&samples)?;
+    // A transient may stand out only once what else was missing is found.
+    if samples.settling.iter().zip(&starting).any(|(known, starts)| *starts && !*known) {
+        progress("searching again without the start-up rows that have come to light");
+        samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
+        found = searched(&samples)?.0;
+    }
 
     progress("asking a finer base whether it needs what was found");
+    let problem = Problem::new(&samples, &screening, &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed).map_err(stage)?;
+    let only_loop = problem.only_loop;
+    drop(problem);
 
     progress("asking whether the model's own base lacks a curve");
-    let own_blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
-    let own_problem = Problem::new(&samples, own.as_ref(), &own_blocks, per_record);
-    let shape = shape::shape(&own_problem, &hypothesis, richest, found.noise, options.seed).map_err(stage)?;
+    let shape = if only_loop.is_some() {
+        None
+    } else {
+        let own_blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
+        let own_problem = Problem::new(&samples, own.as_ref(), &own_blocks, per_record);
+        shape::shape(&own_problem, &hypothesis, richest, found.noise, options.seed).map_err(stage)?
+    };
     if let Some(shape) = shape {
-        let own_errors = uncertainty::standard_errors(&shape.fit);
+        let own_errors = uncertainty::standard_errors(&shape.fit, samples.time[0]);
         let of_shape = |key: &String| key.split('.').next() == Some(shape.named.effect.name());
         errors.extend(own_errors.into_iter().filter(|(key, _)| of_shape(key)));
         hypothesis = shape.hypothesis;
@@ -139,8 +160,26 @@ pub fn diagnose(
     }
 
     progress("judging what is left");
-    let after = simulate(&extended, train, options.zero)?;
-    let remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
+    let mut after = simulate(&extended, train, options.zero)?;
+    let mut useless = Vec::new();
+    if !found.named.is_empty() && !follows_better(&samples, &before, &after) {
+        // What the rich base shows drowns in what this one misses.
+        useless = found.named.drain(..).map(|n| n.effect).collect();
+        (extended, hypothesis, after) = (model.clone(), start.clone(), before.clone());
+    }
+    let mut remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
+    if let (Some(hz), false) = (only_loop, remainder.kind == RemainderKind::None) {
+        remainder.description += &format!(
+            "; the record repeats one loop at {hz:.4} Hz, in which delay, lag, rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape: drive several frequencies and amplitudes"
+        );
+    }
+    if !useless.is_empty() {
+        let names: Vec<&str> = useless.iter().map(|e| e.name()).collect();
+        remainder.description += &format!(
+            "; on a richer base {} would explain a part, but this base does not follow better with it: fit a richer one first",
+            names.join(", ")
+        );
+    }
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
         .transpose()?;
@@ -171,6 +210,13 @@ pub fn diagnose(
         samples: &samples,
     });
     Ok(Diagnosis { extended, findings, pictures, breakdowns })
+}
+
+/// Whether the second simulation errs less than the first, over the rows that count in both.
+fn follows_better(samples: &Samples, before: &Simulation, after: &Simulation) -> bool {
+    let rows = || (0..samples.len()).filter(|k| !before.settling[*k] && !after.settling[*k]);
+    let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
+    squares(after) < squares(before)
 }
 
 /// What a model already holds.
@@ -208,7 +254,11 @@ fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
     match cause {
         Cause::Effect(Effect::Temperature) => varies(&problem.samples.temperature, 0.5),
         Cause::Effect(Effect::Load) => varies(&problem.samples.load, 0.0),
-        Cause::Effect(Effect::RateDependence) => problem.basis.drags(),
+        Cause::Effect(Effect::RateDependence) => problem.basis.drags() && problem.only_loop.is_none(),
+        // What only changes a loop's shape is no more visible in one loop than the hysteresis has a known shape.
+        Cause::Effect(Effect::Delay | Effect::Lag | Effect::Resonance | Effect::Saturation | Effect::Asymmetry) => {
+            problem.only_loop.is_none()
+        }
         _ => true,
     }
 }

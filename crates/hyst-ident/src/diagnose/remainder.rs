@@ -7,8 +7,10 @@ use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
 
-/// A richer base that lowers the variance above the floor by this share shows a lack of capacity.
-const RICHER: f64 = 0.3;
+/// A richer base that takes this share of the variance above the floor shows a lack of capacity.
+const RICHER: f64 = 0.5;
+/// Share from which on what a richer base takes is told.
+const MENTIONED: f64 = 0.1;
 
 /// Whether the rest is noise, lack of capacity of the base, or unexplained.
 pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples: &Samples, richest: f64) -> Remainder {
@@ -45,23 +47,30 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     // The search ran on a richer, rate-independent base: what that one takes is the base's.
     let above = (rmse * rmse - noise2).max(f64::MIN_POSITIVE);
     let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
-    if taken >= RICHER {
-        left(
-            RemainderKind::BaseCapacity,
-            format!(
-                "{:.2} % of span; a richer rate-independent base would leave {:.2} %, so most of it is a map of the input's history that this base is too coarse for",
-                percent(rmse),
-                percent(richest)
-            ),
-        )
+    let map = "a map of the input's history that this base is too coarse for";
+    let (kind, rest) = if taken >= RICHER && richest <= AT_FLOOR * found.noise {
+        (RemainderKind::BaseCapacity, format!("all of it is {map}"))
+    } else if taken >= RICHER {
+        let rest = format!(
+            "{:.0} % of its variance is {map}; the rest stands above the noise floor of {:.2} % too, and no effect of the list explains it",
+            100.0 * taken,
+            percent(found.noise)
+        );
+        (RemainderKind::BaseCapacity, rest)
+    } else if taken >= MENTIONED {
+        let rest = format!(
+            "no effect of the list explains it, and only {:.0} % of its variance is {map}; look for what was not recorded (a load, a temperature)",
+            100.0 * taken
+        );
+        (RemainderKind::Unexplained, rest)
     } else {
-        left(
-            RemainderKind::Unexplained,
-            format!(
-                "{:.2} % of span stands above the noise floor of {:.2} %, and no effect of the list explains it",
-                percent(rmse),
-                percent(found.noise)
-            ),
-        )
-    }
+        let what = format!(
+            "{:.2} % of span stands above the noise floor of {:.2} %, and no effect of the list explains it",
+            percent(rmse),
+            percent(found.noise)
+        );
+        return left(RemainderKind::Unexplained, what);
+    };
+    let richer = format!("a richer rate-independent base would leave {:.2} %", percent(richest));
+    left(kind, format!("{:.2} % of span; {richer}: {rest}", percent(rmse)))
 }

@@ -7,11 +7,18 @@ use hyst_core::SaturationParams;
 
 use super::trial::Trial;
 use crate::Samples;
+use crate::nested::Problem;
 
 /// Bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
+/// Blocks that are drawn together.
+const RUN: usize = 4;
 /// Share of draws in which the gain must be above zero.
 const CONFIDENCE: f64 = 0.99;
+/// Share of draws in which what is clearly better has to be better.
+const CLEARLY: f64 = 0.95;
+/// Ratio of errors beyond which two sets are told apart, however few blocks do it.
+const MOST_APART: f64 = 1.3;
 /// RMSE must fall at least by this share.
 const LEAST_FALL: f64 = 0.1;
 /// What an effect adds must be at least this many noise floors (root mean square).
@@ -23,6 +30,8 @@ const MOST_CREEP: f64 = 0.3;
 
 /// Slowest tone of a sensor \[Hz\]: what swings more slowly may as well be a force or the room.
 const SLOWEST_TONE: f64 = 2.0;
+/// How exactly the frequency of a loop is known, as a share.
+const HARMONIC: f64 = 0.002;
 /// Slowest structural mode \[Hz\]: what moves by itself in seconds is no structure of a piezo's size.
 const SLOWEST_MODE: f64 = 1.0;
 /// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
@@ -53,40 +62,62 @@ impl Judgement {
     }
 }
 
-pub(crate) fn judge(samples: &Samples, without: &Trial, with: &Trial, noise: f64, seed: u64) -> Judgement {
+/// How `with` stands against `without`, by the weaker of what it predicts and what it fits: where a part of the record shows what no
+/// other part does, leaving that part out says more about the gap than about the effect.
+pub(crate) fn judge(problem: &Problem<'_>, without: &Trial, with: &Trial, noise: f64, seed: u64) -> Judgement {
     let rows = with.fit.rows.max(1) as f64;
-    let (before, after) = (without.total(), with.total());
-    let gain = (before - after).max(0.0);
-    let above = (before - rows * noise * noise).max(f64::MIN_POSITIVE);
-    let differences: Vec<f64> = without.blocks.iter().zip(&with.blocks).map(|(a, b)| a - b).collect();
+    let gain_of = |before: f64, after: f64| {
+        let gain = (before - after).max(0.0);
+        let above = (before - rows * noise * noise).max(f64::MIN_POSITIVE);
+        let ratio = (after / before.max(f64::MIN_POSITIVE)).sqrt();
+        (ratio, gain / above, (gain / rows).sqrt() / noise.max(f64::MIN_POSITIVE))
+    };
+    let predicted = gain_of(without.total(), with.total());
+    let fitted = gain_of(without.fit.squares, with.fit.squares);
     Judgement {
-        confidence: share_above_zero(&differences, seed),
-        ratio: (after / before.max(f64::MIN_POSITIVE)).sqrt(),
-        share: gain / above,
-        over_noise: (gain / rows).sqrt() / noise.max(f64::MIN_POSITIVE),
-        sensible: sensible(samples, with),
+        confidence: share_above_zero(&differences(without, with), seed),
+        ratio: predicted.0.max(fitted.0),
+        share: predicted.1.min(fitted.1),
+        over_noise: predicted.2.min(fitted.2),
+        sensible: sensible(problem, with),
     }
 }
 
-/// Whether the first errors may well be no larger than the second.
-pub(super) fn open(a: &[f64], b: &[f64], seed: u64) -> bool {
-    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-    share_above_zero(&differences, seed) < 0.95
+/// What `with` takes of the error of each block.
+fn differences(without: &Trial, with: &Trial) -> Vec<f64> {
+    without.blocks.iter().zip(&with.blocks).map(|(a, b)| a - b).collect()
 }
 
-/// Share of block-bootstrap draws whose sum is above zero.
+/// Whether the second predicts clearly better than the first: in nearly every bootstrap draw.
+pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
+    share_above_zero(&differences(first, second), seed) >= CLEARLY
+}
+
+/// Whether neither predicts clearly better than the other.
+pub(super) fn undecided(a: &Trial, b: &Trial, seed: u64) -> bool {
+    let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > MOST_APART.ln();
+    !apart && !clearly_better(a, b, seed) && !clearly_better(b, a, seed)
+}
+
+/// Share of block-bootstrap draws whose sum is above zero. Runs of blocks are drawn: neighbours share what is slow.
 fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
     let n = differences.len();
     if n == 0 {
         return 0.0;
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let above = (0..DRAWS).filter(|_| (0..n).map(|_| differences[rng.random_range(0..n)]).sum::<f64>() > 0.0).count();
+    let mut draw = || {
+        let runs = n.div_ceil(RUN);
+        let sum_of = |first: usize| (first..first + RUN).map(|b| differences[b % n]).sum::<f64>();
+        (0..runs).map(|_| sum_of(rng.random_range(0..n))).sum::<f64>()
+    };
+    let above = (0..DRAWS).filter(|_| draw() > 0.0).count();
     above as f64 / DRAWS as f64
 }
 
 /// Whether every effect's parameters are physically sensible and away from the bounds of the search.
-pub(super) fn sensible(samples: &Samples, trial: &Trial) -> bool {
+pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
+    let samples = problem.samples;
     let e = &trial.fit.hypothesis.effects;
     let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
     // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit.
@@ -104,7 +135,13 @@ pub(super) fn sensible(samples: &Samples, trial: &Trial) -> bool {
                 && p.hz > f64::max(2.5 / longest, SLOWEST_MODE)
                 && p.hz < 0.9 * nyquist
         })
-        && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE))
+        && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE) && !is_harmonic(problem, p.hz))
+}
+
+/// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
+fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
+    let resolution = 3.0 / (problem.samples.len() as f64 * problem.samples.period);
+    problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 
 /// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the output's span.

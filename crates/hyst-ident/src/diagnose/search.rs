@@ -22,8 +22,21 @@ pub(crate) struct Named {
     pub(crate) cv_without: f64,
     /// Cross-validated RMSE with it.
     pub(crate) cv_with: f64,
-    /// The best that each other candidate does in its place.
-    pub(crate) instead: Vec<(Effect, f64, bool)>,
+    /// The best that each other candidate does in its place, best first.
+    pub(crate) instead: Vec<Instead>,
+    pub(crate) judgement: Judgement,
+}
+
+/// Another effect in the place of a named one.
+#[derive(Clone)]
+pub(crate) struct Instead {
+    pub(crate) effect: Effect,
+    /// Cross-validated RMSE with it.
+    pub(crate) cv_rmse: f64,
+    /// Whether the record cannot tell the two apart.
+    pub(crate) tie: bool,
+    /// The whole set, with its parameters.
+    pub(crate) hypothesis: Hypothesis,
     pub(crate) judgement: Judgement,
 }
 
@@ -65,7 +78,7 @@ impl Judge<'_> {
     }
 
     fn judge(&self, without: &Trial, with: &Trial) -> Judgement {
-        judge(self.problem.samples, without, with, self.noise, self.seed)
+        judge(self.problem, without, with, self.noise, self.seed)
     }
 }
 
@@ -179,7 +192,7 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Optio
     let mut least: Option<Trial> = None;
     for trial in reduced {
         // Without one effect another may be driven to nonsense: then the first one is needed.
-        let Some(trial) = trial?.filter(|t| score::sensible(judge.problem.samples, t)) else { continue };
+        let Some(trial) = trial?.filter(|t| score::sensible(judge.problem, t)) else { continue };
         if !judge.judge(&trial, best).accepted() && least.as_ref().is_none_or(|l| trial.total() < l.total()) {
             least = Some(trial);
         }
@@ -205,17 +218,19 @@ fn swaps(
         let mut instead = Vec::new();
         for (other, trial) in others.iter().zip(trials) {
             let Some(trial) = trial? else { continue };
-            let accepted = judge.judge(&without, &trial).accepted();
-            let tie = score::sensible(judge.problem.samples, &trial) && tie(judge, best, &trial);
-            instead.extend(other.effect().map(|e| (e, trial.cv_rmse(), tie)));
-            let simpler = tie && other.complexity() < cause.complexity();
+            let judgement = judge.judge(&without, &trial);
+            let accepted = judgement.accepted();
+            let tie = judgement.sensible && tie(judge, best, &trial);
+            let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
+            instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
+            let simpler = accepted && tie && other.complexity() < cause.complexity();
             let clearly = accepted && !tie && trial.total() < best.total();
             let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 better = Some(trial);
             }
         }
-        instead.sort_by(|a, b| a.1.total_cmp(&b.1));
+        instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
         if let Some(effect) = cause.effect() {
             named.push(Named {
                 effect,
@@ -229,10 +244,10 @@ fn swaps(
     Ok((better, named))
 }
 
-/// Whether the record cannot tell two sets apart: neither is better in nearly every bootstrap draw, or
-/// what separates them is small against the noise.
+/// Whether the record cannot tell two sets apart: what separates them is small against the noise, or neither is better in nearly
+/// every bootstrap draw.
 fn tie(judge: &Judge<'_>, a: &Trial, b: &Trial) -> bool {
     let per_row = (a.total() - b.total()).abs() / a.fit.rows.max(1) as f64;
     let drowned = per_row < (LEAST_OVER_NOISE * judge.noise).powi(2) && (a.total() / b.total()).ln().abs() < 0.1;
-    drowned || (score::open(&a.blocks, &b.blocks, judge.seed) && score::open(&b.blocks, &a.blocks, judge.seed))
+    drowned || score::undecided(a, b, judge.seed)
 }

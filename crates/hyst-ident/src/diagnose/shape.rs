@@ -6,7 +6,7 @@
 
 use hyst_core::{AsymmetryParams, Error, MAX_DEAD_ZONES};
 
-use super::search::Named;
+use super::search::{Instead, Named};
 use super::trial::Trial;
 use super::{score, starts};
 use crate::model::Effect;
@@ -71,7 +71,7 @@ pub(super) fn shape(
     let judged: Vec<_> = tried
         .iter()
         .map(|(effect, t)| {
-            let judgement = score::judge(problem.samples, &plain, t, noise, seed);
+            let judgement = score::judge(problem, &plain, t, noise, seed);
             (*effect, t, judgement, judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= CLOSED * least)
         })
         .collect();
@@ -82,10 +82,16 @@ pub(super) fn shape(
         (weight(a.0) * a.1.cv_rmse()).total_cmp(&(weight(b.0) * b.1.cv_rmse()))
     });
     Ok(best.map(|(effect, trial, judgement, _)| {
-        let mut instead: Vec<(Effect, f64, bool)> =
-            tried.iter().filter(|(e, _)| e != effect).map(|(e, t)| (*e, t.cv_rmse(), false)).collect();
-        instead.sort_by(|a, b| a.1.total_cmp(&b.1));
-        instead.dedup_by_key(|(e, ..)| *e);
+        let others = judged.iter().filter(|(e, ..)| e != effect).map(|(e, other, judgement, accepted)| Instead {
+            effect: *e,
+            cv_rmse: other.cv_rmse(),
+            tie: *accepted && score::undecided(trial, other, seed),
+            hypothesis: other.fit.hypothesis.clone(),
+            judgement: *judgement,
+        });
+        let mut instead: Vec<Instead> = others.collect();
+        instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+        instead.dedup_by_key(|i| i.effect);
         Shape {
             hypothesis: trial.fit.hypothesis.clone(),
             fit: trial.fit.clone(),

@@ -1,9 +1,6 @@
 //! A fitted set of effects, with its cross-validated errors.
 
-use crate::nested::{Fitted, Problem, cross_validate, folds_interleaved};
-
-/// Folds of the cross-validation.
-const FOLDS: usize = 8;
+use crate::nested::{Fitted, Problem};
 
 /// A fitted set of effects with its cross-validated errors.
 #[derive(Clone)]
@@ -15,7 +12,7 @@ pub(crate) struct Trial {
 
 impl Trial {
     pub(crate) fn of(problem: &Problem<'_>, fit: Fitted) -> Option<Self> {
-        let blocks = cross_validate(&fit, &folds_interleaved(problem.blocks, FOLDS))?;
+        let blocks = problem.cross_validated(&fit)?;
         Some(Self { fit, blocks })
     }
 

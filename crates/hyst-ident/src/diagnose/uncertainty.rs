@@ -5,14 +5,16 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::lsq::Gram;
+use crate::model::Effect;
 use crate::nested::{Fitted, Layout};
 
 /// Standard error of every effect's parameters, by `stage.parameter`.
 ///
-/// Block-wise sandwich: `H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹` with s_b the gradient that block b contributes. A
-/// misfit that is correlated inside a block widens the errors as it should. Parameters at a bound
-/// are held there and get none.
-pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
+/// Jackknife over blocks: each block b is left out of the normal equations once, and the solution moves by
+/// `(H − H_b)⁻¹ s_b` with s_b the gradient that the block contributes; the covariance is (B − 1)/B times the sum of the moves' outer
+/// products. A misfit that is correlated inside a block widens the errors as it should, and so does a parameter that one block
+/// alone determines. Parameters at a bound are held there and get none. `start_s` is the clock at the record's first row \[s\].
+pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f64> {
     let mut errors = BTreeMap::new();
     let Some(columns) = fit.grams.first().map(|g| g.matrix.ncols()) else { return errors };
     let total = Gram::sum(columns, fit.grams.iter());
@@ -30,24 +32,37 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
         let (i, j) = (free[r], free[c]);
         (total.matrix[(i, j)] + fit.penalty[(i, j)]) / (scale[r] * scale[c]) + if r == c { 1e-12 } else { 0.0 }
     });
-    let Some(inverse) = h.cholesky().map(|c| c.inverse()) else { return errors };
-    let mut middle = DMatrix::zeros(free.len(), free.len());
+    let Some(whole) = h.clone().cholesky() else { return errors };
+    let mut covariance = DMatrix::zeros(free.len(), free.len());
     for gram in &fit.grams {
         let full = gram.score(z);
-        let s = DVector::from_fn(free.len(), |r, _| full[free[r]] / scale[r]);
-        middle += &s * s.transpose();
+        let score = DVector::from_fn(free.len(), |r, _| full[free[r]] / scale[r]);
+        let others = DMatrix::from_fn(free.len(), free.len(), |r, c| {
+            h[(r, c)] - gram.matrix[(free[r], free[c])] / (scale[r] * scale[c])
+        });
+        // Where the others alone determine nothing, the move is that of the whole.
+        let moved = others.cholesky().unwrap_or_else(|| whole.clone()).solve(&score);
+        covariance.ger(1.0, &moved, &moved, 1.0);
     }
     let blocks = fit.grams.len() as f64;
-    let covariance = &inverse * middle * &inverse * (blocks / (blocks - 1.0).max(1.0));
-    let of = |unknown: usize| {
-        let r = free.iter().position(|i| *i == unknown)?;
-        Some(covariance[(r, r)].max(0.0).sqrt() / scale[r])
+    covariance *= (blocks - 1.0) / blocks;
+    let covariance_of = |a: usize, b: usize| {
+        let place = |unknown: usize| free.iter().position(|i| *i == unknown);
+        let (r, c) = (place(a)?, place(b)?);
+        Some(covariance[(r, c)] / (scale[r] * scale[c]))
     };
+    let of = |unknown: usize| Some(covariance_of(unknown, unknown)?.max(0.0).sqrt());
 
     let mut hypothesis = fit.hypothesis.clone();
     let layout = Layout::of(&hypothesis, fit.weights.len(), fit.zeros.len());
     let mut next = layout.len();
+    let (mut creep, mut hz) = (Vec::new(), None);
     hypothesis.visit_nonlinear(&mut |p| {
+        match p.effect {
+            Effect::Creep => creep.push(next),
+            Effect::Interference => hz = Some(next),
+            _ => {}
+        }
         if let Some(e) = of(next) {
             let (stage, name) = match p.name.strip_suffix("_2") {
                 Some(name) => (format!("{}_2", p.effect), name.to_owned()),
@@ -57,6 +72,12 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
         }
         next += 1;
     });
+    // Neighbouring shares are far less certain than their sum.
+    let shares = || creep.iter().flat_map(|a| creep.iter().map(move |b| (*a, *b)));
+    let total: f64 = shares().filter_map(|(a, b)| covariance_of(a, b)).sum();
+    if total > 0.0 {
+        errors.insert("creep.total".into(), total.sqrt());
+    }
     let mut put = |name: String, unknown: Option<usize>| {
         if let Some(e) = unknown.and_then(of) {
             errors.insert(name, e);
@@ -67,13 +88,27 @@ pub(super) fn standard_errors(fit: &Fitted) -> BTreeMap<String, f64> {
     for (i, unknown) in layout.zones.clone().enumerate() {
         put(format!("asymmetry.weights[{i}]"), Some(unknown));
     }
-    if let (Some(tone), Some(sine)) = (fit.hypothesis.effects.interference, layout.tone.clone().next())
-        && let (Some(a), Some(b)) = (of(sine), of(sine + 1))
-    {
-        // Sine and cosine parts are nearly independent over many periods.
+    if let (Some(tone), Some(sine), Some(hz)) = (fit.hypothesis.effects.interference, layout.tone.clone().next(), hz) {
+        // Amplitude and phase are those of sine and cosine parts. The phase is that at the clock's zero, from which a frequency that
+        // is off by δ has carried the first row 2π t₀ δ away.
         let (s, c) = tone.phase.sin_cos();
-        errors.insert("interference.amplitude".into(), (a * c).hypot(b * s));
-        errors.insert("interference.phase".into(), (a * s).hypot(b * c) / tone.amplitude.max(f64::MIN_POSITIVE));
+        let a = tone.amplitude.max(f64::MIN_POSITIVE);
+        let away = -2.0 * std::f64::consts::PI * start_s;
+        let variance = |slopes: [(usize, f64); 3]| -> Option<f64> {
+            let mut sum = 0.0;
+            for (i, x) in slopes {
+                for (j, y) in slopes {
+                    if x != 0.0 && y != 0.0 {
+                        sum += x * y * covariance_of(i, j)?;
+                    }
+                }
+            }
+            Some(sum.max(0.0))
+        };
+        let amplitude = variance([(sine, c), (sine + 1, s), (hz, 0.0)]);
+        let phase = variance([(sine, -s / a), (sine + 1, c / a), (hz, away)]);
+        errors.extend(amplitude.map(|v| ("interference.amplitude".into(), v.sqrt())));
+        errors.extend(phase.map(|v| ("interference.phase".into(), v.sqrt())));
     }
     errors
 }

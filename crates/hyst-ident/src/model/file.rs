@@ -46,7 +46,7 @@ pub struct FittedOn {
     pub sha256: String,
     /// Rows that were fitted.
     pub rows: usize,
-    /// Rows that were left out as a start-up transient.
+    /// Rows that were left out: a start-up transient, a sensor at the end of its range.
     pub settling_rows: usize,
 }
 

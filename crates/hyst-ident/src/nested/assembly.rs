@@ -1,12 +1,10 @@
 //! The linear unknowns at one set of nonlinear parameters.
 
-use std::borrow::Cow;
-
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
+use super::columns::BaseColumns;
 use super::{HATS, Hypothesis, Layout, Problem, SignalPath};
-use crate::base::Drag;
 use crate::lsq::{Gram, solve};
 
 /// Rounds in which what bends the output is solved, each linear around the one before.
@@ -47,17 +45,7 @@ fn hat(j: usize, share: f64) -> f64 {
 
 impl Problem<'_> {
     pub(super) fn layout(&self, h: &Hypothesis) -> Layout {
-        Layout::of(h, self.raw.len(), self.zeros())
-    }
-
-    /// The base's columns for what leads to the hysteresis; those of the drive as recorded are kept.
-    pub(super) fn columns(&self, path: &SignalPath<'_>, h: &Hypothesis) -> Cow<'_, [Vec<f64>]> {
-        if h.changes_the_base() {
-            let drag = h.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
-            Cow::Owned(self.basis.columns(&path.input_side(), &self.samples.segments, &drag))
-        } else {
-            Cow::Borrowed(&self.raw)
-        }
+        Layout::of(h, self.width, self.zeros())
     }
 
     /// Solves for the linear unknowns, from `near` if there is a point that is nearly right.
@@ -84,7 +72,12 @@ impl Problem<'_> {
     }
 
     /// The straight model's motion; where the output stands in the knee of a stop, the motion that would show it.
-    fn first_point(&self, h: &Hypothesis, path: &SignalPath<'_>, base: &[Vec<f64>]) -> Result<Option<Point>, Error> {
+    fn first_point(
+        &self,
+        h: &Hypothesis,
+        path: &SignalPath<'_>,
+        base: &BaseColumns<'_>,
+    ) -> Result<Option<Point>, Error> {
         let mut straight = h.clone();
         (straight.effects.asymmetry, straight.effects.saturation, straight.gain_wanders) = (None, None, false);
         let plain = SignalPath::new(self.samples, &straight)?;
@@ -103,10 +96,16 @@ impl Problem<'_> {
     }
 
     /// The course of the motion for a solution.
-    pub(super) fn point(&self, h: &Hypothesis, path: &SignalPath<'_>, base: &[Vec<f64>], z: &DVector<f64>) -> Point {
+    pub(super) fn point(
+        &self,
+        h: &Hypothesis,
+        path: &SignalPath<'_>,
+        base: &BaseColumns<'_>,
+        z: &DVector<f64>,
+    ) -> Point {
         let layout = self.layout(h);
         let z = z.as_slice();
-        let operator = combine(base, &z[layout.weights], self.samples.len());
+        let operator = base.combined(&z[layout.weights], self.samples.len());
         let mut motion = operator.clone();
         if let Some(p) = &h.effects.asymmetry {
             let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
@@ -127,7 +126,7 @@ impl Problem<'_> {
         &self,
         h: &Hypothesis,
         path: &SignalPath<'_>,
-        base: &[Vec<f64>],
+        base: &BaseColumns<'_>,
         point: Option<Point>,
     ) -> Option<Assembly> {
         let layout = self.layout(h);
@@ -152,13 +151,12 @@ impl Problem<'_> {
                 column.iter_mut().zip(stopped).for_each(|(x, (_, slope))| *x *= slope);
             }
         };
-        let mut filtered = Vec::new();
-        for (c, column) in layout.weights.clone().zip(base) {
-            filtered.clone_from(column);
-            path.output_side(&mut filtered);
-            slowed(&mut filtered);
-            put(c, &filtered);
-        }
+        base.each(&mut |c, column| {
+            path.output_side(column);
+            slowed(column);
+            put(layout.weights.start + c, column);
+        });
+        let mut filtered: Vec<f64>;
         for (c, column) in (layout.zeros.start..).zip(self.extras(h)) {
             put(c, &column);
         }
@@ -242,12 +240,4 @@ impl Problem<'_> {
         }
         columns
     }
-}
-
-fn combine(columns: &[Vec<f64>], weights: &[f64], rows: usize) -> Vec<f64> {
-    let mut v = vec![0.0; rows];
-    for (column, w) in columns.iter().zip(weights) {
-        v.iter_mut().zip(column).for_each(|(v, x)| *v += w * x);
-    }
-    v
 }

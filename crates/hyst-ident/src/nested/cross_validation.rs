@@ -1,5 +1,7 @@
 //! Cross-validation inside the training record, from the blocks' normal equations.
 
+use nalgebra::DMatrix;
+
 use super::Fitted;
 use crate::lsq::{Blocks, Gram, solve};
 
@@ -14,12 +16,38 @@ pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>
         .collect()
 }
 
-/// Σ residual² of each block, predicted by a fit to the blocks of all other folds.
+/// Mean variance of a block's prediction by the other folds, in variances of a row, beyond which they say nothing about it.
+const UNKNOWN: f64 = 1.0;
+
+/// Blocks that move the base where no block outside their own fold does (a first rise from rest, say): the others cannot predict
+/// them. `grams` and `penalty` are those of the base.
+pub(super) fn unpredictable(grams: &[Gram], penalty: &DMatrix<f64>, folds: &[Vec<usize>]) -> Vec<bool> {
+    let mut unknown = vec![false; grams.len()];
+    let Some(columns) = grams.first().map(|g| g.matrix.ncols()) else { return unknown };
+    let n = columns - 1;
+    let total = Gram::sum(columns, grams.iter());
+    let scale: Vec<f64> = (0..n).map(|i| total.matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| m[(r, c)] / (scale[r] * scale[c]));
+    let prior = scaled(penalty);
+    for fold in folds {
+        let mut others = scaled(&total.matrix) + &prior;
+        fold.iter().for_each(|b| others -= scaled(&grams[*b].matrix));
+        (0..n).for_each(|i| others[(i, i)] += 1e-12);
+        let factor = others.cholesky();
+        for b in fold {
+            let spread = factor.as_ref().map(|f| f.solve(&scaled(&grams[*b].matrix)).trace());
+            unknown[*b] = spread.is_none_or(|s| s > UNKNOWN * grams[*b].rows as f64);
+        }
+    }
+    unknown
+}
+
+/// Σ residual² of each block, predicted by a fit to the blocks of all other folds; of the `unpredictable` ones as they are fitted.
 ///
 /// The fit to the others is one Gauss-Newton step away from the fit to all, taken with every weight
 /// and parameter free: exact for what is linear, and close for the rest, since one fold moves the
 /// solution little.
-pub(crate) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>]) -> Option<Vec<f64>> {
+pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: &[bool]) -> Option<Vec<f64>> {
     let columns = fit.grams.first()?.matrix.ncols();
     let total = Gram::sum(columns, fit.grams.iter());
     let nonlinear_from = columns - 1 - fit.hypothesis.nonlinear().len();
@@ -36,7 +64,7 @@ pub(crate) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>]) -> Option<Vec<f
         }
         let z = solve(&others, Some(&penalty), &fit.bounds)?;
         for b in fold {
-            squares[*b] = fit.grams[*b].error(&z);
+            squares[*b] = fit.grams[*b].error(if unpredictable[*b] { &fit.solution } else { &z });
         }
     }
     Some(squares)

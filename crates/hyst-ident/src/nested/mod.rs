@@ -7,6 +7,7 @@
 
 mod assembly;
 mod bounds;
+mod columns;
 mod cross_validation;
 mod hypothesis;
 mod layout;
@@ -14,7 +15,7 @@ mod path;
 mod problem;
 mod projector;
 
-pub(crate) use cross_validation::{cross_validate, folds_interleaved};
+pub(crate) use cross_validation::folds_interleaved;
 pub(crate) use hypothesis::{Cause, Hypothesis};
 pub(crate) use layout::{HATS, Layout};
 pub(crate) use path::SignalPath;

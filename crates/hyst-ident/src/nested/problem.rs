@@ -1,15 +1,20 @@
 //! One fit: columns, Jacobian, damped Gauss-Newton.
 
+use std::sync::OnceLock;
+
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
 use super::assembly::Assembly;
 use super::bounds::{box_of, stepped};
+use super::columns::may_be_kept;
+use super::cross_validation::{cross_validate, folds_interleaved, unpredictable};
 use super::{Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::model::Effect;
+use crate::repetition::only_loop;
 
 /// A record, a base and how rows are cut into blocks.
 pub(crate) struct Problem<'a> {
@@ -18,10 +23,21 @@ pub(crate) struct Problem<'a> {
     pub(crate) blocks: &'a Blocks,
     /// One zero for each file instead of one for all.
     pub(crate) zero_per_file: bool,
-    /// The base's columns for the drive as it was recorded.
-    pub(super) raw: Vec<Vec<f64>>,
+    /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
+    pub(super) raw: Option<Vec<Vec<f64>>>,
+    /// How many columns the base has.
+    pub(super) width: usize,
     penalty: Option<DMatrix<f64>>,
+    /// Frequency of the one loop that the record repeats \[Hz\], if it does nothing else.
+    pub(crate) only_loop: Option<f64>,
+    /// Blocks that the other folds cannot predict, once somebody has asked.
+    unpredictable: OnceLock<Vec<bool>>,
 }
+
+/// Variance of a column over its mean square below which it stands still.
+const CONSTANT: f64 = 1e-6;
+/// Folds of the cross-validation.
+const FOLDS: usize = 8;
 
 /// A fit that has converged.
 #[derive(Clone)]
@@ -48,12 +64,42 @@ const TOLERANCE: f64 = 1e-5;
 
 impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
-        let raw = basis.columns(&samples.input, &samples.segments, &Drag::NONE);
-        let rows = |b: usize| blocks.used(b, samples);
-        let squares: f64 =
-            raw.iter().map(|c| (0..blocks.rows.len()).flat_map(rows).map(|k| c[k] * c[k]).sum::<f64>()).sum();
-        let penalty = basis.penalty(squares / raw.len().max(1) as f64);
-        Self { samples, basis, blocks, zero_per_file, raw, penalty }
+        let width = basis.len();
+        let mut raw = may_be_kept(samples, width).then(|| Vec::with_capacity(width));
+        let (mut squares, mut constant) = (0.0, Vec::new());
+        basis.columns(&samples.input, &samples.segments, &Drag::NONE, &mut |c, column| {
+            let (mut n, mut sum, mut own) = (0.0, 0.0, 0.0);
+            for k in blocks.all_used(samples) {
+                (n, sum, own) = (n + 1.0, sum + column[k], own + column[k] * column[k]);
+            }
+            squares += own;
+            if own - sum * sum / f64::max(n, 1.0) <= CONSTANT * own {
+                constant.push((c, own));
+            }
+            raw.iter_mut().for_each(|raw| raw.push(column.to_vec()));
+        });
+        let mut penalty = basis.penalty(squares / width.max(1) as f64);
+        // What stands still over all rows that count looks like the sensor's zero: nothing there says how large it is.
+        for (c, own) in constant {
+            penalty.iter_mut().for_each(|p| p[(c, c)] += own);
+        }
+        let only_loop = only_loop(samples);
+        let unpredictable = OnceLock::new();
+        Self { samples, basis, blocks, zero_per_file, raw, width, penalty, only_loop, unpredictable }
+    }
+
+    /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
+    pub(crate) fn cross_validated(&self, fit: &Fitted) -> Option<Vec<f64>> {
+        let folds = folds_interleaved(self.blocks, FOLDS);
+        // The same for all that are compared: what moves the base depends little on the effects.
+        let of_base = || {
+            let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
+            base.map_or_else(
+                || vec![false; self.blocks.rows.len()],
+                |base| unpredictable(&base.grams, &self.penalty(base.solution.len()), &folds),
+            )
+        };
+        cross_validate(fit, &folds, self.unpredictable.get_or_init(of_base))
     }
 
     pub(super) fn zeros(&self) -> usize {

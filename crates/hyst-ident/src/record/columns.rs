@@ -35,6 +35,14 @@ pub enum MapError {
         /// Its left side.
         name: String,
     },
+    /// A minus where a sign means nothing.
+    #[error("--map \"{argument}\": {role} has no sign to turn; leave the minus out")]
+    Signless {
+        /// The argument.
+        argument: String,
+        /// What it names.
+        role: &'static str,
+    },
     /// Two arguments give the same role to two columns.
     #[error("--map \"{first}\" and --map \"{second}\" both name {role}; keep one")]
     RoleTwice {
@@ -57,11 +65,23 @@ pub enum MapError {
 
 /// Which columns of a file stand for which names of the record format (`--map voltage_v=Vin`).
 ///
-/// A mapped role is taken from the mapped column only, so that `--map displacement_um=displacement_um` also settles
+/// A minus before the column (`--map displacement_um=-Sensor`) turns the sign of an input, an output or a load. A mapped role is taken from the mapped column only, so that `--map displacement_um=displacement_um` also settles
 /// which of two possible outputs is meant. The default maps nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColumnMap {
-    entries: Vec<(Role, String, String)>,
+    entries: Vec<Entry>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Entry {
+    role: Role,
+    /// Name in the record format.
+    canonical: String,
+    column: String,
+    /// Whether the column has the other sign.
+    turned: bool,
+    /// As it was given.
+    argument: String,
 }
 
 impl ColumnMap {
@@ -74,29 +94,33 @@ impl ColumnMap {
         I: IntoIterator,
         I::Item: AsRef<str>,
     {
-        let mut entries: Vec<(Role, String, String)> = Vec::new();
+        let mut entries: Vec<Entry> = Vec::new();
         for argument in arguments {
             let argument = argument.as_ref();
             let malformed = || MapError::Malformed { argument: argument.to_owned() };
             let (name, column) = argument.split_once('=').ok_or_else(malformed)?;
             let (name, column) = (name.trim(), column.trim());
+            let (column, turned) = column.strip_prefix('-').map_or((column, false), |rest| (rest.trim(), true));
             if name.is_empty() || column.is_empty() {
                 return Err(malformed());
             }
             let Some(role) = Role::of_column(name) else {
                 return Err(MapError::UnknownName { argument: argument.to_owned(), name: name.to_owned() });
             };
-            for (other_role, other_name, other_column) in &entries {
-                let first = format!("{other_name}={other_column}");
-                let second = argument.to_owned();
-                if *other_role == role {
+            if turned && !matches!(role, Role::Input | Role::Output | Role::Load) {
+                return Err(MapError::Signless { argument: argument.to_owned(), role: role.words() });
+            }
+            for other in &entries {
+                let (first, second) = (other.argument.clone(), argument.to_owned());
+                if other.role == role {
                     return Err(MapError::RoleTwice { first, second, role: role.words() });
                 }
-                if other_column == column {
+                if other.column == column {
                     return Err(MapError::ColumnTwice { first, second });
                 }
             }
-            entries.push((role, name.to_owned(), column.to_owned()));
+            let (canonical, argument) = (name.to_owned(), argument.to_owned());
+            entries.push(Entry { role, canonical, column: column.to_owned(), turned, argument });
         }
         Ok(Self { entries })
     }
@@ -212,6 +236,8 @@ pub(crate) struct Layout {
     pub(crate) output: Option<(usize, OutputUnit)>,
     pub(crate) temperature: Option<usize>,
     pub(crate) load: Option<usize>,
+    /// Columns that have the other sign.
+    pub(crate) turned: Vec<usize>,
 }
 
 impl Layout {
@@ -227,6 +253,8 @@ impl Layout {
             }
         }
         let header = Header { file, names, mapped: header_map(file, names, map)? };
+        let turned =
+            header.mapped.iter().zip(&map.entries).filter(|(_, e)| e.turned).map(|((.., at), _)| *at).collect();
         let wants_output = matches!(need, Need::InputAndOutput | Need::Output);
         let time = header.required(Role::Time)?;
         let input = match need {
@@ -242,6 +270,7 @@ impl Layout {
             output: output.and_then(|(at, name)| OutputUnit::of_column(name).map(|unit| (at, unit))),
             temperature: index(header.optional(Role::Temperature)?),
             load: index(header.optional(Role::Load)?),
+            turned,
         })
     }
 }
@@ -256,12 +285,12 @@ fn header_map<'a>(
     names: &[String],
     map: &'a ColumnMap,
 ) -> Result<Vec<(Role, &'a str, usize)>, RecordError> {
-    let find = |(role, canonical, column): &'a (Role, String, String)| match names.iter().position(|n| n == column) {
-        Some(at) => Ok((*role, canonical.as_str(), at)),
+    let find = |e: &'a Entry| match names.iter().position(|n| *n == e.column) {
+        Some(at) => Ok((e.role, e.canonical.as_str(), at)),
         None => Err(RecordError::MappedColumnMissing {
             file: file.to_owned(),
-            canonical: canonical.clone(),
-            column: column.clone(),
+            canonical: e.canonical.clone(),
+            column: e.column.clone(),
             found: listed(names),
         }),
     };

@@ -98,7 +98,8 @@ impl Table<'_> {
                 });
             }
             for (at, values) in [&mut input, &mut output, &mut temperature, &mut load].into_iter().flatten() {
-                values.push(self.number(&fields, *at)?);
+                let value = self.number(&fields, *at)?;
+                values.push(if layout.turned.contains(at) { -value } else { value });
             }
         }
         printed.decimals += time_unit.per_second().log10() as i32;

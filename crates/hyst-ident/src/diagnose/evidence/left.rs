@@ -101,8 +101,11 @@ fn by_frequency(scene: &Scene<'_>) -> Option<Breakdown> {
     let lowest = (PER_DECADE * first.log10()).floor() as i32;
     let mut edges: Vec<f64> = (lowest..).map(edge).skip_while(|e| *e <= first).take_while(|e| *e < last).collect();
     edges.push(last);
-    let powers: Vec<f64> = edges.windows(2).map(|w| density.between(w[0], w[1])).collect();
-    let rest = (variance - powers.iter().sum::<f64>()).max(0.0);
+    let mut powers: Vec<f64> = edges.windows(2).map(|w| density.between(w[0], w[1])).collect();
+    // The spectrum weighs the middle of its windows: over a record that is not the same everywhere it need not sum up to the variance.
+    let sum = powers.iter().sum::<f64>();
+    powers.iter_mut().for_each(|p| *p *= f64::min(1.0, variance / sum.max(f64::MIN_POSITIVE)));
+    let rest = (variance - sum).max(0.0);
     let part = |name: String, power: f64| Part { name, rms: power.sqrt(), share: share(power, variance) };
     let mut parts = vec![part(format!("below {} Hz", round(edges[0])), rest)];
     for (w, power) in edges.windows(2).zip(powers) {

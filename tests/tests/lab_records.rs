@@ -1,0 +1,197 @@
+//! What laboratories do to records: other rates, offsets and signs, one tone, one piece, a start-up, a sensor at the end of its
+//! range, gaps, clocks in another unit. The effect is found as before, or a message says what to do.
+
+use hyst_hw::{Bed, Plant, PlantConfig};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
+use hyst_ident::excite::{Identification, Limits};
+use hyst_ident::fit::{FitError, FitOptions, fit};
+use hyst_ident::model::{Effect, Kind};
+use hyst_ident::record::{ColumnMap, Columns, Need, OutputUnit, Record};
+use hyst_tests::{Lab, measured, played};
+
+/// Lag of the actuator \[s\].
+const LAG: f64 = 0.004;
+
+/// An actuator with a lag of 4 ms, noise of 5 nm and a stroke of some 20 µm.
+fn lagging() -> PlantConfig {
+    let mut config = PlantConfig::random_on(Bed::Relays, 41, &["lag"]).unwrap();
+    config.lag.as_mut().unwrap().seconds = LAG;
+    config.sensor.max_rate_hz = 50_000.0;
+    config
+}
+
+/// The usual drive of 18 s at 1 kHz, played on an actuator.
+fn record_of(config: &PlantConfig) -> Record {
+    record_at(config, 1000.0, 18.0, OutputUnit::Micrometre)
+}
+
+fn record_at(config: &PlantConfig, rate_hz: f64, duration_s: f64, unit: OutputUnit) -> Record {
+    let mut plant = Plant::new(config.clone()).unwrap();
+    let range = hyst_hw::Daq::capabilities(&plant).voltage;
+    let limits = Limits { rate_hz, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
+    let usual = Identification::at_rate(rate_hz, 41);
+    let hold_s = usual.hold_s * duration_s / usual.duration_s;
+    let drive = Identification { duration_s, hold_s, rest_s: 0.5, ..usual }.drive(&limits).unwrap();
+    played(&mut plant, &drive, rate_hz, unit, "lab")
+}
+
+/// The record with its columns changed.
+fn changed(record: &Record, change: impl FnOnce(&mut Columns)) -> Record {
+    let label = |s: &std::ops::Range<usize>, k| vec![k; s.len()];
+    let mut columns = Columns {
+        name: "lab".into(),
+        segment: Some(record.segments().iter().zip(0..).flat_map(|(s, k)| label(s, k)).collect()),
+        time: record.time().to_vec(),
+        input: Some(record.input().to_vec()),
+        output: record.output_unit().map(|unit| (unit, record.output().unwrap().to_vec())),
+        temperature: record.temperature().map(<[f64]>::to_vec),
+        ..Columns::default()
+    };
+    change(&mut columns);
+    Record::from_samples(columns).unwrap()
+}
+
+fn outputs(columns: &mut Columns) -> &mut [f64] {
+    &mut columns.output.as_mut().unwrap().1
+}
+
+fn diagnosed(record: &Record) -> Diagnosis {
+    let model = fit(record, Kind::Pi, &FitOptions::default()).unwrap();
+    diagnose(record, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap()
+}
+
+fn names(d: &Diagnosis) -> Vec<&'static str> {
+    d.findings.effects.iter().map(|e| e.name.name()).collect()
+}
+
+/// Exactly the lag is named, and it is as long as the actuator's.
+#[track_caller]
+fn shows_the_lag(record: &Record) -> Diagnosis {
+    let d = diagnosed(record);
+    assert_eq!(names(&d), ["lag"], "{:#?}", d.findings);
+    let seconds = d.findings.effects[0].parameters["seconds"].value;
+    assert!((seconds / LAG - 1.0).abs() < 0.03, "{seconds} s");
+    d
+}
+
+#[test]
+fn slow_and_fast_sample_rates() {
+    for (rate_hz, seconds) in [(200.0, 36.0), (5000.0, 18.0), (50_000.0, 11.0)] {
+        shows_the_lag(&record_at(&lagging(), rate_hz, seconds, OutputUnit::Micrometre));
+    }
+}
+
+#[test]
+fn other_units() {
+    shows_the_lag(&record_at(&lagging(), 1000.0, 18.0, OutputUnit::Newton));
+    let record = record_of(&lagging());
+    shows_the_lag(&changed(&record, |c| {
+        let (unit, y) = c.output.as_mut().unwrap();
+        *unit = OutputUnit::Nanometre;
+        y.iter_mut().for_each(|y| *y *= 1e3);
+    }));
+}
+
+#[test]
+fn an_offset_of_many_strokes() {
+    shows_the_lag(&changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y += 4321.0)));
+}
+
+/// A sensor of the other sign is refused with what to do, and what is to be done works.
+#[test]
+fn a_sensor_of_the_other_sign() {
+    let turned = changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
+    let refused = fit(&turned, Kind::Pi, &FitOptions::default()).unwrap_err();
+    assert!(
+        matches!(refused, FitError::Falling { .. }) && refused.to_string().contains("--map displacement_um=-"),
+        "{refused}"
+    );
+    let mut csv = Vec::new();
+    turned.write_csv(&mut csv).unwrap();
+    let map = ColumnMap::parse(["displacement_um=-displacement_um"]).unwrap();
+    shows_the_lag(&Record::parse("lab", &csv, &map, Need::InputAndOutput).unwrap());
+}
+
+#[test]
+fn one_piece_without_rests() {
+    let config = lagging();
+    let mut plant = Plant::new(config).unwrap();
+    let range = hyst_hw::Daq::capabilities(&plant).voltage;
+    let limits = Limits { rate_hz: 1000.0, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
+    let drive =
+        Identification { duration_s: 18.0, hold_s: 1.0, ..Identification::at_rate(1000.0, 41) }.drive(&limits).unwrap();
+    shows_the_lag(&measured(&mut plant, &[drive.voltage()], 1000.0, OutputUnit::Micrometre, "lab"));
+}
+
+/// At one frequency a lag, a delay and a rate-dependence look alike: none of them is named alone.
+#[test]
+fn one_tone_names_nothing_that_it_cannot_tell_apart() {
+    let mut plant = Plant::new(lagging()).unwrap();
+    let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
+    let drive: Vec<f64> = (0..10_000)
+        .map(|k| 0.5 * high * (1.0 - (2.0 * std::f64::consts::PI * 10.0 * f64::from(k) * 1e-3).cos()))
+        .collect();
+    let d = diagnosed(&measured(&mut plant, &[&drive], 1000.0, OutputUnit::Micrometre, "lab"));
+    let alike = [Effect::Lag, Effect::Delay, Effect::RateDependence, Effect::Resonance];
+    for effect in &d.findings.effects {
+        assert!(alike.contains(&effect.name), "{:#?}", d.findings);
+        let others = effect.alternatives.iter().filter(|a| a.indistinguishable && alike.contains(&a.name)).count();
+        assert!(others > 0, "{:#?}", d.findings);
+    }
+}
+
+/// A transient from before the record is set aside, not explained.
+#[test]
+fn a_start_up_transient() {
+    let record = changed(&record_of(&lagging()), |c| {
+        outputs(c).iter_mut().enumerate().take(1500).for_each(|(k, y)| *y += 4.0 * (-(k as f64) / 60.0).exp());
+    });
+    let after = shows_the_lag(&record).findings.after.train.unwrap();
+    assert!(after.rmse_all_rows > 1.5 * after.rmse, "{after:?}");
+}
+
+/// A sensor whose range ends below the stroke's: the rows at its end are told and left out.
+#[test]
+fn a_sensor_at_the_end_of_its_range() {
+    let record = record_of(&lagging());
+    let (low, high) = record.output().unwrap().iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
+    let end = low + 0.85 * (high - low);
+    let clipped = changed(&record, |c| outputs(c).iter_mut().for_each(|y| *y = y.min(end)));
+    let model = fit(&clipped, Kind::Pi, &FitOptions::default()).unwrap();
+    assert!(model.fitted_on[0].settling_rows > 500, "{:?}", model.fitted_on);
+    shows_the_lag(&clipped);
+
+    let lab = Lab::new();
+    let mut csv = Vec::new();
+    clipped.write_csv(&mut csv).unwrap();
+    lab.write("train.csv", csv);
+    let ran = lab.ok("fit train.csv --model pi -o model.json");
+    assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("left out"), "{}", ran.stderr);
+}
+
+/// Missing rows are refused with the line; as two segments the rest is a record.
+#[test]
+fn missing_rows() {
+    let lab = Lab::new();
+    let mut csv = Vec::new();
+    record_of(&lagging()).write_csv(&mut csv).unwrap();
+    let text = String::from_utf8(csv).unwrap();
+    let with_gap: Vec<&str> = text.lines().take(2000).chain(text.lines().skip(2050)).collect();
+    lab.write("train.csv", with_gap.join("\n"));
+    let ran = lab.run("fit train.csv --model pi -o model.json");
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("line 2001") && ran.stderr.contains("segment"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_clock_in_another_unit() {
+    let lab = Lab::new();
+    let mut csv = Vec::new();
+    let slow = changed(&record_of(&lagging()), |c| c.time.iter_mut().for_each(|t| *t *= 1e3));
+    slow.write_csv(&mut csv).unwrap();
+    lab.write("train.csv", csv);
+    let ran = lab.ok("fit train.csv --model pi -o model.json");
+    assert!(ran.stderr.contains("--map time_ms"), "{}", ran.stderr);
+    let ran = lab.ok("fit train.csv --map time_ms=time_s --model pi -o model-ms.json");
+    assert!(!ran.stderr.contains("--map time_ms"), "{}", ran.stderr);
+}
