@@ -91,7 +91,7 @@ fn candidates(c: &mut Criterion) {
     let mut report = Vec::new();
 
     fn batch<K: Kernel>(kernel: K, rows: Rows<'_>) -> Errors<'_, K> {
-        Errors::new(kernel, rows)
+        Errors::new(kernel, rows).unwrap_or_else(|e| panic!("{e}"))
     }
     let (errors, points) = (batch(PiKernel::<16>, rows), pi_points());
     group.bench_function("PI-16, eight side by side", |b| {

@@ -136,14 +136,18 @@ impl Task {
     fn simulated(&self) -> Vec<f64> {
         let mut lists = match self.model {
             Model::TdPi => self.td_pi_errors().outputs(&self.truth),
-            Model::BoucWen => Errors::new(BoucWenKernel, self.rows()).outputs(&self.truth),
-            Model::Tanh => Errors::new(TANH, self.rows()).outputs(&self.truth),
+            Model::BoucWen => self.errors(BoucWenKernel).outputs(&self.truth),
+            Model::Tanh => self.errors(TANH).outputs(&self.truth),
         };
         lists.swap_remove(0)
     }
 
+    fn errors<K: Kernel>(&self, kernel: K) -> Errors<'_, K> {
+        Errors::new(kernel, self.rows()).unwrap_or_else(|e| panic!("{}: {e}", self.name))
+    }
+
     fn td_pi_errors(&self) -> Errors<'_, TdPiKernel<9>> {
-        Errors::new(TdPiKernel { reference_degc: TdPiParams::PRINTED.reference_degc }, self.rows())
+        self.errors(TdPiKernel { reference_degc: TdPiParams::PRINTED.reference_degc })
     }
 
     /// Root mean square error of candidates, eight side by side \[y\].
@@ -156,8 +160,8 @@ impl Task {
         }
         match self.model {
             Model::TdPi => boxed(self.td_pi_errors()),
-            Model::BoucWen => boxed(Errors::new(BoucWenKernel, self.rows())),
-            Model::Tanh => boxed(Errors::new(TANH, self.rows())),
+            Model::BoucWen => boxed(self.errors(BoucWenKernel)),
+            Model::Tanh => boxed(self.errors(TANH)),
         }
     }
 

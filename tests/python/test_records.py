@@ -156,10 +156,12 @@ def test_a_search_as_the_command_line_has_it():
     within = hyst.fit(**arrays, seed=3, bounds={"gamma/beta": (0.1, 0.5)}).to_dict()["stages"][0]
     ratio = abs(within["gamma"] / within["beta"])
     assert 0.1 - 1e-9 <= ratio <= 0.5 + 1e-9
-    # The exponent is another number to search.
+    # The exponent is another number to search. One is the least that there is: held there, it has no error.
     free = hyst.fit(**arrays, form="xie", evaluations=2000).to_dict()["stages"][0]
     assert free["n"] == pytest.approx(1.0, abs=0.1)
-    assert "n" in free["std_errors"] and "n" not in stage["std_errors"]
+    assert ("n" in free["std_errors"]) == (free["n"] > 1.0) and "n" not in stage["std_errors"]
+    other = hyst.fit(**arrays, form="xie", evaluations=2000, bounds={"n": (1.5, 3.0)}).to_dict()["stages"][0]
+    assert 1.5 <= other["n"] <= 3.0
 
 
 def test_thresholds_and_elements_are_chosen():

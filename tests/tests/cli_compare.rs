@@ -55,6 +55,8 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
     assert_eq!(find("tanh")["parameters"], 4);
     assert_eq!(find("bouc-wen")["parameters"], 4);
     assert_eq!(find("pi")["parameters"], 21);
+    // Slope and gap of the right side, gain, sixteen weights.
+    assert_eq!(find("gpi")["parameters"], 19);
     for kind in ["tanh", "pi"] {
         assert!(find(kind)["undetermined"].is_array() && find(kind)["tables"].is_null(), "{}", find(kind));
     }
@@ -68,10 +70,22 @@ fn every_model_is_fitted_or_skipped_with_the_reason() {
 #[test]
 fn temperature_makes_the_models_of_it_take_part() {
     let lab = lab(WARM);
-    let report = lab.ok("compare train.csv --models td-pi,pi --evaluations 300 --json").json();
+    let report = lab.ok("compare train.csv --models td-pi,td-em,pi --evaluations 300 --json").json();
     let mut models = names(&report["models"]);
     models.sort_unstable();
-    assert_eq!(models, ["pi", "td-pi"]);
+    assert_eq!(models, ["pi", "td-em", "td-pi"]);
+    for m in report["models"].as_array().unwrap() {
+        // What is a convention or follows from others counts for nothing.
+        let (parameters, how) = (&m["parameters"], m["how"].as_str().unwrap());
+        match m["model"].as_str().unwrap() {
+            "td-pi" => assert_eq!(*parameters, 7),
+            "td-em" => {
+                assert_eq!(*parameters, 13);
+                assert!(how.contains("mass, stiffness") && how.contains("are those of the printed tube"), "{how}");
+            }
+            _ => assert_eq!(*parameters, 21),
+        }
+    }
     assert_eq!(report["skipped"], Value::Array(Vec::new()));
 }
 

@@ -65,3 +65,30 @@ fn a_fit_that_searches_nothing_takes_no_bounds() {
         assert!(message.contains("gamma") && message.contains(&format!("{model} has no such variable")), "{message}");
     }
 }
+
+#[test]
+fn a_variable_that_ends_at_its_bound_is_named_with_what_to_do() {
+    let lab = Lab::with_train("");
+    let free = lab.ok("fit train.csv --model bouc-wen -o m.json --json").json();
+    // |γ| is at most β: there is no model beyond, and no wider bounds are asked for.
+    let how = free["how"].as_str().unwrap();
+    assert!(how.ends_with("; gamma/beta ended at its bound 1"), "{how}");
+    let beta = free["estimate"]["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "beta").unwrap();
+    let (low, high) = (2.0 * beta["value"].as_f64().unwrap(), 20.0 * beta["value"].as_f64().unwrap());
+    let name = "beta |alpha|^(n-1)";
+    let mut command = lab.command("fit train.csv --model bouc-wen -o m.json --json");
+    let ran: Ran =
+        command.args(["--bounds", &format!("{name}={low}..{high}")]).output().expect("hystctl starts").into();
+    let report = ran.json();
+    let how = report["how"].as_str().unwrap();
+    let said = format!("{name} ended at its bound {low}; widen it with --bounds {name}=LOW..HIGH");
+    assert!(how.contains(&said), "{said}: {how}");
+    assert!(report["estimate"]["held"].as_array().unwrap().contains(&"beta".into()), "{report}");
+    // The weights of plays end at zero, and no bounds are to blame.
+    let report = lab.ok("fit train.csv --model gpi --evaluations 300 -o m.json --json").json();
+    let held: Vec<&str> = report["estimate"]["held"].as_array().unwrap().iter().filter_map(|n| n.as_str()).collect();
+    let told = report["estimate"]["parameters"].as_array().unwrap();
+    assert!(held.iter().any(|name| name.starts_with("weights")), "{held:?}");
+    assert!(told.iter().all(|p| !held.contains(&p["name"].as_str().unwrap())));
+    assert!(told.iter().all(|p| p["value"] != 0.0 || p["determined"] == "near-zero"), "{told:?}");
+}

@@ -10,9 +10,9 @@ use hyst_core::PreisachParams;
 use serde::{Serialize, Serializer};
 
 use crate::fit::{Fit, FitError, FitOptions, fit_with};
-use crate::identify::{Estimate, TableEstimate, parameters_of};
+use crate::identify::{TableEstimate, parameters_of};
 use crate::metrics::{Errors, Mape, MetricsError, mape, peak_to_valley, smape};
-use crate::model::{Base, Kind, ZERO};
+use crate::model::{Base, Kind};
 use crate::record::Record;
 use crate::simulate::{Simulation, Zero, simulate};
 
@@ -228,11 +228,10 @@ fn for_any<'a>(rows: usize, simulated: impl Iterator<Item = &'a Simulation>) -> 
     settling
 }
 
-/// Numbers that a fit chose: those with an estimate or held at a bound, or the cells and nodes of a convex fit, whose grid is given.
+/// Numbers that a fit chose: those that its estimate counts, or the cells and nodes of a convex fit, whose grid is given.
 fn identified(fit: &Fit) -> usize {
-    if let Some(Estimate { parameters, held, .. }) = &fit.estimate {
-        let own = parameters.iter().filter(|p| !p.name.starts_with(ZERO));
-        return own.count() + held.len();
+    if let Some(estimate) = &fit.estimate {
+        return estimate.fitted;
     }
     // Relays that never switch back are identified only where there are such.
     let cells = |p: &PreisachParams<Vec<f64>>| {

@@ -8,6 +8,43 @@ use crate::optimize::Cost;
 /// Rows between two looks at whether the candidates are still worth it.
 const STRIDE: usize = 256;
 
+/// Most parameters of a kernel.
+const MOST: usize = 64;
+
+/// Why a kernel cannot run over rows.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ErrorsError {
+    /// A kernel without parameters or with too many.
+    #[error("a kernel of {parameters} parameters; it may have 1 to {MOST}")]
+    Parameters {
+        /// How many it has.
+        parameters: usize,
+    },
+    /// Columns that are not equally long.
+    #[error(
+        "{rows} rows, {output} outputs and {counts} flags of what counts: there has to be one of each for each row"
+    )]
+    Lengths {
+        /// Rows of the drive.
+        rows: usize,
+        /// Measured outputs.
+        output: usize,
+        /// Flags of rows that count.
+        counts: usize,
+    },
+    /// A segment that is no part of the rows.
+    #[error("segment {start} … {end} is no part of {rows} rows")]
+    Segment {
+        /// Its first row.
+        start: usize,
+        /// The row behind its last one.
+        end: usize,
+        /// Rows.
+        rows: usize,
+    },
+}
+
 /// Root mean square error of a kernel's candidates over the rows that count \[y\].
 #[derive(Debug)]
 pub struct Errors<'a, K> {
@@ -19,9 +56,23 @@ pub struct Errors<'a, K> {
 
 impl<'a, K: Kernel> Errors<'a, K> {
     /// Of a kernel over some rows.
-    pub fn new(kernel: K, data: Rows<'a>) -> Self {
+    ///
+    /// # Errors
+    /// If the kernel has no parameters or more than 64, columns differ in length, or a segment is no part of them.
+    pub fn new(kernel: K, data: Rows<'a>) -> Result<Self, ErrorsError> {
+        let parameters = kernel.parameters();
+        if !(1..=MOST).contains(&parameters) {
+            return Err(ErrorsError::Parameters { parameters });
+        }
+        let [rows, output, counts] = [data.rows.len(), data.output.len(), data.counts.len()];
+        if output != rows || counts != rows {
+            return Err(ErrorsError::Lengths { rows, output, counts });
+        }
+        if let Some(s) = data.segments.iter().find(|s| s.start > s.end || s.end > rows) {
+            return Err(ErrorsError::Segment { start: s.start, end: s.end, rows });
+        }
         let count = data.counts.iter().filter(|c| **c).count().max(1) as f64;
-        Self { kernel, data, count, arch: Arch::new() }
+        Ok(Self { kernel, data, count, arch: Arch::new() })
     }
 
     /// Sums of squared errors; those of candidates beyond their `limits` may be infinite.
@@ -47,10 +98,10 @@ impl<'a, K: Kernel> Errors<'a, K> {
         sum
     }
 
-    /// Outputs of up to eight candidates over all rows, one list each.
+    /// Outputs of the first candidates, eight at most, over all rows, one list each.
     pub fn outputs(&self, points: &[f64]) -> Vec<Vec<f64>> {
         let parameters = self.kernel.parameters();
-        let used = points.len() / parameters;
+        let used = (points.len() / parameters).min(LANES);
         let c = self.kernel.coefficients(&transposed(points, parameters));
         let mut out = vec![Vec::with_capacity(self.data.rows.len()); used];
         for segment in self.data.segments {
@@ -81,9 +132,6 @@ impl<K: Kernel> WithSimd for Pass<'_, '_, K> {
         self.errors.pass(self.parameters, self.limits)
     }
 }
-
-/// Most parameters of a kernel.
-const MOST: usize = 64;
 
 /// Candidates one after the other, as parameters side by side; lanes without a candidate repeat the first.
 fn transposed(points: &[f64], parameters: usize) -> [Lanes; MOST] {

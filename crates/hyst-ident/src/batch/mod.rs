@@ -2,7 +2,8 @@
 //! vector registers.
 //!
 //! A [`Kernel`] is a model written for that: no branch depends on a candidate's numbers. The compiler vectorises its loops; `pulp`
-//! chooses the instructions at run time. Results are the same bits on every processor, since no operation is fused or reordered.
+//! chooses the instructions at run time. Results are the same bits on every processor: the compiler neither fuses nor reorders operations, and
+//! those that are written as fused ([`Lanes::times_plus`]) are rounded once everywhere, by an instruction or without one.
 //! The models themselves are those of `hyst-core`; the tests hold the two together.
 //!
 //! [`Errors`] is the cost of a search over a kernel's parameters: the root mean square error over the rows of a record. It
@@ -19,7 +20,7 @@ mod tests;
 
 pub use activation::ActivationKernel;
 pub use bouc_wen::BoucWenKernel;
-pub use errors::Errors;
+pub use errors::{Errors, ErrorsError};
 pub use lanes::{LANES, Lanes};
 pub use pi::PiKernel;
 pub use td_pi::TdPiKernel;

@@ -69,7 +69,7 @@ impl Data {
 fn agree<K: Kernel, S: Stage<f64>>(kernel: K, points: &[f64], stage: impl Fn(&[f64]) -> S) {
     let data = Data::new();
     let n = kernel.parameters();
-    let errors = Errors::new(kernel, data.rows());
+    let errors = Errors::new(kernel, data.rows()).unwrap();
     let count = points.len() / n;
     let mut costs = vec![0.0; count];
     errors.costs(points, &vec![f64::INFINITY; count], &mut costs);
@@ -142,8 +142,32 @@ proptest! {
 #[test]
 fn a_candidate_that_is_no_model_has_no_finite_cost() {
     let data = Data::new();
-    let errors = Errors::new(BoucWenKernel, data.rows());
+    let errors = Errors::new(BoucWenKernel, data.rows()).unwrap();
     let mut costs = [0.0];
     errors.costs(&[0.1, 0.05, 0.1, 0.2], &[f64::INFINITY], &mut costs);
     assert!(!costs[0].is_finite());
+}
+
+#[test]
+fn what_a_pass_cannot_run_over_is_refused() {
+    let data = Data::new();
+    assert_eq!(Errors::new(PiKernel::<32>, data.rows()).unwrap_err(), ErrorsError::Parameters { parameters: 65 });
+    assert_eq!(Errors::new(PiKernel::<31>, data.rows()).unwrap().outputs(&[0.1; 63]).len(), 1);
+    let short = Rows { output: &data.output[1..], ..data.rows() };
+    let lengths = ErrorsError::Lengths { rows: 2000, output: 1999, counts: 2000 };
+    assert_eq!(Errors::new(BoucWenKernel, short).unwrap_err(), lengths);
+    let beyond = [0..900, 900..2001];
+    let beyond = Rows { segments: &beyond, ..data.rows() };
+    let segment = ErrorsError::Segment { start: 900, end: 2001, rows: 2000 };
+    assert_eq!(Errors::new(BoucWenKernel, beyond).unwrap_err(), segment);
+    // More candidates than lanes: the first ones.
+    let many = [0.1, 0.05, 0.2, 0.1].repeat(9);
+    assert_eq!(Errors::new(BoucWenKernel, data.rows()).unwrap().outputs(&many).len(), LANES);
+}
+
+#[test]
+fn a_product_and_a_sum_are_rounded_once() {
+    let x = 1.0 + f64::EPSILON;
+    let once = Lanes::all(x).times_plus(Lanes::all(x), Lanes::all(-1.0 - 2.0 * f64::EPSILON));
+    assert_eq!(once, Lanes::all(f64::EPSILON * f64::EPSILON));
 }

@@ -115,7 +115,7 @@ pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError
         Err(_) => {
             let basis = PreisachBasis::for_samples(&quiet, CELLS);
             let (fitted, left) = fit_settled(&mut quiet, &basis, options, &name)?;
-            tables.push(cells(&fitted, &left));
+            tables.push(cells(&fitted, &quiet, &left));
             for (s, own) in slow.iter().zip(&quiet.segments) {
                 samples.settling[samples.segments[*s].clone()].copy_from_slice(&quiet.settling[own.clone()]);
             }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::Samples;
 use crate::identify::convex::untouched;
-use crate::identify::{TableEstimate, TableOf};
+use crate::identify::{Noise, TableEstimate, TableOf};
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::model::capacity::{MIRROR, NODES};
 
@@ -119,7 +119,8 @@ impl MirrorProblem<'_> {
         let untouched = untouched(&total, n);
         let mean = weights.iter().sum::<f64>() / n as f64;
         let left = self.left(&columns, &used, &classical, z.as_slice());
-        let table = TableEstimate::of(TableOf::Nodes, &z.as_slice()[..n], mean, &total, &bounds, &left);
+        let noise = Noise::of(&left, &blocks.used_of_segments(self.samples));
+        let table = TableEstimate::of(TableOf::Nodes, &z.as_slice()[..n], mean, &total, &bounds, &noise);
         let near = |w: &&f64| **w < BOUNDS.lower + 1e-6 || **w > BOUNDS.upper - 1e-6;
         Ok(Some(MirrorFit {
             bound: weights.iter().filter(near).count(),

@@ -1,11 +1,12 @@
 //! Fits that are one convex problem: weights over plays or cells.
 
 use super::{
-    BasisOf, Fit, FitError, FitOptions, basis_for, check, fit_settled, sign_matters, solved, to_model, with_errors,
+    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, basis_for, check, fit_settled, sign_matters, solved, to_model,
+    with_errors,
 };
 use crate::base::SlidingPlays;
-use crate::identify::{Estimate, TableEstimate, TableOf, convex, parameters_of};
-use crate::lsq::Gram;
+use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
+use crate::lsq::{Blocks, Gram};
 use crate::model::{Base, Kind, Model, ZERO};
 use crate::nested::Fitted;
 use crate::record::Record;
@@ -35,7 +36,7 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
     enough(settled, basis.len())?;
     let BasisOf::Pi(even) = &basis else {
         let model = to_model(record, &samples, &basis, &fitted, options.seed);
-        return Ok(Fit { tables: vec![cells(&fitted, &left)], ..Fit::at_once(model, HOW) });
+        return Ok(Fit { tables: vec![cells(&fitted, &samples, &left)], ..Fit::at_once(model, HOW) });
     };
     let Some(chosen) = even.chosen(&samples, options.thresholds) else {
         if options.thresholds.is_some() {
@@ -82,14 +83,19 @@ fn plays(base: &Base, fitted: &Fitted, columns: &Fitted, samples: &Samples, left
     scales.resize(parameters.len(), samples.output_span());
     let (total, values): (_, Vec<f64>) = (total(columns), parameters.iter().map(|(_, value)| *value).collect());
     let free = convex::free(&values, &total, &columns.bounds);
-    convex::estimate(parameters, &scales, &total, &free, left)
+    convex::estimate(parameters, &scales, &total, &free, &noise(samples, left))
 }
 
 /// What the record says of each cell of a Preisach triangle.
-pub(crate) fn cells(fitted: &Fitted, left: &[f64]) -> TableEstimate {
+pub(crate) fn cells(fitted: &Fitted, samples: &Samples, left: &[f64]) -> TableEstimate {
     let weights = &fitted.weights;
     let mean = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
-    TableEstimate::of(TableOf::Cells, weights, mean, &total(fitted), &fitted.bounds, left)
+    TableEstimate::of(TableOf::Cells, weights, mean, &total(fitted), &fitted.bounds, &noise(samples, left))
+}
+
+/// What is left in the rows that a fit used.
+fn noise(samples: &Samples, left: &[f64]) -> Noise {
+    Noise::of(left, &Blocks::new(samples, BLOCKS, ROWS).used_of_segments(samples))
 }
 
 fn total(fitted: &Fitted) -> Gram {

@@ -6,7 +6,7 @@ use hyst_core::Kind;
 
 use super::{Fit, FitError, FitOptions, Optimizer, check, model_of, with_errors};
 use crate::BetweenSamples;
-use crate::identify::{Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
+use crate::identify::{Beside, Ended, Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -45,9 +45,16 @@ pub(super) fn fit(
     let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
     model.between_samples = best.between;
-    let fit = Fit::at_once(with_errors(model, &found.estimate), &how);
+    let how = [how].into_iter().chain(family.given()).chain(found.ended.iter().map(at_bound)).collect::<Vec<_>>();
+    let fit = Fit::at_once(with_errors(model, &found.estimate), &how.join("; "));
     let (trials, evaluations) = (found.trials, found.evaluations);
     Ok(Fit { estimate: Some(found.estimate), trials, evaluations, between_samples: left, ..fit })
+}
+
+/// Says where a searched variable has ended, and what to do about it if the model allows more.
+fn at_bound(Ended { name, bound, beyond }: &Ended) -> String {
+    let more = if *beyond { format!("; widen it with --bounds {name}=LOW..HIGH") } else { String::new() };
+    format!("{name} ended at its bound {bound}{more}")
 }
 
 fn kind_needs_temperature(kind: Kind) -> bool {
@@ -265,5 +272,17 @@ impl Family for Bounded<'_> {
 
     fn identified(&self, name: &str) -> bool {
         self.family.identified(name)
+    }
+
+    fn beside(&self, name: &str) -> Beside {
+        self.family.beside(name)
+    }
+
+    fn in_order(&self, values: &mut [f64]) {
+        self.family.in_order(values);
+    }
+
+    fn given(&self) -> Option<String> {
+        self.family.given()
     }
 }

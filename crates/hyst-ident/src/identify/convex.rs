@@ -3,8 +3,9 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::uncertainty::{Estimate, Evidence, VAGUE};
+use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
 use crate::lsq::{Bounds, Gram};
+use crate::model::ZERO;
 
 /// A column with less than this share of the mean square of all is touched by no row.
 const UNTOUCHED: f64 = 1e-6;
@@ -41,20 +42,13 @@ pub struct TableEstimate {
 impl TableEstimate {
     /// Of the first unknowns of a fit, `elements`, whose bounds are `bounds`; the unknowns behind them are zeros of the sensor.
     /// `mean` is the mean element where the unknowns are not the elements themselves but what they are above one.
-    pub(crate) fn of(
-        of: TableOf,
-        elements: &[f64],
-        mean: f64,
-        total: &Gram,
-        bounds: &[Bounds],
-        residual: &[f64],
-    ) -> Self {
+    pub(crate) fn of(of: TableOf, elements: &[f64], mean: f64, total: &Gram, bounds: &[Bounds], noise: &Noise) -> Self {
         let (n, unknowns) = (elements.len(), total.unknowns());
         let untouched = untouched(total, n);
         let values: Vec<f64> = (0..unknowns).map(|i| elements.get(i).copied().unwrap_or(0.0)).collect();
         let free = free(&values, total, bounds);
         let named = values.iter().map(|value| (String::new(), *value)).collect();
-        let estimate = estimate(named, &vec![mean; unknowns], total, &free, residual);
+        let estimate = estimate(named, &vec![mean; unknowns], total, &free, noise);
         let mut std_errors = vec![None; n];
         for (i, p) in free.iter().zip(&estimate.parameters).filter(|(i, _)| **i < n && !untouched[**i]) {
             std_errors[*i] = Some(p.std_error);
@@ -100,16 +94,21 @@ pub(crate) fn estimate(
     scales: &[f64],
     total: &Gram,
     free: &[usize],
-    residual: &[f64],
+    noise: &Noise,
 ) -> Estimate {
     let normal = |i: usize, j: usize| total.matrix[(free[i], free[j])] * scales[free[i]] * scales[free[j]];
     let held = (0..parameters.len()).filter(|i| !free.contains(i));
+    let n = free.len();
     Estimate::of(Evidence {
         parameters: free.iter().map(|i| parameters[*i].clone()).collect(),
         scales: free.iter().map(|i| scales[*i]).collect(),
-        normal: DMatrix::from_fn(free.len(), free.len(), normal),
-        residual,
-        unknowns: free.len(),
+        sizes: free.iter().map(|i| scales[*i]).collect(),
+        map: DMatrix::identity(n, n),
+        normal: DMatrix::from_fn(n, n, normal),
+        noise,
+        unknowns: n,
+        fitted: parameters.iter().filter(|(name, _)| !name.starts_with(ZERO)).count(),
+        at_least: vec![0.0; n],
         held: held.map(|i| parameters[i].0.clone()).collect(),
     })
 }

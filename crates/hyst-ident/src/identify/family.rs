@@ -53,10 +53,35 @@ pub(crate) trait Family: Sync {
         BetweenSamples::Linear
     }
 
-    /// Whether a parameter of the model was identified, and not given.
+    /// Whether a parameter of the model is told of, if it follows from what was searched or solved for.
     fn identified(&self, _name: &str) -> bool {
         true
     }
+
+    /// Whether a parameter of the model that is neither searched nor solved for is unknown all the same.
+    fn beside(&self, _name: &str) -> Beside {
+        Beside::Nothing
+    }
+
+    /// Brings values into the order in which the model has them: where several variables stand for one another, a search ends with any
+    /// of their orders.
+    fn in_order(&self, _values: &mut [f64]) {}
+
+    /// What else the model is made of, in words: parameters that are neither the record's nor the caller's.
+    fn given(&self) -> Option<String> {
+        None
+    }
+}
+
+/// What a parameter is that is neither searched nor solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Beside {
+    /// Given, or a function of what was searched and solved for.
+    Nothing,
+    /// Chosen by the record before all else: it has an error like the others.
+    Chosen,
+    /// A convention. With others it can be changed without a trace: its error is that of a number that nobody knows.
+    Convention,
 }
 
 /// Output of a stage over the rows, one segment after the other; the drive is linear between samples.

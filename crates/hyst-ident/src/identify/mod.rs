@@ -9,7 +9,7 @@
 //! - `polish.rs`: Levenberg-Marquardt on the projected residual, from where the global search ended.
 //! - `profile.rs`: how far a searched variable can go before the record objects.
 //! - `choice.rs`: where a record calls for plays or slipping elements.
-//! - `slopes.rs`: how the output changes with each parameter.
+//! - `slopes.rs`: how the output changes with what was searched and solved for, and the file's parameters with it.
 //! - `convex.rs`: the same from the normal equations of a fit in which nothing is searched.
 //! - `uncertainty.rs`: standard errors and correlations at the optimum; parameters that the record cannot determine, by name.
 //! - `search.rs`: all of it in a row.
@@ -30,7 +30,8 @@ mod uncertainty;
 pub use convex::{TableEstimate, TableOf};
 pub use families::{Form, UnknownForm};
 pub(crate) use families::{family_of, largest_input};
-pub(crate) use family::{Family, Linear};
+pub(crate) use family::{Beside, Family, Linear};
 pub(crate) use search::{Identification, Located, SearchOptions};
-pub(crate) use slopes::parameters_of;
+pub(crate) use slopes::{Ended, parameters_of};
+pub(crate) use uncertainty::Noise;
 pub use uncertainty::{Determined, Estimate, Parameter, TradeOff};

@@ -6,13 +6,20 @@ use crate::optimize::Space;
 /// Halvings with which the end of an interval is found.
 const HALVINGS: i32 = 12;
 
-/// The values of one variable that the record allows, the other searched ones held.
+/// The part of one variable's side of the box, a part of 0 … 1, that the record allows, the other searched variables held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interval {
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Whether it goes on to a side of the box.
-    pub(crate) open: bool,
+}
+
+impl Interval {
+    /// The standard error that goes with it, as a share of the box. The interval is that of two standard errors to either side; where
+    /// the record allows the whole box, it says no more than the box does, in which every place is as good.
+    pub(crate) fn std_error(self) -> f64 {
+        let all = self.low <= 0.0 && self.high >= 1.0;
+        (self.high - self.low) / if all { 12f64.sqrt() } else { 4.0 }
+    }
 }
 
 /// Where the sum of squares is less than `rise` above its minimum along variable `d`, the linear parameters solved for anew (a section
@@ -26,28 +33,27 @@ pub(crate) fn interval(
     rise: f64,
 ) -> Option<Interval> {
     let least = projection.at(&space.values(point))?.squares();
-    let at = |x: f64| {
+    let allowed = |x: f64| {
         let mut to = point.to_vec();
         to[d] = x;
-        space.values(&to)
+        projection.at(&space.values(&to)).is_some_and(|p| p.squares() <= least + rise)
     };
-    let allowed = |x: f64| projection.at(&at(x)).is_some_and(|p| p.squares() <= least + rise);
     let end = |side: f64| {
         if allowed(side) {
-            return (side, true);
+            return side;
         }
         let (mut inside, mut outside) = (point[d], side);
         // Most intervals are narrower than what halvings come to.
         let nearest = inside + (outside - inside) / f64::from(1 << HALVINGS);
         if !allowed(nearest) {
-            return (inside, false);
+            return inside;
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (inside + outside);
             if allowed(middle) { inside = middle } else { outside = middle }
         }
-        (inside, false)
+        inside
     };
-    let ((low, at_low), (high, at_high)) = rayon::join(|| end(0.0), || end(1.0));
-    Some(Interval { low: at(low)[d], high: at(high)[d], open: at_low || at_high })
+    let (low, high) = rayon::join(|| end(0.0), || end(1.0));
+    Some(Interval { low, high })
 }

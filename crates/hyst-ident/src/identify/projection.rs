@@ -14,12 +14,16 @@ pub(crate) struct Projection<'a> {
     family: &'a dyn Family,
     samples: &'a Samples,
     linear: Vec<Linear>,
-    bounds: Vec<Bounds>,
+    /// Of the linear parameters and the zeros.
+    pub(super) bounds: Vec<Bounds>,
     /// Rows that count.
     pub(crate) rows: Vec<usize>,
+    /// How many of them each segment has.
+    pub(super) lengths: Vec<usize>,
     /// File of each of them; all 0 with a shared zero.
-    group: Vec<usize>,
-    groups: usize,
+    pub(super) group: Vec<usize>,
+    /// Sensor zeros.
+    pub(super) groups: usize,
     /// Columns for trials, so that a trial allocates none.
     spare: Mutex<Vec<DMatrix<f64>>>,
 }
@@ -47,20 +51,16 @@ impl<'a> Projection<'a> {
         let mut bounds: Vec<Bounds> = linear.iter().map(|l| l.bounds).collect();
         let groups = if zero_per_record { samples.files().max(1) } else { 1 };
         bounds.extend(vec![Bounds::FREE; groups]);
-        let mut rows = Vec::new();
-        let mut group = Vec::new();
+        let (mut rows, mut group, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
         for (segment, file) in samples.segments.iter().zip(&samples.file_of_segment) {
+            let before = rows.len();
             for k in segment.clone().filter(|k| !samples.settling[*k]) {
                 rows.push(k);
                 group.push(if zero_per_record { *file } else { 0 });
             }
+            lengths.push(rows.len() - before);
         }
-        Self { family, samples, linear, bounds, rows, group, groups, spare: Mutex::new(Vec::new()) }
-    }
-
-    /// Numbers that are solved for.
-    pub(crate) fn unknowns(&self) -> usize {
-        self.bounds.len()
+        Self { family, samples, linear, bounds, rows, lengths, group, groups, spare: Mutex::new(Vec::new()) }
     }
 
     fn take(&self) -> DMatrix<f64> {
@@ -75,7 +75,7 @@ impl<'a> Projection<'a> {
     }
 
     /// Normal equations of the columns, the zeros and the output over the rows that count.
-    fn gram(&self, columns: &DMatrix<f64>) -> Gram {
+    pub(super) fn gram(&self, columns: &DMatrix<f64>) -> Gram {
         let (m, g) = (columns.ncols(), self.groups);
         let n = m + g;
         let mut gram = Gram::zeros(n + 1);
@@ -96,6 +96,13 @@ impl<'a> Projection<'a> {
         gram.matrix.fill_lower_triangle_with_upper_triangle();
         gram.rows = self.rows.len();
         gram
+    }
+
+    /// The columns at `values` over all rows; `None` if there is no model.
+    pub(super) fn columns(&self, values: &[f64]) -> Option<DMatrix<f64>> {
+        let mut columns = DMatrix::zeros(self.samples.len(), self.linear.len());
+        self.family.columns(values, &mut columns).ok()?;
+        Some(columns)
     }
 
     /// The model at `values`; `None` if there is none or it is not finite.

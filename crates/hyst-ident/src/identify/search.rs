@@ -2,13 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
 use super::Family;
 use super::polish::{Polished, SETTLED, polish};
-use super::profile::interval;
 use super::projection::{Left, Projected, Projection, space};
-use super::slopes::estimate;
+use super::slopes::{Ended, Optimum};
 use super::uncertainty::Estimate;
 use crate::Samples;
 use crate::fit::FitError;
@@ -30,6 +27,8 @@ pub(crate) struct Identified {
     pub(crate) base: Base,
     pub(crate) zeros: Vec<f64>,
     pub(crate) estimate: Estimate,
+    /// Searched variables that are held at a side of their box.
+    pub(crate) ended: Vec<Ended>,
     /// The global searches; `None` if nothing had to be searched.
     pub(crate) trials: Option<Trials>,
     pub(crate) evaluations: u64,
@@ -38,7 +37,7 @@ pub(crate) struct Identified {
 /// Where a search and its polish have ended.
 #[derive(Clone, Debug)]
 pub(crate) struct Located {
-    values: Vec<f64>,
+    pub(super) values: Vec<f64>,
     projected: Projected,
     trials: Option<Trials>,
     evaluations: u64,
@@ -163,24 +162,28 @@ impl<'a> Identification<'a> {
     }
 
     /// The model there, and what the rows say about its parameters.
-    pub(crate) fn conclude(&self, at: Located) -> Identified {
+    pub(crate) fn conclude(&self, mut at: Located) -> Identified {
+        self.in_order(&mut at.values);
         let base = self.family.base(&at.values, &at.projected.linear);
-        let left = at.projected.residual.as_slice();
-        let mut estimate = estimate(self.family, &base, self.samples, self.zero_per_record, left);
-        if let Some(space) = &self.space {
-            // Two standard errors of noise like what is left.
-            let unknowns = space.dimensions() + self.projection.unknowns();
-            let freedom = self.projection.rows.len().saturating_sub(unknowns).max(1);
-            let rise = 4.0 * at.projected.squares() / freedom as f64;
-            let point = space.point(&at.values);
-            let section = |d: usize| interval(&self.projection, space, &point, d, rise);
-            let sections: Vec<_> = (0..space.dimensions()).into_par_iter().map(section).collect();
-            for (variable, section) in space.variables().iter().zip(sections) {
-                if let Some(section) = section {
-                    estimate.widen(&variable.name, section);
-                }
-            }
+        let (estimate, ended) = Optimum {
+            family: self.family,
+            samples: self.samples,
+            projection: &self.projection,
+            space: self.space.as_ref(),
+            values: &at.values,
+            projected: &at.projected,
         }
-        Identified { base, zeros: at.projected.zeros, estimate, trials: at.trials, evaluations: at.evaluations }
+        .estimate();
+        Identified { base, zeros: at.projected.zeros, estimate, ended, trials: at.trials, evaluations: at.evaluations }
+    }
+
+    /// Brings values into the model's order, if each is within the bounds of its new place.
+    fn in_order(&self, values: &mut Vec<f64>) {
+        let Some(space) = &self.space else { return };
+        let mut other = values.clone();
+        self.family.in_order(&mut other);
+        if space.variables().iter().zip(&other).all(|(v, x)| (v.lower..=v.upper).contains(x)) {
+            *values = other;
+        }
     }
 }

@@ -1,17 +1,31 @@
-//! Slopes of a model's output with respect to its parameters, and the standard errors that they give.
+//! Slopes of a model's output along the unknowns of its fit, and what they say of the parameters in its file.
+//!
+//! The unknowns are what was searched and what was solved for. A parameter of the file is a function of them: it may be one of them, a
+//! product of several, or one of many that all follow from the same. So slopes are taken along the unknowns, and errors
+//! are carried over to the file by the slopes of that function (the delta method).
 
 use hyst_core::{Params, Sampling};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::family::Family;
-use super::uncertainty::{Estimate, Evidence};
+use super::convex;
+use super::family::{Beside, Family};
+use super::profile::interval;
+use super::projection::{Projected, Projection};
+use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
 use crate::Samples;
 use crate::drive::{Drive, Passes};
 use crate::model::{Base, Operator};
+use crate::optimize::{Scale, Space, Variable};
 
-/// Relative step of the difference quotients.
+/// Step of the difference quotients of outputs, as a share of an unknown's scale.
 const STEP: f64 = 1e-5;
+/// Step of those of the file's parameters, which have no noise.
+const FINE: f64 = 1e-6;
+/// Within this share of a box a variable is on its side: values are rounded.
+const SIDE: f64 = 1e-12;
+/// How far beyond a side of the box it is tried whether there is a model, as a share of the box.
+const BEYOND: f64 = 1e-3;
 
 /// Names and values of a model's parameters in the order of their visit.
 pub(crate) fn parameters_of(base: &Base) -> Vec<(String, f64)> {
@@ -28,6 +42,12 @@ pub(crate) fn parameters_of(base: &Base) -> Vec<(String, f64)> {
     (0..list.len()).map(|i| (name(i), list[i].1)).collect()
 }
 
+fn values_of(base: &Base) -> Vec<f64> {
+    let mut list = Vec::new();
+    base.clone().visit(&mut |_, x| list.push(*x));
+    list
+}
+
 /// The model with its `which`-th parameter changed.
 fn changed(base: &Base, which: usize, to: f64) -> Base {
     let (mut other, mut i) = (base.clone(), 0);
@@ -40,78 +60,264 @@ fn changed(base: &Base, which: usize, to: f64) -> Base {
     other
 }
 
-/// Standard errors of the parameters of `base`, which was fitted to the settled rows of `samples` together with sensor zeros.
-///
-/// The covariance is `σ² κ (JᵀJ)⁻¹` with J the slopes of the output by central differences, σ² the mean square of
-/// what is left and κ its rows per independent one.
-pub(crate) fn estimate(
-    family: &dyn Family,
-    base: &Base,
-    samples: &Samples,
-    zero_per_record: bool,
-    residual: &[f64],
-) -> Estimate {
-    let all = parameters_of(base);
-    let which: Vec<usize> = (0..all.len()).filter(|i| family.identified(&all[*i].0)).collect();
-    let (low, high) = samples.input_range();
-    let drive = Drive::new(samples, family.between_samples(), Passes::Once);
-    let cx = Sampling { period: drive.period() };
-    let simulated = |base: &Base| {
-        let operator = Operator::new(base, [low, high], &cx).ok()?;
-        let mut y = vec![0.0; samples.len()];
-        drive.run(&operator, &mut y);
-        Some(y)
-    };
-    let scale = |i: usize| {
-        let own = all[i].1.abs();
-        let scale = family.scale(base, &all[i].0).unwrap_or(own);
-        if scale > 0.0 { scale } else { 1.0 }
-    };
-    // Slopes per scale, the mean of each file (or of all) taken off: the zeros are fitted too.
-    let slope = |i: &usize| -> Vec<f64> {
-        let scale = scale(*i);
-        let step = STEP * scale;
-        let side = |sign: f64| simulated(&changed(base, *i, all[*i].1 + sign * step));
-        let (up, down) = (side(1.0), side(-1.0));
-        let of = |a: &[f64], b: &[f64], width: f64| a.iter().zip(b).map(|(a, b)| (a - b) / width * scale).collect();
-        let mut slope: Vec<f64> = match (up, down) {
-            (Some(a), Some(b)) => of(&a, &b, 2.0 * step),
-            // At a bound of the model there is one side only.
-            (Some(a), None) => simulated(base).map_or_else(Vec::new, |y| of(&a, &y, step)),
-            (None, Some(b)) => simulated(base).map_or_else(Vec::new, |y| of(&y, &b, step)),
-            (None, None) => Vec::new(),
-        };
-        slope.resize(samples.len(), 0.0);
-        centre(&mut slope, samples, zero_per_record);
-        slope
-    };
-    let slopes: Vec<Vec<f64>> = which.par_iter().map(slope).collect();
-    let settled: Vec<usize> = (0..samples.len()).filter(|k| !samples.settling[*k]).collect();
-    let n = which.len();
-    let normal = DMatrix::from_fn(n, n, |i, j| settled.iter().map(|k| slopes[i][*k] * slopes[j][*k]).sum::<f64>());
-    let zeros = if zero_per_record { samples.files() } else { 1 };
-    Estimate::of(Evidence {
-        parameters: which.iter().map(|i| all[*i].clone()).collect(),
-        scales: which.iter().map(|i| scale(*i)).collect(),
-        normal,
-        residual,
-        unknowns: n + zeros,
-        held: Vec::new(),
-    })
+/// A searched variable that ended on a side of its box and is held there.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Ended {
+    pub(crate) name: String,
+    /// The side.
+    pub(crate) bound: f64,
+    /// Whether there are models beyond.
+    pub(crate) beyond: bool,
 }
 
-fn centre(slope: &mut [f64], samples: &Samples, zero_per_record: bool) {
-    let files = if zero_per_record { samples.files() } else { 1 };
-    for file in 0..files {
-        let own: Vec<usize> = samples
-            .segments
-            .iter()
-            .zip(&samples.file_of_segment)
-            .filter(|(_, f)| !zero_per_record || **f == file)
-            .flat_map(|(s, _)| s.clone())
-            .filter(|k| !samples.settling[*k])
-            .collect();
-        let mean = own.iter().map(|k| slope[*k]).sum::<f64>() / own.len().max(1) as f64;
-        own.iter().for_each(|k| slope[*k] -= mean);
+/// What an unknown is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    /// A searched variable, by its number.
+    Searched(usize),
+    /// A linear parameter.
+    Solved(usize),
+    /// A parameter of the file that is neither, and yet not given.
+    Beside(Beside, usize),
+}
+
+/// An unknown of the fit.
+struct Unknown {
+    place: Place,
+    /// A change of it that is a large one: half of the box of a searched variable, at most a factor of e of a logarithmic one; for a linear
+    /// parameter its own size, or what would alone make an output as large as the measured one.
+    scale: f64,
+    /// Change of the output with it, over the rows that count, per scale; the sensor's zeros are taken off.
+    slope: Vec<f64>,
+    /// Whether it is held at a bound.
+    held: bool,
+}
+
+/// Where an identification has ended.
+pub(super) struct Optimum<'a> {
+    pub(super) family: &'a dyn Family,
+    pub(super) samples: &'a Samples,
+    pub(super) projection: &'a Projection<'a>,
+    /// `None` if nothing was searched.
+    pub(super) space: Option<&'a Space>,
+    pub(super) values: &'a [f64],
+    pub(super) projected: &'a Projected,
+}
+
+impl Optimum<'_> {
+    /// Standard errors of the parameters of the model there, and the variables that ended on a side of their box.
+    ///
+    /// The covariance of the unknowns is `σ² κ (JᵀJ)⁻¹` with J the slopes of the output, σ² the mean square of what is left and κ its
+    /// rows per independent one; that of the parameters is `G C Gᵀ` with G their slopes.
+    pub(super) fn estimate(&self) -> (Estimate, Vec<Ended>) {
+        let base = self.family.base(self.values, &self.projected.linear);
+        let all = parameters_of(&base);
+        let noise = Noise::of(self.projected.residual.as_slice(), &self.projection.lengths);
+        let unknowns = self.unknowns(&base, &all, &noise);
+        let free: Vec<usize> = (0..unknowns.len()).filter(|u| !unknowns[*u].held).collect();
+        let chosen = |u: &&Unknown| !matches!(u.place, Place::Beside(Beside::Convention, _));
+        let fitted = unknowns.iter().filter(chosen).count();
+        let held = unknowns.iter().filter(|u| u.held).count();
+
+        // Change of each parameter of the file with each unknown, per scale.
+        let changes: Vec<Vec<f64>> = unknowns.iter().map(|u| self.changes(u, all.len())).collect();
+        let told = |i: &usize| self.family.identified(&all[*i].0);
+        let moves = |i: usize, u: usize| changes[u][i] != 0.0;
+        let which: Vec<usize> = (0..all.len()).filter(told).filter(|i| free.iter().any(|u| moves(*i, *u))).collect();
+        let at_bound = |i: &usize| !which.contains(i) && (0..unknowns.len()).any(|u| moves(*i, u));
+        // The family's own scale of a parameter, or how far it goes where the unknowns go as far as theirs; and its size beside that.
+        let scale = |i: &usize| match self.family.scale(&base, &all[*i].0) {
+            Some(own) => (positive(own), positive(own)),
+            None => (positive(changes.iter().map(|c| c[*i] * c[*i]).sum::<f64>().sqrt()), all[*i].1.abs()),
+        };
+        let (scales, sizes): (Vec<f64>, Vec<f64>) = which.iter().map(scale).unzip();
+        let slopes: Vec<&[f64]> = free.iter().map(|u| &unknowns[*u].slope[..]).collect();
+        let normal = DMatrix::from_fn(free.len(), free.len(), |i, j| product(slopes[i], slopes[j]));
+        let freedom = fitted - held + self.projection.groups;
+        let rise = 4.0 * noise.variance(freedom);
+        let estimate = Estimate::of(Evidence {
+            parameters: which.iter().map(|i| all[*i].clone()).collect(),
+            map: DMatrix::from_fn(which.len(), free.len(), |i, u| changes[free[u]][which[i]] / scales[i]),
+            scales,
+            sizes,
+            normal,
+            noise: &noise,
+            unknowns: freedom,
+            fitted,
+            at_least: free.par_iter().map(|u| self.section(&unknowns[*u], rise)).collect(),
+            held: (0..all.len()).filter(told).filter(at_bound).map(|i| all[i].0.clone()).collect(),
+        });
+        let ended = unknowns.iter().filter(|u| u.held).filter_map(|u| self.ended(u)).collect();
+        (estimate, ended)
     }
+
+    /// The unknowns with the slopes of the output along them.
+    fn unknowns(&self, base: &Base, all: &[(String, f64)], noise: &Noise) -> Vec<Unknown> {
+        let searched = (0..self.values.len()).map(Place::Searched);
+        let solved = (0..self.projected.linear.len()).map(Place::Solved);
+        let beside = (0..all.len()).filter_map(|i| match self.family.beside(&all[i].0) {
+            Beside::Nothing => None,
+            what => Some(Place::Beside(what, i)),
+        });
+        let places: Vec<Place> = searched.chain(solved).chain(beside).collect();
+        let Some(columns) = self.projection.columns(self.values) else { return Vec::new() };
+        let held = self.held_linear(&columns);
+        let measured: Vec<f64> = self.projection.rows.iter().map(|k| self.samples.output[*k]).collect();
+        let size = rms(&self.centred(measured));
+        let unknown = |place: &Place| match *place {
+            Place::Searched(d) => {
+                let scale = self.variable(d).map_or(1.0, largest);
+                let slope = self.quotient(scale, |step| self.predicted(&self.moved(d, step)));
+                let alone = (noise.variance(0) / product(&slope, &slope).max(f64::MIN_POSITIVE)).sqrt();
+                // One that leaves no trace may end anywhere: nothing has pushed it there.
+                Unknown { place: *place, scale, slope, held: alone <= VAGUE && self.side(d).is_some() }
+            }
+            Place::Solved(j) => {
+                let mut slope = self.centred(self.projection.rows.iter().map(|k| columns[(*k, j)]).collect());
+                let scale = positive((size / rms(&slope)).max(self.projected.linear[j].abs()));
+                slope.iter_mut().for_each(|s| *s *= scale);
+                Unknown { place: *place, scale, slope, held: held[j] }
+            }
+            Place::Beside(_, i) => {
+                let (name, value) = &all[i];
+                let scale = positive(self.family.scale(base, name).unwrap_or(value.abs()));
+                let slope = self.quotient(scale, |step| self.simulated(&changed(base, i, value + step)));
+                Unknown { place: *place, scale, slope, held: false }
+            }
+        };
+        places.par_iter().map(unknown).collect()
+    }
+
+    /// Which linear parameters are held at their bounds.
+    fn held_linear(&self, columns: &DMatrix<f64>) -> Vec<bool> {
+        let all = [&self.projected.linear[..], &self.projected.zeros].concat();
+        let free = convex::free(&all, &self.projection.gram(columns), &self.projection.bounds);
+        (0..self.projected.linear.len()).map(|j| !free.contains(&j)).collect()
+    }
+
+    fn variable(&self, d: usize) -> Option<&Variable> {
+        self.space.and_then(|space| space.variables().get(d))
+    }
+
+    /// The values with one of them moved: a logarithmic one by its logarithm.
+    fn moved(&self, d: usize, step: f64) -> Vec<f64> {
+        let mut to = self.values.to_vec();
+        match self.variable(d).map(|v| v.scale) {
+            Some(Scale::Log) => to[d] *= step.exp(),
+            _ => to[d] += step,
+        }
+        to
+    }
+
+    /// The side of the box that a variable is on.
+    fn side(&self, d: usize) -> Option<f64> {
+        let (v, place) = (self.variable(d)?, self.space?.point(self.values)[d]);
+        [(v.lower, place), (v.upper, 1.0 - place)].into_iter().find(|(_, off)| *off < SIDE).map(|(side, _)| side)
+    }
+
+    fn ended(&self, unknown: &Unknown) -> Option<Ended> {
+        let Place::Searched(d) = unknown.place else { return None };
+        let (v, bound) = (self.variable(d)?, self.side(d)?);
+        let step = BEYOND * extent(v) * if bound == v.lower { -1.0 } else { 1.0 };
+        let beyond = self.projection.at(&self.moved(d, step)).is_some();
+        Some(Ended { name: v.name.clone(), bound, beyond })
+    }
+
+    /// The least standard error of an unknown, per scale, that a section of the likelihood leaves it; 0 if it is no searched one.
+    fn section(&self, unknown: &Unknown, rise: f64) -> f64 {
+        let (Place::Searched(d), Some(space)) = (unknown.place, self.space) else { return 0.0 };
+        let (Some(v), Some(section)) =
+            (self.variable(d), interval(self.projection, space, &space.point(self.values), d, rise))
+        else {
+            return 0.0;
+        };
+        section.std_error() * extent(v) / unknown.scale
+    }
+
+    /// Change of each parameter of the file with an unknown, per scale.
+    fn changes(&self, unknown: &Unknown, count: usize) -> Vec<f64> {
+        let (values, linear) = (self.values, &self.projected.linear);
+        let side = |step: f64| match unknown.place {
+            Place::Searched(d) => values_of(&self.family.base(&self.moved(d, step), linear)),
+            Place::Solved(j) => {
+                let mut to = linear.clone();
+                to[j] += step;
+                values_of(&self.family.base(values, &to))
+            }
+            Place::Beside(_, i) => (0..count).map(|k| if k == i { step } else { 0.0 }).collect(),
+        };
+        let step = FINE * unknown.scale;
+        side(step).iter().zip(side(-step)).map(|(a, b)| 0.5 * (a - b) / FINE).collect()
+    }
+
+    /// Output over the rows that count, or `None` if there is no model.
+    fn predicted(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let columns = self.projection.columns(values)?;
+        let linear = &self.projected.linear;
+        let row = |k: &usize| linear.iter().enumerate().map(|(j, l)| l * columns[(*k, j)]).sum();
+        Some(self.projection.rows.iter().map(row).collect())
+    }
+
+    /// The same of any model.
+    fn simulated(&self, base: &Base) -> Option<Vec<f64>> {
+        let (low, high) = self.samples.input_range();
+        let drive = Drive::new(self.samples, self.family.between_samples(), Passes::Once);
+        let operator = Operator::new(base, [low, high], &Sampling { period: drive.period() }).ok()?;
+        let mut y = vec![0.0; self.samples.len()];
+        drive.run(&operator, &mut y);
+        Some(self.projection.rows.iter().map(|k| y[*k]).collect())
+    }
+
+    /// Difference quotient of an output per `scale`, the sensor's zeros taken off; zeros where there is no model on either side.
+    fn quotient(&self, scale: f64, output: impl Fn(f64) -> Option<Vec<f64>>) -> Vec<f64> {
+        let of = |a: &[f64], b: &[f64], width: f64| a.iter().zip(b).map(|(a, b)| (a - b) / width).collect();
+        let slope: Vec<f64> = match (output(STEP * scale), output(-STEP * scale)) {
+            (Some(a), Some(b)) => of(&a, &b, 2.0 * STEP),
+            // At a bound of the model there is one side only.
+            (Some(a), None) => output(0.0).map_or_else(Vec::new, |y| of(&a, &y, STEP)),
+            (None, Some(b)) => output(0.0).map_or_else(Vec::new, |y| of(&y, &b, STEP)),
+            (None, None) => Vec::new(),
+        };
+        if slope.is_empty() { vec![0.0; self.projection.rows.len()] } else { self.centred(slope) }
+    }
+
+    /// Without its mean over each file, or over all: the zeros are fitted too.
+    fn centred(&self, mut rows: Vec<f64>) -> Vec<f64> {
+        let (mut sums, mut counts) = (vec![0.0; self.projection.groups], vec![0usize; self.projection.groups]);
+        for (x, group) in rows.iter().zip(&self.projection.group) {
+            sums[*group] += x;
+            counts[*group] += 1;
+        }
+        for (x, group) in rows.iter_mut().zip(&self.projection.group) {
+            *x -= sums[*group] / counts[*group] as f64;
+        }
+        rows
+    }
+}
+
+/// Length of a variable's box, in logarithms of a logarithmic one.
+fn extent(v: &Variable) -> f64 {
+    match v.scale {
+        Scale::Linear => v.upper - v.lower,
+        Scale::Log => (v.upper / v.lower).ln(),
+    }
+}
+
+/// A change of a variable that is a large one.
+fn largest(v: &Variable) -> f64 {
+    let half = 0.5 * extent(v);
+    if v.scale == Scale::Log { half.min(1.0) } else { half }
+}
+
+/// A scale, or one where there is none.
+fn positive(scale: f64) -> f64 {
+    if scale > 0.0 && scale.is_finite() { scale } else { 1.0 }
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn rms(rows: &[f64]) -> f64 {
+    (product(rows, rows) / rows.len().max(1) as f64).sqrt()
 }

@@ -64,21 +64,27 @@ fn search(method: &str, dimensions: usize) -> SearchOptions {
     SearchOptions { method, evaluations: 1500 * dimensions as u64, seed: 1, trials: 1 }
 }
 
+fn located(identification: &Identification<'_>, how: &SearchOptions) -> Located {
+    let located = identification.search(None, how, &mut |_| ControlFlow::Continue(())).unwrap();
+    identification.polish(&located).unwrap()
+}
+
 fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Identified {
     let family = family_of(kind, samples, largest_input(samples), form).unwrap();
     let how = search(method, family.variables().len().max(1));
     let identification = Identification::new(family.as_ref(), samples, false, "record").unwrap();
-    let located = identification.search(None, &how, &mut |_| ControlFlow::Continue(())).unwrap();
-    identification.conclude(identification.polish(&located).unwrap())
+    identification.conclude(located(&identification, &how))
 }
 
-/// Every parameter that the record determines is within three standard errors of the truth, and what is left is the noise.
-fn agrees(found: &Identified, truth: &Base, samples: &Samples, sigma: f64) {
+/// These are the parameters that the record does not determine, every other one is within three standard errors of the truth, and what
+/// is left is the noise.
+fn agrees(found: &Identified, truth: &Base, samples: &Samples, sigma: f64, undetermined: &[&str]) {
+    assert_eq!(found.estimate.undetermined(), undetermined, "{:#?}", found.estimate.parameters);
     let true_values = parameters_of(truth);
     for p in &found.estimate.parameters {
         let (_, true_value) = true_values.iter().find(|(n, _)| *n == p.name).unwrap();
         let off = (p.value - true_value).abs();
-        if !found.estimate.undetermined().contains(&p.name.as_str()) {
+        if !undetermined.contains(&p.name.as_str()) {
             assert!(off <= 3.0 * p.std_error, "{}: {} ± {}, {true_value} expected", p.name, p.value, p.std_error);
         }
     }
@@ -92,7 +98,7 @@ fn bouc_wen_of_the_paper_by_particle_swarm() {
     let drive = |t: f64| 10.0 + 8.0 * (62.0 * t).sin() * (5.0 * t).sin() - 10.0 * (-30.0 * t).exp();
     let (samples, sigma) = record(&truth, 1e-3, 4000, &[23.0], drive, 3);
     let found = identified(Kind::BoucWen, &samples, &Form::default(), "pso");
-    agrees(&found, &truth, &samples, sigma);
+    agrees(&found, &truth, &samples, sigma, &[]);
     // Γ is printed as nothing, and found to be.
     assert_eq!(found.estimate.parameter("gamma").unwrap().determined, Determined::NearZero);
 }
@@ -104,14 +110,13 @@ fn activation_functions_at_10_hz_by_particle_swarm() {
     let tanh = ActivationParams { k0: 0.1461, alpha: -9e-5, beta: 0.3857, gamma: 500_032.0 };
     let (samples, sigma) = record(&Base::Tanh(tanh), 1e-3, 500, &[23.0], drive, 5);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Tanh(tanh), &samples, sigma);
     // Saturated over the whole range: γ leaves no trace, and says so.
-    assert!(found.estimate.undetermined().contains(&"gamma"), "{:?}", found.estimate.parameters);
+    agrees(&found, &Base::Tanh(tanh), &samples, sigma, &["gamma"]);
 
     let softsign = ActivationParams::from_scaled_softsign(0.1516, -0.00017, 100.0, 318.2799);
     let (samples, sigma) = record(&Base::Softsign(softsign), 1e-3, 500, &[23.0], drive, 6);
     let found = identified(Kind::Softsign, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Softsign(softsign), &samples, sigma);
+    agrees(&found, &Base::Softsign(softsign), &samples, sigma, &[]);
     // Its long tails tell a γ that tanh hides.
     let gamma = found.estimate.parameter("gamma").unwrap();
     assert!(gamma.determined == Determined::Yes && gamma.std_error > 0.05 * gamma.value, "{gamma:?}");
@@ -119,8 +124,7 @@ fn activation_functions_at_10_hz_by_particle_swarm() {
     let bent = ActivationParams { gamma: 0.05, ..tanh };
     let (samples, sigma) = record(&Base::Tanh(bent), 1e-3, 500, &[23.0], drive, 7);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Tanh(bent), &samples, sigma);
-    assert!(found.estimate.undetermined().is_empty());
+    agrees(&found, &Base::Tanh(bent), &samples, sigma, &[]);
 }
 
 /// Five sines about 50 V, as in the paper on fractional models.
@@ -139,7 +143,7 @@ fn linear_fractional_model_by_particle_swarm() {
     let truth = LfdmParams::PRINTED;
     let (samples, sigma) = record(&Base::Lfdm(truth), 1e-3, 3000, &[23.0], five_sines, 8);
     let found = identified(Kind::Lfdm, &samples, &Form::default(), "pso");
-    agrees(&found, &Base::Lfdm(truth), &samples, sigma);
+    agrees(&found, &Base::Lfdm(truth), &samples, sigma, &[]);
     let Base::Lfdm(p) = found.base else { panic!() };
     let off = apart(|hz| p.response(hz), |hz| truth.response(hz));
     assert!(off < 1e-3, "{off}");
@@ -150,10 +154,11 @@ fn improved_fractional_model_by_differential_evolution() {
     let truth = IfmParams::PRINTED;
     let (samples, sigma) = record(&Base::Ifm(truth), 2e-4, 10_000, &[23.0], five_sines, 9);
     let found = identified(Kind::Ifm, &samples, &Form::default(), "de");
-    agrees(&found, &Base::Ifm(truth), &samples, sigma);
-    let undetermined = found.estimate.undetermined();
-    for name in ["a", "b", "c", "alpha"] {
-        assert!(undetermined.contains(&name), "{name} not in {undetermined:?}: {:?}", found.estimate.parameters);
+    agrees(&found, &Base::Ifm(truth), &samples, sigma, &["a", "b", "c", "alpha", "beta"]);
+    for (name, expected) in [("tau", truth.tau), ("delta", truth.delta)] {
+        let p = found.estimate.parameter(name).unwrap();
+        assert!(p.determined == Determined::Yes, "{p:?}");
+        assert!((p.value - expected).abs() < (1e-3 * expected).max(p.std_error), "{p:?}, {expected} expected");
     }
     let Base::Ifm(p) = found.base else { panic!() };
     let off = apart(|hz| p.response(hz), |hz| truth.response(hz));
@@ -184,7 +189,9 @@ fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
             "{name}: {value} ± {error}, {expected}"
         );
     }
-    // The scale is found to be free, and what it moves.
+    // The scale is found to be free, and what it moves; seven numbers were chosen.
+    let scaled = ["alpha", "epsilon", "tau", "a0", "a1", "b0", "b1"];
+    assert_eq!((found.estimate.undetermined(), found.estimate.fitted), (scaled.to_vec(), 7));
     let free = &found.estimate.trade_offs[0];
     let sign = |name: &str| free.changes.iter().find(|(n, _)| n == name).map(|(_, x)| x.signum());
     assert!(sign("alpha").is_some() && sign("alpha") == sign("a0") && sign("alpha") != sign("epsilon"), "{free:?}");
@@ -247,8 +254,20 @@ fn electromechanical_model_and_its_products() {
         assert!((product(p) / product(q) - 1.0).abs() < 2e-3, "{t}: {} {}", product(p), product(q));
     }
     // ψ and the gains belong together.
-    let undetermined = found.estimate.undetermined();
-    assert!(undetermined.contains(&"coupling[0]") && undetermined.contains(&"slip.gains[0]"), "{undetermined:?}");
+    let estimate = &found.estimate;
+    let free = (0..10).filter(|i| p.slip.gains[*i] > 0.0);
+    let mut scaled: Vec<String> = free.map(|i| format!("slip.gains[{i}]")).collect();
+    scaled.extend((0..3).map(|i| format!("coupling[{i}]")));
+    assert_eq!(estimate.undetermined(), scaled, "{:#?}", estimate.parameters);
+    // One width was searched, two numbers of the coupling, and ten gains solved for; the other widths are multiples.
+    assert_eq!(estimate.fitted, 13);
+    let width = |i: usize| estimate.parameters.iter().position(|p| p.name == format!("slip.widths[{i}]")).unwrap();
+    for i in 1..10 {
+        let ratio = estimate.parameters[width(i)].std_error / estimate.parameters[width(0)].std_error;
+        assert!((ratio - (i as f64 + 1.0)).abs() < 1e-6, "{i}: {ratio}");
+        assert!((estimate.correlations[width(0)][width(i)] - 1.0).abs() < 1e-6, "{i}");
+    }
+    assert!(estimate.parameter("mass").is_none());
 }
 
 /// The printed widths and a bank of springs, each with a drive that lets all of them slip.
@@ -270,8 +289,9 @@ fn maxwell_slip_fits_its_own_record_to_the_noise() {
         let Base::MaxwellSlip(p) = &found.base else { panic!() };
         assert!(p.widths.len() <= elements && p.gains.iter().all(|g| *g > 0.0), "{p:?}");
         if reading == SlipReading::ElastoSlip {
-            agrees(&found, &truth, &samples, sigma);
+            agrees(&found, &truth, &samples, sigma, &[]);
         }
+        assert_eq!(found.estimate.fitted, 2 * p.widths.len());
     }
 }
 
@@ -300,6 +320,172 @@ fn the_exponent_of_bouc_wen_is_found_too() {
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
     let (samples, sigma) = record(&truth, 1e-3, 2000, &[23.0], drive, 2);
     let found = identified(Kind::BoucWen, &samples, &Form { bouc_wen_n: None, ..Form::default() }, "de");
-    agrees(&found, &truth, &samples, sigma);
+    agrees(&found, &truth, &samples, sigma, &[]);
     assert_eq!(found.estimate.parameter("n").unwrap().determined, Determined::Yes);
+}
+
+/// A drive with loops inside of loops.
+fn loops(t: f64) -> f64 {
+    50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos()
+}
+
+#[test]
+fn errors_belong_to_the_thresholds_in_whatever_order_a_search_ends() {
+    let truth = Base::Pi(PiParams { gain: 0.1, thresholds: vec![3.0, 15.0], weights: vec![0.05, 0.01] });
+    let (samples, sigma) = record(&truth, 1e-3, 3000, &[23.0], loops, 4);
+    let form = Form { elements: Some(2), ..Form::default() };
+    let family = family_of(Kind::Pi, &samples, largest_input(&samples), &form).unwrap();
+    let identification = Identification::new(family.as_ref(), &samples, false, "record").unwrap();
+    let one = located(&identification, &search("de", 2));
+    let mut other = one.clone();
+    other.values.reverse();
+    let [one, other] = [one, other].map(|at| identification.conclude(at));
+    agrees(&one, &truth, &samples, sigma, &[]);
+    assert_eq!(one.estimate, other.estimate);
+    // Another seed ends there too.
+    let again = located(&identification, &SearchOptions { seed: 4, ..search("de", 2) });
+    let again = identification.conclude(again);
+    for (p, q) in one.estimate.parameters.iter().zip(&again.estimate.parameters) {
+        assert!((p.std_error / q.std_error - 1.0).abs() < 1e-2, "{p:?} {q:?}");
+    }
+}
+
+#[test]
+fn a_parameter_that_is_zero_is_known_to_be_zero() {
+    let drive = |t: f64| 20.0 - 20.0 * (20.0 * std::f64::consts::PI * t).cos();
+    let tanh = ActivationParams { k0: 0.1461, alpha: 0.0, beta: 0.3857, gamma: 0.05 };
+    let alone = ActivationParams { k0: 0.0, ..tanh };
+    let straight = ActivationParams { beta: 0.0, ..tanh };
+    for (truth, zeros, undetermined) in [
+        (tanh, &["alpha"][..], &[][..]),
+        (alone, &["k0", "alpha"], &[]),
+        // That there is no activation is known, and of its shape nothing.
+        (straight, &["alpha"], &["gamma"]),
+    ] {
+        let (samples, sigma) = record(&Base::Tanh(truth), 1e-3, 2000, &[23.0], drive, 5);
+        let found = identified(Kind::Tanh, &samples, &Form::default(), "de");
+        agrees(&found, &Base::Tanh(truth), &samples, sigma, undetermined);
+        for name in zeros {
+            assert_eq!(found.estimate.parameter(name).unwrap().determined, Determined::NearZero, "{name}");
+        }
+    }
+    let memory = BoucWenParams { k0: 0.0, alpha: 0.05, beta: 0.02, gamma: 0.0, n: 1.0 };
+    let (samples, sigma) = record(&Base::BoucWen(memory), 1e-3, 3000, &[23.0], loops, 5);
+    let found = identified(Kind::BoucWen, &samples, &Form::default(), "de");
+    agrees(&found, &Base::BoucWen(memory), &samples, sigma, &[]);
+    for name in ["k0", "gamma"] {
+        assert_eq!(found.estimate.parameter(name).unwrap().determined, Determined::NearZero, "{name}");
+    }
+}
+
+#[test]
+fn what_follows_from_one_number_counts_once_and_what_is_at_a_bound_is_held() {
+    // Thresholds where the family has them.
+    let (low, high) = crate::samples::range((0..3000).map(|k| loops(f64::from(k) * 1e-3)));
+    let thresholds: Vec<f64> = (1..=4).map(|i| 0.5 * (high - low) * f64::from(i) / 5.0).collect();
+    let gap = 8.0;
+    let truth = Base::Gpi(GpiParams {
+        left: Curve::Linear { slope: 1.0, offset: -0.5 * gap },
+        right: Curve::Linear { slope: 1.1, offset: 0.5 * gap },
+        gain: 0.1,
+        thresholds,
+        weights: vec![0.03, 0.0, 0.02, 0.0],
+    });
+    let form = Form { elements: Some(4), ..Form::default() };
+    let mut held = 0;
+    for seed in 0..4 {
+        let (samples, sigma) = record(&truth, 1e-3, 3000, &[23.0], loops, seed);
+        let found = identified(Kind::Gpi, &samples, &form, "de");
+        let estimate = &found.estimate;
+        agrees(&found, &truth, &samples, sigma, &[]);
+        let error = |name: &str| estimate.parameter(name).unwrap().std_error;
+        assert!((error("left.linear.offset") / error("right.linear.offset") - 1.0).abs() < 1e-6);
+        // Slope and gap of the right side, gain, four weights.
+        assert_eq!(estimate.fitted, 7);
+        let Base::Gpi(p) = &found.base else { panic!() };
+        for (i, w) in p.weights.iter().enumerate() {
+            let name = format!("weights[{i}]");
+            assert_eq!(*w == 0.0, estimate.held.contains(&name) && estimate.parameter(&name).is_none(), "{name}: {w}");
+        }
+        held += estimate.held.len();
+    }
+    assert!(held > 0);
+}
+
+#[test]
+fn a_variable_that_ends_on_a_side_of_its_box_is_held_and_named() {
+    /// A family with other bounds of its first variable.
+    struct Within<'a>(Box<dyn Family + 'a>, f64, f64);
+    impl Family for Within<'_> {
+        fn variables(&self) -> Vec<crate::optimize::Variable> {
+            let mut list = self.0.variables();
+            (list[0].lower, list[0].upper) = (self.1, self.2);
+            list
+        }
+        fn linear(&self) -> Vec<Linear> {
+            self.0.linear()
+        }
+        fn columns(&self, values: &[f64], columns: &mut nalgebra::DMatrix<f64>) -> Result<(), Error> {
+            self.0.columns(values, columns)
+        }
+        fn base(&self, values: &[f64], linear: &[f64]) -> Base {
+            self.0.base(values, linear)
+        }
+    }
+    let ends = |kind: Kind, truth: &Base, form: &Form, low: f64, high: f64| {
+        let (samples, _) = record(truth, 1e-3, 2000, &[23.0], loops, 2);
+        let family = Within(family_of(kind, &samples, largest_input(&samples), form).unwrap(), low, high);
+        let identification = Identification::new(&family, &samples, false, "record").unwrap();
+        let found = identification.conclude(located(&identification, &search("de", family.variables().len())));
+        (found.ended.clone(), found.estimate)
+    };
+    let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
+    let (ended, estimate) = ends(Kind::BoucWen, &truth, &Form::default(), 0.03, 0.5);
+    let name = "beta |alpha|^(n-1)".to_owned();
+    assert_eq!(ended, [Ended { name, bound: 0.03, beyond: true }]);
+    // γ = β γ/β still has an error, β has none.
+    assert_eq!((&estimate.held[..], estimate.fitted), (&["beta".to_owned()][..], 4));
+    assert!(estimate.parameter("gamma").is_some() && estimate.parameter("beta").is_none());
+    // Inside of the box nothing is held.
+    let (ended, estimate) = ends(Kind::BoucWen, &truth, &Form::default(), 0.01, 0.5);
+    assert!(ended.is_empty() && estimate.held.is_empty());
+    // So is a threshold.
+    let tight = Base::Pi(PiParams { gain: 0.1, thresholds: vec![20.0], weights: vec![0.05] });
+    let form = Form { elements: Some(1), ..Form::default() };
+    let (ended, _) = ends(Kind::Pi, &tight, &form, 25.0, 30.0);
+    assert_eq!(ended, [Ended { name: "thresholds[0]".into(), bound: 25.0, beyond: true }]);
+}
+
+#[test]
+fn rows_that_repeat_others_add_nothing() {
+    let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
+    let (samples, _) = record(&truth, 1e-3, 400, &[23.0], |t| loops(7.0 * t), 3);
+    let held = |times: usize| {
+        let again = |x: &[f64]| x.iter().flat_map(|x| vec![*x; times]).collect::<Vec<f64>>();
+        let rows = times * samples.len();
+        Samples {
+            period: samples.period / times as f64,
+            time: (0..rows).map(|k| k as f64 * samples.period / times as f64).collect(),
+            input: again(&samples.input),
+            output: again(&samples.output),
+            temperature: samples.temperature.as_deref().map(again),
+            segments: std::slice::from_ref(&(0..rows)).to_vec(),
+            settling: vec![false; rows],
+            ..samples.clone()
+        }
+    };
+    let form = Form::default();
+    let family = family_of(Kind::BoucWen, &samples, largest_input(&samples), &form).unwrap();
+    let identification = Identification::new(family.as_ref(), &samples, false, "record").unwrap();
+    let at = located(&identification, &search("de", 2));
+    let once = identification.conclude(at.clone()).estimate;
+    for times in [10, 1000] {
+        let samples = held(times);
+        let family = family_of(Kind::BoucWen, &samples, largest_input(&samples), &form).unwrap();
+        let identification = Identification::new(family.as_ref(), &samples, false, "record").unwrap();
+        let estimate = identification.conclude(identification.polish(&at).unwrap()).estimate;
+        for (p, q) in once.parameters.iter().zip(&estimate.parameters) {
+            assert!((p.std_error / q.std_error - 1.0).abs() < 0.2, "{times}: {p:?} {q:?}");
+        }
+    }
 }

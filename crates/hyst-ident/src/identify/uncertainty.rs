@@ -1,10 +1,10 @@
 //! What the record says about each parameter, and what it cannot say.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
 
-use super::profile::Interval;
-
-/// A parameter that may be off by more than this share of its scale is not determined.
+/// A parameter that may be off by more than this share of its scale is not determined: the scale is half of where it may plausibly be.
 pub(super) const VAGUE: f64 = 0.5;
 /// An error of this share of its scale is a small one.
 const SOME: f64 = 0.05;
@@ -12,8 +12,6 @@ const SOME: f64 = 0.05;
 const ALONE: f64 = 20.0;
 /// Share of a direction's largest entry from which on a parameter takes part in a trade.
 const PART: f64 = 0.1;
-/// Lags over which the residual's correlation is summed.
-const LAGS: usize = 200;
 
 /// How well a parameter is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -21,12 +19,14 @@ const LAGS: usize = 200;
 pub enum Determined {
     /// The record determines it.
     Yes,
-    /// It is known, and known to be about zero: within two standard errors.
+    /// It is known, and known to be about zero: within two standard errors, which are small ones.
     NearZero,
     /// Only together with others: alone it would be known twenty times as well, and it may be off by more than a twentieth. What
     /// the model does with this record is known; this number is not.
     Together,
-    /// The record does not determine it: its standard error is more than half of its own size.
+    /// The record does not determine it: its standard error is more than half of a large change of it, whatever its own size; or more
+    /// than a twentieth, and it may as well be zero. A large change is half of the bounds of what is searched, at most a factor of e;
+    /// that of a weight or gain makes an output like the measured one, or one part of a curve the whole of it.
     No,
 }
 
@@ -65,6 +65,9 @@ pub struct Estimate {
     pub left: f64,
     /// By how much what is left is correlated: rows per independent one.
     pub rows_per_independent: f64,
+    /// Numbers that the fit has chosen, those at a bound with them and sensor zeros without. Where several parameters of a file follow
+    /// from one number, they are more than these.
+    pub fitted: usize,
     /// Parameters at a bound: they are held there, and have no error.
     pub held: Vec<String>,
     #[serde(skip)]
@@ -77,12 +80,20 @@ pub(crate) struct Evidence<'a> {
     pub(crate) parameters: Vec<(String, f64)>,
     /// The change of each that counts as a large one.
     pub(crate) scales: Vec<f64>,
-    /// `JᵀJ`, J the change of the output with each parameter, in units of its scale.
+    /// What the error of one that is not about zero is small beside, or not: its own size, or the curve that it is a part of.
+    pub(crate) sizes: Vec<f64>,
+    /// Change of each parameter with each unknown of the fit, both in units of their scales.
+    pub(crate) map: DMatrix<f64>,
+    /// `JᵀJ`, J the change of the output with each unknown, in units of its scale.
     pub(crate) normal: DMatrix<f64>,
-    /// Measured minus predicted output in the rows that were fitted.
-    pub(crate) residual: &'a [f64],
-    /// Unknowns of the fit.
+    /// What is left in the rows that were fitted.
+    pub(crate) noise: &'a Noise,
+    /// Unknowns of the fit that are not at a bound, sensor zeros with them.
     pub(crate) unknowns: usize,
+    /// Numbers that the fit has chosen.
+    pub(crate) fitted: usize,
+    /// What the standard error of each unknown is at least, in units of its scale, whatever the slope at the optimum says.
+    pub(crate) at_least: Vec<f64>,
     /// Parameters at a bound.
     pub(crate) held: Vec<String>,
 }
@@ -90,47 +101,52 @@ pub(crate) struct Evidence<'a> {
 impl Estimate {
     /// Standard errors from normal equations.
     ///
-    /// The covariance is `σ² κ (JᵀJ)⁻¹` with J the slopes of the output, σ² the mean square of what is left and κ its rows per
-    /// independent one.
+    /// The covariance of the unknowns is `σ² κ (JᵀJ)⁻¹` with J the slopes of the output, σ² the mean square of what is left and κ its
+    /// rows per independent one.
     pub(crate) fn of(evidence: Evidence<'_>) -> Self {
-        let Evidence { parameters: all, scales, normal, residual, unknowns, held } = evidence;
+        let Evidence { parameters: all, scales, sizes, map, mut normal, .. } = evidence;
+        let Evidence { noise, unknowns, fitted, at_least, held, .. } = evidence;
         let n = all.len();
-        let freedom = residual.len().saturating_sub(unknowns).max(1) as f64;
-        let squares: f64 = residual.iter().map(|r| r * r).sum();
-        let correlated = rows_per_independent(residual);
-        let variance = squares / freedom * correlated;
-
-        let eigen = SymmetricEigen::new(normal.clone());
-        let most = eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
-        // What the difference quotients cannot tell from nothing.
-        let floor = 1e-13 * most;
-        let mut covariance = DMatrix::zeros(n, n);
+        let variance = noise.variance(unknowns);
+        let (covariance, _) = inverse(&normal);
+        for (u, least) in at_least.iter().enumerate() {
+            let own = (variance * covariance[(u, u)]).sqrt();
+            if *least > own {
+                // As if the output changed so much less with it: correlations stay.
+                normal.row_mut(u).scale_mut(own / least);
+                normal.column_mut(u).scale_mut(own / least);
+            }
+        }
+        let (covariance, directions) = inverse(&normal);
+        let covariance = &map * covariance * map.transpose() * variance;
         let mut trade_offs = Vec::new();
-        for (i, value) in eigen.eigenvalues.iter().enumerate() {
-            let direction = eigen.eigenvectors.column(i);
-            let spread = variance / value.max(floor);
-            covariance += direction * direction.transpose() * spread;
-            let std_error = spread.sqrt();
+        for (direction, spread) in directions {
+            let direction = &map * direction;
             let largest = direction.iter().fold(0.0f64, |m, x| if x.abs() > m.abs() { *x } else { m });
-            if std_error * largest.abs() > SOME {
+            let std_error = (variance * spread).sqrt() * largest.abs();
+            if std_error > SOME {
                 let entries = direction.iter().zip(&all).filter(|(x, _)| x.abs() > PART * largest.abs());
                 let changes = entries.map(|(x, (name, _))| (name.clone(), x / largest)).collect();
-                trade_offs.push(TradeOff { changes, std_error: std_error * largest.abs() });
+                trade_offs.push(TradeOff { changes, std_error });
             }
         }
         trade_offs.sort_by(|a, b| b.std_error.total_cmp(&a.std_error));
         let size = |i: usize| covariance[(i, i)].max(0.0).sqrt();
-        // Standard error if all others were known.
-        let alone = |i: usize| (variance / normal[(i, i)].max(f64::MIN_POSITIVE)).sqrt();
+        // Standard error if each unknown that it follows from were found with all others known.
+        let alone = |i: usize| {
+            let of = |u: usize| map[(i, u)] * map[(i, u)] / normal[(u, u)].max(f64::MIN_POSITIVE);
+            (variance * (0..map.ncols()).map(of).sum::<f64>()).sqrt()
+        };
         let parameter = |i: usize| {
             let (name, value) = all[i].clone();
             let (share, std_error) = (size(i), size(i) * scales[i]);
-            let determined = if share > VAGUE {
+            let zero = value.abs() < 2.0 * std_error;
+            let determined = if share > VAGUE || (zero && share > SOME) {
                 Determined::No
-            } else if share > SOME && share > ALONE * alone(i) {
-                Determined::Together
-            } else if value.abs() < 2.0 * std_error {
+            } else if zero {
                 Determined::NearZero
+            } else if std_error > SOME * sizes[i] && share > ALONE * alone(i) {
+                Determined::Together
             } else {
                 Determined::Yes
             };
@@ -145,8 +161,9 @@ impl Estimate {
             parameters,
             correlations,
             trade_offs,
-            left: (squares / residual.len().max(1) as f64).sqrt(),
-            rows_per_independent: correlated,
+            left: noise.rms(),
+            rows_per_independent: noise.rows_per_independent,
+            fitted,
             covariance: natural,
             held,
         }
@@ -154,20 +171,8 @@ impl Estimate {
 
     /// Standard error of a quantity with this gradient with respect to [`parameters`](Self::parameters): a product, a ratio.
     pub fn std_error_of(&self, gradient: &[f64]) -> f64 {
-        let g = nalgebra::DVector::from_column_slice(gradient);
+        let g = DVector::from_column_slice(gradient);
         (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
-    }
-
-    /// Takes in what a section of the likelihood says of a searched parameter: one that is allowed up to a side of its bounds, or over
-    /// more than its own size, is not determined, whatever the slope at the optimum says.
-    pub(super) fn widen(&mut self, name: &str, interval: Interval) {
-        let Some(p) = self.parameters.iter_mut().find(|p| p.name == name) else { return };
-        let width = interval.high - interval.low;
-        // The interval is that of two standard errors to either side.
-        p.std_error = p.std_error.max(0.25 * width);
-        if width > 2.0 * p.value.abs() && interval.open {
-            p.determined = Determined::No;
-        }
     }
 
     /// The parameter of that name.
@@ -182,24 +187,182 @@ impl Estimate {
     }
 }
 
-/// `1 + 2 Σ ρₗ` over the first lags at which the correlation is clearly positive: by how much a mean over the rows varies more
-/// than if they were independent.
-fn rows_per_independent(residual: &[f64]) -> f64 {
+/// The inverse of normal equations, and its directions with their spreads. What difference quotients cannot tell from nothing is not
+/// determined, but not infinitely so.
+fn inverse(normal: &DMatrix<f64>) -> (DMatrix<f64>, Vec<(DVector<f64>, f64)>) {
+    let n = normal.nrows();
+    let eigen = SymmetricEigen::new(normal.clone());
+    let floor = 1e-13 * eigen.eigenvalues.amax().max(f64::MIN_POSITIVE);
+    let of = |i: usize| (eigen.eigenvectors.column(i).into_owned(), 1.0 / eigen.eigenvalues[i].max(floor));
+    let directions: Vec<_> = (0..n).map(of).collect();
+    let sum = directions.iter().fold(DMatrix::zeros(n, n), |sum, (d, spread)| sum + d * d.transpose() * *spread);
+    (sum, directions)
+}
+
+/// What a fit has left in the rows that it used, taken as noise.
+#[derive(Clone, Debug)]
+pub(crate) struct Noise {
+    squares: f64,
+    rows: usize,
+    /// By how much a mean over the rows varies more than if they were independent.
+    rows_per_independent: f64,
+}
+
+impl Noise {
+    /// Of measured minus predicted output, row after row; `lengths` of them belong to each segment.
+    pub(crate) fn of(residual: &[f64], lengths: &[usize]) -> Self {
+        Self {
+            squares: residual.iter().map(|r| r * r).sum(),
+            rows: residual.len(),
+            rows_per_independent: rows_per_independent(residual, lengths),
+        }
+    }
+
+    /// Variance that an independent row would need to make parameters as uncertain as these correlated ones do.
+    pub(crate) fn variance(&self, unknowns: usize) -> f64 {
+        self.squares / self.rows.saturating_sub(unknowns).max(1) as f64 * self.rows_per_independent
+    }
+
+    fn rms(&self) -> f64 {
+        (self.squares / self.rows.max(1) as f64).sqrt()
+    }
+}
+
+/// `1 + 2 Σ ρₗ` over the first lags at which the correlation within segments is clearly positive: more than two of its standard errors
+/// (Bartlett's), which grow with the correlations before. So ten rows in place of each one count for no more than that.
+fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
     let n = residual.len();
     let mean = residual.iter().sum::<f64>() / n.max(1) as f64;
-    let variance: f64 = residual.iter().map(|r| (r - mean) * (r - mean)).sum();
+    let mut planner = RealFftPlanner::new();
+    let mut products = vec![0.0; lengths.iter().copied().max().unwrap_or(0)];
+    let mut rest = residual;
+    for length in lengths {
+        let (own, others) = rest.split_at((*length).min(rest.len()));
+        rest = others;
+        autocorrelate(&mut planner, own, mean, &mut products);
+    }
+    let variance = products.first().copied().unwrap_or(0.0);
     if variance.is_nan() || variance <= 0.0 {
         return 1.0;
     }
-    let noise = 2.0 / (n as f64).sqrt();
-    let mut sum = 1.0;
-    for lag in 1..LAGS.min(n / 4) {
-        let products = residual.iter().zip(&residual[lag..]).map(|(a, b)| (a - mean) * (b - mean));
-        let rho = products.sum::<f64>() / variance;
-        if rho < noise {
+    let (mut sum, mut squares) = (1.0, 1.0);
+    for product in &products[1..] {
+        let rho = product / variance;
+        if rho < 2.0 * (squares / n as f64).sqrt() {
             break;
         }
         sum += 2.0 * rho;
+        squares += 2.0 * rho * rho;
     }
     sum
+}
+
+/// Adds the products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` of one segment, lag after lag.
+fn autocorrelate(planner: &mut RealFftPlanner<f64>, own: &[f64], mean: f64, products: &mut [f64]) {
+    if own.is_empty() {
+        return;
+    }
+    // Room for zeros: a transform goes round.
+    let length = (2 * own.len()).next_power_of_two();
+    let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let (mut time, mut spectrum) = (forward.make_input_vec(), forward.make_output_vec());
+    time.iter_mut().zip(own).for_each(|(x, r)| *x = r - mean);
+    if forward.process(&mut time, &mut spectrum).is_err() {
+        return;
+    }
+    spectrum.iter_mut().for_each(|x| *x = Complex::new(x.norm_sqr(), 0.0));
+    if back.process(&mut spectrum, &mut time).is_err() {
+        return;
+    }
+    for (product, x) in products.iter_mut().zip(&time).take(own.len()) {
+        *product += x / length as f64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// An autoregression over `rows`, each with the share `kept` of the one before, of variance 1.
+    fn correlated(rows: usize, kept: f64, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let mut x = normal();
+        (0..rows)
+            .map(|_| {
+                x = kept * x + (1.0 - kept * kept).sqrt() * normal();
+                x
+            })
+            .collect()
+    }
+
+    #[test]
+    fn independent_rows_count_one_by_one_and_an_autoregression_as_it_should() {
+        let white = Noise::of(&correlated(20_000, 0.0, 1), &[20_000]).rows_per_independent;
+        assert!((white - 1.0).abs() < 0.1, "{white}");
+        // (1 + r) / (1 − r), over lags far beyond two hundred.
+        for (kept, expected) in [(0.5, 3.0), (0.98, 99.0), (0.998, 999.0)] {
+            let found = Noise::of(&correlated(400_000, kept, 2), &[400_000]).rows_per_independent;
+            assert!((found / expected - 1.0).abs() < 0.25, "{kept}: {found}, {expected} expected");
+        }
+    }
+
+    #[test]
+    fn ten_rows_in_place_of_one_count_as_one() {
+        let slow = correlated(4000, 0.9, 3);
+        let once = Noise::of(&slow, &[4000]);
+        let held: Vec<f64> = slow.iter().flat_map(|x| [*x; 10]).collect();
+        let between = |k: usize| slow[k / 10] + (slow[(k / 10 + 1).min(3999)] - slow[k / 10]) * (k % 10) as f64 / 10.0;
+        let smooth: Vec<f64> = (0..40_000).map(between).collect();
+        for (what, finer) in [("held", held), ("on lines", smooth)] {
+            let finer = Noise::of(&finer, &[40_000]);
+            // Ten times the normal equations, and as certain as before.
+            let ratio = finer.variance(0) / 10.0 / once.variance(0);
+            assert!((ratio - 1.0).abs() < 0.2, "{what}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn segments_have_nothing_to_do_with_each_other() {
+        // Each segment has a level of its own: rows of one belong together, neighbours across a border do not.
+        let levels = correlated(400, 0.0, 4);
+        let rows: Vec<f64> = levels.iter().flat_map(|x| [*x; 50]).collect();
+        let found = Noise::of(&rows, &vec![50; 400]).rows_per_independent;
+        assert!((found / 50.0 - 1.0).abs() < 0.2, "{found}");
+    }
+
+    #[test]
+    fn what_a_section_says_of_an_unknown_reaches_all_that_follows_from_it() {
+        let noise = Noise::of(&correlated(1000, 0.0, 5), &[1000]);
+        let sigma = noise.variance(0).sqrt();
+        // Two unknowns of one standard error, correlated; the second parameter is the sum of both.
+        let of = |at_least: f64| {
+            Estimate::of(Evidence {
+                parameters: vec![("a".into(), 5.0), ("b".into(), 7.0)],
+                scales: vec![1.0, 2.0],
+                sizes: vec![5.0, 7.0],
+                map: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.5, 0.5]),
+                normal: DMatrix::from_row_slice(2, 2, &[1e4, 5e3, 5e3, 1e4]),
+                noise: &noise,
+                unknowns: 0,
+                fitted: 2,
+                at_least: vec![at_least, 0.0],
+                held: Vec::new(),
+            })
+        };
+        let (plain, wide) = (of(0.0), of(0.2));
+        let one = 0.01 * sigma / 0.75f64.sqrt();
+        let off = |estimate: &Estimate, expected: [f64; 2]| {
+            for (i, (p, expected)) in estimate.parameters.iter().zip(expected).enumerate() {
+                assert!((p.std_error / expected - 1.0).abs() < 1e-9, "{p:?}, {expected} expected");
+                let gradient = [f64::from(u8::from(i == 0)), f64::from(u8::from(i == 1))];
+                assert!((estimate.std_error_of(&gradient) / expected - 1.0).abs() < 1e-9, "{p:?}");
+            }
+        };
+        off(&plain, [one, one]);
+        off(&wide, [0.2, (0.04 + one * one - 0.2 * one).sqrt()]);
+        assert_eq!(plain.parameters, of(0.5 * one).parameters);
+    }
 }

@@ -50,6 +50,15 @@ impl Blocks {
     pub(crate) fn all_used<'a>(&'a self, samples: &'a Samples) -> impl Iterator<Item = usize> + 'a {
         (0..self.rows.len()).flat_map(|b| self.used(b, samples))
     }
+
+    /// How many of [`all_used`](Self::all_used) belong to each segment.
+    pub(crate) fn used_of_segments(&self, samples: &Samples) -> Vec<usize> {
+        let of = |segment: &Range<usize>| {
+            let own = (0..self.rows.len()).filter(|b| segment.contains(&self.rows[*b].start));
+            own.map(|b| self.used(b, samples).count()).sum()
+        };
+        samples.segments.iter().map(of).collect()
+    }
 }
 
 /// `XᵀX` of one set of rows, the target being X's last column.

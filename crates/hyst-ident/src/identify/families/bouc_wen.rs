@@ -62,12 +62,8 @@ impl Family for BoucWenFamily<'_> {
     /// γ is a part of β.
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         match (base, name) {
-            (Base::BoucWen(p), "gamma") => Some(p.beta),
+            (Base::BoucWen(p), "beta" | "gamma") => Some(p.beta),
             _ => None,
         }
-    }
-
-    fn identified(&self, name: &str) -> bool {
-        name != "n" || self.n.is_none()
     }
 }

@@ -66,16 +66,10 @@ impl Family for GpiFamily<'_> {
         Base::Gpi(self.params(values, linear[0], self.thresholds.clone(), linear[1..].to_vec()))
     }
 
-    /// The left side's slope and the thresholds are chosen, not identified.
-    fn identified(&self, name: &str) -> bool {
-        name != "left.linear.slope" && !name.starts_with("thresholds")
-    }
-
-    /// Weights are parts of one curve, offsets parts of the range.
+    /// Weights are parts of one curve.
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         match base {
             Base::Gpi(p) if name.starts_with("weights") => Some(p.gain.abs().max(p.weights.iter().sum())),
-            Base::Gpi(_) if name.ends_with("offset") => Some(largest_input(self.samples)),
             _ => None,
         }
     }

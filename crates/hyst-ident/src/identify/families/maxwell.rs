@@ -8,7 +8,7 @@ use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
 use crate::identify::family::{run, run_into};
-use crate::identify::{Family, Linear};
+use crate::identify::{Beside, Family, Linear};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
@@ -21,6 +21,8 @@ fn gains(count: usize) -> Vec<Linear> {
 pub(super) struct SlipFamily<'a> {
     samples: &'a Samples,
     widths: Vec<f64>,
+    /// Whether the record chose them.
+    chosen: bool,
     reading: SlipReading,
 }
 
@@ -39,8 +41,10 @@ impl<'a> SlipFamily<'a> {
         };
         let bank = |rows| Bank::new(samples, Vec::new(), even(samples, CANDIDATES, reading), &element, rows);
         let chosen = bank(choice::ROWS).at_most(elements).and_then(|widths| bank(fit::ROWS).from(widths));
-        let widths = chosen.filter(|w| !w.is_empty()).unwrap_or_else(|| even(samples, elements, reading));
-        Self { samples, widths, reading }
+        let chosen = chosen.filter(|w| !w.is_empty());
+        let is_chosen = chosen.is_some();
+        let widths = chosen.unwrap_or_else(|| even(samples, elements, reading));
+        Self { samples, widths, chosen: is_chosen, reading }
     }
 }
 
@@ -76,6 +80,10 @@ impl Family for SlipFamily<'_> {
             widths: self.widths.clone(),
             gains: linear.to_vec(),
         })
+    }
+
+    fn beside(&self, name: &str) -> Beside {
+        if self.chosen && name.starts_with("widths") { Beside::Chosen } else { Beside::Nothing }
     }
 
     /// Gains are parts of one curve, widths have their places along it.
@@ -169,9 +177,16 @@ impl Family for TdEmFamily<'_> {
         Base::TdEm(self.params(values, linear.to_vec()))
     }
 
-    /// What belongs to the electrical and mechanical side is given.
-    fn identified(&self, name: &str) -> bool {
-        name.starts_with("slip") || name.starts_with("coupling")
+    /// The products ψ R gᵢ are known, neither ψ nor a gain alone.
+    fn beside(&self, name: &str) -> Beside {
+        if name == "coupling[0]" { Beside::Convention } else { Beside::Nothing }
+    }
+
+    fn given(&self) -> Option<String> {
+        let degc = self.reference_degc;
+        Some(format!(
+            "capacitance, resistance, mass, stiffness, damping and the coupling at {degc:.1} °C are those of the printed tube"
+        ))
     }
 
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {

@@ -58,6 +58,10 @@ impl Family for PiFamily<'_> {
         Base::Pi(PiParams { gain: linear[0], thresholds: Self::thresholds(values), weights })
     }
 
+    fn in_order(&self, values: &mut [f64]) {
+        values.sort_by(f64::total_cmp);
+    }
+
     /// Weights are parts of one curve.
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         match base {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use super::largest_input;
 use crate::Samples;
 use crate::identify::family::run_into;
-use crate::identify::{Family, Linear};
+use crate::identify::{Beside, Family, Linear};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
@@ -67,6 +67,10 @@ impl Family for TdPiFamily<'_> {
 
     fn base(&self, values: &[f64], linear: &[f64]) -> Base {
         Base::TdPi(self.params(values, linear[0]))
+    }
+
+    fn beside(&self, name: &str) -> Beside {
+        if name == "alpha" { Beside::Convention } else { Beside::Nothing }
     }
 
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
