@@ -25,6 +25,8 @@ pub use findings::{
     Alternative, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
 };
 
+use std::collections::BTreeMap;
+
 use crate::base::{Basis, DragParams, ScreeningBasis};
 use crate::fit::{BLOCKS, FitError, FitOptions, basis_of, check, fit_settled, to_model};
 use crate::lsq::Blocks;
@@ -130,12 +132,17 @@ pub fn diagnose(
     } else {
         let own_blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
         let own_problem = Problem::new(&samples, own.as_ref(), &own_blocks, per_record);
+        let stop_found = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
+        if let Some(own) =
+            stop_found.then(|| shape::own_stop(&own_problem, &hypothesis)).transpose().map_err(stage)?.flatten()
+        {
+            errors.extend(of_stage(Effect::Saturation, uncertainty::standard_errors(&own, samples.time[0])));
+            hypothesis = own.hypothesis;
+        }
         shape::shape(&own_problem, &hypothesis, richest, found.noise, options.seed).map_err(stage)?
     };
     if let Some(shape) = shape {
-        let own_errors = uncertainty::standard_errors(&shape.fit, samples.time[0]);
-        let of_shape = |key: &String| key.split('.').next() == Some(shape.named.effect.name());
-        errors.extend(own_errors.into_iter().filter(|(key, _)| of_shape(key)));
+        errors.extend(of_stage(shape.named.effect, uncertainty::standard_errors(&shape.fit, samples.time[0])));
         hypothesis = shape.hypothesis;
         found.named.push(shape.named);
         found.named.sort_by_key(|n| n.effect);
@@ -212,9 +219,15 @@ pub fn diagnose(
     Ok(Diagnosis { extended, findings, pictures, breakdowns })
 }
 
-/// Whether the second simulation errs less than the first, over the rows that count in both.
+/// The errors of one effect's parameters.
+fn of_stage(effect: Effect, errors: BTreeMap<String, f64>) -> impl Iterator<Item = (String, f64)> {
+    errors.into_iter().filter(move |(key, _)| key.split('.').next() == Some(effect.name()))
+}
+
+/// Whether the second simulation errs less than the first, over the rows that count for the search: a model that misses a stop, say,
+/// takes the rows on it for a start-up.
 fn follows_better(samples: &Samples, before: &Simulation, after: &Simulation) -> bool {
-    let rows = || (0..samples.len()).filter(|k| !before.settling[*k] && !after.settling[*k]);
+    let rows = || (0..samples.len()).filter(|k| !samples.settling[*k]);
     let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
     squares(after) < squares(before)
 }

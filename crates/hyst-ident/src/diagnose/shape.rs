@@ -57,15 +57,8 @@ pub(super) fn shape(
         tried.extend(Trial::of(problem, bent).map(|t| (Effect::Asymmetry, t)));
     }
     if found.effects.saturation.is_none() {
-        for stop in starts::stops(problem.samples, &plain.fit) {
-            let mut h = found.clone();
-            h.effects.saturation = Some(stop);
-            let fitted = problem.fit(&h)?.and_then(|f| {
-                // Everything else as it was found: on this coarser base it would take up the misfit.
-                h.effects.saturation = f.hypothesis.effects.saturation;
-                problem.fit_linear(&h).ok().flatten()
-            });
-            tried.extend(fitted.and_then(|f| Trial::of(problem, f)).map(|t| (Effect::Saturation, t)));
+        for fitted in stopped(problem, found, &plain.fit)? {
+            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t)));
         }
     }
     let judged: Vec<_> = tried
@@ -104,6 +97,29 @@ pub(super) fn shape(
             },
         }
     }))
+}
+
+/// Fits of the own base with a stop, from several beginnings. Everything else stays as it was found: on this coarser base it would take
+/// up the misfit.
+fn stopped(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Vec<Fitted>, Error> {
+    let mut fits = Vec::new();
+    let begin = found.effects.saturation.into_iter().chain(starts::stops(problem.samples, plain));
+    for stop in begin.chain(starts::stops_above_rest(problem.samples, plain)) {
+        let mut h = found.clone();
+        h.effects.saturation = Some(stop);
+        fits.extend(problem.fit(&h)?.and_then(|f| {
+            h.effects.saturation = f.hypothesis.effects.saturation;
+            problem.fit_linear(&h).ok().flatten()
+        }));
+    }
+    Ok(fits)
+}
+
+/// Where the own base meets a stop that the rich one has found: what lies behind a stop is hidden, and each base fills it in its own way.
+pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
+    let Some(plain) = problem.fit_linear(found)? else { return Ok(None) };
+    let fits = stopped(problem, found, &plain)?;
+    Ok(fits.into_iter().filter(|f| f.squares < plain.squares).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
 /// Dead zones spread evenly over the operator's output, moving away from zero.

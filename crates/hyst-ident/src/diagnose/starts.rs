@@ -84,6 +84,13 @@ pub(super) fn stops(samples: &Samples, from: &Fitted) -> [SaturationParams; 2] {
     [SaturationParams { low: high - far, high, knee: 0.01 }, SaturationParams { low, high: low + far, knee: 0.01 }]
 }
 
+/// Lower stops under which the device rests: it only shows its motion once it has gone that far.
+pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> [SaturationParams; 3] {
+    let [_, lower] = stops(samples, from);
+    let span = samples.output_span();
+    [0.03, 0.1, 0.25].map(|share| SaturationParams { low: lower.low + share * span, ..lower })
+}
+
 /// How far away, in spans of the output, a stop is that nothing reaches.
 const FAR_STOP: f64 = 3.0;
 
