@@ -11,6 +11,9 @@ use std::time::Instant;
 const ROWS: usize = 5000;
 const CANDIDATES: usize = 96;
 
+/// How much faster side by side has to be.
+const LEAST: f64 = 4.0;
+
 struct Data {
     rows: Vec<Row>,
     output: Vec<f64>,
@@ -119,9 +122,11 @@ fn candidates(c: &mut Criterion) {
     group.finish();
 
     println!("\n| model | one at a time [ns] | eight side by side [ns] | ratio |\n|---|---|---|---|");
-    for (name, single, side) in report {
+    for (name, single, side) in &report {
         println!("| {name} | {single:.2} | {side:.2} | {:.1} |", single / side);
     }
+    let slowest = report.iter().map(|(_, single, side)| single / side).fold(f64::INFINITY, Real::at_most);
+    assert!(slowest >= LEAST, "side by side has to be at least {LEAST} times as fast");
 }
 
 criterion_group!(benches, candidates);

@@ -76,9 +76,22 @@ fn shows_the_lag(record: &Record) -> Diagnosis {
 
 #[test]
 fn slow_and_fast_sample_rates() {
-    for (rate_hz, seconds) in [(200.0, 36.0), (5000.0, 18.0), (50_000.0, 11.0)] {
+    for (rate_hz, seconds) in [(200.0, 36.0), (5000.0, 10.5)] {
         shows_the_lag(&record_at(&lagging(), rate_hz, seconds, OutputUnit::Micrometre));
     }
+    // Two seconds at 50 kHz: decaying loops, fast ones, stairs.
+    let mut plant = Plant::new(lagging()).unwrap();
+    let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
+    let row = |seconds: f64, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        (0..(seconds * 5e4) as usize).map(|k| high * f(k as f64 / 5e4)).collect()
+    };
+    let wave = |hz: f64, t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * hz * t).cos();
+    let decaying = row(1.0, &|t| wave(6.0, t) * (1.0 - 0.8 * t));
+    let fast = row(0.5, &|t| wave(2.0, t) * (0.6 + 0.4 * (std::f64::consts::TAU * 45.0 * t).sin()));
+    let stairs =
+        row(0.5, &|t| 0.2 + 0.6 * ((7.3 * (8.0 * t).floor()).sin() * 0.5 + 0.5) * (8.0 * t).fract().min(0.2) / 0.2);
+    let segments = [decaying.as_slice(), &fast, &stairs];
+    shows_the_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
 }
 
 #[test]

@@ -55,6 +55,16 @@ fn tell_oddities(record: &Record) {
     }
 }
 
+/// Whether a test record is one of the training's files, byte for byte.
+pub(crate) fn is_trained_on(test: &Record, train: &Record) -> bool {
+    let sums = |record: &Record| record.sources().iter().filter_map(|s| s.sha256.clone()).collect::<Vec<_>>();
+    sums(test).iter().any(|sum| sums(train).contains(sum))
+}
+
+/// What is said of such a test record.
+pub(crate) const TRAINED_ON: &str =
+    "note: the test record is one of those that were fitted; its errors say nothing about new data";
+
 /// A model and the text of its file.
 pub(crate) fn model(path: &Path) -> CommandResult<(Model, String)> {
     let name = path.display().to_string();

@@ -163,27 +163,26 @@ pub enum FitError {
         /// What to do.
         advice: &'static str,
     },
+    /// More elements than a model can have, or none.
+    #[error("{elements} elements: a model has 1 to {most}")]
+    Elements {
+        /// What was asked for.
+        elements: usize,
+        /// The most.
+        most: usize,
+    },
     /// First-order descent curves that give no surface.
     #[error(transparent)]
     Everett(#[from] crate::everett::EverettError),
     /// A model does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// This version cannot identify such a model from a record.
-    #[error("{what} cannot be {done} by this version; {}", fitted_kinds())]
-    Unsupported {
-        /// Kind of model, or a stage.
-        what: &'static str,
-        /// What cannot be done with it.
-        done: &'static str,
+    /// A base that is not linear in its weights.
+    #[error("{kind} is no sum of columns with weights: its parameters are searched")]
+    NoBasis {
+        /// The kind of model.
+        kind: &'static str,
     },
-}
-
-/// Kinds of models that a fit of this version can identify.
-pub const FITTED: [Kind; 16] = Kind::ALL;
-
-fn fitted_kinds() -> String {
-    format!("it fits {}", FITTED.map(Kind::name).join(", "))
 }
 
 pub use options::{FitOptions, Optimizer, VariableBounds};
@@ -292,7 +291,7 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitErr
     Ok(match kind {
         Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
         Kind::Preisach => BasisOf::Preisach(PreisachBasis::for_samples(samples, CELLS)),
-        other => return Err(FitError::Unsupported { what: other.name(), done: "fitted" }),
+        other => return Err(FitError::NoBasis { kind: other.name() }),
     })
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use hyst_ident::fit::{FITTED, FitOptions};
+use hyst_ident::fit::FitOptions;
 use hyst_ident::model::Kind;
 
 use super::help::{COMPARE, RECORDS};
@@ -69,12 +69,12 @@ impl FromStr for Kinds {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "all" {
-            return Ok(Self(FITTED.to_vec()));
+            return Ok(Self(Kind::ALL.to_vec()));
         }
         let mut kinds = Vec::new();
         for name in text.split(',') {
-            let known = name.trim().parse::<Kind>().ok().filter(|kind| FITTED.contains(kind));
-            let all = || FITTED.map(Kind::name).join(", ");
+            let known = name.trim().parse::<Kind>().ok();
+            let all = || Kind::ALL.map(Kind::name).join(", ");
             let kind =
                 known.ok_or_else(|| format!("{:?} is no kind of model: give all, or some of {}", name, all()))?;
             if !kinds.contains(&kind) {

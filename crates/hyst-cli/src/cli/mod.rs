@@ -14,7 +14,6 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use hyst_ident::export::CName;
-use hyst_ident::fit::FITTED;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
 
@@ -340,7 +339,7 @@ impl ZeroArg {
 }
 
 fn kinds() -> impl TypedValueParser<Value = Kind> {
-    PossibleValuesParser::new(FITTED.map(Kind::name)).try_map(|name| name.parse::<Kind>())
+    PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| name.parse::<Kind>())
 }
 
 #[cfg(test)]

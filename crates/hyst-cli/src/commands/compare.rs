@@ -29,6 +29,9 @@ struct Summary {
     unit: String,
     zero: Zero,
     seed: u64,
+    /// Whether the test record is one of the training's.
+    #[serde(skip)]
+    trained_on: bool,
     #[serde(flatten)]
     comparison: Comparison,
 }
@@ -41,6 +44,10 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let report = Report::new(args.json.json, &written)?;
     let train = input::training(&args.train, &args.map.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let trained_on = test.as_ref().is_some_and(|test| input::is_trained_on(test, &train));
+    if trained_on {
+        output::say(input::TRAINED_ON);
+    }
     let zero = args.zero.get();
     let options = args.options(zero == Zero::PerRecord);
 
@@ -74,6 +81,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
         unit: train.output_unit().map_or("", |unit| unit.suffix()).to_owned(),
         zero,
         seed: args.seed,
+        trained_on,
         comparison,
     };
     report.print(&summary.text(), &summary)
@@ -95,6 +103,7 @@ impl Summary {
         lines.push(String::new());
         lines.push(table(&self.comparison, unit));
         lines.push(match self.comparison.sorted_by {
+            SortedBy::TestRmse if self.trained_on => "sorted by RMSE on a record that the models were fitted to".to_owned(),
             SortedBy::TestRmse => "sorted by RMSE on the test record, which no model was fitted to".to_owned(),
             SortedBy::TrainRmse => {
                 "sorted by RMSE on the training record, of which more parameters always leave less; --test RECORD shows what holds"

@@ -76,9 +76,8 @@ fn warn(model: &Model, train: &Record, test: Option<&Record>) {
         let names = text::listed(&strange);
         say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
     }
-    let sha = test.and_then(|record| record.sources()[0].sha256.as_deref());
-    if sha.is_some_and(|sha| fitted(sha) || train.sources().iter().any(|source| source.sha256.as_deref() == Some(sha)))
-    {
-        say("note: the test record is one of those that were fitted; its errors say nothing about new data");
+    let of_model = |test: &Record| test.sources().iter().any(|s| s.sha256.as_deref().is_some_and(fitted));
+    if test.is_some_and(|test| of_model(test) || input::is_trained_on(test, train)) {
+        say(input::TRAINED_ON);
     }
 }

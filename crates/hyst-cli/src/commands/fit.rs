@@ -184,13 +184,18 @@ fn identify(
     if args.as_measured && !fod {
         return Err(CommandError::bad_input("--as-measured is about a measured surface; add --from fod"));
     }
+    if fod && !options.convex() {
+        return Err(CommandError::bad_input(
+            "--from fod reads the surface off the curves, there is nothing to search: leave --optimizer out",
+        ));
+    }
     if fod {
         let options = FodOptions { as_measured: args.as_measured, seed: options.seed, cells: None };
         let found = fit_fod(record, &options)?;
         let fit = Fit::at_once(found.model, "a surface measured from first-order descent curves");
         return Ok(Identified { fit, surface: Some(found.report), dynamics: None });
     }
-    if args.model == Kind::Dpm {
+    if args.model == Kind::Dpm && options.convex() {
         let found = fit_dpm(record, options)?;
         let dynamics = Some(found.report.clone());
         return Ok(Identified { fit: found.into(), surface: None, dynamics });

@@ -15,9 +15,12 @@ use crate::base::PreisachBasis;
 use crate::lsq::Blocks;
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::samples::Samples;
+use crate::settle::start_up_rows;
 
 /// An RMSE of this many noise floors counts as the floor.
 pub(super) const AT_FLOOR: f64 = 1.3;
+/// An RMSE of this many noise floors leaves a finer base nothing to find.
+const NOTHING_LEFT: f64 = 1.1;
 /// Error from which on the finer base is the better one.
 const BETTER: f64 = 0.9;
 /// Cells along an edge of the triangle.
@@ -53,12 +56,19 @@ pub(super) fn refine(
         cv_rmse: trial.cv_rmse(),
     };
     // The triangle has no drag.
-    if found.best.cv_rmse() <= AT_FLOOR * found.noise || found.best.fit.hypothesis.drag.is_some() {
+    if found.best.cv_rmse() <= NOTHING_LEFT * found.noise || found.best.fit.hypothesis.drag.is_some() {
         return Ok(of(&found.best));
     }
     let blocks = Blocks::new(samples, problem.blocks.rows.len(), ROWS);
     let basis = PreisachBasis::for_samples(samples, CELLS);
-    let triangle = Problem::new(samples, &basis, &blocks, problem.zero_per_file);
+    let mut settled = samples.clone();
+    let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file);
+    let Some(rough) = first.fit_linear(&found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
+    // A triangle that keeps every turn in its memory also shows how long an unknown start lasts.
+    let starting = start_up_rows(samples, &first.residual(&rough)?);
+    settled.settling.iter_mut().zip(starting).for_each(|(known, starts)| *known |= starts);
+    drop(first);
+    let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file);
     let fitted = |h: &Hypothesis| Ok::<_, Error>(triangle.fit(h)?.and_then(|f| Trial::of(&triangle, f)));
     let Some(mut best) = fitted(&found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
     if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
@@ -102,7 +112,8 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
             let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
                 == other.hypothesis.without(Cause::Effect(other.effect)).causes();
             let near = other.tie || (other.judgement.accepted() && other.cv_rmse <= NEAR * found.named[n].cv_with);
-            if !near || !stands {
+            // In one loop no base can tell what is late from what is late otherwise.
+            if !near || !stands || triangle.only_loop.is_some() {
                 continue;
             }
             let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };

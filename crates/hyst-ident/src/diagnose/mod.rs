@@ -153,12 +153,23 @@ pub fn diagnose(
     if hypothesis.causes().iter().filter_map(|c| c.effect()).ne(start.causes().iter().filter_map(|c| c.effect())) {
         // The effects keep the parameters that the rich base gave them: refitted on a coarser base
         // they would take up its misfit. Only the base's weights and the zero are solved again.
-        let motion_only = without_sensor_effects(&samples, &hypothesis);
-        let final_blocks = Blocks::new(&samples, BLOCKS, FINAL_ROWS);
-        let final_problem = Problem::new(&motion_only, own.as_ref(), &final_blocks, per_record);
+        let mut motion_only = without_sensor_effects(&samples, &hypothesis);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
-        let fit = final_problem.fit_linear(&moving).map_err(stage)?.ok_or_else(unsolvable)?;
+        // What was a start-up for the model as it was need be none for the extended one.
+        motion_only.settling.clone_from(&before.settling);
+        let final_blocks = Blocks::new(&motion_only, BLOCKS, FINAL_ROWS);
+        let fitted = |motion: &Samples| {
+            let problem = Problem::new(motion, own.as_ref(), &final_blocks, per_record);
+            let fit = problem.fit_linear(&moving).map_err(stage)?.ok_or_else(unsolvable)?;
+            let starting = start_up_rows(motion, &problem.residual(&fit).map_err(stage)?);
+            Ok::<_, FitError>((fit, starting))
+        };
+        let (mut fit, starting) = fitted(&motion_only)?;
+        if starting != motion_only.settling {
+            motion_only.settling = starting;
+            fit = fitted(&motion_only)?.0;
+        }
         // Its reach is that of the motion, not of the sensor.
         extended = to_model(train, &motion_only, &own, &fit, model.seed);
         extended.effects.drift = hypothesis.effects.drift;
@@ -177,7 +188,7 @@ pub fn diagnose(
     let mut remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
     if let (Some(hz), false) = (only_loop, remainder.kind == RemainderKind::None) {
         remainder.description += &format!(
-            "; the record repeats one loop at {hz:.4} Hz, in which delay, lag, rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape: drive several frequencies and amplitudes"
+            "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
         );
     }
     if !useless.is_empty() {
@@ -268,10 +279,9 @@ fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
         Cause::Effect(Effect::Temperature) => varies(&problem.samples.temperature, 0.5),
         Cause::Effect(Effect::Load) => varies(&problem.samples.load, 0.0),
         Cause::Effect(Effect::RateDependence) => problem.basis.drags() && problem.only_loop.is_none(),
-        // What only changes a loop's shape is no more visible in one loop than the hysteresis has a known shape.
-        Cause::Effect(Effect::Delay | Effect::Lag | Effect::Resonance | Effect::Saturation | Effect::Asymmetry) => {
-            problem.only_loop.is_none()
-        }
+        // What changes one loop's shape may as well be a hysteresis of that shape. That the output turns after the drive does is none:
+        // of what is late, the simplest stands for all.
+        Cause::Effect(Effect::Resonance | Effect::Saturation | Effect::Asymmetry) => problem.only_loop.is_none(),
         _ => true,
     }
 }

@@ -9,6 +9,8 @@ use crate::simulate::Simulation;
 
 /// A richer base that takes this share of the variance above the floor shows a lack of capacity.
 const RICHER: f64 = 0.5;
+/// Share that counts as nearly all.
+const NEARLY_ALL: f64 = 0.9;
 /// Share from which on what a richer base takes is told.
 const MENTIONED: f64 = 0.1;
 
@@ -48,8 +50,8 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     let above = (rmse * rmse - noise2).max(f64::MIN_POSITIVE);
     let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
     let map = "a map of the input's history that this base is too coarse for";
-    let (kind, rest) = if taken >= RICHER && richest <= AT_FLOOR * found.noise {
-        (RemainderKind::BaseCapacity, format!("all of it is {map}"))
+    let (kind, rest) = if taken >= NEARLY_ALL || (taken >= RICHER && richest <= AT_FLOOR * found.noise) {
+        (RemainderKind::BaseCapacity, format!("nearly all of it is {map}"))
     } else if taken >= RICHER {
         let rest = format!(
             "{:.0} % of its variance is {map}; the rest stands above the noise floor of {:.2} % too, and no effect of the list explains it",

@@ -12,6 +12,8 @@ use crate::noise::{noise_floor, quantisation};
 
 /// Sets of effects carried from one round to the next.
 const BEAM: usize = 2;
+/// Error, over that of what is named, up to which what is late otherwise is alike in one loop.
+const ALIKE: f64 = 1.1;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -212,7 +214,14 @@ fn swaps(
     let mut better: Option<Trial> = None;
     for cause in candidates_for_removal(best, already) {
         let Some(without) = judge.refit(&best.fit.hypothesis.without(cause))? else { continue };
-        let others: Vec<Cause> = candidates(judge.problem, &without.fit).into_iter().filter(|c| *c != cause).collect();
+        let mut others = candidates(judge.problem, &without.fit);
+        let one_loop = judge.problem.only_loop.is_some() && is_late(cause);
+        if one_loop {
+            let also = [Effect::RateDependence, Effect::Resonance].map(Cause::Effect);
+            let drags = |c: &Cause| *c != Cause::Effect(Effect::RateDependence) || judge.problem.basis.drags();
+            others.extend(also.into_iter().filter(|c| without.fit.hypothesis.has_room(*c) && drags(c)));
+        }
+        others.retain(|c| *c != cause);
         let trials: Vec<Result<Option<Trial>, Error>> =
             others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
         let mut instead = Vec::new();
@@ -220,7 +229,9 @@ fn swaps(
             let Some(trial) = trial? else { continue };
             let judgement = judge.judge(&without, &trial);
             let accepted = judgement.accepted();
-            let tie = judgement.sensible && tie(judge, best, &trial);
+            // In one loop all that is late is alike.
+            let alike = one_loop && is_late(*other) && trial.cv_rmse() < ALIKE * best.cv_rmse();
+            let tie = judgement.sensible && (alike || tie(judge, best, &trial));
             let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
             let simpler = accepted && tie && other.complexity() < cause.complexity();
@@ -242,6 +253,12 @@ fn swaps(
         }
     }
     Ok((better, named))
+}
+
+/// Whether a cause makes the output turn after the drive does.
+fn is_late(cause: Cause) -> bool {
+    let late = [Effect::Delay, Effect::Lag, Effect::RateDependence, Effect::Resonance];
+    cause.effect().is_some_and(|e| late.contains(&e))
 }
 
 /// Whether the record cannot tell two sets apart: what separates them is small against the noise, or neither is better in nearly

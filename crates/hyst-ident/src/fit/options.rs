@@ -83,7 +83,7 @@ pub struct FitOptions {
 
 impl FitOptions {
     /// Whether weights are to be solved for without a search, where that is possible.
-    pub(super) fn convex(&self) -> bool {
+    pub fn convex(&self) -> bool {
         matches!(self.optimizer, Optimizer::Auto | Optimizer::Convex)
     }
 
@@ -91,8 +91,11 @@ impl FitOptions {
     ///
     /// # Errors
     /// [`FitError::Thresholds`] if there are no thresholds to choose, [`FitError::UnknownBounds`] if there are bounds where nothing is
-    /// searched.
+    /// searched, [`FitError::Elements`] if a model cannot have that many.
     pub fn suits(&self, kind: Kind) -> Result<(), FitError> {
+        if let Some(elements) = self.form.elements.filter(|n| !(1..=PLAYS).contains(n)) {
+            return Err(FitError::Elements { elements, most: PLAYS });
+        }
         if let (true, Some(bound)) = (self.convex() && CONVEX.contains(&kind), self.bounds.first()) {
             let (name, names) = (bound.name.clone(), "nothing".into());
             return Err(FitError::UnknownBounds { name, kind: kind.name(), names });

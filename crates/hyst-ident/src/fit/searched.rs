@@ -122,13 +122,10 @@ impl<'a> Setup<'a> {
         'a: 's,
     {
         let Self { kind, options, largest, .. } = *self;
-        if matches!(kind, Kind::Preisach | Kind::Dpm) {
-            let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
-            return Err(FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice });
-        }
         let form = Form { between_samples: Some(between), ..options.form };
-        let unsupported = FitError::Unsupported { what: kind.name(), done: "fitted" };
-        let family = Bounded { family: family_of(kind, samples, largest, &form).ok_or(unsupported)?, options };
+        let advice = "it is linear in all its parameters, there is nothing to search: use auto or convex";
+        let linear = || FitError::Optimizer { kind: kind.name(), optimizer: "a search".into(), advice };
+        let family = Bounded { family: family_of(kind, samples, largest, &form).ok_or_else(linear)?, options };
         let variables = family.variables();
         let unknowns = variables.len() + family.linear().len() + 1;
         let (settled, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * unknowns);

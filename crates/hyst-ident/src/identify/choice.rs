@@ -13,6 +13,8 @@ use crate::Samples;
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::nested::folds_interleaved;
 
+/// Share of the largest element's motion below which an element is no candidate.
+const STANDS_STILL: f64 = 0.02;
 /// Candidates over the range in which elements can be told apart.
 pub(crate) const CANDIDATES: usize = 64;
 /// Rows that a choice looks at; the last slide sees more.
@@ -87,6 +89,16 @@ impl<'a> Bank<'a> {
         bounds.resize(columns.len(), Bounds::FREE);
         let always = columns.iter().map(|c| rows.iter().map(|k| c[*k]).collect()).collect();
         let folds = folds_interleaved(&cut, FOLDS);
+        // One that hardly moves in the rows that count cannot be told from the sensor's zero.
+        let moves = |place: &f64| {
+            let column = element(*place);
+            let (low, high) = crate::samples::range(rows.iter().map(|k| column[*k]));
+            high - low
+        };
+        let moves: Vec<f64> = candidates.iter().map(moves).collect();
+        let enough = STANDS_STILL * moves.iter().fold(0.0, |m: f64, x| m.max(*x));
+        let candidates =
+            candidates.into_iter().zip(moves).filter(|(_, moves)| *moves > enough).map(|(c, _)| c).collect();
         Self { samples, element, always, bounds, candidates, rows, blocks, folds }
     }
 

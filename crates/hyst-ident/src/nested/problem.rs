@@ -34,8 +34,6 @@ pub(crate) struct Problem<'a> {
     unpredictable: OnceLock<Vec<bool>>,
 }
 
-/// Variance of a column over its mean square below which it stands still.
-const CONSTANT: f64 = 1e-6;
 /// Folds of the cross-validation.
 const FOLDS: usize = 8;
 
@@ -66,23 +64,12 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
         let width = basis.len();
         let mut raw = may_be_kept(samples, width).then(|| Vec::with_capacity(width));
-        let (mut squares, mut constant) = (0.0, Vec::new());
-        basis.columns(&samples.input, &samples.segments, &Drag::NONE, &mut |c, column| {
-            let (mut n, mut sum, mut own) = (0.0, 0.0, 0.0);
-            for k in blocks.all_used(samples) {
-                (n, sum, own) = (n + 1.0, sum + column[k], own + column[k] * column[k]);
-            }
-            squares += own;
-            if own - sum * sum / f64::max(n, 1.0) <= CONSTANT * own {
-                constant.push((c, own));
-            }
+        let mut squares = 0.0;
+        basis.columns(&samples.input, &samples.segments, &Drag::NONE, &mut |_, column| {
+            squares += blocks.all_used(samples).map(|k| column[k] * column[k]).sum::<f64>();
             raw.iter_mut().for_each(|raw| raw.push(column.to_vec()));
         });
-        let mut penalty = basis.penalty(squares / width.max(1) as f64);
-        // What stands still over all rows that count looks like the sensor's zero: nothing there says how large it is.
-        for (c, own) in constant {
-            penalty.iter_mut().for_each(|p| p[(c, c)] += own);
-        }
+        let penalty = basis.penalty(squares / width.max(1) as f64);
         let only_loop = only_loop(samples);
         let unpredictable = OnceLock::new();
         Self { samples, basis, blocks, zero_per_file, raw, width, penalty, only_loop, unpredictable }

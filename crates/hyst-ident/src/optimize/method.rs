@@ -124,6 +124,14 @@ impl Method {
         self
     }
 
+    /// Members, particles or wolves that it starts with.
+    pub fn members(&self, dimensions: usize, evaluations: u64) -> usize {
+        match *self {
+            Self::Shade { population } => population.unwrap_or_else(|| suitable(dimensions, evaluations)),
+            Self::De { population, .. } | Self::Pso { population, .. } | Self::Gwo { population, .. } => population,
+        }
+    }
+
     /// The search, for a number of variables and of evaluations.
     ///
     /// # Errors
@@ -135,9 +143,8 @@ impl Method {
         seed: u64,
     ) -> Result<Box<dyn Optimizer + Send>, MethodError> {
         Ok(match *self {
-            Self::Shade { population } => {
-                let population = population.unwrap_or_else(|| suitable(dimensions, evaluations));
-                Box::new(Shade::new(dimensions, population, evaluations, seed)?)
+            Self::Shade { .. } => {
+                Box::new(Shade::new(dimensions, self.members(dimensions, evaluations), evaluations, seed)?)
             }
             Self::De { population, factor, crossover } => {
                 Box::new(De::new(dimensions, population, factor, crossover, seed)?)

@@ -175,3 +175,19 @@ proptest! {
         prop_assert!(optimizer.tell(&[1.0]).is_err());
     }
 }
+
+/// A population that no memory holds is refused by its number, before it is made.
+#[test]
+fn a_population_beyond_the_budget_is_refused_at_once() {
+    let (space, stop) = (cube(2, 1.0), Stop::after(1000));
+    let bowl = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    for name in Method::NAMES {
+        let method = Method::named(name, 2).unwrap().with_population(usize::MAX / 2);
+        let refused = trials(&space, &bowl, &method, &stop, 1, 1, &mut |_, _| ControlFlow::Continue(()));
+        assert_eq!(
+            refused.err(),
+            Some(SearchError::TooFew { evaluations: 1000, population: usize::MAX / 2 }),
+            "{name}"
+        );
+    }
+}

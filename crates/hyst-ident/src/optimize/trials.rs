@@ -75,7 +75,12 @@ pub fn trials(
     watch: &mut dyn FnMut(usize, Progress) -> ControlFlow<()>,
 ) -> Result<Trials, SearchError> {
     super::MethodError::at_least("trials", count, 1)?;
-    let mut found = Vec::with_capacity(count);
+    // Before there is memory asked for that nobody has.
+    let population = method.members(space.dimensions(), stop.evaluations);
+    if population as u64 > stop.evaluations {
+        return Err(SearchError::TooFew { evaluations: stop.evaluations, population });
+    }
+    let mut found = Vec::new();
     for trial in 0..count {
         let mut search = method.build(space.dimensions(), stop.evaluations, seed.wrapping_add(trial as u64))?;
         found.push(minimize(space, cost, search.as_mut(), stop, &mut |p| watch(trial, p))?);

@@ -63,7 +63,11 @@ fn finding(effect: &Finding, unit: &str) -> String {
     }
     for tie in effect.alternatives.iter().filter(|other| other.indistinguishable) {
         let rmse = short(tie.cv_rmse);
-        let _ = writeln!(text, "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit})", tie.name);
+        let _ = writeln!(
+            text,
+            "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit}); `hystctl excite separate {} {}` makes the drive that would",
+            tie.name, effect.name, tie.name
+        );
     }
     let others: Vec<String> = effect
         .alternatives
