@@ -136,7 +136,7 @@ fn records_that_no_model_can_be_fitted_to() {
     let stuck = constant(HEADER, |k| format!("{:.3},{},7.5", k as f64 * 0.002, (k % 50) as f64));
     refused(stuck, &["bad.csv", "displacement_um", "constant (7.5)"]);
     let falling = constant(HEADER, |k| format!("{:.3},{},{}", k as f64 * 0.002, k % 50, -0.1 * (k % 50) as f64));
-    refused(falling, &["bad.csv", "falls when the input rises"]);
+    refused(falling, &["bad.csv", "falls where the input rises"]);
 }
 
 #[test]

@@ -27,11 +27,26 @@ pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Recor
 pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<Record> {
     let record = Record::read(path, &ColumnMap::parse(map)?, need)?;
     tell_oddities(&record);
+    if falls(&record) {
+        let column = record.output_unit().map_or("", |unit| unit.column());
+        say(&format!(
+            "note: {}: the output falls where the input rises; if its sign is turned, read it with --map {column}=-COLUMN",
+            record.name()
+        ));
+    }
     Ok(record)
 }
 
+/// Whether the output goes against the input; a fit refuses such a record by itself.
+fn falls(record: &Record) -> bool {
+    let (u, y) = (record.input(), record.output().unwrap_or_default());
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let (mean_u, mean_y) = (mean(u), mean(y));
+    u.iter().zip(y).map(|(u, y)| (u - mean_u) * (y - mean_y)).sum::<f64>() < 0.0
+}
+
 /// Sample rates that actuators are measured at \[Hz\].
-const ORDINARY_RATES: Range<f64> = 5.0..2e6;
+const ORDINARY_RATES: Range<f64> = 5.0..2e5;
 
 /// Says what is legal in a record but is seldom meant.
 fn tell_oddities(record: &Record) {

@@ -27,6 +27,8 @@ pub(super) struct Compensation {
     /// Largest relative error of the inversion inside its band.
     band_error: f64,
     voltage_limited_rows: usize,
+    /// Of these, rows at the lower limit.
+    voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
     /// Effects that are in the sensor.
     not_compensated: Vec<&'static str>,
@@ -93,6 +95,7 @@ impl Compensation {
             bandwidth_hz: drive.bandwidth_hz,
             band_error: drive.band_error,
             voltage_limited_rows: drive.voltage_limited.len(),
+            voltage_limited_low_rows: drive.voltage_limited.iter().filter(|k| drive.voltage[**k] <= lowest).count(),
             slew_limited_rows: drive.slew_limited.len(),
             not_compensated: in_the_sensor.map(Effect::name).collect(),
             unit: model.input.unit.clone(),
@@ -111,9 +114,22 @@ impl Compensation {
             text::count(self.voltage_limited_rows, "row"),
             text::count(self.slew_limited_rows, "row")
         )];
-        if self.voltage_limited_rows + self.slew_limited_rows > 0 {
+        let (low, all) = (self.voltage_limited_low_rows, self.voltage_limited_rows);
+        for (rows, end, advice) in [
+            (
+                low,
+                self.lowest,
+                "goes below what the actuator reaches on its way there: shift it up, or shrink it about a higher middle",
+            ),
+            (all - low, self.highest, "goes beyond what the actuator reaches: shift it down or shrink it"),
+        ] {
+            if rows > 0 {
+                lines.push(format!("in {} at {} {unit} the reference {advice}", text::count(rows, "row"), short(end)));
+            }
+        }
+        if self.slew_limited_rows > 0 {
             lines.push(
-                "where it is limited the actuator cannot follow: slow the reference down or shrink it".to_owned(),
+                "where the slew is limited the actuator cannot follow: slow the reference down or shrink it".to_owned(),
             );
         }
         let lead = format!(

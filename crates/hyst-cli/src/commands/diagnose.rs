@@ -5,6 +5,7 @@ use std::path::Path;
 use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
+use hyst_ident::simulate::Zero;
 use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
@@ -50,6 +51,7 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
             model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
             train: &train,
             test: test.as_ref(),
+            reading: reading(args),
             seed: args.seed,
         })?;
         target.write(|out| out.write_all(page.as_bytes()))?;
@@ -61,6 +63,13 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         }
     }
     said_as.print(&said, findings)
+}
+
+/// Options with which records are read, as the command line takes them.
+fn reading(args: &DiagnoseArgs) -> Vec<String> {
+    let map = args.map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]);
+    let zero = (args.zero.get() == Zero::PerRecord).then(|| ["--zero".to_owned(), "per-record".to_owned()]);
+    map.chain(zero.into_iter().flatten()).collect()
 }
 
 /// Warns where the files are not what they should be for the figures to mean something.

@@ -28,6 +28,8 @@ pub(crate) struct Contents<'a> {
     pub(crate) model_sha256: &'a str,
     pub(crate) train: &'a Record,
     pub(crate) test: Option<&'a Record>,
+    /// Options with which the records were read.
+    pub(crate) reading: Vec<String>,
     /// Seed of the bootstrap.
     pub(crate) seed: u64,
 }

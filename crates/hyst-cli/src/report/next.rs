@@ -35,11 +35,15 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     match f.remainder.kind {
         RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
             let files = files(c);
+            let test = c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())));
+            let reading: String = c.reading.iter().map(|word| format!(" {}", quoted(word))).collect();
             advise(
                 "Most of what is left is the base's own misfit. A finer base, and its diagnosis:",
                 &[
-                    format!("hystctl fit {files} --model preisach -o finer.json"),
-                    format!("hystctl diagnose {files} --model finer.json -o finer-extended.json --report finer.html"),
+                    format!("hystctl fit {files}{reading} --model preisach -o finer.json"),
+                    format!(
+                        "hystctl diagnose {files}{test}{reading} --model finer.json -o finer-extended.json --report finer.html"
+                    ),
                 ],
             );
         }

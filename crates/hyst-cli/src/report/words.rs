@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hyst_ident::diagnose::{Findings, Found, RemainderKind, Verdict};
+use hyst_ident::diagnose::{Finding, Findings, Found, RemainderKind, Verdict};
 
 use crate::text::{listed, symbol, with_error};
 
@@ -10,8 +10,9 @@ use crate::text::{listed, symbol, with_error};
 pub(crate) fn verdict(findings: &Findings) -> String {
     match findings.verdict {
         Verdict::Explained => {
-            let mut names: Vec<&str> = findings.effects.iter().map(|effect| effect.name.name()).collect();
+            let mut names: Vec<String> = findings.effects.iter().map(with_ties).collect();
             names.dedup();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let part = if findings.remainder.kind == RemainderKind::None { "" } else { " in part" };
             format!("explained{part}: the model lacks {}", listed(&names))
         }
@@ -21,6 +22,12 @@ pub(crate) fn verdict(findings: &Findings) -> String {
         }
         Verdict::Unexplained => "unexplained: what is left is none of the effects that are looked for".to_owned(),
     }
+}
+
+/// The name of an effect, and those that the record cannot tell it from.
+fn with_ties(effect: &Finding) -> String {
+    let alike = effect.alternatives.iter().filter(|other| other.indistinguishable);
+    alike.fold(effect.name.name().to_owned(), |text, other| format!("{text} or {}", other.name))
 }
 
 /// What kind of remainder it is.

@@ -102,8 +102,9 @@ impl<T: Real> Activation<T> {
         let inverse = |flattest: f64, contraction: f64| AntiCausal {
             forward: *self,
             scale: T::from_f64(1.0 / a),
-            // If no drive changes by more than V in a sample, no drive at rest does by more than V (1 + 2a/φ′).
-            share: tolerance * flattest / (flattest + 2.0 * a),
+            // If no drive changes by more than V in a sample, no drive at rest does by more than V (1 + 2a/φ′); and where a drive is
+            // off by e, the output is by (1 + contraction) a e at most.
+            share: tolerance * flattest / ((flattest + 2.0 * a) * (1.0 + contraction)),
             lead: 0,
             contraction,
             switching: 0.0,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::search::Named;
 pub use crate::metrics::Errors;
-use crate::model::{Base, Effect, Kind, Model};
+use crate::model::{Base, Effect, Kind, Model, creep_share};
 use crate::record::OutputUnit;
 use crate::samples::Samples;
 use crate::simulate::{Simulation, Zero};
@@ -345,7 +345,7 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
         }),
         Effect::Creep => e.creep.iter().for_each(|p| {
             for (tau, share) in p.seconds.iter().zip(&p.shares).filter(|(_, share)| **share > 0.0) {
-                put("creep", &format!("share_{tau:.3}s"), *share, "1");
+                put("creep", &creep_share(*tau), *share, "1");
             }
             put("creep", "total", p.total(), "1");
         }),

@@ -6,9 +6,11 @@
 //!    Every trial refits the whole nested model.
 //! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,
 //!    and it must matter against the noise floor and against what is left.
-//! 3. **Extend** the user's own model with the effects found, all weights refitted.
+//! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and the own base whether it lacks a curve.
+//! 4. **Extend** the user's own model with the effects found, all weights refitted.
 
 mod evidence;
+mod extension;
 mod findings;
 mod finer;
 mod remainder;
@@ -25,17 +27,17 @@ pub use findings::{
     Alternative, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
 };
 
-use std::collections::BTreeMap;
+use extension::Own;
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
-use crate::fit::{BLOCKS, FitError, FitOptions, basis_of, check, fit_settled, to_model};
+use crate::fit::{BLOCKS, FitError, FitOptions, basis_of, check, fit_settled};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
-use crate::simulate::{Simulation, Zero, simulate};
+use crate::simulate::{Zero, simulate};
 
 /// What a diagnosis may be told.
 #[derive(Clone, Copy, Debug)]
@@ -126,78 +128,30 @@ pub fn diagnose(
     let only_loop = problem.only_loop;
     drop(problem);
 
-    progress("asking whether the model's own base lacks a curve");
-    let shape = if only_loop.is_some() {
-        None
-    } else {
-        let own_blocks = Blocks::new(&samples, BLOCKS, SHAPE_ROWS);
-        let own_problem = Problem::new(&samples, own.as_ref(), &own_blocks, per_record);
-        let stop_found = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
-        if let Some(own) =
-            stop_found.then(|| shape::own_stop(&own_problem, &hypothesis)).transpose().map_err(stage)?.flatten()
-        {
-            errors.extend(of_stage(Effect::Saturation, uncertainty::standard_errors(&own, samples.time[0])));
-            hypothesis = own.hypothesis;
-        }
-        shape::shape(&own_problem, &hypothesis, richest, found.noise, options.seed).map_err(stage)?
-    };
-    if let Some(shape) = shape {
-        errors.extend(of_stage(shape.named.effect, uncertainty::standard_errors(&shape.fit, samples.time[0])));
-        hypothesis = shape.hypothesis;
-        found.named.push(shape.named);
+    let asked = Own { model, train, samples: &samples, basis: &own, before: &before, per_record };
+    if only_loop.is_none() {
+        progress("asking whether the model's own base lacks a curve");
+        let stop_is_new = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
+        let curve = asked.shape(&mut hypothesis, &mut errors, stop_is_new, richest, found.noise, options.seed)?;
+        found.named.extend(curve);
         found.named.sort_by_key(|n| n.effect);
     }
 
     progress("refitting the model with what was found");
     let mut extended = model.clone();
     if hypothesis.causes().iter().filter_map(|c| c.effect()).ne(start.causes().iter().filter_map(|c| c.effect())) {
-        // The effects keep the parameters that the rich base gave them: refitted on a coarser base
-        // they would take up its misfit. Only the base's weights and the zero are solved again.
-        let mut motion_only = without_sensor_effects(&samples, &hypothesis);
-        let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
-        (moving.effects.drift, moving.effects.interference) = (None, None);
-        // What was a start-up for the model as it was need be none for the extended one.
-        motion_only.settling.clone_from(&before.settling);
-        let final_blocks = Blocks::new(&motion_only, BLOCKS, FINAL_ROWS);
-        let fitted = |motion: &Samples| {
-            let problem = Problem::new(motion, own.as_ref(), &final_blocks, per_record);
-            let fit = problem.fit_linear(&moving).map_err(stage)?.ok_or_else(unsolvable)?;
-            let starting = start_up_rows(motion, &problem.residual(&fit).map_err(stage)?);
-            Ok::<_, FitError>((fit, starting))
-        };
-        let (mut fit, starting) = fitted(&motion_only)?;
-        if starting != motion_only.settling {
-            motion_only.settling = starting;
-            fit = fitted(&motion_only)?.0;
-        }
-        // Its reach is that of the motion, not of the sensor.
-        extended = to_model(train, &motion_only, &own, &fit, model.seed);
-        extended.effects.drift = hypothesis.effects.drift;
-        extended.effects.interference = hypothesis.effects.interference;
-        extended.std_errors.clone_from(&errors);
+        extended = Model { std_errors: errors.clone(), ..asked.extended(&hypothesis)? };
     }
 
     progress("judging what is left");
     let mut after = simulate(&extended, train, options.zero)?;
     let mut useless = Vec::new();
-    if !found.named.is_empty() && !follows_better(&samples, &before, &after) {
+    if !found.named.is_empty() && !asked.is_helped(&after) {
         // What the rich base shows drowns in what this one misses.
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, hypothesis, after) = (model.clone(), start.clone(), before.clone());
     }
-    let mut remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
-    if let (Some(hz), false) = (only_loop, remainder.kind == RemainderKind::None) {
-        remainder.description += &format!(
-            "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
-        );
-    }
-    if !useless.is_empty() {
-        let names: Vec<&str> = useless.iter().map(|e| e.name()).collect();
-        remainder.description += &format!(
-            "; on a richer base {} would explain a part, but this base does not follow better with it: fit a richer one first",
-            names.join(", ")
-        );
-    }
+    let remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest).beside(only_loop, &useless);
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
         .transpose()?;
@@ -230,19 +184,6 @@ pub fn diagnose(
     Ok(Diagnosis { extended, findings, pictures, breakdowns })
 }
 
-/// The errors of one effect's parameters.
-fn of_stage(effect: Effect, errors: BTreeMap<String, f64>) -> impl Iterator<Item = (String, f64)> {
-    errors.into_iter().filter(move |(key, _)| key.split('.').next() == Some(effect.name()))
-}
-
-/// Whether the second simulation errs less than the first, over the rows that count for the search: a model that misses a stop, say,
-/// takes the rows on it for a start-up.
-fn follows_better(samples: &Samples, before: &Simulation, after: &Simulation) -> bool {
-    let rows = || (0..samples.len()).filter(|k| !samples.settling[*k]);
-    let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
-    squares(after) < squares(before)
-}
-
 /// What a model already holds.
 fn hypothesis_of(model: &Model) -> Hypothesis {
     let drag = match &model.base {
@@ -250,21 +191,6 @@ fn hypothesis_of(model: &Model) -> Hypothesis {
         _ => None,
     };
     Hypothesis { drag, ..Hypothesis::of(model.effects.clone()) }
-}
-
-/// The record with drift and tone taken from its output.
-fn without_sensor_effects(samples: &Samples, h: &Hypothesis) -> Samples {
-    let (mut motion, effects) = (samples.clone(), &h.effects);
-    for (k, y) in motion.output.iter_mut().enumerate() {
-        let t = samples.time[k];
-        if let Some(drift) = effects.drift {
-            *y -= drift.per_second * t;
-        }
-        if let Some(tone) = effects.interference {
-            *y -= tone.amplitude * (2.0 * std::f64::consts::PI * (tone.hz * t).fract() + tone.phase).sin();
-        }
-    }
-    motion
 }
 
 /// Whether a record can show a cause at all.

@@ -3,6 +3,7 @@
 use super::findings::{Remainder, RemainderKind};
 use super::finer::AT_FLOOR;
 use super::search::Search;
+use crate::model::Effect;
 use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
@@ -75,4 +76,23 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     };
     let richer = format!("a richer rate-independent base would leave {:.2} %", percent(richest));
     left(kind, format!("{:.2} % of span; {richer}: {rest}", percent(rmse)))
+}
+
+impl Remainder {
+    /// With what else has to be said: that the record repeats one loop \[Hz\], and which effects of a rich base do not help this one.
+    pub(super) fn beside(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
+        if let (Some(hz), false) = (only_loop, self.kind == RemainderKind::None) {
+            self.description += &format!(
+                "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
+            );
+        }
+        if !useless.is_empty() {
+            let names: Vec<&str> = useless.iter().map(|e| e.name()).collect();
+            self.description += &format!(
+                "; on a richer base {} would explain a part, but this base does not follow better with it: fit a richer one first",
+                names.join(", ")
+            );
+        }
+        self
+    }
 }

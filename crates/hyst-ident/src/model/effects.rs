@@ -247,7 +247,7 @@ impl Effects {
             let mut taus = taus.iter();
             bank.visit(&mut |meta: &Meta, value| {
                 if let Some(tau) = (meta.name == "shares").then(|| taus.next()).flatten() {
-                    let name = format!("share_{tau:.3}s");
+                    let name = creep_share(*tau);
                     f(Parameter { effect: Effect::Creep, name, lower: meta.lower, upper: meta.upper, value });
                 }
             });
@@ -266,4 +266,10 @@ impl Effects {
             });
         }
     }
+}
+
+/// Name of the share of a creep element with this time constant \[s\]: three decimals, more where they would not tell it from others.
+pub(crate) fn creep_share(seconds: f64) -> String {
+    let decimals = (2.0 - seconds.log10().floor()).clamp(3.0, 12.0) as usize;
+    format!("share_{seconds:.decimals$}s")
 }

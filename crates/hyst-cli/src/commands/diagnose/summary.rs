@@ -65,7 +65,7 @@ fn finding(effect: &Finding, unit: &str) -> String {
         let rmse = short(tie.cv_rmse);
         let _ = writeln!(
             text,
-            "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit}); `hystctl excite separate {} {}` makes the drive that would",
+            "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit}); `hystctl excite separate {} {} --high V -o next.csv` makes the drive that would",
             tie.name, effect.name, tie.name
         );
     }
