@@ -174,7 +174,10 @@ def test_activation_inverses(name):
     y = model.simulate(u)
     lead = model.inverse(tolerance=1e-9).lead
     switches = 1 if name == "Softplus" else 2
-    assert lead * 1e-4 == pytest.approx(switches * np.log(1e9) * abs(printed["alpha"]) / printed["k0"], rel=0.25)
+    # Beside the tolerance itself: what the rate's own size takes, and the output's error over the drive's.
+    tau = abs(printed["alpha"]) / printed["k0"]
+    asked = np.log(1e9) + np.log(2 * (1 + 2 * tau / 1e-4))
+    assert lead * 1e-4 == pytest.approx(switches * asked * tau, rel=0.12)
     again = model.compensate(y, tolerance=1e-9)
     # The reference is held after its end, where the drive was still moving.
     assert np.max(np.abs(again - u)[: -2 * lead]) <= 1e-7 * span(u)
