@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use hyst_hw::{Actuator, Bed, Plant, PlantConfig, Sensor, Viscosity};
+use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::compensate::{CompensateOptions, compensate};
 use hyst_ident::everett::{DpmReport, FodOptions, fit_dpm, fit_fod};
 use hyst_ident::excite::{DecayingSine, Drive, Forc, Limits, Peak, Shape, Triangle};
@@ -13,7 +13,7 @@ use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{Columns, OutputUnit, Record};
 use hyst_ident::simulate::{Zero, simulate};
 
-use crate::measured;
+use crate::{measured, viscous_relays};
 
 /// Rows per second.
 const RATE: f64 = 10_000.0;
@@ -45,17 +45,7 @@ pub struct DpmStudy {
 /// 0.18 N/V at low rates; a relay turns after 5 mV·s of overdrive, so that the classical model errs about as much as in the
 /// paper's Table 2.
 fn actuator(seed: u64) -> PlantConfig {
-    let actuator = Actuator {
-        min_v: 0.0,
-        max_v: 100.0,
-        rest_v: 0.0,
-        gain_um_per_v: GAIN,
-        loop_share: 0.12,
-        bed: Bed::Relays,
-        relays: 15_000,
-    };
-    let sensor = Sensor { range_um: [-10.0, 30.0], bits: 16, noise_um: 0.005, offset_um: 0.0, max_rate_hz: 20_000.0 };
-    PlantConfig { viscosity: Some(Viscosity { volt_seconds: 5e-3 }), ..PlantConfig::bare(seed, actuator, sensor) }
+    viscous_relays(seed, GAIN, [-10.0, 30.0], 0.005)
 }
 
 /// The paper's kind of waveforms \[V\], from rest at 0 V and between 0 and 80 V.

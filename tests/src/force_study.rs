@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use hyst_core::{AffineFit, Env, ForceParams, Stage};
-use hyst_hw::{Actuator, Bed, Plant, PlantConfig, Sensor, Viscosity};
+use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::compare::{Compared, Comparison, compare};
 use hyst_ident::fit::FitOptions;
 use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{OutputUnit, Record};
 
-use crate::measured;
+use crate::{measured, viscous_relays};
 
 /// Rows per second.
 const RATE: f64 = 1000.0;
@@ -49,17 +49,7 @@ pub struct ForceStudy {
 }
 
 fn actuator(seed: u64) -> PlantConfig {
-    let actuator = Actuator {
-        min_v: 0.0,
-        max_v: 100.0,
-        rest_v: 0.0,
-        gain_um_per_v: GAIN,
-        loop_share: 0.12,
-        bed: Bed::Relays,
-        relays: 15_000,
-    };
-    let sensor = Sensor { range_um: [-2.0, 10.0], bits: 16, noise_um: 0.002, offset_um: 0.0, max_rate_hz: 20_000.0 };
-    PlantConfig { viscosity: Some(Viscosity { volt_seconds: 5e-3 }), ..PlantConfig::bare(seed, actuator, sensor) }
+    viscous_relays(seed, GAIN, [-2.0, 10.0], 0.002)
 }
 
 fn rows(seconds: f64, u: impl Fn(f64) -> f64) -> Vec<f64> {

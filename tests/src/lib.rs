@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use hyst_hw::Plant;
+use hyst_hw::{Actuator, Bed, Plant, PlantConfig, Sensor, Viscosity};
 use hyst_ident::excite::{Drive, Identification, Limits};
 use hyst_ident::record::{Columns, OutputUnit, Record};
 use serde_json::{Value, json};
@@ -261,6 +261,22 @@ pub fn column(csv: &str, name: &str) -> Vec<f64> {
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let at = header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("no {name} in {header:?}"));
     lines.map(|line| line.split(',').nth(at).and_then(|cell| cell.parse().ok()).expect("a number")).collect()
+}
+
+/// An actuator of 0 to 100 V whose 15,000 relays turn after 5 mV·s of overdrive: gain \[output unit/V\], range and noise of the sensor
+/// \[output unit\].
+pub fn viscous_relays(seed: u64, gain: f64, range: [f64; 2], noise: f64) -> PlantConfig {
+    let actuator = Actuator {
+        min_v: 0.0,
+        max_v: 100.0,
+        rest_v: 0.0,
+        gain_um_per_v: gain,
+        loop_share: 0.12,
+        bed: Bed::Relays,
+        relays: 15_000,
+    };
+    let sensor = Sensor { range_um: range, bits: 16, noise_um: noise, offset_um: 0.0, max_rate_hz: 20_000.0 };
+    PlantConfig { viscosity: Some(Viscosity { volt_seconds: 5e-3 }), ..PlantConfig::bare(seed, actuator, sensor) }
 }
 
 /// Plays the standard identification drive on an actuator at 1 kHz and returns the record.

@@ -151,21 +151,26 @@ fn delay_shifts_the_record_by_whole_samples() {
     }
 }
 
-#[test]
-fn asymmetry_bends_the_displacement_before_it_is_scaled() {
-    let mut config = clean();
-    config.actuator.rest_v = 20.0;
-    config.asymmetry = Some(config::Asymmetry { bend: 0.08, hook: 0.0 });
-    config.temperature = Some(config::Temperature {
+/// 1 % per K above 20 °C, at a temperature \[°C\] that stays.
+fn steady(degc: f64) -> config::Temperature {
+    config::Temperature {
         per_k: 0.01,
         reference_degc: 20.0,
-        mean_degc: 30.0,
+        mean_degc: degc,
         swing_k: 0.0,
         period_s: None,
         shape: config::TemperatureShape::Sine,
         recorded: false,
         noise_k: 0.0,
-    });
+    }
+}
+
+#[test]
+fn asymmetry_bends_the_displacement_before_it_is_scaled() {
+    let mut config = clean();
+    config.actuator.rest_v = 20.0;
+    config.asymmetry = Some(config::Asymmetry { bend: 0.08, hook: 0.0 });
+    config.temperature = Some(steady(30.0));
     let mut plant = Plant::new(config).unwrap();
     plant.start(100.0).unwrap();
     let [rest, low, middle, high] =
@@ -180,16 +185,7 @@ fn asymmetry_bends_the_displacement_before_it_is_scaled() {
 #[test]
 fn temperature_scales_the_displacement() {
     let mut config = clean();
-    config.temperature = Some(config::Temperature {
-        per_k: 0.01,
-        reference_degc: 20.0,
-        mean_degc: 25.0,
-        swing_k: 0.0,
-        period_s: None,
-        shape: config::TemperatureShape::Sine,
-        recorded: false,
-        noise_k: 0.0,
-    });
+    config.temperature = Some(steady(25.0));
     let mut plant = Plant::new(config).unwrap();
     assert!(!plant.capabilities().temperature);
     plant.start(100.0).unwrap();
