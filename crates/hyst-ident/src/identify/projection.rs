@@ -1,5 +1,6 @@
 //! Variable projection: the best linear parameters for given values of the others.
 
+use std::ops::Range;
 use std::sync::Mutex;
 
 use nalgebra::{DMatrix, DVector};
@@ -24,8 +25,19 @@ pub(crate) struct Projection<'a> {
     pub(super) group: Vec<usize>,
     /// Sensor zeros.
     pub(super) groups: usize,
-    /// Columns for trials, so that a trial allocates none.
-    spare: Mutex<Vec<DMatrix<f64>>>,
+    /// Rows without a gap that count and have one file, at most [`PIECE`] each, with that file.
+    pieces: Vec<(Range<usize>, usize)>,
+    /// Room for trials, so that a trial makes none.
+    spare: Mutex<Vec<Room>>,
+}
+
+/// Rows whose products are summed up at once: so many of each column stay in the processor's cache.
+const PIECE: usize = 256;
+
+/// What a trial writes into.
+struct Room {
+    columns: DMatrix<f64>,
+    gram: Gram,
 }
 
 /// The model at some values.
@@ -60,42 +72,65 @@ impl<'a> Projection<'a> {
             }
             lengths.push(rows.len() - before);
         }
-        Self { family, samples, linear, bounds, rows, lengths, group, groups, spare: Mutex::new(Vec::new()) }
-    }
-
-    fn take(&self) -> DMatrix<f64> {
-        let spare = self.spare.lock().ok().and_then(|mut s| s.pop());
-        spare.unwrap_or_else(|| DMatrix::zeros(self.samples.len(), self.linear.len()))
-    }
-
-    fn give(&self, columns: DMatrix<f64>) {
-        if let Ok(mut spare) = self.spare.lock() {
-            spare.push(columns);
+        let mut pieces: Vec<(Range<usize>, usize)> = Vec::new();
+        for (k, g) in rows.iter().zip(&group) {
+            match pieces.last_mut() {
+                Some((piece, own)) if piece.end == *k && own == g && piece.len() < PIECE => piece.end += 1,
+                _ => pieces.push((*k..*k + 1, *g)),
+            }
         }
+        Self { family, samples, linear, bounds, rows, lengths, group, groups, pieces, spare: Mutex::new(Vec::new()) }
+    }
+
+    /// Does something in a room for trials.
+    fn within<T>(&self, f: impl FnOnce(&mut Room) -> T) -> T {
+        let mut room = self.spare.lock().ok().and_then(|mut s| s.pop()).unwrap_or_else(|| Room {
+            columns: DMatrix::zeros(self.samples.len(), self.linear.len()),
+            gram: Gram::zeros(self.linear.len() + self.groups + 1),
+        });
+        let result = f(&mut room);
+        if let Ok(mut spare) = self.spare.lock() {
+            spare.push(room);
+        }
+        result
     }
 
     /// Normal equations of the columns, the zeros and the output over the rows that count.
     pub(super) fn gram(&self, columns: &DMatrix<f64>) -> Gram {
-        let (m, g) = (columns.ncols(), self.groups);
-        let n = m + g;
-        let mut gram = Gram::zeros(n + 1);
-        let mut values = vec![0.0; n + 1];
-        for (k, group) in self.rows.iter().zip(&self.group) {
-            for (j, value) in values.iter_mut().enumerate().take(m) {
-                *value = columns[(*k, j)];
-            }
-            values[m..n].fill(0.0);
-            values[m + group] = 1.0;
-            values[n] = self.samples.output[*k];
-            for (j, b) in values.iter().enumerate() {
-                for (i, a) in values.iter().enumerate().take(j + 1) {
-                    gram.matrix[(i, j)] += a * b;
+        let mut gram = Gram::zeros(columns.ncols() + self.groups + 1);
+        self.gram_into(columns, &mut gram);
+        gram
+    }
+
+    fn gram_into(&self, columns: &DMatrix<f64>, gram: &mut Gram) {
+        let m = columns.ncols();
+        let n = m + self.groups;
+        gram.matrix.fill(0.0);
+        gram.rows = 0;
+        let height = columns.nrows();
+        let column = |j: usize, piece: &Range<usize>| {
+            let all = if j < m { &columns.as_slice()[j * height..(j + 1) * height] } else { &self.samples.output };
+            &all[piece.clone()]
+        };
+        for (piece, group) in &self.pieces {
+            for j in 0..=m {
+                let b = column(j, piece);
+                let to = if j < m { j } else { n };
+                for i in 0..(j + 1).min(m) {
+                    gram.matrix[(i, to)] += dot(column(i, piece), b);
+                }
+                let sum: f64 = b.iter().sum();
+                if j < m {
+                    gram.matrix[(j, m + group)] += sum;
+                } else {
+                    gram.matrix[(m + group, n)] += sum;
+                    gram.matrix[(n, n)] += dot(b, b);
                 }
             }
+            gram.matrix[(m + group, m + group)] += piece.len() as f64;
+            gram.rows += piece.len();
         }
         gram.matrix.fill_lower_triangle_with_upper_triangle();
-        gram.rows = self.rows.len();
-        gram
     }
 
     /// The columns at `values` over all rows; `None` if there is no model.
@@ -107,28 +142,57 @@ impl<'a> Projection<'a> {
 
     /// The model at `values`; `None` if there is none or it is not finite.
     pub(crate) fn at(&self, values: &[f64]) -> Option<Projected> {
-        let mut columns = self.take();
-        let projected = self.family.columns(values, &mut columns).ok().and_then(|()| self.project(&columns));
-        self.give(columns);
-        projected
+        self.within(|room| {
+            let z = self.solved(values, room)?;
+            let m = self.linear.len();
+            let residual = DVector::from_iterator(self.rows.len(), self.left(&room.columns, &z));
+            let projected =
+                Projected { linear: z.as_slice()[..m].to_vec(), zeros: z.as_slice()[m..].to_vec(), residual };
+            projected.squares().is_finite().then_some(projected)
+        })
     }
 
-    fn project(&self, columns: &DMatrix<f64>) -> Option<Projected> {
-        let m = columns.ncols();
-        let z = solve(&self.gram(columns), None, &self.bounds)?;
-        let residual = DVector::from_iterator(
-            self.rows.len(),
-            self.rows.iter().zip(&self.group).map(|(k, group)| {
-                let mut predicted = z[m + group];
-                for j in 0..m {
-                    predicted += z[j] * columns[(*k, j)];
-                }
-                self.samples.output[*k] - predicted
-            }),
-        );
-        let projected = Projected { linear: z.as_slice()[..m].to_vec(), zeros: z.as_slice()[m..].to_vec(), residual };
-        projected.squares().is_finite().then_some(projected)
+    /// Columns and normal equations at `values`, and the best linear parameters and zeros for them.
+    fn solved(&self, values: &[f64], room: &mut Room) -> Option<DVector<f64>> {
+        self.family.columns(values, &mut room.columns).ok()?;
+        self.gram_into(&room.columns, &mut room.gram);
+        solve(&room.gram, None, &self.bounds)
     }
+
+    /// Measured minus predicted in each row that counts.
+    fn left<'b>(&'b self, columns: &'b DMatrix<f64>, z: &'b DVector<f64>) -> impl Iterator<Item = f64> + 'b {
+        let m = columns.ncols();
+        self.rows.iter().zip(&self.group).map(move |(k, group)| {
+            let mut predicted = z[m + group];
+            for j in 0..m {
+                predicted += z[j] * columns[(*k, j)];
+            }
+            self.samples.output[*k] - predicted
+        })
+    }
+
+    /// Σ (measured − predicted)² at `values`, infinite if there is no model.
+    fn squares(&self, values: &[f64]) -> f64 {
+        self.within(|room| {
+            let z = self.solved(values, room)?;
+            Some(self.left(&room.columns, &z).map(|r| r * r).sum())
+        })
+        .filter(|squares: &f64| squares.is_finite())
+        .unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Σ aᵢ bᵢ in four sums side by side, which the compiler makes one instruction of; the same on every processor.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a, b) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a.zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// Root mean square of what is left \[y\], as the cost of a search over the variables.
@@ -138,10 +202,12 @@ pub(crate) struct Left<'a> {
 }
 
 impl Cost for Left<'_> {
+    /// No trial is given up: the linear parameters make up for the others so well over the first rows that an eighth of a record
+    /// rules out no more than a tenth of the trials of most families, and would be run twice for the rest.
     fn costs(&self, points: &[f64], _hopeless: &[f64], costs: &mut [f64]) {
+        let rows = self.projection.rows.len().max(1) as f64;
         for (cost, values) in costs.iter_mut().zip(points.chunks_exact(self.dimensions)) {
-            let squares = self.projection.at(values).map_or(f64::INFINITY, |p| p.squares());
-            *cost = (squares / self.projection.rows.len().max(1) as f64).sqrt();
+            *cost = (self.projection.squares(values) / rows).sqrt();
         }
     }
 }
