@@ -22,21 +22,14 @@ impl Interval {
     }
 }
 
-/// Where the sum of squares is less than `rise` above its minimum along variable `d`, the linear parameters solved for anew (a section
+/// Where the sum of squares is no more than `most` along variable `d`, the linear parameters solved for anew (a section
 /// of the likelihood). A slope at the minimum does not show what this does: an activation that is saturated stays so, however far
 /// its sharpness goes.
-pub(crate) fn interval(
-    projection: &Projection<'_>,
-    space: &Space,
-    point: &[f64],
-    d: usize,
-    rise: f64,
-) -> Option<Interval> {
-    let least = projection.at(&space.values(point))?.squares();
+pub(crate) fn interval(projection: &Projection<'_>, space: &Space, point: &[f64], d: usize, most: f64) -> Interval {
     let allowed = |x: f64| {
         let mut to = point.to_vec();
         to[d] = x;
-        projection.at(&space.values(&to)).is_some_and(|p| p.squares() <= least + rise)
+        projection.squares(&space.values(&to)) <= most
     };
     let end = |side: f64| {
         if allowed(side) {
@@ -55,5 +48,5 @@ pub(crate) fn interval(
         inside
     };
     let (low, high) = rayon::join(|| end(0.0), || end(1.0));
-    Some(Interval { low, high })
+    Interval { low, high }
 }

@@ -107,9 +107,8 @@ impl<'a> Projection<'a> {
         let n = m + self.groups;
         gram.matrix.fill(0.0);
         gram.rows = 0;
-        let height = columns.nrows();
         let column = |j: usize, piece: &Range<usize>| {
-            let all = if j < m { &columns.as_slice()[j * height..(j + 1) * height] } else { &self.samples.output };
+            let all = if j < m { column(columns, j) } else { &self.samples.output[..] };
             &all[piece.clone()]
         };
         for (piece, group) in &self.pieces {
@@ -145,7 +144,9 @@ impl<'a> Projection<'a> {
         self.within(|room| {
             let z = self.solved(values, room)?;
             let m = self.linear.len();
-            let residual = DVector::from_iterator(self.rows.len(), self.left(&room.columns, &z));
+            let mut residual = Vec::with_capacity(self.rows.len());
+            self.left(&room.columns, &z, |piece| residual.extend_from_slice(piece));
+            let residual = DVector::from_vec(residual);
             let projected =
                 Projected { linear: z.as_slice()[..m].to_vec(), zeros: z.as_slice()[m..].to_vec(), residual };
             projected.squares().is_finite().then_some(projected)
@@ -159,27 +160,36 @@ impl<'a> Projection<'a> {
         solve(&room.gram, None, &self.bounds)
     }
 
-    /// Measured minus predicted in each row that counts.
-    fn left<'b>(&'b self, columns: &'b DMatrix<f64>, z: &'b DVector<f64>) -> impl Iterator<Item = f64> + 'b {
-        let m = columns.ncols();
-        self.rows.iter().zip(&self.group).map(move |(k, group)| {
-            let mut predicted = z[m + group];
+    /// Measured minus predicted in the rows that count, piece after piece.
+    fn left(&self, columns: &DMatrix<f64>, z: &DVector<f64>, mut f: impl FnMut(&[f64])) {
+        let (m, mut room) = (columns.ncols(), [0.0; PIECE]);
+        for (piece, group) in &self.pieces {
+            let left = &mut room[..piece.len()];
+            left.iter_mut().zip(&self.samples.output[piece.clone()]).for_each(|(r, y)| *r = y - z[m + group]);
             for j in 0..m {
-                predicted += z[j] * columns[(*k, j)];
+                let (weight, column) = (z[j], &column(columns, j)[piece.clone()]);
+                left.iter_mut().zip(column).for_each(|(r, x)| *r -= weight * x);
             }
-            self.samples.output[*k] - predicted
-        })
+            f(left);
+        }
     }
 
     /// Σ (measured − predicted)² at `values`, infinite if there is no model.
-    fn squares(&self, values: &[f64]) -> f64 {
+    pub(super) fn squares(&self, values: &[f64]) -> f64 {
         self.within(|room| {
             let z = self.solved(values, room)?;
-            Some(self.left(&room.columns, &z).map(|r| r * r).sum())
+            let mut sum = 0.0;
+            self.left(&room.columns, &z, |piece| sum += dot(piece, piece));
+            Some(sum)
         })
         .filter(|squares: &f64| squares.is_finite())
         .unwrap_or(f64::INFINITY)
     }
+}
+
+/// A column's rows.
+fn column(columns: &DMatrix<f64>, j: usize) -> &[f64] {
+    &columns.as_slice()[j * columns.nrows()..][..columns.nrows()]
 }
 
 /// Σ aᵢ bᵢ in four sums side by side, which the compiler makes one instruction of; the same on every processor.

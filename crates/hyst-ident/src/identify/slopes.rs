@@ -112,8 +112,11 @@ impl Optimum<'_> {
     pub(super) fn estimate(&self) -> (Estimate, Vec<Ended>) {
         let base = self.family.base(self.values, &self.projected.linear);
         let all = parameters_of(&base);
-        let noise = Noise::of(self.projected.residual.as_slice(), &self.projection.lengths);
-        let unknowns = self.unknowns(&base, &all, &noise);
+        let (noise, columns) = rayon::join(
+            || Noise::of(self.projected.residual.as_slice(), &self.projection.lengths),
+            || self.projection.columns(self.values),
+        );
+        let unknowns = columns.map_or_else(Vec::new, |columns| self.unknowns(&base, &all, &noise, &columns));
         let free: Vec<usize> = (0..unknowns.len()).filter(|u| !unknowns[*u].held).collect();
         let chosen = |u: &&Unknown| !matches!(u.place, Place::Beside(Beside::Convention, _));
         let fitted = unknowns.iter().filter(chosen).count();
@@ -152,7 +155,7 @@ impl Optimum<'_> {
     }
 
     /// The unknowns with the slopes of the output along them.
-    fn unknowns(&self, base: &Base, all: &[(String, f64)], noise: &Noise) -> Vec<Unknown> {
+    fn unknowns(&self, base: &Base, all: &[(String, f64)], noise: &Noise, columns: &DMatrix<f64>) -> Vec<Unknown> {
         let searched = (0..self.values.len()).map(Place::Searched);
         let solved = (0..self.projected.linear.len()).map(Place::Solved);
         let beside = (0..all.len()).filter_map(|i| match self.family.beside(&all[i].0) {
@@ -160,8 +163,7 @@ impl Optimum<'_> {
             what => Some(Place::Beside(what, i)),
         });
         let places: Vec<Place> = searched.chain(solved).chain(beside).collect();
-        let Some(columns) = self.projection.columns(self.values) else { return Vec::new() };
-        let held = self.held_linear(&columns);
+        let held = self.held_linear(columns);
         let measured: Vec<f64> = self.projection.rows.iter().map(|k| self.samples.output[*k]).collect();
         let size = rms(&self.centred(measured));
         let unknown = |place: &Place| match *place {
@@ -226,12 +228,9 @@ impl Optimum<'_> {
     /// The least standard error of an unknown, per scale, that a section of the likelihood leaves it; 0 if it is no searched one.
     fn section(&self, unknown: &Unknown, rise: f64) -> f64 {
         let (Place::Searched(d), Some(space)) = (unknown.place, self.space) else { return 0.0 };
-        let (Some(v), Some(section)) =
-            (self.variable(d), interval(self.projection, space, &space.point(self.values), d, rise))
-        else {
-            return 0.0;
-        };
-        section.std_error() * extent(v) / unknown.scale
+        let Some(v) = self.variable(d) else { return 0.0 };
+        let most = self.projected.squares() + rise;
+        interval(self.projection, space, &space.point(self.values), d, most).std_error() * extent(v) / unknown.scale
     }
 
     /// Change of each parameter of the file with an unknown, per scale.
