@@ -1,5 +1,5 @@
 //! How often a diagnosis is right, on simulated actuators that were drawn at random:
-//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED]`.
+//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED] [ONE]`; ONE is the number of a case that is told at length.
 
 use std::collections::BTreeMap;
 
@@ -13,6 +13,16 @@ const AT_ONCE: usize = 8;
 fn main() {
     let argument = |i: usize| std::env::args().nth(i).and_then(|s| s.parse::<u64>().ok());
     let (count, seed) = (argument(1).unwrap_or(40), argument(2).unwrap_or(1));
+    if let Some(one) = argument(3) {
+        let o = run(&draw(seed, one));
+        println!("{}", line(&o));
+        println!("test RMSE {:.5} µm after, {:.5} µm without the effect", o.test.0, o.test.1);
+        for (name, found, truth, error) in &o.parameters {
+            println!("{name}: {found:.6} ± {:.6}, true {truth:.6}", error.unwrap_or(f64::NAN));
+        }
+        o.evidence.iter().for_each(|why| println!("{why}"));
+        return;
+    }
     println!("{count} actuators from seed {seed}:");
     let mut outcomes: Vec<Outcome> = Vec::new();
     let numbers: Vec<u64> = (0..count).collect();

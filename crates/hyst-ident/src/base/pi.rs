@@ -38,8 +38,8 @@ impl PiBasis {
 
     /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
     /// are left out clearly better than these do and are no more. `None` if there are none.
-    pub(crate) fn chosen(&self, samples: &Samples, most: Option<usize>) -> Option<Self> {
-        let element = |r: f64| play_column(&samples.input, &samples.segments, r);
+    pub(crate) fn chosen(&self, samples: &Samples, drag: &Drag, most: Option<usize>) -> Option<Self> {
+        let element = |r: f64| plays(&samples.input, &samples.segments, r, drag);
         let bank = |rows| {
             let identity = (samples.input.clone(), Bounds::above(self.floor));
             Bank::new(samples, vec![identity], even(samples, CANDIDATES, CANDIDATES / 4), &element, rows)

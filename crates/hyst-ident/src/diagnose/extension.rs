@@ -2,17 +2,24 @@
 
 use std::collections::BTreeMap;
 
+use super::search::Named;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
+use crate::base::Drag;
+use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
-use crate::nested::{Hypothesis, Problem};
+use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 use crate::simulate::Simulation;
 
+/// Error, over that of a fit that takes more rows for a start-up, up to which the one that follows more of them is the better.
+const AS_GOOD: f64 = 1.2;
+
 /// A model and the record that it is extended on.
+#[derive(Clone, Copy)]
 pub(super) struct Own<'a> {
     pub(super) model: &'a Model,
     pub(super) train: &'a Record,
@@ -31,33 +38,60 @@ impl Own<'_> {
         FitError::Stage { record: self.train.name(), source }
     }
 
-    /// Looks on the own base for what only it can show: where it meets a stop that was found, and whether it lacks a curve.
-    /// Changes what was found accordingly, and gives the curve.
+    /// Places a stop that was found where the own base meets it.
+    pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
+            self.take(Effect::Saturation, &fit, errors);
+            *hypothesis = fit.hypothesis;
+        }
+        Ok(())
+    }
+
+    /// Standard errors of an effect's parameters.
+    fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
+        let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
+        errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
+    }
+
+    /// Looks on the own base for what only it can show: whether it lacks a curve. Changes what was found accordingly, and gives the
+    /// curve; and the base, if its plays were chosen anew.
     pub(super) fn shape(
         &self,
         hypothesis: &mut Hypothesis,
         errors: &mut BTreeMap<String, f64>,
-        stop_is_new: bool,
         richest: f64,
         noise: f64,
         seed: u64,
-    ) -> Result<Option<super::search::Named>, FitError> {
+    ) -> Result<(Option<Named>, Option<BasisOf>), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
-        let mut take = |effect: Effect, fit: &crate::nested::Fitted| {
-            let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
-            errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
-        };
-        if stop_is_new && let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
-            take(Effect::Saturation, &fit);
-            *hypothesis = fit.hypothesis;
-        }
-        let found = shape::shape(&problem, hypothesis, richest, noise, seed).map_err(|e| self.stage(e))?;
-        Ok(found.map(|shape| {
-            take(shape.named.effect, &shape.fit);
-            *hypothesis = shape.hypothesis;
-            shape.named
-        }))
+        let stage = |e| self.stage(e);
+        let bent = shape::bent(&problem, hypothesis, richest).map_err(stage)?;
+        let anew = bent.map(|bent| self.rechosen(&problem, &bent)).transpose()?.flatten();
+        let behind = anew.as_ref().map(|basis| Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record));
+        let found = shape::shape(&problem, behind.as_ref(), hypothesis, richest, noise, seed).map_err(stage)?;
+        let Some(shape) = found else { return Ok((None, None)) };
+        self.take(shape.named.effect, &shape.fit, errors);
+        *hypothesis = shape.hypothesis;
+        Ok((Some(shape.named), anew.filter(|_| shape.anew)))
+    }
+
+    /// The own base with plays where the record calls for them once these effects are known, if they predict clearly better than those
+    /// it has and are no more: those were placed while the effects stood in the record.
+    pub(super) fn on_better_plays(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, FINAL_ROWS);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
+        fit.map(|fit| self.rechosen(&problem, &fit)).transpose().map(Option::flatten)
+    }
+
+    fn rechosen(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
+        let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
+        let operator = problem.record_of_operator(fit).map_err(|e| self.stage(e))?;
+        let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
+        Ok(plays.chosen(&operator, &drag, None).map(BasisOf::Pi))
     }
 
     /// The model with these effects: they keep the parameters that the rich base gave them, since refitted on a coarser base they would
@@ -66,8 +100,6 @@ impl Own<'_> {
         let mut motion = without_sensor_effects(self.samples, hypothesis);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
-        // What was a start-up for the model as it was need be none for the extended one.
-        motion.settling.clone_from(&self.before.settling);
         let blocks = Blocks::new(&motion, BLOCKS, FINAL_ROWS);
         let fitted = |motion: &Samples| {
             let problem = Problem::new(motion, self.basis.as_ref(), &blocks, self.per_record);
@@ -76,11 +108,28 @@ impl Own<'_> {
             let starting = start_up_rows(motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
             Ok::<_, FitError>((fit, starting))
         };
-        let (mut fit, starting) = fitted(&motion)?;
-        if starting != motion.settling {
-            motion.settling = starting;
-            fit = fitted(&motion)?.0;
+        // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
+        let mut found: Option<(Fitted, Vec<bool>, f64)> = None;
+        for beginning in [self.before.settling.clone(), clipped_rows(&motion.output, &motion.segments)] {
+            motion.settling = beginning;
+            let (mut fit, starting) = fitted(&motion)?;
+            if starting != motion.settling {
+                motion.settling = starting;
+                fit = fitted(&motion)?.0;
+            }
+            let counted = motion.settling.iter().filter(|starts| !**starts).count();
+            let rmse = (fit.squares / fit.rows.max(1) as f64).sqrt();
+            let better = |(_, other, least): &(Fitted, Vec<bool>, f64)| {
+                counted > other.iter().filter(|starts| !**starts).count() && rmse <= AS_GOOD * least
+            };
+            if found.as_ref().is_none_or(better) {
+                found = Some((fit, motion.settling.clone(), rmse));
+            }
         }
+        let Some((fit, settling, _)) = found else {
+            return Err(FitError::Unsolvable { record: self.train.name() });
+        };
+        motion.settling = settling;
         // Its reach is that of the motion, not of the sensor.
         let mut extended = to_model(self.train, &motion, self.basis, &fit, self.model.seed);
         extended.effects.drift = hypothesis.effects.drift;

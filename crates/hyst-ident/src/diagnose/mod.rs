@@ -30,7 +30,8 @@ pub use findings::{
 use extension::Own;
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
-use crate::fit::{BLOCKS, FitError, FitOptions, basis_of, check, fit_settled};
+use crate::clipping::clipped_rows;
+use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
@@ -73,6 +74,8 @@ const ROWS_PER_UNKNOWN: usize = 10;
 const SEARCH_ROWS: usize = 16_000;
 /// Rows that the search for a curve behind the own base uses at most.
 const SHAPE_ROWS: usize = 8_000;
+/// Rounds in which a stop and the plays of the base behind it are placed.
+const STOP_ROUNDS: usize = 3;
 /// Rows that the final fit uses at most.
 const FINAL_ROWS: usize = 40_000;
 
@@ -120,6 +123,22 @@ pub fn diagnose(
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
         found = searched(&samples)?.0;
     }
+    // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
+    if !found.named.is_empty() {
+        let mut all = samples.clone();
+        all.settling = clipped_rows(&samples.output, &samples.segments);
+        let problem = Problem::new(&all, &screening, &blocks, per_record);
+        if let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? {
+            let starting = start_up_rows(&all, &problem.residual(&fit).map_err(stage)?);
+            drop(problem);
+            let count = |rows: &[bool]| rows.iter().filter(|starts| **starts).count();
+            if 2 * count(&starting) < count(&samples.settling) {
+                progress("searching again with the rows that are no start-up once it is known what acts");
+                samples.settling = starting;
+                found = searched(&samples)?.0;
+            }
+        }
+    }
 
     progress("asking a finer base whether it needs what was found");
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
@@ -128,18 +147,33 @@ pub fn diagnose(
     let only_loop = problem.only_loop;
     drop(problem);
 
+    let effects = |h: &Hypothesis| h.causes().iter().filter_map(|c| c.effect()).collect::<Vec<_>>();
+    // What was found takes other plays to follow; a stop stands where these meet it, and what it hides is another thing then.
+    let mut basis: Option<BasisOf> = None;
     let asked = Own { model, train, samples: &samples, basis: &own, before: &before, per_record };
+    let stop_is_new = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
+    if effects(&hypothesis) != effects(&start) {
+        basis = asked.on_better_plays(&hypothesis)?;
+    }
+    for _ in 0..if stop_is_new { STOP_ROUNDS } else { 0 } {
+        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
+        asked.stop(&mut hypothesis, &mut errors)?;
+        let Some(better) = asked.on_better_plays(&hypothesis)? else { break };
+        basis = Some(better);
+    }
     if only_loop.is_none() {
         progress("asking whether the model's own base lacks a curve");
-        let stop_is_new = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
-        let curve = asked.shape(&mut hypothesis, &mut errors, stop_is_new, richest, found.noise, options.seed)?;
+        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
+        let (curve, behind) = asked.shape(&mut hypothesis, &mut errors, richest, found.noise, options.seed)?;
+        basis = behind.or(basis);
         found.named.extend(curve);
         found.named.sort_by_key(|n| n.effect);
     }
+    let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
 
     progress("refitting the model with what was found");
     let mut extended = model.clone();
-    if hypothesis.causes().iter().filter_map(|c| c.effect()).ne(start.causes().iter().filter_map(|c| c.effect())) {
+    if effects(&hypothesis) != effects(&start) {
         extended = Model { std_errors: errors.clone(), ..asked.extended(&hypothesis)? };
     }
 

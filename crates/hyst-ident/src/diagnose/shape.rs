@@ -16,6 +16,8 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 const MISSING: f64 = 1.1;
 /// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
 const CLOSED: f64 = 1.7;
+/// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
+const CLOSED_ANEW: f64 = 1.25;
 /// Share of what stands above the noise floor that it has to take.
 const TAKEN: f64 = 0.9;
 /// Noise floors that count as near the noise.
@@ -28,12 +30,25 @@ pub(super) struct Shape {
     pub(super) hypothesis: Hypothesis,
     pub(super) fit: Fitted,
     pub(super) named: Named,
+    /// Whether it is the curve of the base that was chosen behind it.
+    pub(super) anew: bool,
 }
 
-/// Looks for a curve behind the own base of `problem`, all that was found before kept; `richest` is the cross-validated error that a
-/// rich base leaves \[y\].
+/// The own base with a curve, if it misses something that the rich one shows, and the curve takes some of it.
+pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, richest: f64) -> Result<Option<Fitted>, Error> {
+    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
+    let plain = plain.filter(|p| p.cv_rmse() > MISSING * richest && found.effects.asymmetry.is_none());
+    let Some(curve) = plain.as_ref().and_then(|plain| curve(problem, plain)) else { return Ok(None) };
+    let mut h = found.clone();
+    h.effects.asymmetry = Some(curve);
+    problem.fit_linear(&h)
+}
+
+/// Looks for a curve behind the own base of `problem`, all that was found before kept; `anew` has the plays that were chosen behind a
+/// curve, `richest` is the cross-validated error that a rich base leaves \[y\].
 pub(super) fn shape(
     problem: &Problem<'_>,
+    anew: Option<&Problem<'_>>,
     found: &Hypothesis,
     richest: f64,
     noise: f64,
@@ -43,39 +58,34 @@ pub(super) fn shape(
     let Some(plain) = plain.filter(|p| p.cv_rmse() > MISSING * richest) else { return Ok(None) };
     // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave.
     let least = if found.drag.is_some() { richest.min(NEAR_NOISE * noise) } else { richest };
-    let mut tried: Vec<(Effect, Trial)> = Vec::new();
-    if found.effects.asymmetry.is_none()
-        && let Some(bent) = curve(problem, &plain)
-            .map(|curve| {
-                let mut h = found.clone();
-                h.effects.asymmetry = Some(curve);
-                problem.fit_linear(&h)
-            })
-            .transpose()?
-            .flatten()
-    {
-        tried.extend(Trial::of(problem, bent).map(|t| (Effect::Asymmetry, t)));
+    let mut tried: Vec<(Effect, Trial, bool)> = Vec::new();
+    for (on, is_anew) in [(Some(problem), false), (anew, true)] {
+        let Some(on) = on else { continue };
+        let bent = bent(on, found, richest)?.and_then(|bent| Trial::of(on, bent));
+        tried.extend(bent.map(|t| (Effect::Asymmetry, t, is_anew)));
     }
     if found.effects.saturation.is_none() {
         for fitted in stopped(problem, found, &plain.fit)? {
-            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t)));
+            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, false)));
         }
     }
     let judged: Vec<_> = tried
         .iter()
-        .map(|(effect, t)| {
+        .map(|(effect, t, anew)| {
+            let closed = if *anew { CLOSED_ANEW } else { CLOSED };
             let judgement = score::judge(problem, &plain, t, noise, seed);
-            (*effect, t, judgement, judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= CLOSED * least)
+            let accepted = judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= closed * least;
+            (*effect, t, judgement, accepted, *anew)
         })
         .collect();
-    let accepted = judged.iter().filter(|(.., accepted)| *accepted);
+    let accepted = judged.iter().filter(|(.., accepted, _)| *accepted);
     // A stop has fewer numbers than a curve: where they are as good as each other it is the stop.
     let best = accepted.min_by(|a, b| {
         let weight = |effect: Effect| if effect == Effect::Saturation { 0.95 } else { 1.0 };
         (weight(a.0) * a.1.cv_rmse()).total_cmp(&(weight(b.0) * b.1.cv_rmse()))
     });
-    Ok(best.map(|(effect, trial, judgement, _)| {
-        let others = judged.iter().filter(|(e, ..)| e != effect).map(|(e, other, judgement, accepted)| Instead {
+    Ok(best.map(|(effect, trial, judgement, _, anew)| {
+        let others = judged.iter().filter(|(e, ..)| e != effect).map(|(e, other, judgement, accepted, _)| Instead {
             effect: *e,
             cv_rmse: other.cv_rmse(),
             tie: *accepted && score::undecided(trial, other, seed),
@@ -88,6 +98,7 @@ pub(super) fn shape(
         Shape {
             hypothesis: trial.fit.hypothesis.clone(),
             fit: trial.fit.clone(),
+            anew: *anew,
             named: Named {
                 effect: *effect,
                 cv_without: plain.cv_rmse(),

@@ -4,7 +4,7 @@ use super::{
     BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, basis_for, check, fit_settled, sign_matters, solved, to_model,
     with_errors,
 };
-use crate::base::SlidingPlays;
+use crate::base::{Drag, SlidingPlays};
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
 use crate::lsq::{Blocks, Gram};
 use crate::model::{Base, Kind, Model, ZERO};
@@ -38,7 +38,7 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
         let model = to_model(record, &samples, &basis, &fitted, options.seed);
         return Ok(Fit { tables: vec![cells(&fitted, &samples, &left)], ..Fit::at_once(model, HOW) });
     };
-    let Some(chosen) = even.chosen(&samples, options.thresholds) else {
+    let Some(chosen) = even.chosen(&samples, &Drag::NONE, options.thresholds) else {
         if options.thresholds.is_some() {
             return Err(FitError::Unsolvable { record: name() });
         }

@@ -6,4 +6,4 @@ mod quadratic;
 
 pub(crate) use gram::{Blocks, Gram};
 pub(crate) use ordered::{Order, nearest_ordered};
-pub(crate) use quadratic::{Bounds, solve};
+pub(crate) use quadratic::{Bounds, solve, solve_near};

@@ -25,10 +25,23 @@ impl Bounds {
 /// without moving what the record determines.
 const RIDGE: f64 = 1e-10;
 
+/// Steps of an active-set search after which starting from scratch is as quick.
+const NEAR_STEPS: usize = 100;
+
 /// Minimises `|y − X z|² + zᵀ P z` within bounds. `penalty` is P's upper triangle or `None`.
 ///
 /// Returns `None` if the equations are not finite or the solver gives up.
 pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bounds]) -> Option<DVector<f64>> {
+    solve_near(gram, penalty, bounds, None)
+}
+
+/// [`solve`] from the answer to nearly the same equations: which bounds bind there is nearly right, and costs less than to find out.
+pub(crate) fn solve_near(
+    gram: &Gram,
+    penalty: Option<&DMatrix<f64>>,
+    bounds: &[Bounds],
+    near: Option<&DVector<f64>>,
+) -> Option<DVector<f64>> {
     let n = gram.unknowns();
     let mut h: DMatrix<f64> = gram.matrix.view((0, 0), (n, n)).into();
     let mut g: DVector<f64> = gram.matrix.view((0, n), (n, 1)).column(0).into();
@@ -59,7 +72,15 @@ pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bound
     let inside = |z: &DVector<f64>| z.iter().zip(&scaled).all(|(z, b)| *z >= b.lower && *z <= b.upper);
     let z = match free {
         Some(z) if inside(&z) => z,
-        _ => bounded(&h, &g, &scaled)?,
+        _ => {
+            let inside = |i: usize, z: f64| (z * scale[i] / size).max(scaled[i].lower).min(scaled[i].upper);
+            let start = near.map(|near| DVector::from_fn(n, |i, _| inside(i, near[i])));
+            let from_near = start.and_then(|start| polish(&h, &g, &scaled, start, NEAR_STEPS).ok());
+            match from_near {
+                Some(z) => z,
+                None => bounded(&h, &g, &scaled)?,
+            }
+        }
     };
     Some(DVector::from_fn(n, |i, _| z[i] / scale[i] * size))
 }
@@ -104,7 +125,7 @@ fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVec
     if !z.iter().all(|x| x.is_finite()) {
         return None;
     }
-    Some(polish(h, g, bounds, z))
+    Some(polish(h, g, bounds, z, 10 * n).unwrap_or_else(|z| z))
 }
 
 /// Where an unknown stands.
@@ -115,11 +136,18 @@ enum At {
     Free,
 }
 
-/// Carries an interior-point answer to the exact optimum by a primal active-set search.
+/// Carries an answer that is nearly right to the exact optimum by a primal active-set search of at most so many steps; where these do
+/// not suffice, what they led to is the error.
 ///
 /// Plays with near thresholds make the problem so ill-conditioned that a duality gap of 10⁻⁸ still
 /// leaves several times the smallest possible residual; the active set it points to is nearly right.
-fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<f64>) -> DVector<f64> {
+fn polish(
+    h: &DMatrix<f64>,
+    g: &DVector<f64>,
+    bounds: &[Bounds],
+    mut z: DVector<f64>,
+    steps: usize,
+) -> Result<DVector<f64>, DVector<f64>> {
     let n = g.len();
     let size = z.amax().max(f64::MIN_POSITIVE);
     let mut at: Vec<At> = (0..n)
@@ -136,11 +164,11 @@ fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<
         }
     }
     let tolerance = 1e-11 * g.amax();
-    for _ in 0..10 * n {
+    for _ in 0..steps {
         let free: Vec<usize> = (0..n).filter(|i| at[*i] == At::Free).collect();
         let target = match minimum(h, g, &z, &free) {
             Some(target) => target,
-            None => break,
+            None => return Err(z),
         };
         // Towards the minimum over the free ones, as far as the bounds allow.
         let (mut reach, mut hit) = (1.0, None);
@@ -171,10 +199,10 @@ fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<
         };
         match (0..n).max_by(|a, b| outward(*a).total_cmp(&outward(*b))) {
             Some(i) if outward(i) > tolerance => at[i] = At::Free,
-            _ => break,
+            _ => return Ok(z),
         }
     }
-    z
+    Err(z)
 }
 
 /// The minimum over the free unknowns, the others held.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
 use super::{HATS, Hypothesis, Layout, Problem, SignalPath};
-use crate::lsq::{Gram, solve};
+use crate::lsq::{Gram, solve_near};
 
 /// Rounds in which what bends the output is solved, each linear around the one before.
 const ROUNDS: usize = 4;
@@ -31,6 +31,8 @@ pub(super) struct Point {
     pub(super) operator: Vec<f64>,
     /// Motion before the stop \[y\].
     pub(super) motion: Vec<f64>,
+    /// The unknowns that it comes from.
+    pub(super) solution: DVector<f64>,
 }
 
 /// What a dead zone of an asymmetry adds for each unit of its weight.
@@ -118,7 +120,7 @@ impl Problem<'_> {
             path.structure(&mut deflection);
             motion.iter_mut().zip(&deflection).for_each(|(m, d)| *m += c * d);
         }
-        Point { operator, motion }
+        Point { operator, motion, solution: DVector::from_column_slice(z) }
     }
 
     /// One solution, linear around `point`.
@@ -195,7 +197,8 @@ impl Problem<'_> {
         let grams: Vec<Gram> = blocks.iter().map(|x| Gram { matrix: x.transpose() * x, rows: x.nrows() }).collect();
         let total = Gram::sum(width, grams.iter());
         let penalty = self.penalty(width - 1);
-        let solution = solve(&total, Some(&penalty), &self.bounds(h))?;
+        let near = point.as_ref().map(|p| &p.solution).filter(|z| z.len() == width - 1);
+        let solution = solve_near(&total, Some(&penalty), &self.bounds(h), near)?;
         let objective = total.error(&solution) + (solution.transpose() * &penalty * &solution)[(0, 0)];
         Some(Assembly { blocks, grams, total, solution, objective, point })
     }

@@ -29,7 +29,11 @@ fn range_of(samples: &Samples) -> f64 {
     high - low
 }
 
-/// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much.
+/// How far from rest, in spans of the output, a stop is that nothing reaches. It stays where it is: far away, only its distance times the
+/// knee leaves a trace.
+const OUT_OF_REACH: f64 = 1.5;
+
+/// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much: not at all where it leaves no trace.
 pub(super) fn stepped(h: &Hypothesis, index: usize, samples: &Samples) -> Option<(Hypothesis, f64, Effect)> {
     let mut moved = h.clone();
     let mut found = None;
@@ -44,6 +48,7 @@ pub(super) fn stepped(h: &Hypothesis, index: usize, samples: &Samples) -> Option
                 (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                 (Effect::Resonance, "hz") => 1e-5 * *p.value,
                 (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
+                (Effect::Saturation, "low" | "high") if p.value.abs() > OUT_OF_REACH * span => 0.0,
                 (Effect::Saturation, "low" | "high") => 1e-5 * span,
                 _ => 1e-5,
             };
