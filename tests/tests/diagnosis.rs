@@ -7,6 +7,7 @@ use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Effect, Kind, Model};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
+use hyst_tests::calibration::{draw, run};
 use hyst_tests::experiment;
 
 /// Train and test record of an actuator with these effects.
@@ -72,6 +73,17 @@ fn what_nobody_put_on_the_list_is_unexplained() {
         let (_, d) = diagnosed(&train, &test);
         assert!(names(&d).is_empty(), "{kind}, seed {seed}: {:#?}", d.findings.effects);
         assert_eq!(d.findings.verdict, Verdict::Unexplained, "{kind}: {}", d.findings.remainder.description);
+    }
+}
+
+/// Plays were placed while an effect stood in the record; once it is known they are placed where they would have been without it.
+#[test]
+fn plays_that_an_effect_has_misplaced_are_placed_anew() {
+    // A gain that follows temperature, and a slight curve that shows on well placed plays alone.
+    for number in [51, 7] {
+        let outcome = run(&draw(1001, number));
+        assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+        assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
     }
 }
 

@@ -58,6 +58,9 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         }
     }
     page.table(&table);
+    if let Some(plays) = words::plays_placed_anew(f) {
+        page.paragraph("soft", &plays);
+    }
     let zero = match f.zero {
         Zero::None => "the model's zero holds for every record",
         Zero::PerRecord => "one constant for each file is taken from its measured output",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hyst_ident::diagnose::{Finding, Findings, Found, RemainderKind, Verdict};
 
-use crate::text::{listed, symbol, with_error};
+use crate::text::{count, listed, symbol, with_error};
 
 /// The diagnosis in a sentence.
 pub(crate) fn verdict(findings: &Findings) -> String {
@@ -42,6 +42,17 @@ pub(crate) fn kind(kind: RemainderKind) -> &'static str {
 /// Whether the error on the test record has grown, so that the extended model should not be used.
 pub(crate) fn worse_on_test(findings: &Findings) -> bool {
     findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)
+}
+
+/// That the plays of the extended base stand elsewhere than the model's, if they do.
+pub(crate) fn plays_placed_anew(findings: &Findings) -> Option<String> {
+    let of = |n| {
+        format!(
+            "the extended base has {} at new places: the model's own were placed while the effects stood in the record",
+            count(n, "play")
+        )
+    };
+    findings.plays_placed_anew.map(of)
 }
 
 /// Name and value of every parameter, the elements of a creep bank in their order.

@@ -124,6 +124,10 @@ pub struct Findings {
     pub before: OnRecords,
     /// Effects, in the chain's order.
     pub effects: Vec<Finding>,
+    /// Plays that the base of the extended model has at other places than the model's; `None` if they stayed where they were. Those of the
+    /// model were placed while the effects stood in the record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plays_placed_anew: Option<usize>,
     /// What is left.
     pub remainder: Remainder,
     /// Errors of the extended model.
@@ -144,6 +148,15 @@ pub(super) struct Material<'a> {
     pub(super) samples: &'a Samples,
 }
 
+/// Thresholds of a base of plays.
+fn thresholds(base: &Base) -> Option<&[f64]> {
+    match base {
+        Base::Pi(p) => Some(&p.thresholds),
+        Base::ViscousPi(p) => Some(&p.pi.thresholds),
+        _ => None,
+    }
+}
+
 pub(super) fn collect(m: &Material<'_>) -> Findings {
     let effects: Vec<Finding> = m.named.iter().map(|n| finding(m, n)).collect();
     let verdict = match (effects.is_empty(), m.remainder.kind) {
@@ -161,6 +174,9 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         base: m.model.base.kind(),
         unit: m.model.output.unit.clone(),
         noise_floor: m.noise,
+        plays_placed_anew: thresholds(&m.extended.base)
+            .filter(|new| thresholds(&m.model.base).is_some_and(|old| old != *new))
+            .map(<[f64]>::len),
         zero: m.zero,
         verdict,
         before: on(m.before, m.tests.map(|t| &t.0)),

@@ -13,6 +13,9 @@ pub(super) fn of(findings: &Findings) -> String {
     let mut text = format!("{}\n\n{}", words::verdict(findings), errors(findings, unit));
     // Writing to a String does not fail.
     let _ = writeln!(text, "noise floor {} {unit}", short(findings.noise_floor));
+    if let Some(plays) = words::plays_placed_anew(findings) {
+        let _ = writeln!(text, "{plays}");
+    }
     if words::worse_on_test(findings) {
         let _ = writeln!(
             text,
