@@ -6,12 +6,16 @@
 
 use crate::Samples;
 use crate::clipping::clipped_rows;
+use crate::nested::Fitted;
 use crate::samples::range;
 
 /// Share of a segment's swing after which its memory no longer depends on the past.
 const SWEPT: f64 = 0.9;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
+
+/// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
+const NO_MORE: f64 = 1.05;
 
 /// Rows of each segment in which a start-up transient can lie: until the input has swept its range,
 /// once more as long, and at most half of the segment.
@@ -53,6 +57,39 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
         settling[s.start..s.start + end].fill(true);
     }
     settling
+}
+
+/// Fits without some rows, and says which are a start-up then.
+pub(crate) type Fits<'a, E> = dyn FnMut(&[bool]) -> Result<(Fitted, Vec<bool>), E> + 'a;
+
+/// A fit and the rows that it did not see.
+pub(crate) struct Settled {
+    pub(crate) fit: Fitted,
+    pub(crate) settling: Vec<bool>,
+}
+
+impl Settled {
+    /// A fit without these rows; once more without those that are a start-up for it, if they are others.
+    pub(crate) fn from<E>(settling: Vec<bool>, fit: &mut Fits<'_, E>) -> Result<Self, E> {
+        let (first, starting) = fit(&settling)?;
+        if starting == settling {
+            return Ok(Self { fit: first, settling });
+        }
+        Ok(Self { fit: fit(&starting)?.0, settling: starting })
+    }
+}
+
+/// What is known, or, if it takes rows for a start-up, a fit that has seen them all: if at most half of them are a start-up then, and it
+/// errs no more. A model that misses what acts at the beginning takes that for a transient.
+pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fits<'_, E>) -> Result<Settled, E> {
+    let clipped = clipped_rows(&samples.output, &samples.segments);
+    let start_up = |rows: &[bool]| rows.iter().zip(&clipped).filter(|(starts, clipped)| **starts && !**clipped).count();
+    if start_up(&known.settling) == 0 {
+        return Ok(known);
+    }
+    let all = Settled::from(clipped.clone(), fit)?;
+    let followed = 2 * start_up(&all.settling) <= start_up(&known.settling);
+    Ok(if followed && all.fit.rmse() <= NO_MORE * known.fit.rmse() { all } else { known })
 }
 
 /// Residual minus each file's mean outside the windows: another sensor zero is no transient.

@@ -3,20 +3,17 @@
 use std::collections::BTreeMap;
 
 use super::search::Named;
+use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
 use crate::base::Drag;
-use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
 use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::start_up_rows;
+use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::Simulation;
-
-/// Error, over that of a fit that takes more rows for a start-up, up to which the one that follows more of them is the better.
-const AS_GOOD: f64 = 1.2;
 
 /// A model and the record that it is extended on.
 #[derive(Clone, Copy)]
@@ -68,10 +65,19 @@ impl Own<'_> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
         let stage = |e| self.stage(e);
-        let bent = shape::bent(&problem, hypothesis, richest).map_err(stage)?;
-        let anew = bent.map(|bent| self.rechosen(&problem, &bent)).transpose()?.flatten();
-        let behind = anew.as_ref().map(|basis| Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record));
-        let found = shape::shape(&problem, behind.as_ref(), hypothesis, richest, noise, seed).map_err(stage)?;
+        let Some(plain) = shape::lacking(&problem, hypothesis, richest).map_err(stage)? else {
+            return Ok((None, None));
+        };
+        let own = shape::bent(&problem, hypothesis, &plain.fit).map_err(stage)?;
+        let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.fit)).transpose()?.flatten();
+        let mut bent = Bent { own, anew: None };
+        if let Some(basis) = &anew {
+            let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record);
+            if let Some(plain) = behind.fit_linear(hypothesis).map_err(stage)? {
+                bent.anew = shape::bent(&behind, hypothesis, &plain).map_err(stage)?;
+            }
+        }
+        let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
         let Some(shape) = found else { return Ok((None, None)) };
         self.take(shape.named.effect, &shape.fit, errors);
         *hypothesis = shape.hypothesis;
@@ -101,34 +107,17 @@ impl Own<'_> {
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
         let blocks = Blocks::new(&motion, BLOCKS, FINAL_ROWS);
-        let fitted = |motion: &Samples| {
-            let problem = Problem::new(motion, self.basis.as_ref(), &blocks, self.per_record);
+        let mut fitted = |settling: &[bool]| {
+            motion.settling.copy_from_slice(settling);
+            let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
             let fit = problem.fit_linear(&moving).map_err(|e| self.stage(e))?;
             let fit = fit.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
-            let starting = start_up_rows(motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
+            let starting = start_up_rows(&motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
             Ok::<_, FitError>((fit, starting))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
-        let mut found: Option<(Fitted, Vec<bool>, f64)> = None;
-        for beginning in [self.before.settling.clone(), clipped_rows(&motion.output, &motion.segments)] {
-            motion.settling = beginning;
-            let (mut fit, starting) = fitted(&motion)?;
-            if starting != motion.settling {
-                motion.settling = starting;
-                fit = fitted(&motion)?.0;
-            }
-            let counted = motion.settling.iter().filter(|starts| !**starts).count();
-            let rmse = (fit.squares / fit.rows.max(1) as f64).sqrt();
-            let better = |(_, other, least): &(Fitted, Vec<bool>, f64)| {
-                counted > other.iter().filter(|starts| !**starts).count() && rmse <= AS_GOOD * least
-            };
-            if found.as_ref().is_none_or(better) {
-                found = Some((fit, motion.settling.clone(), rmse));
-            }
-        }
-        let Some((fit, settling, _)) = found else {
-            return Err(FitError::Unsolvable { record: self.train.name() });
-        };
+        let known = Settled::from(self.before.settling.clone(), &mut fitted)?;
+        let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
         motion.settling = settling;
         // Its reach is that of the motion, not of the sensor.
         let mut extended = to_model(self.train, &motion, self.basis, &fit, self.model.seed);

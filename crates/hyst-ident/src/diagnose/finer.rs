@@ -6,10 +6,9 @@
 use std::collections::BTreeMap;
 
 use hyst_core::Error;
-use rayon::prelude::*;
 
 use super::score;
-use super::search::{Instead, Named, Search};
+use super::search::Search;
 use super::trial::Trial;
 use super::uncertainty::standard_errors;
 use crate::base::PreisachBasis;
@@ -106,36 +105,18 @@ fn without(triangle: &Problem<'_>, best: &Trial, cause: Cause, noise: f64, seed:
 
 /// Asks the finer base about what came near to each effect that was named: the one that it clearly prefers is named.
 fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, seed: u64) -> Result<(), Error> {
-    // In one loop no base can tell what is late from what is late otherwise.
-    if triangle.only_loop.is_some() {
-        return Ok(());
-    }
-    // The others of its set are those of the best, or another rival has been named since.
-    let stands = |named: &Named, other: &Instead, best: &Trial| {
-        best.fit.hypothesis.without(Cause::Effect(named.effect)).causes()
-            == other.hypothesis.without(Cause::Effect(other.effect)).causes()
-    };
-    let near = |named: &Named, other: &Instead| {
-        other.tie || (other.judgement.accepted() && other.cv_rmse <= NEAR * named.cv_with)
-    };
-    let asked = |named: &Named, other: &Instead| {
-        if !near(named, other) || !stands(named, other, best) {
-            return Ok(None);
-        }
-        Ok::<_, Error>(triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)))
-    };
-    // All at once; a rival that is named shuts others out, and lets none in.
-    let pairs: Vec<(&Named, &Instead)> =
-        found.named.iter().flat_map(|n| n.instead.iter().map(move |i| (n, i))).collect();
-    let trials = pairs.par_iter().map(|(n, i)| asked(n, i)).collect::<Result<Vec<_>, Error>>()?;
-    let mut trials = trials.into_iter();
     for n in 0..found.named.len() {
         for i in 0..found.named[n].instead.len() {
-            let Some(trial) = trials.next().flatten() else { continue };
             let other = found.named[n].instead[i].clone();
-            if !stands(&found.named[n], &other, best) {
+            // The others of its set are those of the best, or another rival has been named since.
+            let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
+                == other.hypothesis.without(Cause::Effect(other.effect)).causes();
+            let near = other.tie || (other.judgement.accepted() && other.cv_rmse <= NEAR * found.named[n].cv_with);
+            // In one loop no base can tell what is late from what is late otherwise.
+            if !near || !stands || triangle.only_loop.is_some() {
                 continue;
             }
+            let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };
             let named = &mut found.named[n];
             named.instead[i].tie = score::undecided(best, &trial, seed);
             if other.judgement.accepted() && score::clearly_better(best, &trial, seed) {

@@ -30,14 +30,13 @@ pub use findings::{
 use extension::Own;
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
-use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::start_up_rows;
+use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Zero, simulate};
 
 /// What a diagnosis may be told.
@@ -125,18 +124,19 @@ pub fn diagnose(
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
-        let mut all = samples.clone();
-        all.settling = clipped_rows(&samples.output, &samples.segments);
-        let problem = Problem::new(&all, &screening, &blocks, per_record);
-        if let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? {
-            let starting = start_up_rows(&all, &problem.residual(&fit).map_err(stage)?);
-            drop(problem);
-            let count = |rows: &[bool]| rows.iter().filter(|starts| **starts).count();
-            if 2 * count(&starting) < count(&samples.settling) {
-                progress("searching again with the rows that are no start-up once it is known what acts");
-                samples.settling = starting;
-                found = searched(&samples)?.0;
-            }
+        let mut seen = samples.clone();
+        let known = Settled { fit: found.best.fit.clone(), settling: samples.settling.clone() };
+        let followed = unless_followed(&samples, known, &mut |settling: &[bool]| {
+            seen.settling.copy_from_slice(settling);
+            let problem = Problem::new(&seen, &screening, &blocks, per_record);
+            let fit = problem.fit(&found.best.fit.hypothesis).map_err(stage)?.ok_or_else(unsolvable)?;
+            let starting = start_up_rows(&seen, &problem.residual(&fit).map_err(stage)?);
+            Ok::<_, FitError>((fit, starting))
+        })?;
+        if followed.settling != samples.settling {
+            progress("searching again with the rows that are no start-up once it is known what acts");
+            samples.settling = followed.settling;
+            found = searched(&samples)?.0;
         }
     }
 

@@ -34,36 +34,43 @@ pub(super) struct Shape {
     pub(super) anew: bool,
 }
 
-/// The own base with a curve, if it misses something that the rich one shows, and the curve takes some of it.
-pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, richest: f64) -> Result<Option<Fitted>, Error> {
-    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
-    let plain = plain.filter(|p| p.cv_rmse() > MISSING * richest && found.effects.asymmetry.is_none());
-    let Some(curve) = plain.as_ref().and_then(|plain| curve(problem, plain)) else { return Ok(None) };
-    let mut h = found.clone();
-    h.effects.asymmetry = Some(curve);
-    problem.fit_linear(&h)
+/// The own base with a curve behind it.
+pub(super) struct Bent {
+    pub(super) own: Option<Trial>,
+    /// On the plays that were chosen behind that curve.
+    pub(super) anew: Option<Trial>,
 }
 
-/// Looks for a curve behind the own base of `problem`, all that was found before kept; `anew` has the plays that were chosen behind a
-/// curve, `richest` is the cross-validated error that a rich base leaves \[y\].
+/// The own base with what was found, if it misses something that the rich one shows.
+pub(super) fn lacking(problem: &Problem<'_>, found: &Hypothesis, richest: f64) -> Result<Option<Trial>, Error> {
+    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
+    Ok(plain.filter(|p| p.cv_rmse() > MISSING * richest))
+}
+
+/// The same with a curve behind it; none if there is one already.
+pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Option<Trial>, Error> {
+    let Some(curve) = curve(problem, plain).filter(|_| found.effects.asymmetry.is_none()) else { return Ok(None) };
+    let mut h = found.clone();
+    h.effects.asymmetry = Some(curve);
+    Ok(problem.fit_linear(&h)?.and_then(|f| Trial::of(problem, f)))
+}
+
+/// Looks for a curve behind the own base of `problem`, all that was found before kept. `plain` is that base without one, which
+/// [lacks](lacking) something; `richest` is the cross-validated error that a rich base leaves \[y\].
 pub(super) fn shape(
     problem: &Problem<'_>,
-    anew: Option<&Problem<'_>>,
     found: &Hypothesis,
+    plain: &Trial,
+    bent: Bent,
     richest: f64,
     noise: f64,
     seed: u64,
 ) -> Result<Option<Shape>, Error> {
-    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
-    let Some(plain) = plain.filter(|p| p.cv_rmse() > MISSING * richest) else { return Ok(None) };
     // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave.
     let least = if found.drag.is_some() { richest.min(NEAR_NOISE * noise) } else { richest };
-    let mut tried: Vec<(Effect, Trial, bool)> = Vec::new();
-    for (on, is_anew) in [(Some(problem), false), (anew, true)] {
-        let Some(on) = on else { continue };
-        let bent = bent(on, found, richest)?.and_then(|bent| Trial::of(on, bent));
-        tried.extend(bent.map(|t| (Effect::Asymmetry, t, is_anew)));
-    }
+    let curves = [(bent.own, false), (bent.anew, true)].into_iter();
+    let mut tried: Vec<(Effect, Trial, bool)> =
+        curves.filter_map(|(t, anew)| t.map(|t| (Effect::Asymmetry, t, anew))).collect();
     if found.effects.saturation.is_none() {
         for fitted in stopped(problem, found, &plain.fit)? {
             tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, false)));
@@ -73,7 +80,7 @@ pub(super) fn shape(
         .iter()
         .map(|(effect, t, anew)| {
             let closed = if *anew { CLOSED_ANEW } else { CLOSED };
-            let judgement = score::judge(problem, &plain, t, noise, seed);
+            let judgement = score::judge(problem, plain, t, noise, seed);
             let accepted = judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= closed * least;
             (*effect, t, judgement, accepted, *anew)
         })
@@ -134,8 +141,8 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
 }
 
 /// Dead zones spread evenly over the operator's output, moving away from zero.
-fn curve(problem: &Problem<'_>, plain: &Trial) -> Option<AsymmetryParams<Vec<f64>>> {
-    let operator = problem.operator_output(&plain.fit).ok()?;
+fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f64>>> {
+    let operator = problem.operator_output(plain).ok()?;
     let settled = operator.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
     let (low, high) = crate::samples::range(settled);
     let (low, high) = (low + MARGIN * (high - low), high - MARGIN * (high - low));

@@ -219,6 +219,27 @@ fn minimum(h: &DMatrix<f64>, g: &DVector<f64>, z: &DVector<f64>, free: &[usize])
 mod tests {
     use super::*;
 
+    /// From wherever it starts, the answer is that from scratch: near it, far from it, and outside of the bounds.
+    #[test]
+    fn an_answer_does_not_depend_on_where_the_search_for_it_begins() {
+        let n = 40;
+        // Neighbouring hats over 300 rows, whose weights alternate: half of them end at a bound.
+        let hat = |k: usize, c: usize| (1.0 - (k as f64 / 7.5 - c as f64).abs() / 3.0).max(0.0);
+        let y =
+            |k: usize| (0..n).map(|c| hat(k, c) * if c % 2 == 0 { 1.0 } else { -0.6 }).sum::<f64>() + (k as f64).sin();
+        let x = DMatrix::from_fn(300, n + 1, |k, c| if c < n { hat(k, c) } else { y(k) });
+        let gram = Gram { matrix: x.transpose() * &x, rows: 300 };
+        let bounds = vec![Bounds { lower: 0.0, upper: 0.8 }; n];
+        let exact = solve(&gram, None, &bounds).unwrap();
+        let bound = exact.iter().filter(|z| **z == 0.0 || **z == 0.8).count();
+        assert!(bound > n / 4 && bound < n, "{bound} of {n} at a bound");
+        let beside = exact.map(|z| z + 0.05 * (17.0 * z).sin());
+        for near in [exact.clone(), beside, DVector::zeros(n), DVector::from_element(n, 0.4), -exact.clone() * 9.0] {
+            let found = solve_near(&gram, None, &bounds, Some(&near)).unwrap();
+            assert!((&found - &exact).amax() < 1e-8, "{}", (&found - &exact).amax());
+        }
+    }
+
     #[test]
     fn a_bound_that_binds_holds_and_the_rest_is_refitted() {
         // y = 2 a − b on orthogonal columns; b ≥ 0 leaves a = 2.

@@ -29,16 +29,23 @@ fn range_of(samples: &Samples) -> f64 {
     high - low
 }
 
-/// How far from rest, in spans of the output, a stop is that nothing reaches. It stays where it is: far away, only its distance times the
-/// knee leaves a trace.
-const OUT_OF_REACH: f64 = 1.5;
+/// Distance beyond the motion, in spans of it, from which on nothing reaches a stop. It stays where it is: far away, only its distance
+/// times the knee leaves a trace.
+const OUT_OF_REACH: f64 = 1.0;
 
 /// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much: not at all where it leaves no trace.
-pub(super) fn stepped(h: &Hypothesis, index: usize, samples: &Samples) -> Option<(Hypothesis, f64, Effect)> {
+/// `motion` is the lowest and the highest motion that the hypothesis gives \[y\].
+pub(super) fn stepped(
+    h: &Hypothesis,
+    index: usize,
+    samples: &Samples,
+    motion: (f64, f64),
+) -> Option<(Hypothesis, f64, Effect)> {
     let mut moved = h.clone();
     let mut found = None;
     let mut i = 0;
     let span = samples.output_span();
+    let room = OUT_OF_REACH * (motion.1 - motion.0);
     moved.visit_nonlinear(&mut |p| {
         if i == index {
             let step = match (p.effect, p.name.trim_end_matches("_2")) {
@@ -48,7 +55,8 @@ pub(super) fn stepped(h: &Hypothesis, index: usize, samples: &Samples) -> Option
                 (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                 (Effect::Resonance, "hz") => 1e-5 * *p.value,
                 (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
-                (Effect::Saturation, "low" | "high") if p.value.abs() > OUT_OF_REACH * span => 0.0,
+                (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
+                (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
                 (Effect::Saturation, "low" | "high") => 1e-5 * span,
                 _ => 1e-5,
             };

@@ -15,6 +15,7 @@ use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::model::Effect;
 use crate::repetition::only_loop;
+use crate::samples::range;
 
 /// A record, a base and how rows are cut into blocks.
 pub(crate) struct Problem<'a> {
@@ -59,6 +60,13 @@ pub(crate) struct Fitted {
 const ITERATIONS: usize = 14;
 /// Relative fall of the objective at which a fit has converged.
 const TOLERANCE: f64 = 1e-5;
+
+impl Fitted {
+    /// Root mean square of what is left in the rows that count \[y\].
+    pub(crate) fn rmse(&self) -> f64 {
+        (self.squares / self.rows.max(1) as f64).sqrt()
+    }
+}
 
 impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
@@ -138,9 +146,10 @@ impl<'a> Problem<'a> {
     /// Change of the output with every nonlinear parameter, by forward differences.
     fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
         let here = self.motion(h, solution)?;
+        let reached = range(here.iter().copied());
         let mut columns = Vec::new();
         let mut at = 0;
-        while let Some((moved, step, effect)) = stepped(h, at, self.samples) {
+        while let Some((moved, step, effect)) = stepped(h, at, self.samples, reached) {
             let column = if step == 0.0 {
                 vec![0.0; self.samples.len()]
             } else if effect == Effect::Interference {
