@@ -88,6 +88,7 @@ fn jacobian(x: &[f64], now: &Projected, at: &(dyn Fn(&[f64]) -> Option<Projected
     // All sides at once: pairs of them would leave a core without work at the end.
     let sides: Vec<Side> = (0..2 * x.len())
         .into_par_iter()
+        .with_max_len(1)
         .map(|i| {
             let (mut to, d) = (x.to_vec(), i / 2);
             to[d] = (to[d] + if i % 2 == 0 { STEP } else { -STEP }).clamp(0.0, 1.0);

@@ -1,10 +1,13 @@
 //! How far a variable can go before the record objects.
 
-use super::projection::Projection;
-use crate::optimize::Space;
-
-/// Halvings with which the end of an interval is found.
-const HALVINGS: i32 = 12;
+/// The nearest place that is looked at, as a share of the way to the side of the box: an interval that ends before it counts as none.
+const NEAREST: f64 = 1.0 / 4096.0;
+/// Most places that are tried to find the end of an interval.
+const TRIALS: usize = 16;
+/// How near to the end one of them counts as there, as a part of its distance.
+const NEAR: f64 = 0.01;
+/// Share of the rise below which none is told from rounding.
+const LOWEST: f64 = 1e-12;
 
 /// The part of one variable's side of the box, a part of 0 … 1, that the record allows, the other searched variables held.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,31 +25,96 @@ impl Interval {
     }
 }
 
-/// Where the sum of squares is no more than `most` along variable `d`, the linear parameters solved for anew (a section
-/// of the likelihood). A slope at the minimum does not show what this does: an activation that is saturated stays so, however far
-/// its sharpness goes.
-pub(crate) fn interval(projection: &Projection<'_>, space: &Space, point: &[f64], d: usize, most: f64) -> Interval {
-    let allowed = |x: f64| {
-        let mut to = point.to_vec();
-        to[d] = x;
-        projection.squares(&space.values(&to)) <= most
-    };
+/// Where a sum of squares is no more than `least + rise` along one side of the box (a section of the likelihood); `least` is that at
+/// `place`. A slope at the minimum does not show what this does: an activation that is saturated stays so, however far its sharpness
+/// goes.
+pub(crate) fn interval(squares: impl Fn(f64) -> f64 + Sync, place: f64, (least, rise): (f64, f64)) -> Interval {
     let end = |side: f64| {
-        if allowed(side) {
+        let at = |distance: f64| if distance < 0.0 { place + distance.exp() * (side - place) } else { side };
+        // Over logarithms of the distance a parabola is a straight line; 0 where it has risen by `rise`.
+        let height = |distance: f64| 0.5 * ((squares(at(distance)) - least) / rise).max(LOWEST).ln();
+        let (mut outside, mut far) = (0.0, height(0.0));
+        if far <= 0.0 {
             return side;
         }
-        let (mut inside, mut outside) = (point[d], side);
-        // Most intervals are narrower than what halvings come to.
-        let nearest = inside + (outside - inside) / f64::from(1 << HALVINGS);
-        if !allowed(nearest) {
-            return inside;
+        let (mut inside, mut near) = (NEAREST.ln(), height(NEAREST.ln()));
+        if near > 0.0 {
+            return place;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (inside + outside);
-            if allowed(middle) { inside = middle } else { outside = middle }
+        // Regula falsi; an end that stays counts half as much each time (Illinois), so that none stays for long.
+        let mut stayed = 0.0;
+        for _ in 0..TRIALS {
+            let part = if far.is_finite() { near / (near - far) } else { 0.5 };
+            let between = inside + part * (outside - inside);
+            let here = height(between);
+            if here.abs() <= NEAR || outside - inside <= NEAR {
+                return at(between);
+            }
+            if here < 0.0 {
+                (inside, near) = (between, here);
+                far *= if stayed > 0.0 { 0.5 } else { 1.0 };
+                stayed = 1.0;
+            } else {
+                (outside, far) = (between, here);
+                near *= if stayed < 0.0 { 0.5 } else { 1.0 };
+                stayed = -1.0;
+            }
         }
-        inside
+        at(inside)
     };
     let (low, high) = rayon::join(|| end(0.0), || end(1.0));
     Interval { low, high }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// The interval of a section that has risen by 1 at the ends, and how often it was looked at.
+    fn of(place: f64, rise: impl Fn(f64) -> f64 + Sync) -> (Interval, usize) {
+        let looks = AtomicUsize::new(0);
+        let squares = |x: f64| {
+            looks.fetch_add(1, Ordering::Relaxed);
+            7.0 + rise(x)
+        };
+        (interval(squares, place, (7.0, 1.0)), looks.into_inner())
+    }
+
+    #[test]
+    fn the_ends_of_a_section_are_found() {
+        let close = |found: f64, expected: f64, place: f64| {
+            assert!((found - expected).abs() <= 0.02 * (expected - place).abs(), "{found}, {expected} expected");
+        };
+        for width in [0.0007, 0.02, 0.19] {
+            // A parabola; one that a saturating curve flattens; steeper and flatter ones.
+            let sections: [fn(f64) -> f64; 4] =
+                [|far| far * far, |far| 4.0 * far * far / (3.0 + far * far), |far| far.powi(4), f64::abs];
+            for section in sections {
+                let section = |x: f64| section((x - 0.3) / width);
+                let (found, looks) = of(0.3, section);
+                close(found.low, 0.3 - width, 0.3);
+                close(found.high, 0.3 + width, 0.3);
+                assert!(looks <= 16, "{looks} for {width}");
+            }
+        }
+        // A wall, behind which there is no model, and a plateau before it.
+        let (found, _) = of(0.4, |x| if x > 0.6 { f64::INFINITY } else { 0.1 });
+        close(found.high, 0.6, 0.4);
+        assert_eq!(found.low, 0.0);
+    }
+
+    #[test]
+    fn what_the_record_does_not_object_to_is_the_whole_box() {
+        let (found, looks) = of(0.3, |_| 0.5);
+        assert_eq!((found, looks), (Interval { low: 0.0, high: 1.0 }, 2));
+        assert!((found.std_error() - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+        // At the side there is nowhere to go.
+        assert_eq!(of(1.0, |x| 1e9 * (1.0 - x)).0, Interval { low: 1.0, high: 1.0 });
+    }
+
+    #[test]
+    fn a_fit_that_leaves_nothing_allows_nothing() {
+        assert_eq!(interval(|x| (x - 0.5).abs(), 0.5, (0.0, 0.0)), Interval { low: 0.5, high: 0.5 });
+    }
 }

@@ -225,12 +225,18 @@ impl Optimum<'_> {
         Some(Ended { name: v.name.clone(), bound, beyond })
     }
 
-    /// The least standard error of an unknown, per scale, that a section of the likelihood leaves it; 0 if it is no searched one.
+    /// The least standard error of an unknown, per scale, that a section of the likelihood leaves it, the linear parameters solved for
+    /// anew and the other searched ones held; 0 if it is no searched one.
     fn section(&self, unknown: &Unknown, rise: f64) -> f64 {
         let (Place::Searched(d), Some(space)) = (unknown.place, self.space) else { return 0.0 };
         let Some(v) = self.variable(d) else { return 0.0 };
-        let most = self.projected.squares() + rise;
-        interval(self.projection, space, &space.point(self.values), d, most).std_error() * extent(v) / unknown.scale
+        let point = space.point(self.values);
+        let squares = |place: f64| {
+            let mut to = point.clone();
+            to[d] = place;
+            self.projection.squares(&space.values(&to))
+        };
+        interval(squares, point[d], (self.projected.squares(), rise)).std_error() * extent(v) / unknown.scale
     }
 
     /// Change of each parameter of the file with an unknown, per scale.
@@ -268,9 +274,9 @@ impl Optimum<'_> {
     }
 
     /// Difference quotient of an output per `scale`, the sensor's zeros taken off; zeros where there is no model on either side.
-    fn quotient(&self, scale: f64, output: impl Fn(f64) -> Option<Vec<f64>>) -> Vec<f64> {
+    fn quotient(&self, scale: f64, output: impl Fn(f64) -> Option<Vec<f64>> + Sync) -> Vec<f64> {
         let of = |a: &[f64], b: &[f64], width: f64| a.iter().zip(b).map(|(a, b)| (a - b) / width).collect();
-        let slope: Vec<f64> = match (output(STEP * scale), output(-STEP * scale)) {
+        let slope: Vec<f64> = match rayon::join(|| output(STEP * scale), || output(-STEP * scale)) {
             (Some(a), Some(b)) => of(&a, &b, 2.0 * STEP),
             // At a bound of the model there is one side only.
             (Some(a), None) => output(0.0).map_or_else(Vec::new, |y| of(&a, &y, STEP)),

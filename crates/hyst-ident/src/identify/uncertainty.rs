@@ -233,21 +233,27 @@ impl Noise {
 fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
     let n = residual.len();
     let mean = residual.iter().sum::<f64>() / n.max(1) as f64;
-    let mut planner = RealFftPlanner::new();
-    let mut products = vec![0.0; lengths.iter().copied().max().unwrap_or(0)];
     let mut rest = residual;
-    for length in lengths {
-        let (own, others) = rest.split_at((*length).min(rest.len()));
-        rest = others;
-        autocorrelate(&mut planner, own, mean, &mut products);
-    }
-    let variance = products.first().copied().unwrap_or(0.0);
+    let segments: Vec<&[f64]> =
+        lengths.iter().map(|length| rest.split_off(..(*length).min(rest.len())).unwrap_or_default()).collect();
+    let product = |lag: usize| -> f64 {
+        let of = |own: &&[f64]| -> f64 {
+            own.iter().zip(own.get(lag..).unwrap_or_default()).map(|(a, b)| (a - mean) * (b - mean)).sum()
+        };
+        segments.iter().map(of).sum()
+    };
+    let variance = product(0);
     if variance.is_nan() || variance <= 0.0 {
         return 1.0;
     }
+    let longest = segments.iter().map(|own| own.len()).max().unwrap_or(0);
+    let mut all = Vec::new();
     let (mut sum, mut squares) = (1.0, 1.0);
-    for product in &products[1..] {
-        let rho = product / variance;
+    for lag in 1..longest {
+        if lag == FEW {
+            all = products(&segments, mean, longest);
+        }
+        let rho = all.get(lag).copied().unwrap_or_else(|| product(lag)) / variance;
         if rho < 2.0 * (squares / n as f64).sqrt() {
             break;
         }
@@ -255,6 +261,19 @@ fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
         squares += 2.0 * rho * rho;
     }
     sum
+}
+
+/// Lags up to which products are summed one by one: white noise needs no more.
+const FEW: usize = 16;
+
+/// The products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` within segments, of all lags.
+fn products(segments: &[&[f64]], mean: f64, longest: usize) -> Vec<f64> {
+    let mut planner = RealFftPlanner::new();
+    let mut products = vec![0.0; longest];
+    for own in segments {
+        autocorrelate(&mut planner, own, mean, &mut products);
+    }
+    products
 }
 
 /// Adds the products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` of one segment, lag after lag.

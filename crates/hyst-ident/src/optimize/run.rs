@@ -188,8 +188,10 @@ pub fn minimize(
             space.values_into(point, value);
         }
         let groups = costs.par_chunks_mut(width).zip(values.par_chunks(width * dimensions));
+        // One by one: who is left with several at the end of a generation keeps the others waiting.
         groups
             .zip(asked.hopeless.par_chunks(width))
+            .with_max_len(1)
             .for_each(|((costs, points), hopeless)| cost.costs(points, hopeless, costs));
         evaluations += count as u64;
         optimizer.tell(&costs)?;
