@@ -16,6 +16,8 @@ const CLEARLY: f64 = 3.0;
 
 /// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
 const NO_MORE: f64 = 1.05;
+/// Share of the output's span below which an RMSE is rounding.
+const EXACT: f64 = 1e-6;
 
 /// Rows of each segment in which a start-up transient can lie: until the input has swept its range,
 /// once more as long, and at most half of the segment.
@@ -59,8 +61,8 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     settling
 }
 
-/// Fits without some rows, and says which are a start-up then.
-pub(crate) type Fits<'a, E> = dyn FnMut(&[bool]) -> Result<(Fitted, Vec<bool>), E> + 'a;
+/// Fits without some rows, and says which are a start-up then; `None` if that cannot be solved.
+pub(crate) type Fits<'a, E> = dyn FnMut(&[bool]) -> Result<Option<(Fitted, Vec<bool>)>, E> + 'a;
 
 /// A fit and the rows that it did not see.
 pub(crate) struct Settled {
@@ -70,26 +72,28 @@ pub(crate) struct Settled {
 
 impl Settled {
     /// A fit without these rows; once more without those that are a start-up for it, if they are others.
-    pub(crate) fn from<E>(settling: Vec<bool>, fit: &mut Fits<'_, E>) -> Result<Self, E> {
-        let (first, starting) = fit(&settling)?;
+    pub(crate) fn from<E>(settling: Vec<bool>, fit: &mut Fits<'_, E>) -> Result<Option<Self>, E> {
+        let Some((first, starting)) = fit(&settling)? else { return Ok(None) };
         if starting == settling {
-            return Ok(Self { fit: first, settling });
+            return Ok(Some(Self { fit: first, settling }));
         }
-        Ok(Self { fit: fit(&starting)?.0, settling: starting })
+        Ok(fit(&starting)?.map(|(fit, _)| Self { fit, settling: starting }))
     }
 }
 
-/// What is known, or, if it takes rows for a start-up, a fit that has seen them all: if at most half of them are a start-up then, and it
-/// errs no more. A model that misses what acts at the beginning takes that for a transient.
+/// What is known, or, if it takes rows for a start-up, a fit that begins with all of them: if at most half of those are a start-up then,
+/// and it errs no more. A model that misses what acts at the beginning takes that for a transient.
 pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fits<'_, E>) -> Result<Settled, E> {
     let clipped = clipped_rows(&samples.output, &samples.segments);
     let start_up = |rows: &[bool]| rows.iter().zip(&clipped).filter(|(starts, clipped)| **starts && !**clipped).count();
     if start_up(&known.settling) == 0 {
         return Ok(known);
     }
-    let all = Settled::from(clipped.clone(), fit)?;
+    let floor = EXACT * samples.output_span();
+    let errs_no_more = |all: &Settled| all.fit.rmse() <= NO_MORE * known.fit.rmse().max(floor);
+    let Some(all) = Settled::from(clipped.clone(), fit)? else { return Ok(known) };
     let followed = 2 * start_up(&all.settling) <= start_up(&known.settling);
-    Ok(if followed && all.fit.rmse() <= NO_MORE * known.fit.rmse() { all } else { known })
+    Ok(if followed && errs_no_more(&all) { all } else { known })
 }
 
 /// Residual minus each file's mean outside the windows: another sensor zero is no transient.

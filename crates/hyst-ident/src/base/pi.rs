@@ -31,17 +31,29 @@ impl PiBasis {
     /// Thresholds spaced evenly over what the record's input can move: loops reach half its swing,
     /// the first rise from rest its largest magnitude.
     pub(crate) fn for_samples(samples: &Samples) -> Self {
+        Self::even(samples, LOOPS, VIRGIN)
+    }
+
+    /// The same with so many of either.
+    pub(super) fn even(samples: &Samples, loops: usize, virgin: usize) -> Self {
         let (low, high) = samples.input_range();
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
-        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain }
+        Self { thresholds: even(samples, loops, virgin), floor: FLOOR * gain }
     }
 
     /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
-    /// are left out clearly better than these do and are no more. `None` if there are none.
-    pub(crate) fn chosen(&self, samples: &Samples, drag: &Drag, most: Option<usize>) -> Option<Self> {
-        let element = |r: f64| plays(&samples.input, &samples.segments, r, drag);
+    /// are left out clearly better than these do and are no more. `None` if there are none. The output shows a play as what `through`
+    /// makes of it.
+    pub(crate) fn chosen(
+        &self,
+        samples: &Samples,
+        drag: &Drag,
+        through: &(dyn Fn(Vec<f64>) -> Vec<f64> + Sync),
+        most: Option<usize>,
+    ) -> Option<Self> {
+        let element = |r: f64| through(plays(&samples.input, &samples.segments, r, drag));
         let bank = |rows| {
-            let identity = (samples.input.clone(), Bounds::above(self.floor));
+            let identity = (through(samples.input.clone()), Bounds::above(self.floor));
             Bank::new(samples, vec![identity], even(samples, CANDIDATES, CANDIDATES / 4), &element, rows)
         };
         let quick = bank(choice::ROWS);

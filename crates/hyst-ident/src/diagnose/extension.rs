@@ -6,6 +6,7 @@ use super::search::Named;
 use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
 use crate::base::Drag;
+use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
@@ -73,8 +74,8 @@ impl Own<'_> {
         let mut bent = Bent { own, anew: None };
         if let Some(basis) = &anew {
             let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record);
-            if let Some(plain) = behind.fit_linear(hypothesis).map_err(stage)? {
-                bent.anew = shape::bent(&behind, hypothesis, &plain).map_err(stage)?;
+            if let Some(plain) = shape::lacking(&behind, hypothesis, richest).map_err(stage)? {
+                bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
             }
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
@@ -95,9 +96,9 @@ impl Own<'_> {
 
     fn rechosen(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
         let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
-        let operator = problem.record_of_operator(fit).map_err(|e| self.stage(e))?;
+        let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
-        Ok(plays.chosen(&operator, &drag, None).map(BasisOf::Pi))
+        Ok(plays.chosen(&seen.samples, &drag, &|play| seen.through(play), None).map(BasisOf::Pi))
     }
 
     /// The model with these effects: they keep the parameters that the rich base gave them, since refitted on a coarser base they would
@@ -107,16 +108,19 @@ impl Own<'_> {
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
         let blocks = Blocks::new(&motion, BLOCKS, FINAL_ROWS);
+        let clipped = clipped_rows(&self.samples.output, &self.samples.segments);
         let mut fitted = |settling: &[bool]| {
             motion.settling.copy_from_slice(settling);
             let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
-            let fit = problem.fit_linear(&moving).map_err(|e| self.stage(e))?;
-            let fit = fit.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
-            let starting = start_up_rows(&motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
-            Ok::<_, FitError>((fit, starting))
+            let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
+            let mut starting = start_up_rows(&motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
+            // Without drift and tone nothing stands still at the end of the sensor's range.
+            starting.iter_mut().zip(&clipped).for_each(|(row, clipped)| *row |= clipped);
+            Ok::<_, FitError>(Some((fit, starting)))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
         let known = Settled::from(self.before.settling.clone(), &mut fitted)?;
+        let known = known.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
         let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
         motion.settling = settling;
         // Its reach is that of the motion, not of the sensor.

@@ -97,7 +97,7 @@ pub fn diagnose(
     let per_record = options.zero == Zero::PerRecord;
 
     let own = basis_of(model, &samples).map_err(stage)?;
-    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags());
+    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), samples.len() / ROWS_PER_UNKNOWN);
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
@@ -129,9 +129,9 @@ pub fn diagnose(
         let followed = unless_followed(&samples, known, &mut |settling: &[bool]| {
             seen.settling.copy_from_slice(settling);
             let problem = Problem::new(&seen, &screening, &blocks, per_record);
-            let fit = problem.fit(&found.best.fit.hypothesis).map_err(stage)?.ok_or_else(unsolvable)?;
+            let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? else { return Ok(None) };
             let starting = start_up_rows(&seen, &problem.residual(&fit).map_err(stage)?);
-            Ok::<_, FitError>((fit, starting))
+            Ok::<_, FitError>(Some((fit, starting)))
         })?;
         if followed.settling != samples.settling {
             progress("searching again with the rows that are no start-up once it is known what acts");

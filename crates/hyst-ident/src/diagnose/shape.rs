@@ -37,8 +37,8 @@ pub(super) struct Shape {
 /// The own base with a curve behind it.
 pub(super) struct Bent {
     pub(super) own: Option<Trial>,
-    /// On the plays that were chosen behind that curve.
-    pub(super) anew: Option<Trial>,
+    /// The same on the plays that were chosen behind that curve: without it, where they lack something too, and with it.
+    pub(super) anew: Option<(Trial, Trial)>,
 }
 
 /// The own base with what was found, if it misses something that the rich one shows.
@@ -49,7 +49,10 @@ pub(super) fn lacking(problem: &Problem<'_>, found: &Hypothesis, richest: f64) -
 
 /// The same with a curve behind it; none if there is one already.
 pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Option<Trial>, Error> {
-    let Some(curve) = curve(problem, plain).filter(|_| found.effects.asymmetry.is_none()) else { return Ok(None) };
+    if found.effects.asymmetry.is_some() {
+        return Ok(None);
+    }
+    let Some(curve) = curve(problem, plain) else { return Ok(None) };
     let mut h = found.clone();
     h.effects.asymmetry = Some(curve);
     Ok(problem.fit_linear(&h)?.and_then(|f| Trial::of(problem, f)))
@@ -68,21 +71,22 @@ pub(super) fn shape(
 ) -> Result<Option<Shape>, Error> {
     // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave.
     let least = if found.drag.is_some() { richest.min(NEAR_NOISE * noise) } else { richest };
-    let curves = [(bent.own, false), (bent.anew, true)].into_iter();
-    let mut tried: Vec<(Effect, Trial, bool)> =
-        curves.filter_map(|(t, anew)| t.map(|t| (Effect::Asymmetry, t, anew))).collect();
+    let own = bent.own.map(|t| (Effect::Asymmetry, t, None));
+    let anew = bent.anew.map(|(plain, t)| (Effect::Asymmetry, t, Some(plain)));
+    let mut tried: Vec<(Effect, Trial, Option<Trial>)> = own.into_iter().chain(anew).collect();
     if found.effects.saturation.is_none() {
         for fitted in stopped(problem, found, &plain.fit)? {
-            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, false)));
+            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, None)));
         }
     }
     let judged: Vec<_> = tried
         .iter()
         .map(|(effect, t, anew)| {
-            let closed = if *anew { CLOSED_ANEW } else { CLOSED };
-            let judgement = score::judge(problem, plain, t, noise, seed);
+            // What better plays gain is not the curve's.
+            let (without, closed) = anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
+            let judgement = score::judge(problem, without, t, noise, seed);
             let accepted = judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= closed * least;
-            (*effect, t, judgement, accepted, *anew)
+            (*effect, t, judgement, accepted, anew)
         })
         .collect();
     let accepted = judged.iter().filter(|(.., accepted, _)| *accepted);
@@ -105,10 +109,10 @@ pub(super) fn shape(
         Shape {
             hypothesis: trial.fit.hypothesis.clone(),
             fit: trial.fit.clone(),
-            anew: *anew,
+            anew: anew.is_some(),
             named: Named {
                 effect: *effect,
-                cv_without: plain.cv_rmse(),
+                cv_without: anew.as_ref().unwrap_or(plain).cv_rmse(),
                 cv_with: trial.cv_rmse(),
                 judgement: *judgement,
                 instead,

@@ -4,7 +4,7 @@
 const NEAREST: f64 = 1.0 / 4096.0;
 /// Most places that are tried to find the end of an interval.
 const TRIALS: usize = 16;
-/// How near to the end one of them counts as there, as a part of its distance.
+/// How near to the end one of them counts as there: as a part of its distance on a parabola, anywhere on a plateau of that height.
 const NEAR: f64 = 0.01;
 /// Share of the rise below which none is told from rounding.
 const LOWEST: f64 = 1e-12;
@@ -32,7 +32,10 @@ pub(crate) fn interval(squares: impl Fn(f64) -> f64 + Sync, place: f64, (least, 
     let end = |side: f64| {
         let at = |distance: f64| if distance < 0.0 { place + distance.exp() * (side - place) } else { side };
         // Over logarithms of the distance a parabola is a straight line; 0 where it has risen by `rise`.
-        let height = |distance: f64| 0.5 * ((squares(at(distance)) - least) / rise).max(LOWEST).ln();
+        let height = |distance: f64| {
+            let squares = squares(at(distance));
+            if squares.is_nan() { f64::INFINITY } else { 0.5 * ((squares - least) / rise).max(LOWEST).ln() }
+        };
         let (mut outside, mut far) = (0.0, height(0.0));
         if far <= 0.0 {
             return side;
@@ -102,6 +105,7 @@ mod tests {
         let (found, _) = of(0.4, |x| if x > 0.6 { f64::INFINITY } else { 0.1 });
         close(found.high, 0.6, 0.4);
         assert_eq!(found.low, 0.0);
+        assert_eq!(of(0.4, |x| if x > 0.6 { f64::NAN } else { 0.1 }).0, found);
     }
 
     #[test]

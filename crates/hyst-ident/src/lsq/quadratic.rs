@@ -234,7 +234,8 @@ mod tests {
         let bound = exact.iter().filter(|z| **z == 0.0 || **z == 0.8).count();
         assert!(bound > n / 4 && bound < n, "{bound} of {n} at a bound");
         let beside = exact.map(|z| z + 0.05 * (17.0 * z).sin());
-        for near in [exact.clone(), beside, DVector::zeros(n), DVector::from_element(n, 0.4), -exact.clone() * 9.0] {
+        let outside = DVector::from_fn(n, |i, _| if i % 2 == 0 { 9.0 } else { -9.0 });
+        for near in [exact.clone(), beside, DVector::zeros(n), DVector::from_element(n, 0.4), outside] {
             let found = solve_near(&gram, None, &bounds, Some(&near)).unwrap();
             assert!((&found - &exact).amax() < 1e-8, "{}", (&found - &exact).amax());
         }

@@ -69,3 +69,35 @@ pub(super) fn stepped(
     });
     found.map(|(step, effect)| (moved, step, effect))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Effects;
+    use hyst_core::SaturationParams;
+
+    #[test]
+    fn a_stop_that_nothing_reaches_stays_where_it_is() {
+        let samples = Samples {
+            period: 1e-3,
+            time: vec![0.0, 1e-3],
+            input: vec![0.0, 1.0],
+            output: vec![100.0, 110.0],
+            temperature: None,
+            load: None,
+            segments: Vec::from([0..2]),
+            file_of_segment: vec![0],
+            settling: vec![false; 2],
+        };
+        let moves = |low: f64, high: f64| {
+            let stop = SaturationParams { low, high, knee: 0.1 };
+            let h = Hypothesis::of(Effects { saturation: Some(stop), ..Effects::default() });
+            let step = |index| stepped(&h, index, &samples, (100.0, 110.0)).map(|(_, step, _)| step > 0.0);
+            assert_eq!((step(2), step(3)), (Some(true), None));
+            (step(0), step(1))
+        };
+        // By its distance from the motion, wherever zero is.
+        assert_eq!(moves(95.0, 130.0), (Some(true), Some(false)));
+        assert_eq!(moves(0.0, 115.0), (Some(false), Some(true)));
+    }
+}

@@ -14,6 +14,7 @@ mod layout;
 mod path;
 mod problem;
 mod projector;
+mod tangent;
 
 pub(crate) use cross_validation::folds_interleaved;
 pub(crate) use hypothesis::{Cause, Hypothesis};

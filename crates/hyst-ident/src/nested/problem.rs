@@ -135,14 +135,6 @@ impl<'a> Problem<'a> {
         Ok(self.point(&fit.hypothesis, &path, &base, &fit.solution).operator)
     }
 
-    /// The record as the operator alone would have given it: its own drive, and its output with what the fit has left.
-    pub(crate) fn record_of_operator(&self, fit: &Fitted) -> Result<Samples, Error> {
-        let mut output = self.operator_output(fit)?;
-        output.iter_mut().zip(self.residual(fit)?).for_each(|(v, left)| *v += left);
-        let input = SignalPath::new(self.samples, &fit.hypothesis)?.input_side();
-        Ok(Samples { input, output, ..self.samples.clone() })
-    }
-
     /// Change of the output with every nonlinear parameter, by forward differences.
     fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
         let here = self.motion(h, solution)?;

@@ -8,7 +8,7 @@ use super::{Asked, MethodError, Optimizer, SearchError};
 ///
 /// Rivals are `v = xᵢ + F (x_p − xᵢ) + F (x_a − x_b)`, x_p one of the best `p N`, x_b also from an archive of members that were
 /// beaten; F and CR are drawn about means that follow what succeeded. Settings of the paper: memory of 6, p = 0.11, archive 2.6 N,
-/// 4 members at the end. The population shrinks with the evaluations spent (here by fours), so it has to be told how many there will be.
+/// 4 members at the end. The population shrinks with the evaluations spent, so it has to be told how many there will be.
 ///
 /// Half of the rivals are crossed along the principal axes of the better half of the members instead of the coordinates (Guo & Yang
 /// 2015, IEEE Trans. Evol. Comput. 19): the parameters of a hysteresis model trade against each other, and a valley that lies
@@ -34,8 +34,6 @@ const MEMORY: usize = 6;
 const BEST: f64 = 0.11;
 const ARCHIVE: f64 = 2.6;
 const FEWEST: usize = 4;
-/// The population shrinks by as many at once: a generation that cores cannot share evenly leaves some of them without work at its end.
-const TOGETHER: usize = 4;
 /// Share of the rivals that are crossed along the axes.
 const TURNED: f64 = 0.5;
 /// Width of both distributions about their means.
@@ -151,7 +149,7 @@ impl Shade {
     fn shrink(&mut self) {
         let share = (self.spent as f64 / self.budget.max(1) as f64).min(1.0);
         let wanted = self.initial as f64 + (FEWEST as f64 - self.initial as f64) * share;
-        let wanted = ((wanted / TOGETHER as f64).round() as usize * TOGETHER).max(FEWEST);
+        let wanted = (wanted.round() as usize).max(FEWEST);
         if wanted < self.members.len() {
             let mut kept = self.members.ranked();
             kept.truncate(wanted);

@@ -1,0 +1,121 @@
+//! A record as the operator alone sees it.
+
+use hyst_core::Error;
+
+use super::{Fitted, Problem, SignalPath};
+use crate::Samples;
+
+/// What a record says about the operator of a fit while all that surrounds it is held: to first order, the output changes with the
+/// operator's as [`through`](Self::through) says.
+pub(crate) struct Tangent<'a> {
+    /// What the operator is driven with, and the part of the output that comes from it, with what the fit has left.
+    pub(crate) samples: Samples,
+    path: SignalPath<'a>,
+    /// Slopes of the curve behind the operator and of the stop in each row, where there are such.
+    curve: Option<Vec<f64>>,
+    stop: Option<Vec<f64>>,
+}
+
+impl Tangent<'_> {
+    /// The change of the output that this change of the operator's makes.
+    pub(crate) fn through(&self, mut change: Vec<f64>) -> Vec<f64> {
+        times(&mut change, self.curve.as_deref());
+        self.path.output_side(&mut change);
+        times(&mut change, self.stop.as_deref());
+        change
+    }
+}
+
+fn times(change: &mut [f64], slope: Option<&[f64]>) {
+    if let Some(slope) = slope {
+        change.iter_mut().zip(slope).for_each(|(c, s)| *c *= s);
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The record as the operator of a fit sees it.
+    ///
+    /// # Errors
+    /// If a stage cannot be built.
+    pub(crate) fn tangent(&self, fit: &Fitted) -> Result<Tangent<'a>, Error> {
+        let h = &fit.hypothesis;
+        let path = SignalPath::new(self.samples, h)?;
+        let point = self.point(h, &path, &self.columns(&path, h), &fit.solution);
+        let curve = h.effects.asymmetry.as_ref().map(|p| {
+            let weights = &fit.solution.as_slice()[self.layout(h).zones];
+            let beyond = |v: f64, s: f64| if s >= 0.0 { v > s } else { v < s };
+            let added =
+                |v: f64| p.thresholds.iter().zip(weights).filter(|(s, _)| beyond(v, **s)).map(|(_, c)| c).sum::<f64>();
+            point.operator.iter().map(|v| 1.0 + added(*v)).collect()
+        });
+        let stop = h.effects.saturation.as_ref().map(|_| point.motion.iter().map(|m| path.stopped(*m).1).collect());
+        let input = path.input_side();
+        let mut tangent = Tangent { samples: Samples { input, ..self.samples.clone() }, path, curve, stop };
+        tangent.samples.output = tangent.through(point.operator);
+        tangent.samples.output.iter_mut().zip(self.residual(fit)?).for_each(|(y, left)| *y += left);
+        Ok(tangent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::PiBasis;
+    use crate::lsq::Blocks;
+    use crate::model::Effects;
+    use crate::nested::Hypothesis;
+    use hyst_core::{AsymmetryParams, CreepParams, LagParams, ResonanceParams, SaturationParams};
+
+    /// A drive of growing swing and an output that follows it somehow.
+    fn samples() -> Samples {
+        let rows = 3000;
+        let time: Vec<f64> = (0..rows).map(|k| f64::from(k) * 1e-3).collect();
+        let input: Vec<f64> = time.iter().map(|t| 10.0 * t * (1.0 - (15.0 * t).cos())).collect();
+        let output = input.iter().map(|u| 0.1 * u - 0.4 * (0.1 * u).sin()).collect();
+        let whole = 0..input.len();
+        Samples {
+            period: 1e-3,
+            settling: vec![false; input.len()],
+            temperature: Some(time.iter().map(|t| 23.0 + t).collect()),
+            load: None,
+            segments: Vec::from([whole]),
+            file_of_segment: vec![0],
+            time,
+            input,
+            output,
+        }
+    }
+
+    #[test]
+    fn a_small_change_of_the_operator_arrives_as_its_tangent_says() {
+        let samples = samples();
+        let effects = Effects {
+            lag: Some(LagParams { seconds: 0.01 }),
+            creep: Some(CreepParams { seconds: vec![0.3], shares: vec![0.05] }),
+            resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
+            asymmetry: Some(AsymmetryParams { thresholds: vec![1.0, 2.5], weights: vec![0.1, 0.2] }),
+            saturation: Some(SaturationParams { low: -9.0, high: 4.5, knee: 0.05 }),
+            ..Effects::default()
+        };
+        let h = Hypothesis::of(effects);
+        let basis = PiBasis::for_samples(&samples);
+        let blocks = Blocks::new(&samples, 20, 3000);
+        let problem = Problem::new(&samples, &basis, &blocks, false);
+        let fit = problem.fit_linear(&h).unwrap().unwrap();
+        let tangent = problem.tangent(&fit).unwrap();
+        assert_ne!(tangent.samples.input, samples.input);
+
+        let mut other = fit.clone();
+        other.solution.rows_mut(0, fit.weights.len()).scale_mut(1.0 + 1e-6);
+        let difference = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+        let change = difference(problem.operator_output(&other).unwrap(), problem.operator_output(&fit).unwrap());
+        let seen = difference(problem.residual(&fit).unwrap(), problem.residual(&other).unwrap());
+        let largest = seen.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let mut stopped = 0;
+        for (k, (said, seen)) in tangent.through(change).iter().zip(&seen).enumerate() {
+            assert!((said - seen).abs() < 1e-3 * largest, "row {k}: {said} said, {seen} seen");
+            stopped += usize::from(seen.abs() < 0.1 * largest && samples.input[k] > 40.0);
+        }
+        assert!(stopped > 20 && largest > 1e-6, "{stopped} {largest}");
+    }
+}
