@@ -31,14 +31,9 @@ impl PiBasis {
     /// Thresholds spaced evenly over what the record's input can move: loops reach half its swing,
     /// the first rise from rest its largest magnitude.
     pub(crate) fn for_samples(samples: &Samples) -> Self {
-        Self::even(samples, LOOPS, VIRGIN)
-    }
-
-    /// The same with so many of either.
-    pub(super) fn even(samples: &Samples, loops: usize, virgin: usize) -> Self {
         let (low, high) = samples.input_range();
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
-        Self { thresholds: even(samples, loops, virgin), floor: FLOOR * gain }
+        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain }
     }
 
     /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that

@@ -14,12 +14,6 @@ use super::{Basis, Drag, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
 
-/// Plays whose loops lie inside the record's swing: the fewest, and as many as are of use. Each bends the output where it
-/// starts to move, and what follows the hysteresis may ring at every bend.
-const LOOPS: Range<usize> = 15..30;
-/// Plays that only the first rise from virgin memory reaches.
-const VIRGIN: usize = 5;
-
 /// Plays with quadratic and cubic curves.
 #[derive(Clone, Debug)]
 pub(crate) struct ScreeningBasis {
@@ -31,14 +25,9 @@ pub(crate) struct ScreeningBasis {
 }
 
 impl ScreeningBasis {
-    /// For the input range of a record, with at most about `most` unknowns; with drag only where the base that is extended in the end
-    /// has one too.
-    pub(crate) fn for_samples(samples: &Samples, drags: bool, most: usize) -> Self {
-        let of = |loops: usize| Self::with(PiBasis::even(samples, loops, VIRGIN), samples, drags);
-        (LOOPS.start + 1..=LOOPS.end).rev().map(of).find(|basis| basis.len() <= most).unwrap_or_else(|| of(LOOPS.start))
-    }
-
-    fn with(linear: PiBasis, samples: &Samples, drags: bool) -> Self {
+    /// For the input range of a record; with drag only where the base that is extended in the end has one too.
+    pub(crate) fn for_samples(samples: &Samples, drags: bool) -> Self {
+        let linear = PiBasis::for_samples(samples);
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();

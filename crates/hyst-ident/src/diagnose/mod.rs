@@ -97,7 +97,7 @@ pub fn diagnose(
     let per_record = options.zero == Zero::PerRecord;
 
     let own = basis_of(model, &samples).map_err(stage)?;
-    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), samples.len() / ROWS_PER_UNKNOWN);
+    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags());
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;

@@ -85,7 +85,7 @@ mod tests {
             output: vec![100.0, 110.0],
             temperature: None,
             load: None,
-            segments: Vec::from([0..2]),
+            segments: std::iter::once(0..2).collect(),
             file_of_segment: vec![0],
             settling: vec![false; 2],
         };
