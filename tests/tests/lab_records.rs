@@ -182,6 +182,30 @@ fn a_sensor_at_the_end_of_its_range() {
     assert!(ran.stderr.contains("end of its range") && ran.stderr.contains("left out"), "{}", ran.stderr);
 }
 
+/// The same while the sensor drifts: what is cleaned of the drift stands no longer still there, and stays left out; a transient from
+/// before the record is set aside beside it.
+#[test]
+fn a_drifting_sensor_at_the_end_of_its_range() {
+    let record = record_of(&lagging());
+    let span = record.output().unwrap().iter().fold(f64::MIN, |h, y| h.max(*y));
+    let rate = 0.004 * span; // µm/s: 7 % of the stroke over the record
+    let end = 0.85 * span;
+    for transient in [0.0, 0.3 * span] {
+        let clipped = changed(&record, |c| {
+            let times = c.time.clone();
+            for (k, (y, t)) in outputs(c).iter_mut().zip(times).enumerate() {
+                *y = (*y + rate * t + transient * (-(k as f64) / 60.0).exp()).min(end);
+            }
+        });
+        let d = diagnosed(&clipped);
+        assert_eq!(names(&d), ["lag", "drift"], "{:#?}", d.findings);
+        let found = |k: usize, name: &str| d.findings.effects[k].parameters[name].value;
+        assert!((found(0, "seconds") / LAG - 1.0).abs() < 0.03, "{} s", found(0, "seconds"));
+        assert!((found(1, "per_second") / rate - 1.0).abs() < 0.05, "{} of {rate}", found(1, "per_second"));
+        assert!(d.findings.after.train.unwrap().rmse < 0.01 * span, "{:?}", d.findings.after);
+    }
+}
+
 /// Missing rows are refused with the line; as two segments the rest is a record.
 #[test]
 fn missing_rows() {

@@ -2,6 +2,7 @@
 
 use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Env, Sampling, Stage};
 use hyst_ident::BetweenSamples;
+use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::fit::{Fit, FitOptions, fit_with};
 use hyst_ident::model::{Base, Kind, Model};
 use hyst_ident::record::{Columns, OutputUnit, Record};
@@ -104,6 +105,26 @@ fn the_way_that_the_drive_went_is_found_from_the_record() {
         // The file keeps it.
         assert_eq!(Model::parse("text", &fit.model.to_json()).unwrap(), fit.model);
     }
+}
+
+/// Around an operator that a diagnosis keeps as it is, the drive goes on between its samples as before, and what was known of it stays.
+#[test]
+fn a_diagnosis_keeps_the_oscillator_and_the_way_that_its_drive_went() {
+    let (u, y) = simulated(64, 2 * PERIOD);
+    let hum = |k: usize| (std::f64::consts::TAU * 33.0 * k as f64 / RATE).sin();
+    let largest = y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+    let with_hum: Vec<f64> = noisy(&y).iter().enumerate().map(|(k, y)| y + 0.05 * largest * hum(k)).collect();
+    let record = record(&u, &with_hum);
+    let mut model = Model::read(&root().join("docs/models/bouc-wen-oscillator.json")).unwrap();
+    model.between_samples = BetweenSamples::BandLimited;
+    model.std_errors.insert("bouc-wen-oscillator.mass".into(), 1e-4);
+    let found = diagnose(&record, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
+    let names: Vec<&str> = found.findings.effects.iter().map(|e| e.name.name()).collect();
+    assert_eq!(names, ["interference"], "{:#?}", found.findings);
+    assert_eq!(found.extended.between_samples, BetweenSamples::BandLimited);
+    assert_eq!(found.extended.std_errors["bouc-wen-oscillator.mass"], 1e-4);
+    let (before, after) = (found.findings.before.train.unwrap().rmse, found.findings.after.train.unwrap().rmse);
+    assert!(after < 0.1 * before, "{before} {after}");
 }
 
 #[test]

@@ -75,6 +75,8 @@ pub(crate) enum Passes {
 /// The drive of a record in as many steps a row as a model shall take.
 pub(crate) struct Drive<'a> {
     samples: &'a Samples,
+    /// The drive at the rows.
+    rows: &'a [f64],
     steps: usize,
     /// `steps` values for each row: those that lead to it, and its own.
     values: Cow<'a, [f64]>,
@@ -83,12 +85,17 @@ pub(crate) struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     pub(crate) fn new(samples: &'a Samples, between: BetweenSamples, passes: Passes) -> Self {
+        Self::of(samples, &samples.input, between, passes)
+    }
+
+    /// Another drive over the segments and in the surroundings of a record.
+    pub(crate) fn of(samples: &'a Samples, rows: &'a [f64], between: BetweenSamples, passes: Passes) -> Self {
         match between {
-            BetweenSamples::Linear => Self { samples, steps: 1, values: Cow::Borrowed(&samples.input), passes },
+            BetweenSamples::Linear => Self { samples, rows, steps: 1, values: Cow::Borrowed(rows), passes },
             BetweenSamples::BandLimited => {
                 let segments = samples.segments.iter();
-                let values = segments.flat_map(|s| band_limited(&samples.input[s.clone()], passes)).collect();
-                Self { samples, steps: STEPS, values: Cow::Owned(values), passes }
+                let values = segments.flat_map(|s| band_limited(&rows[s.clone()], passes)).collect();
+                Self { samples, rows, steps: STEPS, values: Cow::Owned(values), passes }
             }
         }
     }
@@ -103,7 +110,7 @@ impl<'a> Drive<'a> {
         let mut state = Box::new(stage.state());
         for segment in &self.samples.segments {
             let Some(first) = segment.clone().next() else { continue };
-            out[first] = stage.reset(&mut state, &self.samples.env(first), self.samples.input[first]);
+            out[first] = stage.reset(&mut state, &self.samples.env(first), self.rows[first]);
             let again = match self.passes {
                 Passes::Once => 0..0,
                 Passes::Periodic => segment.clone(),

@@ -247,7 +247,7 @@ pub fn fit_with(
 }
 
 /// Models that rise and fall with their input: a record in which the output falls has a sensor with the wrong sign.
-fn sign_matters(kind: Kind) -> bool {
+pub(crate) fn sign_matters(kind: Kind) -> bool {
     // The oscillator lags by up to half a turn.
     kind != Kind::BoucWenOscillator
 }
@@ -310,7 +310,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-        other => BasisOf::Fixed(FixedBasis::new(other, samples)?),
+        _ => BasisOf::Fixed(FixedBasis::new(model, samples)?),
     })
 }
 
@@ -438,8 +438,7 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitt
 pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
-    let (least, most) =
-        crate::samples::range(samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| *y));
+    let (least, most) = crate::samples::range(samples.settled_output());
     Model {
         input: Channel { column: record.input_column().into(), unit: unit_of(record.input_column()), low, high },
         between_samples: BetweenSamples::Linear,

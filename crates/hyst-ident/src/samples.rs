@@ -108,10 +108,14 @@ impl Samples {
         range(self.input.iter().copied())
     }
 
+    /// Output in the rows that count \[output unit\].
+    pub(crate) fn settled_output(&self) -> impl Iterator<Item = f64> + '_ {
+        self.output.iter().zip(&self.settling).filter(|(_, settling)| !**settling).map(|(y, _)| *y)
+    }
+
     /// Highest minus lowest output over the settled rows \[output unit\].
     pub fn output_span(&self) -> f64 {
-        let settled = self.output.iter().zip(&self.settling).filter(|(_, s)| !**s).map(|(y, _)| *y);
-        let (low, high) = range(settled);
+        let (low, high) = range(self.settled_output());
         (high - low).max(0.0)
     }
 

@@ -2,49 +2,45 @@
 
 use std::ops::Range;
 
-use hyst_core::{Env, Error, Sampling, Stage};
+use hyst_core::{Error, Sampling};
 use nalgebra::DMatrix;
 
 use super::{Basis, Drag};
-use crate::Samples;
+use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
-use crate::model::{Base, Operator};
+use crate::model::{Base, Model, Operator};
+use crate::{BetweenSamples, Samples};
 
 /// Any operator with the parameters that it has: around it effects are looked for, in it nothing is refitted.
 #[derive(Clone, Debug)]
 pub(crate) struct FixedBasis {
     pub(crate) base: Base,
+    between: BetweenSamples,
     operator: Box<Operator>,
-    surroundings: Vec<Env<f64>>,
+    /// Segments and surroundings of the record that it is for.
+    samples: Samples,
 }
 
 impl FixedBasis {
-    /// For the surroundings of a record.
+    /// For a record, its drive going on between the samples as the model has it.
     ///
     /// # Errors
     /// If the operator cannot be built at the record's sample period.
-    pub(crate) fn new(base: &Base, samples: &Samples) -> Result<Self, Error> {
+    pub(crate) fn new(model: &Model, samples: &Samples) -> Result<Self, Error> {
         let (low, high) = samples.input_range();
-        let operator = Operator::new(base, [low, high], &Sampling { period: samples.period })?;
-        let surroundings = (0..samples.len()).map(|k| samples.env(k)).collect();
-        Ok(Self { base: base.clone(), operator: Box::new(operator), surroundings })
+        let between = model.between_samples;
+        let period = Drive::new(samples, between, Passes::Once).period();
+        let operator = Operator::new(&model.base, [low, high], &Sampling { period })?;
+        let surroundings = Samples { input: Vec::new(), output: Vec::new(), ..samples.clone() };
+        Ok(Self { base: model.base.clone(), between, operator: Box::new(operator), samples: surroundings })
     }
 }
 
 impl Basis for FixedBasis {
     fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+        debug_assert_eq!(segments, self.samples.segments);
         let mut column = vec![0.0; drive.len()];
-        let mut state = Box::new(self.operator.state());
-        for segment in segments {
-            for k in segment.clone() {
-                let env = &self.surroundings[k];
-                column[k] = if k == segment.start {
-                    self.operator.reset(&mut state, env, drive[k])
-                } else {
-                    self.operator.step(&mut state, env, drive[k])
-                };
-            }
-        }
+        Drive::of(&self.samples, drive, self.between, Passes::Once).run(&*self.operator, &mut column);
         each(0, &mut column);
     }
 

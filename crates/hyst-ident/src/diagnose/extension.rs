@@ -10,10 +10,10 @@ use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
-use crate::nested::{Fitted, Hypothesis, Problem};
+use crate::nested::{Fitted, Hypothesis, Problem, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_rows, unless_followed};
+use crate::settle::{Settled, start_up_and, unless_followed};
 use crate::simulate::Simulation;
 
 /// A model and the record that it is extended on.
@@ -74,9 +74,11 @@ impl Own<'_> {
         let mut bent = Bent { own, anew: None };
         if let Some(basis) = &anew {
             let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record);
-            if let Some(plain) = shape::lacking(&behind, hypothesis, richest).map_err(stage)? {
-                bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
-            }
+            let Some(plain) = shape::lacking(&behind, hypothesis, richest).map_err(stage)? else {
+                // Other plays alone were missing, no curve.
+                return Ok((None, anew));
+            };
+            bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
         let Some(shape) = found else { return Ok((None, None)) };
@@ -101,10 +103,10 @@ impl Own<'_> {
         Ok(plays.chosen(&seen.samples, &drag, &|play| seen.through(play), None).map(BasisOf::Pi))
     }
 
-    /// The model with these effects: they keep the parameters that the rich base gave them, since refitted on a coarser base they would
-    /// take up its misfit. Only the base's weights and the zero are solved again.
-    pub(super) fn extended(&self, hypothesis: &Hypothesis) -> Result<Model, FitError> {
-        let mut motion = without_sensor_effects(self.samples, hypothesis);
+    /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a
+    /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again.
+    pub(super) fn extended(&self, hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>) -> Result<Model, FitError> {
+        let mut motion = without_sensor_effects(self.samples, &hypothesis.effects);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
         let blocks = Blocks::new(&motion, BLOCKS, FINAL_ROWS);
@@ -113,9 +115,8 @@ impl Own<'_> {
             motion.settling.copy_from_slice(settling);
             let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
-            let mut starting = start_up_rows(&motion, &problem.residual(&fit).map_err(|e| self.stage(e))?);
-            // Without drift and tone nothing stands still at the end of the sensor's range.
-            starting.iter_mut().zip(&clipped).for_each(|(row, clipped)| *row |= clipped);
+            let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
+            let starting = start_up_and(&clipped, &motion, &residual);
             Ok::<_, FitError>(Some((fit, starting)))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
@@ -127,6 +128,13 @@ impl Own<'_> {
         let mut extended = to_model(self.train, &motion, self.basis, &fit, self.model.seed);
         extended.effects.drift = hypothesis.effects.drift;
         extended.effects.interference = hypothesis.effects.interference;
+        extended.between_samples = self.model.between_samples;
+        if let BasisOf::Fixed(_) = self.basis {
+            // What is known of an operator that stays as it is stays known.
+            extended.std_errors.clone_from(&self.model.std_errors);
+            extended.undetermined.clone_from(&self.model.undetermined);
+        }
+        extended.std_errors.extend(errors.clone());
         Ok(extended)
     }
 
@@ -138,19 +146,4 @@ impl Own<'_> {
         let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
         squares(after) < squares(self.before)
     }
-}
-
-/// The record with drift and tone taken from its output.
-fn without_sensor_effects(samples: &Samples, h: &Hypothesis) -> Samples {
-    let (mut motion, effects) = (samples.clone(), &h.effects);
-    for (k, y) in motion.output.iter_mut().enumerate() {
-        let t = samples.time[k];
-        if let Some(drift) = effects.drift {
-            *y -= drift.per_second * t;
-        }
-        if let Some(tone) = effects.interference {
-            *y -= tone.amplitude * (2.0 * std::f64::consts::PI * (tone.hz * t).fract() + tone.phase).sin();
-        }
-    }
-    motion
 }

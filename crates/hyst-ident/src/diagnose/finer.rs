@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use hyst_core::Error;
 
 use super::score;
-use super::search::Search;
+use super::search::{Search, beyond};
 use super::trial::Trial;
 use super::uncertainty::standard_errors;
 use crate::base::PreisachBasis;
@@ -49,7 +49,7 @@ pub(super) fn refine(
     samples: &Samples,
     seed: u64,
 ) -> Result<Finer, Error> {
-    beside_wandering(problem, found)?;
+    beside_wandering(problem, found, already)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -76,18 +76,20 @@ pub(super) fn refine(
     }
     decide_rivals(&triangle, found, &mut best, seed)?;
     loop {
-        let mut least: Option<(Cause, Trial)> = None;
-        for cause in best.fit.hypothesis.causes().into_iter().filter(|c| !already.contains(c)) {
+        let mut least: Option<Trial> = None;
+        for cause in beyond(&best.fit.hypothesis, already) {
             let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
             if !score::judge(&triangle, &without, &best, found.noise, seed).accepted()
-                && least.as_ref().is_none_or(|(_, l)| without.total() < l.total())
+                && least.as_ref().is_none_or(|l| without.total() < l.total())
             {
-                least = Some((cause, without));
+                least = Some(without);
             }
         }
-        let Some((cause, without)) = least else { break };
-        found.named.retain(|n| cause.effect() != Some(n.effect));
+        let Some(without) = least else { break };
         best = fitted(&without.fit.hypothesis)?.unwrap_or(without);
+        // Of two modes one may stay, and the name with it.
+        let stays = beyond(&best.fit.hypothesis, already);
+        found.named.retain(|n| stays.contains(&Cause::Effect(n.effect)));
     }
     Ok(of(&best))
 }
@@ -134,7 +136,7 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
 }
 
 /// Takes back what is small beside a wandering that was found.
-fn beside_wandering(problem: &Problem<'_>, found: &mut Search) -> Result<(), Error> {
+fn beside_wandering(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
     let h = &found.best.fit.hypothesis;
     let mut still = h.clone();
     (still.zero_wanders, still.gain_wanders) = (false, false);
@@ -146,8 +148,9 @@ fn beside_wandering(problem: &Problem<'_>, found: &mut Search) -> Result<(), Err
     let mut kept = h.clone();
     found.named.retain(|n| {
         let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= BESIDE_WANDERING * explained;
-        if !enough {
-            kept = kept.without(Cause::Effect(n.effect));
+        let cause = Cause::Effect(n.effect);
+        while !enough && beyond(&kept, already).contains(&cause) {
+            kept = kept.without(cause);
         }
         enough
     });

@@ -30,7 +30,7 @@ pub use findings::{
 use extension::Own;
 
 use crate::base::{Basis, DragParams, ScreeningBasis};
-use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled};
+use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
@@ -92,12 +92,16 @@ pub fn diagnose(
 ) -> Result<Diagnosis, FitError> {
     let before = simulate(model, train, options.zero)?;
     let mut samples = Samples::from_record(train);
-    check(train, &samples, true)?;
+    check(train, &samples, sign_matters(model.base.kind()))?;
     let stage = |source| FitError::Stage { record: train.name(), source };
     let per_record = options.zero == Zero::PerRecord;
 
     let own = basis_of(model, &samples).map_err(stage)?;
-    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags());
+    let kept = match &own {
+        BasisOf::Fixed(kept) => Some(kept.clone()),
+        _ => None,
+    };
+    let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
@@ -155,10 +159,12 @@ pub fn diagnose(
     if effects(&hypothesis) != effects(&start) {
         basis = asked.on_better_plays(&hypothesis)?;
     }
-    for _ in 0..if stop_is_new { STOP_ROUNDS } else { 0 } {
+    for round in (1..=STOP_ROUNDS).filter(|_| stop_is_new) {
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         asked.stop(&mut hypothesis, &mut errors)?;
-        let Some(better) = asked.on_better_plays(&hypothesis)? else { break };
+        // The last word is the stop's.
+        let better = if round < STOP_ROUNDS { asked.on_better_plays(&hypothesis)? } else { None };
+        let Some(better) = better else { break };
         basis = Some(better);
     }
     if only_loop.is_none() {
@@ -174,7 +180,7 @@ pub fn diagnose(
     progress("refitting the model with what was found");
     let mut extended = model.clone();
     if effects(&hypothesis) != effects(&start) {
-        extended = Model { std_errors: errors.clone(), ..asked.extended(&hypothesis)? };
+        extended = asked.extended(&hypothesis, &errors)?;
     }
 
     progress("judging what is left");

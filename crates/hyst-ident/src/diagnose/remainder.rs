@@ -20,7 +20,7 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
-    let settled = || samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| *y);
+    let settled = || samples.settled_output();
     let n = settled().count().max(1) as f64;
     let mean = settled().sum::<f64>() / n;
     let variance = settled().map(|y| (y - mean) * (y - mean)).sum::<f64>() / n;

@@ -7,7 +7,8 @@ use hyst_core::SaturationParams;
 
 use super::trial::Trial;
 use crate::Samples;
-use crate::nested::Problem;
+use crate::nested::{Problem, ends_at_a_bound, shown_motion};
+use crate::samples::range;
 
 /// Bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
@@ -122,8 +123,9 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
     let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
     // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit.
     let least = if trial.fit.hypothesis.drag.is_some() { 0.3 } else { 0.02 };
-    let time = |seconds: f64| seconds > least * samples.period && seconds < 0.09 * longest;
-    e.delay.is_none_or(|p| time(p.seconds))
+    let time = |seconds: f64| seconds > least * samples.period;
+    !ends_at_a_bound(&trial.fit.hypothesis, samples)
+        && e.delay.is_none_or(|p| time(p.seconds))
         && e.lag.is_none_or(|p| time(p.seconds))
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
         && e.saturation.is_none_or(|p| stops_something(samples, trial, &p))
@@ -144,15 +146,15 @@ fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
     problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 
-/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the output's span.
+/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the motion's span.
 const TOUCHED: f64 = 0.003;
 const NEAR_LIMIT: f64 = 0.05;
 
 /// Whether the output comes to one of the limits and stays there for some rows.
 fn stops_something(samples: &Samples, trial: &Trial, p: &SaturationParams) -> bool {
-    let zero = trial.fit.zeros.iter().sum::<f64>() / trial.fit.zeros.len().max(1) as f64;
-    let near = NEAR_LIMIT * samples.output_span();
-    let settled = || samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| y - zero);
-    let touched = settled().filter(|y| (p.high - y).min(y - p.low) < near).count();
-    p.knee < 0.2 && touched as f64 > TOUCHED * settled().count() as f64
+    let shown = shown_motion(samples, &trial.fit);
+    let (low, high) = range(shown.iter().copied());
+    let near = NEAR_LIMIT * (high - low);
+    let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
+    p.knee < 0.2 && touched as f64 > TOUCHED * shown.len() as f64
 }

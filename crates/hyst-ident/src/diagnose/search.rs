@@ -175,8 +175,9 @@ fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
         .collect()
 }
 
-fn candidates_for_removal(best: &Trial, already: &[Cause]) -> Vec<Cause> {
-    let mut names = best.fit.hypothesis.causes();
+/// What a set holds beyond what was there already, each once.
+pub(super) fn beyond(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
+    let mut names = h.causes();
     for known in already {
         if let Some(at) = names.iter().position(|n| n == known) {
             names.remove(at);
@@ -188,7 +189,7 @@ fn candidates_for_removal(best: &Trial, already: &[Cause]) -> Vec<Cause> {
 
 /// Drops the effect that is needed least, if there is one that is not needed.
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
-    let names = candidates_for_removal(best, already);
+    let names = beyond(&best.fit.hypothesis, already);
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.refit(&best.fit.hypothesis.without(*e))).collect();
     let mut least: Option<Trial> = None;
@@ -212,7 +213,7 @@ fn swaps(
 ) -> Result<(Option<Trial>, Vec<Named>), Error> {
     let mut named = Vec::new();
     let mut better: Option<Trial> = None;
-    for cause in candidates_for_removal(best, already) {
+    for cause in beyond(&best.fit.hypothesis, already) {
         let Some(without) = judge.refit(&best.fit.hypothesis.without(cause))? else { continue };
         let mut others = candidates(judge.problem, &without.fit);
         let one_loop = judge.problem.only_loop.is_some() && is_late(cause);
@@ -267,4 +268,24 @@ fn tie(judge: &Judge<'_>, a: &Trial, b: &Trial) -> bool {
     let per_row = (a.total() - b.total()).abs() / a.fit.rows.max(1) as f64;
     let drowned = per_row < (LEAST_OVER_NOISE * judge.noise).powi(2) && (a.total() / b.total()).ln().abs() < 0.1;
     drowned || score::undecided(a, b, judge.seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Effects;
+    use hyst_core::{LagParams, ResonanceParams};
+
+    #[test]
+    fn of_two_modes_one_may_have_been_there() {
+        let mode = |hz| ResonanceParams { hz, damping: 0.02, gain: 1.0 };
+        let lag = Some(LagParams { seconds: 0.01 });
+        let h = Hypothesis::of(Effects { lag, resonances: vec![mode(40.0), mode(90.0)], ..Effects::default() });
+        let (lag, resonance) = (Cause::Effect(Effect::Lag), Cause::Effect(Effect::Resonance));
+        assert_eq!(beyond(&h, &[]), [lag, resonance]);
+        assert_eq!(beyond(&h, &[resonance]), [lag, resonance]);
+        assert_eq!(beyond(&h, &[resonance, lag]), [resonance]);
+        assert_eq!(beyond(&h, &[resonance, resonance]), [lag]);
+        assert_eq!(beyond(&h.without(resonance), &[resonance]), [lag]);
+    }
 }

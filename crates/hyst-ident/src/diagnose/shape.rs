@@ -79,10 +79,12 @@ pub(super) fn shape(
             tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, None)));
         }
     }
+    // What better plays gain is not the curve's.
+    let on_better_plays = tried.iter().find_map(|(.., anew)| anew.clone()).filter(|p| p.total() < plain.total());
+    let plain = on_better_plays.as_ref().unwrap_or(plain);
     let judged: Vec<_> = tried
         .iter()
         .map(|(effect, t, anew)| {
-            // What better plays gain is not the curve's.
             let (without, closed) = anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
             let judgement = score::judge(problem, without, t, noise, seed);
             let accepted = judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= closed * least;
@@ -125,8 +127,9 @@ pub(super) fn shape(
 /// up the misfit.
 fn stopped(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Vec<Fitted>, Error> {
     let mut fits = Vec::new();
-    let begin = found.effects.saturation.into_iter().chain(starts::stops(problem.samples, plain));
-    for stop in begin.chain(starts::stops_above_rest(problem.samples, plain)) {
+    let ends = starts::stops(problem.samples, plain).into_iter().flatten();
+    let above_rest = starts::stops_above_rest(problem.samples, plain).into_iter().flatten();
+    for stop in found.effects.saturation.into_iter().chain(ends).chain(above_rest) {
         let mut h = found.clone();
         h.effects.saturation = Some(stop);
         fits.extend(problem.fit(&h)?.and_then(|f| {

@@ -11,7 +11,7 @@ use hyst_core::{
 use super::spectrum::{peaks, tone};
 use crate::base::DragParams;
 use crate::model::{CreepBank, Effect, Effects};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion};
 use crate::samples::Samples;
 
 /// Creep elements per decade of time.
@@ -48,7 +48,10 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         // It is looked for on the user's base.
         Effect::Asymmetry => Vec::new(),
         Effect::Load => vec![with(&|e| e.load = Some(LoadParams { per_newton: 0.0 }))],
-        Effect::Saturation => stops(samples, from).map(|stop| with(&|e| e.saturation = Some(stop))).into(),
+        Effect::Saturation => {
+            let stops = stops(samples, from).into_iter().flatten();
+            stops.map(|stop| with(&|e| e.saturation = Some(stop))).collect()
+        }
         Effect::Temperature => {
             let reference_degc = starting_temperature(samples);
             vec![with(&|e| e.temperature = Some(TemperatureParams { per_kelvin: 0.0, reference_degc }))]
@@ -71,24 +74,24 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
     })
 }
 
-/// A stop at either end of what the sensor has shown, the other end far away.
-pub(super) fn stops(samples: &Samples, from: &Fitted) -> [SaturationParams; 2] {
-    let zero = from.zeros.iter().sum::<f64>() / from.zeros.len().max(1) as f64;
-    let settled = samples.output.iter().zip(&samples.settling).filter(|(_, s)| !**s).map(|(y, _)| y - zero);
-    let mut shown: Vec<f64> = settled.collect();
+/// A stop at the upper and one at the lower end of what the sensor has shown, the other end far away; none where it has shown no motion.
+pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 2]> {
+    let mut shown = shown_motion(samples, from);
     shown.sort_by(f64::total_cmp);
     let at = |share: f64| shown.get((share * (shown.len() - 1) as f64) as usize).copied().unwrap_or(0.0);
     // Noise reaches beyond a stop: not the very last value.
     let (low, high) = (at(0.001), at(0.999));
     let far = FAR_STOP * (high - low);
-    [SaturationParams { low: high - far, high, knee: 0.01 }, SaturationParams { low, high: low + far, knee: 0.01 }]
+    let stops =
+        [SaturationParams { low: high - far, high, knee: 0.01 }, SaturationParams { low, high: low + far, knee: 0.01 }];
+    stops.iter().all(|stop| stop.low < stop.high).then_some(stops)
 }
 
 /// Lower stops under which the device rests: it only shows its motion once it has gone that far.
-pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> [SaturationParams; 3] {
-    let [_, lower] = stops(samples, from);
-    let span = samples.output_span();
-    [0.03, 0.1, 0.25].map(|share| SaturationParams { low: lower.low + share * span, ..lower })
+pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 3]> {
+    let [_, lower] = stops(samples, from)?;
+    let span = (lower.high - lower.low) / FAR_STOP;
+    Some([0.03, 0.1, 0.25].map(|share| SaturationParams { low: lower.low + share * span, ..lower }))
 }
 
 /// How far away, in spans of the output, a stop is that nothing reaches.

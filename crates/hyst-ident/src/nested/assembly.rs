@@ -1,5 +1,7 @@
 //! The linear unknowns at one set of nonlinear parameters.
 
+use std::ops::Range;
+
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
@@ -38,6 +40,12 @@ pub(super) struct Point {
 /// What a dead zone of an asymmetry adds for each unit of its weight.
 pub(super) fn dead_zone(v: f64, threshold: f64) -> f64 {
     if threshold >= 0.0 { (v - threshold).max(0.0) } else { (v - threshold).min(0.0) }
+}
+
+/// By how much that changes with what enters it.
+pub(super) fn dead_zone_slope(v: f64, threshold: f64) -> f64 {
+    let beyond = if threshold >= 0.0 { v > threshold } else { v < threshold };
+    f64::from(u8::from(beyond))
 }
 
 /// Height of the hat with number `j` of a wandering at a share of the record's rows.
@@ -203,6 +211,12 @@ impl Problem<'_> {
         Some(Assembly { blocks, grams, total, solution, objective, point })
     }
 
+    /// How far what wanders in time has wandered in a row, from the heights of its hats.
+    pub(super) fn wandering(&self, heights: &[f64], row: usize) -> f64 {
+        let share = row as f64 / self.samples.len().max(2) as f64;
+        heights.iter().enumerate().map(|(j, height)| height * hat(j, share)).sum()
+    }
+
     /// Measured minus predicted output, all rows.
     pub(super) fn residual_of(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, h)?;
@@ -212,10 +226,7 @@ impl Problem<'_> {
         let extras = self.extras(h);
         let n = self.samples.len();
         let z = z.as_slice();
-        let wanders = |hats: &std::ops::Range<usize>, k: usize| -> f64 {
-            let share = k as f64 / n.max(2) as f64;
-            z[hats.clone()].iter().enumerate().map(|(j, z)| z * hat(j, share)).sum()
-        };
+        let wanders = |hats: &Range<usize>, k| self.wandering(&z[hats.clone()], k);
         Ok((0..n)
             .map(|k| {
                 let beside: f64 = extras.iter().zip(&z[layout.zeros.start..]).map(|(c, z)| z * c[k]).sum();

@@ -23,6 +23,24 @@ pub(super) fn box_of(p: &Parameter<'_>, samples: &Samples) -> Bounds {
     Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
 }
 
+/// Shares of their upper bounds up to which a time and the gain of a mode count as found, not as stopped by the bound.
+const INSIDE: f64 = 0.9;
+const GAIN_INSIDE: f64 = 0.99;
+
+/// Whether the search for a delay, a lag, a drag or a mode's gain has run up against its upper bound.
+pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
+    let mut ends = false;
+    h.clone().visit_nonlinear(&mut |p| {
+        let inside = match p.effect {
+            Effect::Delay | Effect::Lag | Effect::RateDependence => INSIDE,
+            Effect::Resonance if p.name.starts_with("gain") => GAIN_INSIDE,
+            _ => return,
+        };
+        ends |= *p.value >= inside * box_of(&p, samples).upper;
+    });
+    ends
+}
+
 /// Highest minus lowest input.
 fn range_of(samples: &Samples) -> f64 {
     let (low, high) = samples.input_range();
@@ -74,21 +92,40 @@ pub(super) fn stepped(
 mod tests {
     use super::*;
     use crate::model::Effects;
-    use hyst_core::SaturationParams;
+    use hyst_core::{LagParams, SaturationParams};
+
+    /// Rows of a millisecond, the drive from 0 to 1, the output from 100 to 110.
+    fn samples(rows: usize) -> Samples {
+        let share = |k: usize| k as f64 / (rows - 1) as f64;
+        Samples {
+            period: 1e-3,
+            time: (0..rows).map(|k| k as f64 * 1e-3).collect(),
+            input: (0..rows).map(share).collect(),
+            output: (0..rows).map(|k| 100.0 + 10.0 * share(k)).collect(),
+            temperature: None,
+            load: None,
+            segments: std::iter::once(0..rows).collect(),
+            file_of_segment: vec![0],
+            settling: vec![false; rows],
+        }
+    }
+
+    #[test]
+    fn a_lag_at_the_bound_of_its_search_has_ended_there() {
+        let ends = |rows: usize, seconds: f64| {
+            let effects = Effects { lag: Some(LagParams { seconds }), ..Effects::default() };
+            ends_at_a_bound(&Hypothesis::of(effects), &samples(rows))
+        };
+        // A tenth of a segment of 2 s.
+        assert!(ends(2000, 0.2) && !ends(2000, 0.1));
+        // However long the record is, no search goes on beyond one second.
+        assert!(ends(40_000, 1.0) && !ends(40_000, 0.5));
+        assert!(!ends_at_a_bound(&Hypothesis::default(), &samples(2000)));
+    }
 
     #[test]
     fn a_stop_that_nothing_reaches_stays_where_it_is() {
-        let samples = Samples {
-            period: 1e-3,
-            time: vec![0.0, 1e-3],
-            input: vec![0.0, 1.0],
-            output: vec![100.0, 110.0],
-            temperature: None,
-            load: None,
-            segments: std::iter::once(0..2).collect(),
-            file_of_segment: vec![0],
-            settling: vec![false; 2],
-        };
+        let samples = samples(2);
         let moves = |low: f64, high: f64| {
             let stop = SaturationParams { low, high, knee: 0.1 };
             let h = Hypothesis::of(Effects { saturation: Some(stop), ..Effects::default() });

@@ -14,11 +14,14 @@ mod layout;
 mod path;
 mod problem;
 mod projector;
+mod sensor;
 mod tangent;
 
+pub(crate) use bounds::ends_at_a_bound;
 pub(crate) use cross_validation::folds_interleaved;
 pub(crate) use hypothesis::{Cause, Hypothesis};
 pub(crate) use layout::{HATS, Layout};
 pub(crate) use path::SignalPath;
 pub(crate) use problem::{Fitted, Problem};
 pub(crate) use projector::Projector;
+pub(crate) use sensor::{shown_motion, without_sensor_effects};
