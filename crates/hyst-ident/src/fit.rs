@@ -257,7 +257,7 @@ pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
     /// An operator of another kind, kept as it is.
-    Fixed(FixedBasis),
+    Fixed(Box<FixedBasis>),
 }
 
 impl BasisOf {
@@ -265,7 +265,7 @@ impl BasisOf {
         match self {
             Self::Pi(b) => b,
             Self::Preisach(b) => b,
-            Self::Fixed(b) => b,
+            Self::Fixed(b) => b.as_ref(),
         }
     }
 
@@ -310,7 +310,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-        _ => BasisOf::Fixed(FixedBasis::new(model, samples)?),
+        _ => BasisOf::Fixed(Box::new(FixedBasis::new(model, samples)?)),
     })
 }
 

@@ -22,13 +22,13 @@ pub(crate) struct ScreeningBasis {
     middle: f64,
     half: f64,
     drags: bool,
-    kept: Option<FixedBasis>,
+    kept: Option<Box<FixedBasis>>,
 }
 
 impl ScreeningBasis {
     /// For the input range of a record; with drag only where the base that is extended in the end has one too, and with that base
     /// if it is kept as it is.
-    pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<FixedBasis>) -> Self {
+    pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
         let linear = PiBasis::for_samples(samples);
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
