@@ -6,6 +6,8 @@
 //! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file), with any of eleven [`EFFECTS`] and with
 //!   [`Disturbance`]s that are none of them.
 //!
+//! - [`wire`]: frames on a stream of bytes, `no_std` and without heap, for a device and its firmware.
+//!
 //! ```
 //! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};
 //! use std::ops::ControlFlow;
@@ -19,17 +21,29 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![cfg_attr(not(feature = "std"), no_std)]
+
+pub mod wire;
+
+#[cfg(feature = "std")]
 mod daq;
+#[cfg(feature = "std")]
 mod plant;
+#[cfg(feature = "std")]
 mod runner;
 
+#[cfg(feature = "std")]
 pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
+#[cfg(feature = "std")]
 pub use plant::config::{
     Actuator, Asymmetry, Bed, Creep, Delay, Disturbance, Drift, Interference, Lag, Load, LoadShape, Mode, PlantConfig,
     Saturation, Sensor, Temperature, TemperatureShape, Viscosity,
 };
+#[cfg(feature = "std")]
 pub use plant::error::{ConfigError, PlantError};
+#[cfg(feature = "std")]
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
+#[cfg(feature = "std")]
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,
 };
