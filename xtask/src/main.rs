@@ -54,6 +54,11 @@ const CHECKS: &[Check] = &[
         environment: &[],
     },
     Check {
+        name: "wire without std",
+        arguments: &["clippy", "--package", "hyst-hw", "--no-default-features", "--", "-D", "warnings"],
+        environment: &[],
+    },
+    Check {
         name: "documentation",
         arguments: &["doc", "--workspace", "--no-deps", "--document-private-items"],
         environment: &[("RUSTDOCFLAGS", "-D warnings")],

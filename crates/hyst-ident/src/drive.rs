@@ -43,6 +43,14 @@ impl FromStr for BetweenSamples {
 }
 
 impl BetweenSamples {
+    /// Steps from one row to the next.
+    pub(crate) fn steps(self) -> usize {
+        match self {
+            Self::Linear => 1,
+            Self::BandLimited => STEPS,
+        }
+    }
+
     /// Its name in files and options.
     pub fn name(self) -> &'static str {
         match self {
@@ -90,14 +98,13 @@ impl<'a> Drive<'a> {
 
     /// Another drive over the segments and in the surroundings of a record.
     pub(crate) fn of(samples: &'a Samples, rows: &'a [f64], between: BetweenSamples, passes: Passes) -> Self {
-        match between {
-            BetweenSamples::Linear => Self { samples, rows, steps: 1, values: Cow::Borrowed(rows), passes },
+        let values = match between {
+            BetweenSamples::Linear => Cow::Borrowed(rows),
             BetweenSamples::BandLimited => {
-                let segments = samples.segments.iter();
-                let values = segments.flat_map(|s| band_limited(&rows[s.clone()], passes)).collect();
-                Self { samples, rows, steps: STEPS, values: Cow::Owned(values), passes }
+                samples.segments.iter().flat_map(|s| band_limited(&rows[s.clone()], passes)).collect()
             }
-        }
+        };
+        Self { samples, rows, steps: between.steps(), values, passes }
     }
 
     /// Sample period that a stage has to be built for \[s\].

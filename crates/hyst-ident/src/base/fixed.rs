@@ -29,10 +29,9 @@ impl FixedBasis {
     pub(crate) fn new(model: &Model, samples: &Samples) -> Result<Self, Error> {
         let (low, high) = samples.input_range();
         let between = model.between_samples;
-        let period = Drive::new(samples, between, Passes::Once).period();
+        let period = samples.period / between.steps() as f64;
         let operator = Operator::new(&model.base, [low, high], &Sampling { period })?;
-        let surroundings = Samples { input: Vec::new(), output: Vec::new(), ..samples.clone() };
-        Ok(Self { base: model.base.clone(), between, operator: Box::new(operator), samples: surroundings })
+        Ok(Self { base: model.base.clone(), between, operator: Box::new(operator), samples: samples.clone() })
     }
 }
 

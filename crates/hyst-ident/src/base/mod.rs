@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 
 use crate::lsq::Bounds;
 
-/// A family of rate-independent operators, linear in their weights.
+/// A family of operators, linear in their weights.
 ///
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
 /// scale the motion and not an arbitrary zero.

@@ -55,8 +55,8 @@ impl Basis for ScreeningBasis {
             // In volts like the others, whatever its unit: one penalty is for all.
             let size = |column: &[f64]| column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
             kept.columns(drive, segments, drag, &mut |_, column| {
-                let scale = size(drive) / size(column).max(f64::MIN_POSITIVE);
-                column.iter_mut().for_each(|y| *y *= scale);
+                let scale = size(drive) / size(column);
+                column.iter_mut().filter(|_| scale.is_finite()).for_each(|y| *y *= scale);
                 each(self.linear.len() + 2 * self.curved.len(), column);
             });
         }

@@ -66,19 +66,23 @@ impl Own<'_> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
         let stage = |e| self.stage(e);
-        let Some(plain) = shape::lacking(&problem, hypothesis, richest).map_err(stage)? else {
+        let plain = shape::plain(&problem, hypothesis).map_err(stage)?;
+        let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
             return Ok((None, None));
         };
         let own = shape::bent(&problem, hypothesis, &plain.fit).map_err(stage)?;
         let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.fit)).transpose()?.flatten();
         let mut bent = Bent { own, anew: None };
         if let Some(basis) = &anew {
-            let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record);
-            let Some(plain) = shape::lacking(&behind, hypothesis, richest).map_err(stage)? else {
+            let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).beside(&problem);
+            match shape::plain(&behind, hypothesis).map_err(stage)? {
                 // Other plays alone were missing, no curve.
-                return Ok((None, anew));
-            };
-            bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
+                Some(plain) if shape::is_complete(&plain, richest) => return Ok((None, anew)),
+                Some(plain) => {
+                    bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
+                }
+                None => {}
+            }
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
         let Some(shape) = found else { return Ok((None, None)) };
@@ -131,8 +135,11 @@ impl Own<'_> {
         extended.between_samples = self.model.between_samples;
         if let BasisOf::Fixed(_) = self.basis {
             // What is known of an operator that stays as it is stays known.
-            extended.std_errors.clone_from(&self.model.std_errors);
-            extended.undetermined.clone_from(&self.model.undetermined);
+            let of_operator = format!("{}.", self.model.base.kind().name());
+            let own = |name: &&String| name.starts_with(&of_operator);
+            let errors = self.model.std_errors.iter().filter(|(name, _)| own(name));
+            extended.std_errors = errors.map(|(name, error)| (name.clone(), *error)).collect();
+            extended.undetermined = self.model.undetermined.iter().filter(own).cloned().collect();
         }
         extended.std_errors.extend(errors.clone());
         Ok(extended)

@@ -148,11 +148,13 @@ fn beside_wandering(problem: &Problem<'_>, found: &mut Search, already: &[Cause]
     let mut kept = h.clone();
     found.named.retain(|n| {
         let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= BESIDE_WANDERING * explained;
-        let cause = Cause::Effect(n.effect);
-        while !enough && beyond(&kept, already).contains(&cause) {
-            kept = kept.without(cause);
+        if enough {
+            return true;
         }
-        enough
+        // What was judged is the last of two modes; the other stays, and the name with it.
+        let cause = Cause::Effect(n.effect);
+        kept = kept.without(cause);
+        beyond(&kept, already).contains(&cause)
     });
     if kept != *h
         && let Some(trial) = problem.fit(&kept)?.and_then(|f| Trial::of(problem, f))

@@ -1,7 +1,7 @@
 //! Closing the loop with measured data: find what a fitted model leaves over, name the effect that
 //! explains it, add it, and show the error before and after.
 //!
-//! 1. **Search** on a rich rate-independent base (`base/screening.rs`), so that a coarse base model's
+//! 1. **Search** on a rich base (`base/screening.rs`: rate-independent, and the model's own where that stays as it is), so that a coarse one's
 //!    own misfit is not taken for an effect: forward with a small beam, then elimination, then swaps.
 //!    Every trial refits the whole nested model.
 //! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,

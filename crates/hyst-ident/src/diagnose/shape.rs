@@ -41,10 +41,14 @@ pub(super) struct Bent {
     pub(super) anew: Option<(Trial, Trial)>,
 }
 
-/// The own base with what was found, if it misses something that the rich one shows.
-pub(super) fn lacking(problem: &Problem<'_>, found: &Hypothesis, richest: f64) -> Result<Option<Trial>, Error> {
-    let plain = problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f));
-    Ok(plain.filter(|p| p.cv_rmse() > MISSING * richest))
+/// The own base with what was found; none if it cannot be solved.
+pub(super) fn plain(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Trial>, Error> {
+    Ok(problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f)))
+}
+
+/// Whether it misses nothing that the rich one shows.
+pub(super) fn is_complete(plain: &Trial, richest: f64) -> bool {
+    plain.cv_rmse() <= MISSING * richest
 }
 
 /// The same with a curve behind it; none if there is one already.
@@ -59,7 +63,7 @@ pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) ->
 }
 
 /// Looks for a curve behind the own base of `problem`, all that was found before kept. `plain` is that base without one, which
-/// [lacks](lacking) something; `richest` is the cross-validated error that a rich base leaves \[y\].
+/// [lacks](is_complete) something; `richest` is the cross-validated error that a rich base leaves \[y\].
 pub(super) fn shape(
     problem: &Problem<'_>,
     found: &Hypothesis,

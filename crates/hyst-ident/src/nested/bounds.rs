@@ -91,8 +91,9 @@ pub(super) fn stepped(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::DragParams;
     use crate::model::Effects;
-    use hyst_core::{LagParams, SaturationParams};
+    use hyst_core::{DelayParams, LagParams, ResonanceParams, SaturationParams};
 
     /// Rows of a millisecond, the drive from 0 to 1, the output from 100 to 110.
     fn samples(rows: usize) -> Samples {
@@ -121,6 +122,16 @@ mod tests {
         // However long the record is, no search goes on beyond one second.
         assert!(ends(40_000, 1.0) && !ends(40_000, 0.5));
         assert!(!ends_at_a_bound(&Hypothesis::default(), &samples(2000)));
+        // A delay, a drag, and what a mode carries.
+        let of = |effects: Effects| ends_at_a_bound(&Hypothesis::of(effects), &samples(2000));
+        let delay = |seconds: f64| of(Effects { delay: Some(DelayParams { seconds }), ..Effects::default() });
+        assert!(delay(0.19) && !delay(0.17));
+        let drag = |seconds: f64| Some(DragParams { seconds, volt_seconds: 0.0 });
+        let dragged = |seconds| Hypothesis { drag: drag(seconds), ..Hypothesis::default() };
+        assert!(ends_at_a_bound(&dragged(0.19), &samples(2000)) && !ends_at_a_bound(&dragged(0.17), &samples(2000)));
+        let mode = |gain: f64| ResonanceParams { hz: 50.0, damping: 0.02, gain };
+        let rings = |gain: f64| of(Effects { resonances: vec![mode(1.0), mode(gain)], ..Effects::default() });
+        assert!(rings(1.195) && !rings(1.1));
     }
 
     #[test]

@@ -83,18 +83,26 @@ impl<'a> Problem<'a> {
         Self { samples, basis, blocks, zero_per_file, raw, width, penalty, only_loop, unpredictable }
     }
 
-    /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
-    pub(crate) fn cross_validated(&self, fit: &Fitted) -> Option<Vec<f64>> {
-        let folds = folds_interleaved(self.blocks, FOLDS);
+    /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
+    pub(crate) fn beside(self, other: &Self) -> Self {
+        Self { unpredictable: OnceLock::from(other.unpredictable().to_vec()), ..self }
+    }
+
+    fn unpredictable(&self) -> &[bool] {
         // The same for all that are compared: what moves the base depends little on the effects.
-        let of_base = || {
+        self.unpredictable.get_or_init(|| {
             let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
+            let folds = folds_interleaved(self.blocks, FOLDS);
             base.map_or_else(
                 || vec![false; self.blocks.rows.len()],
                 |base| unpredictable(&base.grams, &self.penalty(base.solution.len()), &folds),
             )
-        };
-        cross_validate(fit, &folds, self.unpredictable.get_or_init(of_base))
+        })
+    }
+
+    /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
+    pub(crate) fn cross_validated(&self, fit: &Fitted) -> Option<Vec<f64>> {
+        cross_validate(fit, &folds_interleaved(self.blocks, FOLDS), self.unpredictable())
     }
 
     pub(super) fn zeros(&self) -> usize {
