@@ -94,6 +94,14 @@ fn a_pair_is_named_as_a_pair() {
     assert_eq!(names(&d), ["creep", "resonance"], "{:#?}", d.findings);
 }
 
+/// Behind a structure that rings at every cell of a triangle, a zero that may wander takes a little more than the drift that acts: too
+/// little to leave the drift without its name.
+#[test]
+fn a_drift_keeps_its_name_beside_a_wandering_zero() {
+    let outcome = run(&draw(12, 35));
+    assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
+}
+
 /// Parameters with a true value come out right, and the standard errors are of the right size.
 #[test]
 fn parameters_are_those_of_the_plant() {

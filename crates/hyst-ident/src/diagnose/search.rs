@@ -235,7 +235,9 @@ fn swaps(
             let tie = judgement.sensible && (alike || tie(judge, best, &trial));
             let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
-            let simpler = accepted && tie && other.complexity() < cause.complexity();
+            // What has no name has to be worth its many numbers: not where an effect leaves it next to nothing to take.
+            let nameless = || cause.effect().is_none() && !judge.judge(&trial, best).accepted();
+            let simpler = accepted && other.complexity() < cause.complexity() && (tie || nameless());
             let clearly = accepted && !tie && trial.total() < best.total();
             let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
