@@ -47,7 +47,8 @@ impl fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Writes a message as a frame to the beginning of a buffer, and gives that part of it.
+/// Writes a message as a frame to the beginning of a buffer, and gives that part of it. [`MAX_FRAME`] bytes hold any frame; the message is
+/// put together in as many on the stack.
 ///
 /// # Errors
 /// [`FrameError::TooLong`] if the message has more than [`MAX_PAYLOAD`] bytes, or the buffer no room for it;
@@ -89,9 +90,8 @@ pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b 
 #[derive(Debug, Clone)]
 pub struct Deframer {
     bytes: [u8; MAX_FRAME],
+    /// Bytes since the last zero; one more than there is room for, however many more have come.
     length: usize,
-    /// Whether bytes have come for which there was no room.
-    overrun: bool,
 }
 
 impl Default for Deframer {
@@ -103,7 +103,7 @@ impl Default for Deframer {
 impl Deframer {
     /// At the beginning of a frame.
     pub const fn new() -> Self {
-        Self { bytes: [0; MAX_FRAME], length: 0, overrun: false }
+        Self { bytes: [0; MAX_FRAME], length: 0 }
     }
 
     /// Takes bytes from the front of `input` up to the end of a frame, and gives its message; `None` if all are taken before one has
@@ -112,14 +112,13 @@ impl Deframer {
         while let Some((byte, rest)) = input.split_first() {
             *input = rest;
             if *byte != 0 {
-                match self.bytes.get_mut(self.length) {
-                    Some(place) => *place = *byte,
-                    None => self.overrun = true,
+                if let Some(place) = self.bytes.get_mut(self.length) {
+                    *place = *byte;
                 }
-                self.length = (self.length + 1).min(MAX_FRAME);
+                self.length = (self.length + 1).min(MAX_FRAME + 1);
             } else if self.length > 0 {
                 let message = self.message();
-                (self.length, self.overrun) = (0, false);
+                self.length = 0;
                 return Some(message);
             }
         }
@@ -127,10 +126,8 @@ impl Deframer {
     }
 
     fn message<M: DeserializeOwned>(&mut self) -> Result<M, FrameError> {
-        if self.overrun {
-            return Err(FrameError::TooLong);
-        }
-        let length = cobs::decode_in_place(&mut self.bytes[..self.length]).map_err(|_| FrameError::Stuffing)?;
+        let stuffed = self.bytes.get_mut(..self.length).ok_or(FrameError::TooLong)?;
+        let length = cobs::decode_in_place(stuffed).map_err(|_| FrameError::Stuffing)?;
         let (payload, sum) = self.bytes[..length].split_last_chunk::<SUM>().ok_or(FrameError::TooShort)?;
         if CRC.checksum(payload) != u32::from_le_bytes(*sum) {
             return Err(FrameError::Sum);

@@ -78,7 +78,7 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
 pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 2]> {
     let mut shown = shown_motion(samples, from);
     shown.sort_by(f64::total_cmp);
-    let at = |share: f64| shown.get((share * (shown.len() - 1) as f64) as usize).copied().unwrap_or(0.0);
+    let at = |share: f64| shown.get((share * shown.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
     // Noise reaches beyond a stop: not the very last value.
     let (low, high) = (at(0.001), at(0.999));
     let far = FAR_STOP * (high - low);
