@@ -118,6 +118,8 @@ impl Ran {
     }
 }
 
+const SHORT_DRIVE: &str = "excite identification --rate 500 --high 100 --seconds 4 --slow 4 --hold 0.3 --rest 0.1";
+
 /// A folder of its own in which a test runs `hystctl`.
 #[derive(Debug)]
 pub struct Lab {
@@ -157,8 +159,12 @@ impl Lab {
 
     /// Writes a short identification drive.
     pub fn excite(&self, name: &str, seed: u64) {
-        let options = "--rate 500 --high 100 --seconds 4 --slow 4 --hold 0.3 --rest 0.1";
-        self.ok(&format!("excite identification {options} --seed {seed} -o {name}"));
+        self.ok(&format!("{SHORT_DRIVE} --seed {seed} -o {name}"));
+    }
+
+    /// Writes one that differs from it in every segment.
+    pub fn excite_for_test(&self, name: &str) {
+        self.ok(&format!("{SHORT_DRIVE} --test -o {name}"));
     }
 
     /// Writes a reference of `seconds` at 500 Hz: a raised cosine of 1 Hz from 6 to `top` µm.

@@ -6,7 +6,7 @@ use serde_json::Value;
 /// A lab with `train.csv` and, of another drive, `test.csv`.
 fn lab(more: &str) -> Lab {
     let lab = Lab::with_train(more);
-    lab.excite("v.csv", 9);
+    lab.excite_for_test("v.csv");
     lab.ok("run --daq sim:plant.toml --drive v.csv --record test.csv");
     lab
 }

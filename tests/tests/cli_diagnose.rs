@@ -5,7 +5,7 @@ use serde_json::Value;
 
 fn lab() -> Lab {
     let lab = Lab::with_model();
-    lab.excite("u2.csv", 2);
+    lab.excite_for_test("u2.csv");
     lab.ok("run --daq sim:plant.toml --drive u2.csv --record test.csv");
     lab
 }
@@ -21,6 +21,11 @@ fn a_lag_is_found_named_and_added() {
         assert!(ran.stdout.contains(part), "\"{part}\" is missing in: {}", ran.stdout);
     }
     assert_eq!(ran.stderr, "");
+    assert!(
+        ran.stdout.contains("\nnext: ") && ran.stdout.contains("\n  hystctl fit train.csv --model preisach"),
+        "{}",
+        ran.stdout
+    );
     let findings: Value = serde_json::from_str(&lab.read("findings.json")).unwrap();
     assert_eq!(findings["schema"], "hyst.findings/1");
     assert_eq!(findings["verdict"], "explained");
@@ -55,6 +60,11 @@ fn files_that_mislead_are_told() {
     assert!(ran.stderr.contains("was not fitted to test.csv"), "{}", ran.stderr);
     let ran = lab.ok("diagnose train.csv --test train.csv --model model.json");
     assert!(ran.stderr.contains("say nothing about new data"), "{}", ran.stderr);
+    // The sines and triangles of another seed are the same.
+    lab.excite("u3.csv", 3);
+    lab.ok("run --daq sim:plant.toml --drive u3.csv --record alike.csv --seed 5");
+    let ran = lab.ok("diagnose train.csv --test alike.csv --model model.json");
+    assert!(ran.stderr.contains("repeat a segment"), "{}", ran.stderr);
 }
 
 #[test]

@@ -56,6 +56,33 @@ fn from_a_drive_to_a_record_that_is_fitted() {
 }
 
 #[test]
+fn what_was_measured_before_is_kept() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    lab.excite("u.csv", 1);
+    let run = "run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap";
+    assert_eq!(lab.ok(run).stderr, "");
+    let first = lab.read("train.csv");
+    let ran = lab.ok(&format!("{run} --seed 4"));
+    for note in
+        ["train.csv was there already; it is train.csv.~1~ now", "run.mcap was there already; it is run.mcap.~1~ now"]
+    {
+        assert!(ran.stderr.contains(note), "{}", ran.stderr);
+    }
+    assert_eq!(lab.read("train.csv.~1~"), first);
+    assert_eq!(log(&lab, "run.mcap.~1~").len(), log(&lab, "run.mcap").len());
+    // The same drive with another noise.
+    let second = lab.read("train.csv");
+    assert_eq!(column(&second, "voltage_v"), column(&first, "voltage_v"));
+    let (one, other) = (column(&first, "displacement_um"), column(&second, "displacement_um"));
+    assert!(one.iter().zip(&other).filter(|(a, b)| a != b).count() > one.len() / 2);
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 0.1));
+    // A run that is refused moves no file.
+    lab.refuses("run --daq sim:plant.toml --drive u.csv --record train.csv --log run.mcap --limit 0,1", 2);
+    assert_eq!(lab.read("train.csv"), second);
+}
+
+#[test]
 fn a_reference_is_followed_and_logged() {
     let lab = Lab::with_model();
     lab.reference("reference.csv", 2.5, 12.0);

@@ -12,7 +12,7 @@ use serde_json::Value;
 /// A lab in which a lag has been diagnosed, with `findings.json` and `report.html`.
 fn diagnosed() -> Lab {
     let lab = Lab::with_model();
-    lab.excite("u2.csv", 2);
+    lab.excite_for_test("u2.csv");
     lab.ok("run --daq sim:plant.toml --drive u2.csv --record test.csv");
     // What is there already gives way, as with every output.
     lab.write("report.html", "old");

@@ -70,8 +70,38 @@ fn tell_oddities(record: &Record) {
     }
 }
 
+/// Says where a test record is not new; returns whether it is one of the training's files.
+pub(crate) fn tell_repeated(test: &Record, train: &Record) -> bool {
+    if is_trained_on(test, train) {
+        say(TRAINED_ON);
+        return true;
+    }
+    let repeated = repeated_rows(test, train);
+    if repeated > 0 {
+        say(&format!(
+            "note: {}: {} of its rows repeat a segment of the training's drive, and the errors say less about new drives there; `hystctl excite identification --test` makes a drive that differs throughout",
+            test.name(),
+            text::percent(100.0 * repeated as f64 / test.rows() as f64)
+        ));
+    }
+    false
+}
+
+/// Rows of those segments whose drive is, but for noise, that of a segment of the training.
+fn repeated_rows(test: &Record, train: &Record) -> usize {
+    let (new, old) = (test.input(), train.input());
+    let span =
+        |u: &[f64]| u.iter().fold(f64::NEG_INFINITY, |m, u| m.max(*u)) - u.iter().fold(f64::INFINITY, |m, u| m.min(*u));
+    let alike = |a: &[f64], b: &[f64]| {
+        let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+        a.len() == b.len() && (squares / a.len() as f64).sqrt() < 2e-3 * span(b)
+    };
+    let of_training = |rows: &Range<usize>| train.segments().iter().any(|r| alike(&new[rows.clone()], &old[r.clone()]));
+    test.segments().iter().filter(|rows| of_training(rows)).map(Range::len).sum()
+}
+
 /// Whether a test record is one of the training's files, byte for byte.
-pub(crate) fn is_trained_on(test: &Record, train: &Record) -> bool {
+fn is_trained_on(test: &Record, train: &Record) -> bool {
     let sums = |record: &Record| record.sources().iter().filter_map(|s| s.sha256.clone()).collect::<Vec<_>>();
     sums(test).iter().any(|sum| sums(train).contains(sum))
 }
@@ -109,16 +139,17 @@ pub(crate) fn temperature(given: TemperatureArg, model: &Model, record: &Record)
     Some(degc)
 }
 
-/// The simulated plant that a file describes.
-pub(crate) fn plant(path: &Path) -> CommandResult<Plant> {
-    let named = |error: anyhow::Error| {
-        CommandError::new(
-            Exit::BadInput,
-            anyhow::anyhow!("{}: {}; correct the plant's file", path.display(), format!("{error:#}").trim_end()),
-        )
+/// The simulated plant that a file describes, with its noise from another seed if one is given.
+pub(crate) fn plant(path: &Path, noise: Option<u64>) -> CommandResult<Plant> {
+    let wrong = |error: anyhow::Error, advice: &str| {
+        let message = format!("{}: {}; {advice}", path.display(), format!("{error:#}").trim_end());
+        CommandError::new(Exit::BadInput, anyhow::anyhow!("{message}"))
     };
-    let text = fs::read_to_string(path).map_err(|error| named(error.into()))?;
-    let config = PlantConfig::from_toml(&text).map_err(|error| named(error.into()))?;
+    let named = |error: anyhow::Error| wrong(error, "correct the plant's file");
+    let text = fs::read_to_string(path)
+        .map_err(|error| wrong(error.into(), "`hystctl run --help` shows what such a file holds"))?;
+    let mut config = PlantConfig::from_toml(&text).map_err(|error| named(error.into()))?;
+    config.noise_seed = noise.or(config.noise_seed);
     Plant::new(config).map_err(|error| named(error.into()))
 }
 

@@ -18,6 +18,8 @@ use tempfile::TempPath;
 pub(crate) use contents::{LoggedModel, LoggedSample, RunInfo};
 use contents::{metadata, schema, units};
 
+use crate::output;
+
 /// Channel of the samples.
 pub(crate) const TOPIC: &str = "/actuator/sample";
 
@@ -37,6 +39,10 @@ pub(crate) struct RunLog {
     path: PathBuf,
     /// The temporary name, until the first sample.
     unnamed: Option<TempPath>,
+    /// Whether an older file of this name is set aside.
+    keeps_older: bool,
+    /// The name that it has got.
+    older: Option<PathBuf>,
     writer: Writer<BufWriter<File>>,
     channel_id: u16,
     samples: u32,
@@ -53,7 +59,24 @@ impl RunLog {
         let failed = |source| LogError { path: path.to_owned(), source };
         let (file, unnamed) = temporary(path).map_err(|error| failed(error.into()))?.into_parts();
         let (writer, channel_id) = begin(file, info).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), unnamed: Some(unnamed), writer, channel_id, samples: 0, unflushed_s: None })
+        Ok(Self {
+            path: path.to_owned(),
+            unnamed: Some(unnamed),
+            keeps_older: false,
+            older: None,
+            writer,
+            channel_id,
+            samples: 0,
+            unflushed_s: None,
+        })
+    }
+
+    /// As [`create`](Self::create); an older file is set aside instead of replaced.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub(crate) fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+        Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
     /// Appends one sample.
@@ -86,6 +109,11 @@ impl RunLog {
         &self.path
     }
 
+    /// The name that an older file has got.
+    pub(crate) fn older(&self) -> Option<&Path> {
+        self.older.as_deref()
+    }
+
     /// Samples so far.
     pub(crate) fn samples(&self) -> u32 {
         self.samples
@@ -108,10 +136,11 @@ impl RunLog {
     }
 
     fn take_name(&mut self) -> io::Result<()> {
-        match self.unnamed.take() {
-            Some(temporary) => temporary.persist(&self.path).map_err(|error| error.error),
-            None => Ok(()),
+        let Some(temporary) = self.unnamed.take() else { return Ok(()) };
+        if self.keeps_older {
+            self.older = output::set_aside(&self.path)?;
         }
+        temporary.persist(&self.path).map_err(|error| error.error)
     }
 }
 
@@ -202,6 +231,19 @@ mod tests {
         (0..250).for_each(|k| log.sample(&sample(k)).unwrap());
         assert!(read(&path).len() >= 202);
         drop(log);
+    }
+
+    #[test]
+    fn an_older_log_is_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        std::fs::write(&path, "older").unwrap();
+        let mut log = RunLog::beside_older(&path, &info()).unwrap();
+        assert_eq!(log.older(), None);
+        log.sample(&sample(0)).unwrap();
+        assert_eq!(std::fs::read(log.older().unwrap()).unwrap(), b"older");
+        log.finish().unwrap();
+        assert_eq!(read(&path).len(), 1);
     }
 
     #[test]

@@ -123,7 +123,13 @@ fn check(model: &Model, record: &Record, samples: &Samples) -> Result<(), FitErr
         return missing(&model.input.column, "the model was fitted with it; use --map if it has another name".into());
     }
     if let Some(unit) = record.output_unit().filter(|u| u.column() != model.output.column) {
-        return missing(&model.output.column, format!("the record's output is {}, the model's is not", unit.column()));
+        return missing(
+            &model.output.column,
+            format!(
+                "the record has {} instead: convert its values and rename the column, or fit a model to records in that unit",
+                unit.column()
+            ),
+        );
     }
     match model.lacking(samples) {
         Some((column, why)) => missing(column, why.into()),

@@ -9,6 +9,7 @@ use crate::output::Target;
 const EXAMPLES: &str = "\
 Examples:
   hystctl excite identification --rate 1000 --high 120 -o u.csv
+  hystctl excite identification --rate 1000 --high 120 --test -o u-test.csv
   hystctl excite sine --frequency 2 --cycles 5 --low -20 --high 120 -o u.csv
   hystctl excite separate lag delay --high 120 -o u.csv
   hystctl excite --help; hystctl excite stairs --help
@@ -71,6 +72,9 @@ pub(crate) enum ExciteKind {
         /// How long the ramps between levels take; chosen by the rate if not given
         #[arg(long, value_name = "S")]
         ramp: Option<f64>,
+        /// The drive for a test record: as the one without this option, but with other frequencies, levels and phases
+        #[arg(long)]
+        test: bool,
         /// Seed of levels and phases
         #[arg(long, default_value_t = 1)]
         seed: u64,

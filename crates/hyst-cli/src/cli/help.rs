@@ -61,6 +61,7 @@ pub(super) const PLANT: &str = "\
 A simulated plant is a file like this; every section after [sensor] may be left out. All but the last are effects that a \
 diagnosis can name; a [[disturbance]] is what it cannot:
   seed = 7
+  noise_seed = 8           # if left out: seed
   [actuator]
   max_v = 120
   gain_um_per_v = 0.2
@@ -76,7 +77,7 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   [asymmetry]
   bend = 0.05              # slope at the upper end less that at the lower one
   hook = 0.01              # slope at both ends less that in the middle
-  [viscosity]
+  [viscosity]              # the effect rate-dependence
   volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
   [temperature]
   per_k = 0.005
@@ -94,7 +95,7 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   period_s = 8
   shape = \"steps\"          # or sine, wander
   recorded = false         # true, or left out: the record has load_n
-  [[mode]]
+  [[mode]]                 # the effect resonance
   hz = 100
   damping = 0.02
   gain = 0.9

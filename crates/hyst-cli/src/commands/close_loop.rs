@@ -64,7 +64,7 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
         return Err(CommandError::bad_input(message));
     }
     let Device::Simulated(described) = &args.daq;
-    let mut plant = input::plant(described)?;
+    let mut plant = input::plant(described, None)?;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
     let report = Report::new(args.json.json, &[])?;

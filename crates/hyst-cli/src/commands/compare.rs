@@ -14,12 +14,16 @@ use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report};
 use crate::progress::Progress;
+use crate::report::next;
 use crate::{input, text};
 
 /// What is said about a comparison.
 #[derive(Debug, Serialize)]
 struct Summary {
     train: String,
+    /// Names of the training files, as the command line takes them.
+    #[serde(skip)]
+    files: String,
     rows: usize,
     /// Rows that are a start-up transient for one of the models, and count for none.
     settling_rows: usize,
@@ -44,10 +48,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let report = Report::new(args.json.json, &written)?;
     let train = input::training(&args.train, &args.map.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
-    let trained_on = test.as_ref().is_some_and(|test| input::is_trained_on(test, &train));
-    if trained_on {
-        output::say(input::TRAINED_ON);
-    }
+    let trained_on = test.as_ref().is_some_and(|test| input::tell_repeated(test, &train));
     let zero = args.zero.get();
     let options = args.options(zero == Zero::PerRecord);
 
@@ -73,6 +74,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let settling = |rows: &[bool]| rows.iter().filter(|settling| **settling).count();
     let summary = Summary {
         train: train.name(),
+        files: next::files(&train),
         rows: train.rows(),
         settling_rows: settling(&comparison.train_settling),
         test_rows: test.as_ref().map(hyst_ident::record::Record::rows),
@@ -121,13 +123,19 @@ impl Summary {
         for Skipped { kind, reason } in &self.comparison.skipped {
             lines.push(format!("skipped {kind}: {reason}"));
         }
+        if let Some(best) = self.comparison.models.first() {
+            lines.push(format!(
+                "these are bare models of the hysteresis; what one of them lacks (creep, resonance, temperature …) is another question:\n  hystctl fit {} --model {} -o model.json, then hystctl diagnose",
+                self.files, best.kind
+            ));
+        }
         lines.join("\n")
     }
 }
 
 /// One line for each model and record.
 fn table(comparison: &Comparison, unit: &str) -> String {
-    let head = ["model", "on", "RMSE", "of span", "max", "PV", "MAPE", "left out", "SMAPE", "params", "undet.", "fit"];
+    let head = ["model", "on", "RMSE", "of span", "max", "PV", "MAPE", "without", "SMAPE", "params", "undet.", "fit"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.push(["", "", unit, "", unit, unit, "", "rows", "", "", "", "s"].map(str::to_owned).to_vec());
     for m in &comparison.models {

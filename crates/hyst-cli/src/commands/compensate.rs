@@ -30,6 +30,11 @@ pub(super) struct Compensation {
     /// Of these, rows at the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
+    /// Rows beyond the input that the model was fitted to.
+    extrapolated_rows: usize,
+    /// Inputs that the model was fitted to.
+    #[serde(skip)]
+    fitted: (f64, f64),
     /// Effects that are in the sensor.
     not_compensated: Vec<&'static str>,
     /// What the model itself misses with this drive; none where it runs live.
@@ -97,6 +102,12 @@ impl Compensation {
             voltage_limited_rows: drive.voltage_limited.len(),
             voltage_limited_low_rows: drive.voltage_limited.iter().filter(|k| drive.voltage[**k] <= lowest).count(),
             slew_limited_rows: drive.slew_limited.len(),
+            extrapolated_rows: drive
+                .voltage
+                .iter()
+                .filter(|u| !(model.input.low..=model.input.high).contains(*u))
+                .count(),
+            fitted: (model.input.low, model.input.high),
             not_compensated: in_the_sensor.map(Effect::name).collect(),
             unit: model.input.unit.clone(),
             output_unit: model.output.unit.clone(),
@@ -126,6 +137,14 @@ impl Compensation {
             if rows > 0 {
                 lines.push(format!("in {} at {} {unit} the reference {advice}", text::count(rows, "row"), short(end)));
             }
+        }
+        if self.extrapolated_rows > 0 {
+            lines.push(format!(
+                "in {} the drive goes beyond {} to {} {unit}, which the model was fitted to: what it says there is a guess; narrow --limit or fit a wider record",
+                text::count(self.extrapolated_rows, "row"),
+                short(self.fitted.0),
+                short(self.fitted.1)
+            ));
         }
         if self.slew_limited_rows > 0 {
             lines.push(

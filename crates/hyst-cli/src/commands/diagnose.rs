@@ -12,7 +12,7 @@ use crate::cli::DiagnoseArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
-use crate::report::{self, Contents};
+use crate::report::{self, Contents, next};
 use crate::{input, text};
 
 mod summary;
@@ -43,20 +43,21 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         let json = output::json(findings)?;
         target.write(|out| out.write_all(json.as_bytes()))?;
     }
+    let contents = Contents {
+        diagnosis: &diagnosis,
+        model: &model,
+        model_file: &args.model.file_name().map_or_else(|| "model".into(), |name| name.to_string_lossy()),
+        model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
+        train: &train,
+        test: test.as_ref(),
+        reading: reading(args),
+        seed: args.seed,
+    };
     if let Some(target) = &args.report {
-        let page = report::page(&Contents {
-            diagnosis: &diagnosis,
-            model: &model,
-            model_file: &args.model.file_name().map_or_else(|| "model".into(), |name| name.to_string_lossy()),
-            model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
-            train: &train,
-            test: test.as_ref(),
-            reading: reading(args),
-            seed: args.seed,
-        })?;
+        let page = report::page(&contents)?;
         target.write(|out| out.write_all(page.as_bytes()))?;
     }
-    let mut said = summary::of(findings);
+    let mut said = summary::of(findings, &next::advice(&contents));
     for (target, what) in [(&args.output, "extended model"), (&args.findings, "findings"), (&args.report, "report")] {
         if let Some(Target::File(path)) = target {
             said.push_str(&format!("\n{what}: {}", path.display()));
@@ -86,7 +87,11 @@ fn warn(model: &Model, train: &Record, test: Option<&Record>) {
         say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
     }
     let of_model = |test: &Record| test.sources().iter().any(|s| s.sha256.as_deref().is_some_and(fitted));
-    if test.is_some_and(|test| of_model(test) || input::is_trained_on(test, train)) {
-        say(input::TRAINED_ON);
+    match test {
+        Some(test) if of_model(test) => say(input::TRAINED_ON),
+        Some(test) => {
+            input::tell_repeated(test, train);
+        }
+        None => {}
     }
 }

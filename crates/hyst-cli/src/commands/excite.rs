@@ -21,6 +21,8 @@ struct Summary<'a> {
     rate_hz: f64,
     seconds: f64,
     segments: &'a [&'static str],
+    /// Steepest slope \[V/s\].
+    steepest_v_per_s: f64,
     /// Peak over root mean square of a multisine, without its fades.
     #[serde(skip_serializing_if = "Option::is_none")]
     crest_factor: Option<f64>,
@@ -42,6 +44,7 @@ pub(super) fn run(args: &ExciteArgs) -> CommandResult {
         rate_hz: common.rate,
         seconds: drive.time().last().map_or(0.0, |end| end + 1.0 / common.rate),
         segments: drive.shapes(),
+        steepest_v_per_s: drive.steepest(),
         crest_factor,
     };
     report.print(&summary.text(), &summary)
@@ -62,7 +65,7 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
     let limits = |c: &Common| Limits { rate_hz: c.rate, lo_v: c.low, hi_v: c.high, slew_v_per_s: c.slew };
     let (mut crest_factor, mut between) = (None, REST);
     let (common, shapes) = match kind {
-        ExciteKind::Identification { seconds, rest, slow, fast, band, hold, ramp, seed, common } => {
+        ExciteKind::Identification { seconds, rest, slow, fast, band, hold, ramp, test, seed, common } => {
             let usual = Identification::at_rate(common.rate, *seed);
             let spec = Identification {
                 duration_s: *seconds,
@@ -74,6 +77,7 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
                 ramp_s: ramp.unwrap_or(usual.ramp_s),
                 seed: *seed,
             };
+            let spec = if *test { spec.for_test() } else { spec };
             return Ok(Made { common, drive: spec.drive(&limits(common)), crest_factor: None });
         }
         ExciteKind::Separate(args) => return Err(args),
@@ -172,11 +176,12 @@ impl Summary<'_> {
     fn text(&self) -> String {
         let crest = self.crest_factor.map_or_else(String::new, |crest| format!(", crest factor {crest:.2}"));
         format!(
-            "{}: {} at {} Hz, {} s, {}: {}{crest}",
+            "{}: {} at {} Hz, {} s, steepest slope {} V/s, {}: {}{crest}",
             self.output,
             text::count(self.rows, "row"),
             self.rate_hz,
             text::short(self.seconds),
+            text::short(self.steepest_v_per_s),
             text::count(self.segments.len(), "segment"),
             self.segments.join(", ")
         )

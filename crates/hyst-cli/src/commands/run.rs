@@ -56,6 +56,9 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     if args.drive.is_some() && written.is_empty() {
         return Err(CommandError::bad_input("what is measured would be lost: give --record, --log or both"));
     }
+    if written.is_empty() {
+        output::say("note: what is measured is not kept; give --record, --log or both");
+    }
     if args.log.as_deref() == Some(Path::new("-")) {
         return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
     }
@@ -64,7 +67,7 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     read.extend([&args.model, &args.reference, &args.drive].into_iter().filter_map(|path| path.as_deref()));
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    on_device(&mut input::plant(described)?, args, report)
+    on_device(&mut input::plant(described, args.seed)?, args, report)
 }
 
 /// The run on any device.
@@ -77,10 +80,14 @@ where
     let device = daq.capabilities().device.clone();
     let model = job.followed.as_ref().map(|followed| LoggedModel { model: &followed.model, json: &followed.json });
     let info = RunInfo { device: &device, output: unit, sample_rate_hz: job.options.rate_hz, model };
-    let create = |path: &PathBuf| RunLog::create(path, &info).map_err(|error| CommandError::new(Exit::Failed, error));
+    let create =
+        |path: &PathBuf| RunLog::beside_older(path, &info).map_err(|error| CommandError::new(Exit::Failed, error));
     let mut log = args.log.as_ref().map(create).transpose()?;
     let played = play::play(daq, &mut job, log.as_mut());
     // What was measured is kept in any case; the first error is the one to tell.
+    if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
+        output::tell_set_aside(path, older);
+    }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let recording = played?;
     closed?;
@@ -90,7 +97,7 @@ where
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         let column = format!("reference_{}", unit.suffix());
         let extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
-        target.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
+        target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));

@@ -30,8 +30,6 @@ use crate::{recording, text};
 
 /// Sample rate of the experiments \[Hz\].
 const RATE_HZ: f64 = 1000.0;
-/// Added to the seed for the test record's drive, so that it is another one.
-const TEST_SEED: u64 = 1 << 32;
 
 /// Summary of a demo, and the sign that a folder is one's.
 const MARK: &str = "demo.json";
@@ -58,12 +56,12 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let mut plant = Plant::new(config.clone()).map_err(CommandError::failed)?;
     let limits =
         Limits { rate_hz: RATE_HZ, lo_v: config.actuator.min_v, hi_v: config.actuator.max_v, slew_v_per_s: None };
-    let design = |seed: u64| -> CommandResult<Drive> { Ok(Identification::at_rate(RATE_HZ, seed).drive(&limits)?) };
+    let usual = Identification::at_rate(RATE_HZ, args.seed);
 
     progress.say("driving the identification experiment");
-    let train = experiment(&mut plant, &design(args.seed)?, "train.csv")?;
+    let train = experiment(&mut plant, &usual.drive(&limits)?, "train.csv")?;
     progress.say("driving a second experiment, for the test");
-    let test = experiment(&mut plant, &design(args.seed.wrapping_add(TEST_SEED))?, "test.csv")?;
+    let test = experiment(&mut plant, &usual.for_test().drive(&limits)?, "test.csv")?;
     let train = write_record(out, "train.csv", train)?;
     let test = write_record(out, "test.csv", test)?;
 
@@ -192,9 +190,12 @@ impl Story<'_> {
             ));
         }
         let (truth, named) = (self.truth(), self.named());
+        let (modes, found) = (self.config.modes.len(), self.diagnosis.extended.effects.resonances.len());
+        let truth_modes =
+            if found > 0 && modes != found { format!(" ({modes} modes, {found} found)") } else { String::new() };
         let had = if truth.is_empty() { "no effect".to_owned() } else { text::listed(&truth) };
         lines.push(format!(
-            "revealed   the plant's file has {had}: {}",
+            "revealed   the plant's file has {had}: {}{truth_modes}",
             if truth == named { "as found" } else { "NOT as found" }
         ));
         lines.push(format!("written    {}", out.display()));

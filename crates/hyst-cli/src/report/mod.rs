@@ -8,7 +8,7 @@ mod figures;
 mod files;
 mod html;
 mod left;
-mod next;
+pub(crate) mod next;
 mod summary;
 pub(crate) mod words;
 

@@ -3,22 +3,40 @@
 use hyst_ident::diagnose::{RemainderKind, Verdict};
 use hyst_ident::model::{Effect, Kind};
 
+use hyst_ident::record::Record;
+
 use super::html::Page;
 use super::{Contents, words};
 use crate::text::listed;
 
-/// What to do next.
+/// What to do next, and why.
+#[derive(Debug)]
+pub(crate) struct Advice {
+    pub(crate) text: String,
+    /// Commands, in the order in which they are to be run.
+    pub(crate) commands: Vec<String>,
+}
+
+/// Writes what to do next.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
-    page.section("next", "Next");
-    let f = &c.diagnosis.findings;
-    let mut said = false;
-    let mut advise = |text: &str, commands: &[String]| {
+    let advice = advice(c);
+    for Advice { text, commands } in &advice {
         page.paragraph("", text);
         if !commands.is_empty() {
             page.command(&commands.join("\n"));
         }
-        said = true;
-    };
+    }
+    if advice.is_empty() {
+        page.paragraph("", "Nothing that another experiment would have to settle");
+    }
+}
+
+/// What to do next.
+pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
+    let f = &c.diagnosis.findings;
+    let mut all = Vec::new();
+    let mut advise =
+        |text: &str, commands: &[String]| all.push(Advice { text: text.to_owned(), commands: commands.to_vec() });
     for finding in &f.effects {
         for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
             let text = format!(
@@ -29,12 +47,12 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         }
     }
     if words::worse_on_test(f) {
-        advise("Record a drive that shows every effect, and fit and diagnose that:", &[identification(c, 1)]);
+        advise("Record a drive that shows every effect, and fit and diagnose that:", &[identification(c, "")]);
     }
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
     match f.remainder.kind {
         RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
-            let files = files(c);
+            let files = files(c.train);
             let test = c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())));
             let reading: String = c.reading.iter().map(|word| format!(" {}", quoted(word))).collect();
             advise(
@@ -73,16 +91,14 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         RemainderKind::None => {}
     }
     if f.verdict == Verdict::NothingMissing || (f.verdict == Verdict::Explained && c.test.is_none()) {
-        advise("See what the model is worth on a drive that it has not seen:", &[identification(c, c.seed + 1)]);
+        advise("See what the model is worth on a drive that it has not seen:", &[identification(c, " --test")]);
     }
-    if !said {
-        page.paragraph("", "Nothing that another experiment would have to settle");
-    }
+    all
 }
 
 /// Names of the training files, as the command line takes them.
-fn files(c: &Contents<'_>) -> String {
-    c.train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
+pub(crate) fn files(train: &Record) -> String {
+    train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
 }
 
 /// A word of the command line.
@@ -105,8 +121,8 @@ fn separate(c: &Contents<'_>, one: Effect, other: Effect) -> String {
     format!("hystctl excite separate {one} {other} {}{sensors} -o next.csv", limits(c))
 }
 
-fn identification(c: &Contents<'_>, seed: u64) -> String {
-    format!("hystctl excite identification {} --seed {seed} -o next.csv", limits(c))
+fn identification(c: &Contents<'_>, more: &str) -> String {
+    format!("hystctl excite identification {}{more} -o next.csv", limits(c))
 }
 
 #[cfg(test)]

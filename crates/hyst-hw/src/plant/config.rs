@@ -34,6 +34,9 @@ use super::validate;
 pub struct PlantConfig {
     /// Seed of everything random: relay bed, temperature phase, noise. At most 2⁶³ − 1, as TOML integers are signed.
     pub seed: u64,
+    /// Seed of the noise alone, so that one actuator can be measured again on another day; `seed` if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_seed: Option<u64>,
     /// The hysteretic element.
     pub actuator: Actuator,
     /// Position sensor and its converter.
@@ -82,6 +85,7 @@ impl PlantConfig {
     pub const fn bare(seed: u64, actuator: Actuator, sensor: Sensor) -> Self {
         Self {
             seed,
+            noise_seed: None,
             actuator,
             sensor,
             viscosity: None,
@@ -97,6 +101,11 @@ impl PlantConfig {
             interference: None,
             disturbances: Vec::new(),
         }
+    }
+
+    /// Seed of what differs from one measurement to the next.
+    pub(super) fn noise(&self) -> u64 {
+        self.noise_seed.unwrap_or(self.seed)
     }
 
     /// Reads and validates a description.

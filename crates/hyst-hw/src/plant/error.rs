@@ -87,7 +87,9 @@ pub enum PlantError {
         seconds: f64,
     },
     /// The displacement left the range of the sensor's converter.
-    #[error("at {time_s} s the sensor would have to show {value_um} um: widen sensor.range_um in the plant's file")]
+    #[error(
+        "at {time_s:.4} s the sensor would have to show {value_um:.4} um: widen sensor.range_um in the plant's file, or lower the drive"
+    )]
     SensorRange {
         /// Time on the lab's clock (s).
         time_s: f64,

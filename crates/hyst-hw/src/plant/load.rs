@@ -50,6 +50,14 @@ impl AppliedLoad {
         Self { um_per_n, profile, cell }
     }
 
+    /// With the force sensor's noise from another seed.
+    pub(crate) fn with_noise(mut self, seed: u64) -> Self {
+        if let Some(cell) = &mut self.cell {
+            cell.draws = Draws::new(seed, Purpose::LoadNoise);
+        }
+        self
+    }
+
     /// True force at lab time `t` (N).
     pub(crate) fn at(&self, t: f64) -> f64 {
         match &self.profile {

@@ -29,7 +29,7 @@ impl PositionSensor {
             drift_um_per_s: config.drift.as_ref().map_or(0.0, |drift| drift.um_per_s),
             wave: config.interference.as_ref().map(|w| (w.amplitude_um, TAU * w.hz, w.phase_rad)),
             noise: sensor.noise_um,
-            draws: Draws::new(config.seed, Purpose::PositionNoise),
+            draws: Draws::new(config.noise(), Purpose::PositionNoise),
             low,
             quantum: (high - low) / codes,
             top_code: codes - 1.0,

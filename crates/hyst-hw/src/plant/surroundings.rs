@@ -15,9 +15,10 @@ pub(crate) struct Surroundings {
 
 impl Surroundings {
     pub(crate) fn new(config: &PlantConfig) -> Self {
+        let noise = config.noise();
         Self {
-            climate: config.temperature.as_ref().map(|t| Climate::new(config.seed, t)),
-            load: config.load.as_ref().map(|load| AppliedLoad::new(config.seed, load)),
+            climate: config.temperature.as_ref().map(|t| Climate::new(config.seed, t).with_noise(noise)),
+            load: config.load.as_ref().map(|load| AppliedLoad::new(config.seed, load).with_noise(noise)),
             gain_steps: config
                 .disturbances
                 .iter()

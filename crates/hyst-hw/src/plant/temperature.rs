@@ -35,6 +35,14 @@ impl Climate {
         Self { mean: config.mean_degc, reference: config.reference_degc, per_k: config.per_k, waves, thermometer }
     }
 
+    /// With the thermometer's noise from another seed.
+    pub(crate) fn with_noise(mut self, seed: u64) -> Self {
+        if let Some(thermometer) = &mut self.thermometer {
+            thermometer.draws = Draws::new(seed, Purpose::TemperatureNoise);
+        }
+        self
+    }
+
     /// True temperature at lab time `t` (°C).
     pub(crate) fn at(&self, t: f64) -> f64 {
         self.waves.on(self.mean, t)

@@ -42,6 +42,28 @@ fn play(plant: &mut Plant, drive: &[f64], block: usize) -> Vec<Sample> {
 }
 
 #[test]
+fn another_noise_is_all_that_another_noise_seed_makes() {
+    let quiet = |mut config: PlantConfig| {
+        config.sensor.noise_um = 0.0;
+        config.temperature.iter_mut().for_each(|t| t.noise_k = 0.0);
+        config.load.iter_mut().for_each(|l| l.noise_n = 0.0);
+        config
+    };
+    let run = |config: PlantConfig| {
+        let drive = triangle(400, config.actuator.max_v);
+        let mut plant = Plant::new(config).unwrap();
+        plant.start(1000.0).unwrap();
+        play(&mut plant, &drive, 400)
+    };
+    let noisy = everything();
+    let [one, other] = [None, Some(9)].map(|noise_seed| run(PlantConfig { noise_seed, ..noisy.clone() }));
+    assert!(one.iter().zip(&other).all(|(a, b)| a.temperature_degc != b.temperature_degc && a.load_n != b.load_n));
+    assert!(one.iter().zip(&other).filter(|(a, b)| a.output != b.output).count() > 300);
+    let [one, other] = [None, Some(9)].map(|noise_seed| run(quiet(PlantConfig { noise_seed, ..noisy.clone() })));
+    assert_eq!(one, other);
+}
+
+#[test]
 fn same_seed_same_bits_in_any_block_size() {
     for config in [everything(), disturbed()] {
         let drive = triangle(1500, config.actuator.max_v);

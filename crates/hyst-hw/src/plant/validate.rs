@@ -27,8 +27,10 @@ fn count_within(field: &str, value: usize, low: usize, high: usize, what: &str) 
 
 /// First error of a whole description.
 pub(crate) fn check(config: &PlantConfig) -> Checked {
-    if i64::try_from(config.seed).is_err() {
-        return Err(ConfigError::value("seed", config.seed, format!("give an integer from 0 to {}", i64::MAX)));
+    for (field, seed) in [("seed", Some(config.seed)), ("noise_seed", config.noise_seed)] {
+        if let Some(seed) = seed.filter(|seed| i64::try_from(*seed).is_err()) {
+            return Err(ConfigError::value(field, seed, format!("give an integer from 0 to {}", i64::MAX)));
+        }
     }
     actuator(&config.actuator)?;
     sensor(&config.sensor)?;
@@ -246,6 +248,7 @@ mod tests {
     fn errors_name_the_field() {
         clean().validate().unwrap();
         complains("seed", |c| c.seed = u64::MAX);
+        complains("noise_seed", |c| c.noise_seed = Some(u64::MAX));
         complains("actuator.max_v", |c| c.actuator.max_v = c.actuator.min_v);
         complains("actuator.rest_v", |c| c.actuator.rest_v = -1.0);
         complains("actuator.gain_um_per_v", |c| {

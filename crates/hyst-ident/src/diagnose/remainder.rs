@@ -44,7 +44,11 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     if rmse <= AT_FLOOR * found.noise {
         return left(
             RemainderKind::None,
-            format!("what is left is noise: {rmse:.3e} against a floor of {:.3e}", found.noise),
+            format!(
+                "what is left is noise: {:.3} % of span, against a floor of {:.3} %",
+                percent(rmse),
+                percent(found.noise)
+            ),
         );
     }
     // The search ran on a richer, rate-independent base: what that one takes is the base's.

@@ -4,6 +4,9 @@ use super::{
     DecayingSine, Drive, ExciteError, Limits, Multisine, Phases, Shape, Sine, Stairs, Triangle, positive, require,
 };
 
+/// Added to the seed of a test record's drive.
+const TEST_SEED: u64 = 1 << 32;
+
 /// A drive that shows every effect that a diagnosis can name: nested loops (decaying sine), slow and fast full loops
 /// (lag, resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +41,20 @@ impl Identification {
             hold_s: 2.0,
             ramp_s: f64::max(0.08, 4.0 / rate_hz),
             seed,
+        }
+    }
+
+    /// The drive for a test record: as long, over the same voltages and band, but every segment differs from that of the
+    /// training. Periodic waves have other frequencies, a tenth (on a logarithmic scale) further inside; levels and phases are
+    /// drawn anew.
+    #[must_use]
+    pub fn for_test(self) -> Self {
+        let inwards = (self.fast_hz / self.slow_hz).powf(0.1);
+        Self {
+            slow_hz: self.slow_hz * inwards,
+            fast_hz: self.fast_hz / inwards,
+            seed: self.seed.wrapping_add(TEST_SEED),
+            ..self
         }
     }
 

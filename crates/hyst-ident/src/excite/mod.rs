@@ -105,6 +105,7 @@ pub struct Drive {
     time: Vec<f64>,
     voltage: Vec<f64>,
     decimals: usize,
+    rate_hz: f64,
 }
 
 impl Drive {
@@ -128,6 +129,7 @@ impl Drive {
             time: Vec::new(),
             voltage: Vec::new(),
             decimals: grid.decimals,
+            rate_hz: limits.rate_hz,
         };
         let mut start = 0.0;
         for shape in shapes {
@@ -164,6 +166,12 @@ impl Drive {
         &self.voltage
     }
 
+    /// The steepest slope from one row of a segment to the next \[V/s\].
+    pub fn steepest(&self) -> f64 {
+        let segments = self.segments.iter().map(|rows| &self.voltage[rows.clone()]);
+        segments.map(|volts| steepest_step(volts) * self.rate_hz).fold(0.0, f64::max)
+    }
+
     /// The drive as a record without an output; `name` stands for it in messages.
     ///
     /// # Errors
@@ -187,6 +195,11 @@ impl Drive {
         let record = self.to_record("drive").map_err(std::io::Error::other)?;
         record.write_with(out, &[Extra::rounded("voltage_v", &self.voltage, self.decimals)])
     }
+}
+
+/// The largest step from one row to the next \[V\].
+fn steepest_step(voltage: &[f64]) -> f64 {
+    voltage.windows(2).fold(0.0, |most, w| f64::max(most, (w[1] - w[0]).abs()))
 }
 
 /// The voltages that can be printed, as whole numbers of the last decimal.
@@ -221,8 +234,7 @@ impl VoltageGrid {
 
     fn check_slew(&self, limits: &Limits, shape: &Shape, voltage: &[f64]) -> Result<(), ExciteError> {
         let Some(limit) = limits.slew_v_per_s else { return Ok(()) };
-        let step = voltage.windows(2).fold(0.0_f64, |most, w| most.max((w[1] - w[0]).abs()));
-        let needed = step * limits.rate_hz;
+        let needed = steepest_step(voltage) * limits.rate_hz;
         if needed <= limit * (1.0 + 1e-9) {
             return Ok(());
         }

@@ -220,6 +220,32 @@ fn seeds_decide() {
 }
 
 #[test]
+fn a_test_drive_differs_in_every_segment() {
+    for rate_hz in [20.0, 1000.0, 20_000.0] {
+        let limits = Limits { rate_hz, ..LIMITS };
+        let long = Identification { duration_s: 80.0, ..Identification::at_rate(rate_hz, 1) };
+        let [train, test] = [long, long.for_test()].map(|spec| spec.drive(&limits).unwrap());
+        assert_eq!(train.shapes(), test.shapes());
+        for (a, b) in train.segments().iter().zip(test.segments()) {
+            let (a, b) = (&train.voltage()[a.clone()], &test.voltage()[b.clone()]);
+            assert_eq!(extremes(a).0, extremes(b).0);
+            let same = a.iter().zip(b).filter(|(a, b)| a == b).count();
+            assert!(10 * same < a.len(), "{same} of {} rows at {rate_hz} Hz", a.len());
+        }
+    }
+}
+
+#[test]
+fn the_steepest_slope_is_that_of_the_drive() {
+    let sine = Drive::new(&[Shape::Sine(Sine { frequency_hz: 2.0, cycles: 3 })], &LIMITS, 0.0).unwrap();
+    let (low, high) = (LIMITS.lo_v, LIMITS.hi_v);
+    let exact = std::f64::consts::PI * 2.0 * (high - low);
+    assert!((sine.steepest() / exact - 1.0).abs() < 1e-3, "{} {exact}", sine.steepest());
+    let limits = Limits { slew_v_per_s: Some(sine.steepest()), ..LIMITS };
+    Drive::new(&[Shape::Sine(Sine { frequency_hz: 2.0, cycles: 3 })], &limits, 0.0).unwrap();
+}
+
+#[test]
 fn the_identification_has_its_duration_and_all_its_parts() {
     for rate_hz in [100.0, 750.0, 1000.0, 20_000.0] {
         let limits = Limits { rate_hz, ..LIMITS };

@@ -43,6 +43,18 @@ pub enum MapError {
         /// What it names.
         role: &'static str,
     },
+    /// Both sides are names of the record format, in different units.
+    #[error(
+        "--map \"{argument}\": a map only renames, and \"{column}\" is in another unit than \"{name}\"; leave the map out, {column} is read as it is"
+    )]
+    OtherUnit {
+        /// The argument.
+        argument: String,
+        /// Its left side.
+        name: String,
+        /// Its right side, without a minus.
+        column: String,
+    },
     /// Two arguments give the same role to two columns.
     #[error("--map \"{first}\" and --map \"{second}\" both name {role}; keep one")]
     RoleTwice {
@@ -110,6 +122,10 @@ impl ColumnMap {
             if turned && !matches!(role, Role::Input | Role::Output | Role::Load) {
                 return Err(MapError::Signless { argument: argument.to_owned(), role: role.words() });
             }
+            if Role::of_column(column).is_some() && unit_of(column) != unit_of(name) {
+                let (argument, name, column) = (argument.to_owned(), name.to_owned(), column.to_owned());
+                return Err(MapError::OtherUnit { argument, name, column });
+            }
             for other in &entries {
                 let (first, second) = (other.argument.clone(), argument.to_owned());
                 if other.role == role {
@@ -124,6 +140,11 @@ impl ColumnMap {
         }
         Ok(Self { entries })
     }
+}
+
+/// The unit at the end of a column's name.
+fn unit_of(name: &str) -> Option<&str> {
+    name.rsplit_once('_').map(|(_, unit)| unit)
 }
 
 /// What a column is for.
@@ -292,6 +313,10 @@ fn header_map<'a>(
             canonical: e.canonical.clone(),
             column: e.column.clone(),
             found: listed(names),
+            hint: match names.iter().find(|name| name.starts_with(&format!("{} ", e.column))) {
+                Some(whole) => format!("; a name with spaces needs quotes: --map \"{}={whole}\"", e.canonical),
+                None => String::new(),
+            },
         }),
     };
     map.entries.iter().map(find).collect()

@@ -128,7 +128,7 @@ pub enum RecordError {
     },
     /// `--map` names a column that the file does not have.
     #[error(
-        "{file}, line 1: --map {canonical}={column} names a column that is not in the file (columns found: {found})"
+        "{file}, line 1: --map {canonical}={column} names a column that is not in the file (columns found: {found}){hint}"
     )]
     MappedColumnMissing {
         /// The file.
@@ -139,6 +139,8 @@ pub enum RecordError {
         column: String,
         /// The header's names.
         found: String,
+        /// A further remark, or nothing.
+        hint: String,
     },
     /// A row has more or fewer fields than the header.
     #[error(

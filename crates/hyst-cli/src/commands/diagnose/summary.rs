@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use hyst_ident::diagnose::{Finding, Findings, FoundErrors};
 
-use crate::report::words;
+use crate::report::{next::Advice, words};
 use crate::text::{percent, short, symbol, table};
 
-/// Verdict, errors before and after, each effect, and what is left.
-pub(super) fn of(findings: &Findings) -> String {
+/// Verdict, errors before and after, each effect, what is left, and what to do next.
+pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
     let unit = symbol(&findings.unit);
     let mut text = format!("{}\n\n{}", words::verdict(findings), errors(findings, unit));
     // Writing to a String does not fail.
@@ -31,6 +31,12 @@ pub(super) fn of(findings: &Findings) -> String {
     let _ = writeln!(text, "\nremainder: {kind}, {share} of the output's variance\n  {}", remainder.description);
     for place in &remainder.places {
         let _ = writeln!(text, "  - {place}");
+    }
+    for Advice { text: advice, commands } in next {
+        let _ = writeln!(text, "\nnext: {advice}");
+        for command in commands {
+            let _ = writeln!(text, "  {command}");
+        }
     }
     text
 }
@@ -66,11 +72,7 @@ fn finding(effect: &Finding, unit: &str) -> String {
     }
     for tie in effect.alternatives.iter().filter(|other| other.indistinguishable) {
         let rmse = short(tie.cv_rmse);
-        let _ = writeln!(
-            text,
-            "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit}); `hystctl excite separate {} {} --high V -o next.csv` makes the drive that would",
-            tie.name, effect.name, tie.name
-        );
+        let _ = writeln!(text, "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit})", tie.name);
     }
     let others: Vec<String> = effect
         .alternatives
