@@ -28,6 +28,19 @@ fn without_times(mut report: Value) -> Value {
 }
 
 #[test]
+fn the_next_commands_read_the_records_as_this_one_did() {
+    let lab = Lab::with_train("");
+    let said = lab.ok("compare train.csv --models pi --map voltage_v=voltage_v --zero per-record --seed 3").stdout;
+    let reading = "train.csv --map voltage_v=voltage_v --zero per-record";
+    for command in [
+        format!("hystctl fit {reading} --model pi --seed 3 -o model.json"),
+        format!("hystctl diagnose {reading} --model model.json"),
+    ] {
+        assert!(said.contains(&command), "\"{command}\" is missing in: {said}");
+    }
+}
+
+#[test]
 fn every_model_is_fitted_or_skipped_with_the_reason() {
     let lab = lab("");
     let report = lab.ok("compare train.csv --test test.csv --evaluations 200 --json").json();

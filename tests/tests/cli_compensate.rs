@@ -184,3 +184,17 @@ fn lead_and_bandwidth_are_stated() {
     let narrow = lab.ok("compensate --model extended.json reference.csv -o drive.csv --bandwidth 20 --json").json();
     assert!(narrow["bandwidth_hz"].as_f64().unwrap() <= band, "{narrow}");
 }
+
+#[test]
+fn a_drive_beyond_what_was_fitted_is_told() {
+    let lab = Lab::with_model();
+    lab.reference("reference.csv", 2.0, 24.0);
+    let line = "compensate --model model.json reference.csv -o drive.csv --limit 0,150";
+    let ran = lab.ok(line);
+    assert!(ran.stderr.contains("the drive lies beyond 0 to 100.0 V"), "{}", ran.stderr);
+    let found = &lab.ok(&format!("{line} --json")).json()["extrapolated"];
+    let rows = found["rows"].as_u64().unwrap();
+    assert!((1..1000).contains(&rows) && found["largest"].as_f64().unwrap() > 5.0, "{found}");
+    lab.reference("reference.csv", 2.0, 15.0);
+    assert!(!lab.ok(line).stderr.contains("lies beyond"));
+}

@@ -123,7 +123,12 @@ fn maps_that_lead_nowhere() {
     let sound = with_header(HEADER, &rows(40));
     refused_with(&sound, "--map voltage_v=Vin", &["bad.csv, line 1", "--map voltage_v=Vin", "\"time_s\""]);
     refused_with(&sound, "--map voltage_v", &["--map \"voltage_v\"", "NAME=COLUMN"]);
-    refused_with(&sound, "--map displacement_um=displacement_mm", &["only renames", "another unit"]);
+    refused_with(
+        &sound,
+        "--map displacement_um=displacement_mm",
+        &["only renames", "--map displacement_mm=displacement_mm"],
+    );
+    refused_with(&sound, "--map displacement_um=-displacement_mm", &["--map displacement_mm=-displacement_mm"]);
     refused_with(&sound, "--map colour=a", &["\"colour\"", "voltage_v"]);
     refused_with(&sound, "--map time_s=time_s --map time_ms=x", &["the time", "keep one"]);
 }

@@ -8,8 +8,9 @@ use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::clipping::clipped;
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
+use hyst_ident::simulate::Zero;
 
-use crate::cli::TemperatureArg;
+use crate::cli::{MapArg, TemperatureArg, ZeroArg};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::say;
 use crate::text;
@@ -70,12 +71,15 @@ fn tell_oddities(record: &Record) {
     }
 }
 
-/// Says where a test record is not new; returns whether it is one of the training's files.
-pub(crate) fn tell_repeated(test: &Record, train: &Record) -> bool {
-    if is_trained_on(test, train) {
-        say(TRAINED_ON);
-        return true;
-    }
+/// Options with which records are read, as the command line takes them.
+pub(crate) fn reading(map: &MapArg, zero: &ZeroArg) -> Vec<String> {
+    let map = map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]);
+    let zero = (zero.get() == Zero::PerRecord).then(|| ["--zero".to_owned(), "per-record".to_owned()]);
+    map.chain(zero.into_iter().flatten()).collect()
+}
+
+/// Says how much of a test record repeats the training's drive, if any of it does.
+pub(crate) fn tell_repeated(test: &Record, train: &Record) {
     let repeated = repeated_rows(test, train);
     if repeated > 0 {
         say(&format!(
@@ -84,24 +88,23 @@ pub(crate) fn tell_repeated(test: &Record, train: &Record) -> bool {
             text::percent(100.0 * repeated as f64 / test.rows() as f64)
         ));
     }
-    false
 }
 
-/// Rows of those segments whose drive is, but for noise, that of a segment of the training.
+/// Rows of those whole segments whose drive is, but for noise, that of a segment of the training.
 fn repeated_rows(test: &Record, train: &Record) -> usize {
     let (new, old) = (test.input(), train.input());
     let span =
         |u: &[f64]| u.iter().fold(f64::NEG_INFINITY, |m, u| m.max(*u)) - u.iter().fold(f64::INFINITY, |m, u| m.min(*u));
     let alike = |a: &[f64], b: &[f64]| {
-        let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
-        a.len() == b.len() && (squares / a.len() as f64).sqrt() < 2e-3 * span(b)
+        let squares = || a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        a.len() == b.len() && (squares() / a.len() as f64).sqrt() < 2e-3 * span(b)
     };
     let of_training = |rows: &Range<usize>| train.segments().iter().any(|r| alike(&new[rows.clone()], &old[r.clone()]));
     test.segments().iter().filter(|rows| of_training(rows)).map(Range::len).sum()
 }
 
 /// Whether a test record is one of the training's files, byte for byte.
-fn is_trained_on(test: &Record, train: &Record) -> bool {
+pub(crate) fn is_trained_on(test: &Record, train: &Record) -> bool {
     let sums = |record: &Record| record.sources().iter().filter_map(|s| s.sha256.clone()).collect::<Vec<_>>();
     sums(test).iter().any(|sum| sums(train).contains(sum))
 }

@@ -11,14 +11,13 @@ use std::fs::File;
 use std::io::{self, BufWriter, IntoInnerError};
 use std::path::{Path, PathBuf};
 
+use hyst_ident::atomic_file::set_aside;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use tempfile::TempPath;
 
 pub(crate) use contents::{LoggedModel, LoggedSample, RunInfo};
 use contents::{metadata, schema, units};
-
-use crate::output;
 
 /// Channel of the samples.
 pub(crate) const TOPIC: &str = "/actuator/sample";
@@ -137,15 +136,25 @@ impl RunLog {
 
     fn take_name(&mut self) -> io::Result<()> {
         let Some(temporary) = self.unnamed.take() else { return Ok(()) };
-        if self.keeps_older {
-            self.older = output::set_aside(&self.path)?;
+        let target = behind_links(&self.path);
+        if self.keeps_older && target.is_file() {
+            self.older = Some(set_aside(&target)?);
         }
-        temporary.persist(&self.path).map_err(|error| error.error)
+        temporary.persist(&target).map_err(|error| error.error)
     }
 }
 
-/// A file beside `path`, readable for whom the process lets.
+/// The file that `path` leads to: a link stays one.
+fn behind_links(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+/// A file beside what `path` leads to, readable for whom the process lets.
 fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let path = behind_links(path);
+    if path.exists() && !path.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no regular file"));
+    }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hyst-").suffix(".part");
     #[cfg(unix)]

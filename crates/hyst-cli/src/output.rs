@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use hyst_ident::atomic_file::write_atomic;
+use hyst_ident::atomic_file::{write_atomic, write_beside_older};
 use hyst_ident::record::WriteError;
 use serde::Serialize;
 
@@ -48,12 +48,11 @@ impl Target {
 
     /// As [`write`](Self::write); an older file is set aside first.
     pub(crate) fn write_beside_older(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
-        if let Self::File(path) = self
-            && let Some(older) = set_aside(path)?
-        {
+        let Self::File(path) = self else { return self.write(content) };
+        if let Some(older) = write_beside_older(path, content)? {
             tell_set_aside(path, &older);
         }
-        self.write(content)
+        Ok(())
     }
 
     /// Writes what `content` writes.
@@ -123,25 +122,11 @@ pub(crate) fn check(read: &[&Path], written: &[&Target]) -> CommandResult {
     Ok(())
 }
 
-/// Gives what is at `path` another name, `path.~1~` or the next free one, and returns that: what was measured cannot be had again.
-pub(crate) fn set_aside(path: &Path) -> io::Result<Option<PathBuf>> {
-    // A pipe or a device keeps nothing.
-    if !path.symlink_metadata().is_ok_and(|there| there.is_file() || there.is_symlink()) {
-        return Ok(None);
-    }
-    let numbered = |n: u32| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(format!(".~{n}~"));
-        PathBuf::from(name)
-    };
-    let free = (1..=u32::MAX).map(numbered).find(|name| name.symlink_metadata().is_err());
-    let free = free.ok_or(io::ErrorKind::AlreadyExists)?;
-    std::fs::rename(path, &free)?;
-    Ok(Some(free))
-}
-
-/// Says so.
+/// Says that an older file has another name now.
 pub(crate) fn tell_set_aside(path: &Path, older: &Path) {
+    // Behind a link it lies in another folder; else it is named as the path was given.
+    let link = path.symlink_metadata().is_ok_and(|there| there.is_symlink());
+    let older = older.file_name().filter(|_| !link).map_or_else(|| older.to_owned(), |name| path.with_file_name(name));
     say(&format!("note: {} was there already; it is {} now", path.display(), older.display()));
 }
 
@@ -236,18 +221,6 @@ mod tests {
         check(&[&record], &[&fresh, &Target::Stdout]).unwrap();
         check(&[&record], &[&fresh, &target(&folder.path().join(".").join("b.csv"))]).unwrap_err();
         check(&[], &[&Target::Stdout, &Target::Stdout]).unwrap_err();
-    }
-
-    #[test]
-    fn what_is_set_aside_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let record = folder.path().join("a.csv");
-        for text in ["first", "second", "third"] {
-            let written = Target::File(record.clone()).write_beside_older(|out| out.write_all(text.as_bytes()));
-            written.unwrap();
-        }
-        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
-        assert_eq!(["a.csv", "a.csv.~1~", "a.csv.~2~"].map(read), ["third", "first", "second"]);
     }
 
     #[test]

@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use hyst_ident::identify::{TableEstimate, TableOf};
 use hyst_ident::metrics::{Errors, Mape};
+use hyst_ident::model::Channel;
 use hyst_ident::record::{OutputUnit, Record};
+use hyst_ident::simulate::Extrapolated;
 
 /// `x` with four significant digits.
 pub(crate) fn short(x: f64) -> String {
@@ -96,6 +98,24 @@ pub(crate) fn errors(e: &Errors, unit: &str) -> String {
         percent(e.nrmse_percent),
         short(e.max_abs),
         short(e.rmse_all_rows)
+    )
+}
+
+/// With the row counted from 1, as people and JSON do.
+pub(crate) fn from_one(found: Extrapolated) -> Extrapolated {
+    Extrapolated { row: found.row + usize::from(found.rows > 0), ..found }
+}
+
+/// Where `what` leaves the range that a model was fitted to; rows count from 1.
+pub(crate) fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -> String {
+    let Channel { low, high, unit, .. } = input;
+    format!(
+        "in {} the {what} lies beyond {} to {} {unit}, the range that the model was identified on, by {} {unit} at most (row {})",
+        count(found.rows, "row"),
+        short(*low),
+        short(*high),
+        short(found.largest),
+        found.row
     )
 }
 

@@ -3,7 +3,7 @@
 //! The content goes to a temporary file in the target's folder, which takes the target's name only when everything is
 //! on the disk. A command that fails half-way leaves an older file as it was, and no fragment.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ pub fn write_atomic(
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), AtomicFileError> {
     let path = path.as_ref();
-    put(path, Older::Replaced, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path, Older::Replaced, content).map(|_| ()).map_err(|source| AtomicFileError { path: path.to_owned(), source })
 }
 
 /// As [`write_atomic`], but nothing that is there already is replaced.
@@ -41,7 +41,40 @@ pub fn create_atomic(
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), AtomicFileError> {
     let path = path.as_ref();
-    put(path, Older::Kept, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path, Older::Kept, content).map(|_| ()).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
+/// As [`write_atomic`], but an older file keeps its content under the name that is returned: `path.~1~` or the next free number.
+///
+/// # Errors
+/// As [`write_atomic`], and when the older file cannot have another name; nothing has changed then.
+pub fn write_beside_older(
+    path: impl AsRef<Path>,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Option<PathBuf>, AtomicFileError> {
+    let path = path.as_ref();
+    put(path, Older::SetAside, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
+/// Gives the regular file `target` a second name, `target.~1~` or the next free number, under which it stays when `target` is
+/// replaced. Where the file system knows no second names, the file is renamed.
+///
+/// # Errors
+/// When the folder refuses.
+pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
+    let mut number = 1_u64;
+    loop {
+        let mut name = target.as_os_str().to_owned();
+        name.push(format!(".~{number}~"));
+        let name = PathBuf::from(name);
+        match fs::hard_link(target, &name) {
+            Ok(()) => return Ok(name),
+            // Somebody's, perhaps of this very moment.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            Err(_) if name.symlink_metadata().is_ok() => number += 1,
+            Err(_) => return fs::rename(target, &name).map(|()| name),
+        }
+    }
 }
 
 /// What becomes of an older file.
@@ -49,9 +82,14 @@ pub fn create_atomic(
 enum Older {
     Replaced,
     Kept,
+    SetAside,
 }
 
-fn put(path: &Path, older: Older, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn put(
+    path: &Path,
+    older: Older,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<Option<PathBuf>> {
     // A link that leads nowhere is something, too.
     if older == Older::Kept && path.symlink_metadata().is_ok() {
         return Err(io::ErrorKind::AlreadyExists.into());
@@ -66,7 +104,7 @@ fn put(path: &Path, older: Older, content: impl FnOnce(&mut dyn Write) -> io::Re
     match &existing {
         Some(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Some(metadata) if !metadata.is_file() => {
-            return write_through(File::options().write(true).open(path)?, content);
+            return write_through(File::options().write(true).open(path)?, content).map(|()| None);
         }
         // Renaming would replace a file that its owner protects.
         Some(metadata) if metadata.permissions().readonly() => {
@@ -88,17 +126,19 @@ fn put(path: &Path, older: Older, content: impl FnOnce(&mut dyn Write) -> io::Re
         content(&mut buffered)?;
         buffered.flush()?;
     }
+    let replaces = existing.is_some();
     if let Some(metadata) = existing {
         temporary.as_file().set_permissions(metadata.permissions())?;
     }
     temporary.as_file().sync_all()?;
+    let aside = if replaces && older == Older::SetAside { Some(set_aside(&target)?) } else { None };
     let named = match older {
-        Older::Replaced => temporary.persist(&target),
+        Older::Replaced | Older::SetAside => temporary.persist(&target),
         // Somebody else may have made one meanwhile.
         Older::Kept => temporary.persist_noclobber(&target),
     };
     named.map_err(|error| error.error)?;
-    Ok(())
+    Ok(aside)
 }
 
 fn write_through(file: File, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -115,7 +155,7 @@ fn in_folder(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     {
         use std::os::unix::fs::PermissionsExt;
         // The process's umask applies.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
+        builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder)
 }
@@ -123,7 +163,6 @@ fn in_folder(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<_> =
@@ -177,6 +216,26 @@ mod tests {
     }
 
     #[test]
+    fn what_is_set_aside_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let write = |text: &str| write_beside_older(&path, |out| out.write_all(text.as_bytes())).unwrap();
+        assert_eq!(write("first"), None);
+        fs::write(folder.path().join("a.csv.~1~"), "somebody's").unwrap();
+        let name = write("second").unwrap();
+        assert_eq!(name, folder.path().join("a.csv.~2~"));
+        write("third").unwrap();
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+        assert_eq!(
+            ["a.csv", "a.csv.~1~", "a.csv.~2~", "a.csv.~3~"].map(read),
+            ["third", "somebody's", "first", "second"]
+        );
+        // A failure leaves all names as they were.
+        write_beside_older(&path, |_| Err(io::Error::other("no"))).unwrap_err();
+        assert_eq!(names(folder.path()).len(), 4);
+    }
+
+    #[test]
     fn folders_are_no_targets_and_have_to_exist() {
         let folder = tempfile::tempdir().unwrap();
         let write = |path: &Path| write_atomic(path, |_| Ok(())).unwrap_err().to_string();
@@ -213,7 +272,17 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), "newer");
         assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o640);
 
+        let aside = write_beside_older(&link, |out| out.write_all(b"newest")).unwrap().unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(
+            (fs::read_to_string(&path).unwrap(), fs::read_to_string(&aside).unwrap()),
+            ("newest".into(), "newer".into())
+        );
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o640);
+
         write_atomic("/dev/null", |out| out.write_all(b"x")).unwrap();
+        assert_eq!(write_beside_older("/dev/null", |out| out.write_all(b"x")).unwrap(), None);
+        assert!(!Path::new("/dev/null.~1~").exists());
         assert!(!Path::new("/dev/null").metadata().unwrap().is_file());
     }
 }

@@ -44,7 +44,8 @@ pub struct Extrapolated {
 }
 
 impl Extrapolated {
-    fn of(model: &Model, input: &[f64]) -> Self {
+    /// Where `input` leaves the range that `model` was fitted to.
+    pub fn of(model: &Model, input: &[f64]) -> Self {
         let mut found = Self::default();
         for (row, u) in input.iter().enumerate() {
             let beyond = (u - model.input.high).max(model.input.low - u);

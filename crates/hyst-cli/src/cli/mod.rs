@@ -246,7 +246,8 @@ pub(crate) struct CompensateArgs {
 /// With --reference the drive is computed before anything moves, as by compensate, and the measured output is compared
 /// with the reference. With --drive a file with voltage_v is played as it stands; a drive outside the limits is refused.
 /// Limits that are not given are the device's, and with a model no wider than the record that it was fitted to. Ctrl-C
-/// ramps the device to rest. A record or log that is there already is not replaced: it gets the ending .~1~.
+/// ramps the device to rest. A record or log that is there already is kept: its name gets the ending .~1~, or the
+/// next free number.
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
@@ -273,7 +274,7 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
     /// Seed of a simulated plant's noise, so that a second record has another one; that of its file if not given
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: Option<u64>,
     /// Rest between two segments
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use hyst_ident::compare::{Compared, Comparison, Figures, Skipped, SortedBy, Step, compare};
-use hyst_ident::record::Need;
+use hyst_ident::record::{Need, Record};
 use hyst_ident::simulate::Zero;
 use serde::Serialize;
 
@@ -14,16 +14,16 @@ use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report};
 use crate::progress::Progress;
-use crate::report::next;
+use crate::report::next::{files, quoted};
 use crate::{input, text};
 
 /// What is said about a comparison.
 #[derive(Debug, Serialize)]
 struct Summary {
     train: String,
-    /// Names of the training files, as the command line takes them.
+    /// Commands that say what the best model lacks.
     #[serde(skip)]
-    files: String,
+    next: Vec<String>,
     rows: usize,
     /// Rows that are a start-up transient for one of the models, and count for none.
     settling_rows: usize,
@@ -48,7 +48,12 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let report = Report::new(args.json.json, &written)?;
     let train = input::training(&args.train, &args.map.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
-    let trained_on = test.as_ref().is_some_and(|test| input::tell_repeated(test, &train));
+    let trained_on = test.as_ref().is_some_and(|test| input::is_trained_on(test, &train));
+    match &test {
+        Some(_) if trained_on => output::say(input::TRAINED_ON),
+        Some(test) => input::tell_repeated(test, &train),
+        None => {}
+    }
     let zero = args.zero.get();
     let options = args.options(zero == Zero::PerRecord);
 
@@ -74,10 +79,10 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let settling = |rows: &[bool]| rows.iter().filter(|settling| **settling).count();
     let summary = Summary {
         train: train.name(),
-        files: next::files(&train),
+        next: comparison.models.first().map_or_else(Vec::new, |best| next(args, &train, test.as_ref(), best)),
         rows: train.rows(),
         settling_rows: settling(&comparison.train_settling),
-        test_rows: test.as_ref().map(hyst_ident::record::Record::rows),
+        test_rows: test.as_ref().map(Record::rows),
         test_settling_rows: test.as_ref().map(|_| settling(&comparison.test_settling)),
         test: test.map(|test| test.name()),
         unit: train.output_unit().map_or("", |unit| unit.suffix()).to_owned(),
@@ -123,14 +128,36 @@ impl Summary {
         for Skipped { kind, reason } in &self.comparison.skipped {
             lines.push(format!("skipped {kind}: {reason}"));
         }
-        if let Some(best) = self.comparison.models.first() {
-            lines.push(format!(
-                "these are bare models of the hysteresis; what one of them lacks (creep, resonance, temperature …) is another question:\n  hystctl fit {} --model {} -o model.json, then hystctl diagnose",
-                self.files, best.kind
-            ));
+        if !self.next.is_empty() {
+            lines.push(
+                "these are bare models of the hysteresis; what the first of them lacks (creep, resonance, temperature …):"
+                    .to_owned(),
+            );
+            lines.extend(self.next.iter().map(|command| format!("  {command}")));
         }
         lines.join("\n")
     }
+}
+
+/// The fit and the diagnosis of one of the models, as it was compared.
+fn next(args: &CompareArgs, train: &Record, test: Option<&Record>, best: &Compared) -> Vec<String> {
+    let words = |words: Vec<String>| words.iter().map(|word| format!(" {}", quoted(word))).collect::<String>();
+    let (files, reading) = (files(train), words(input::reading(&args.map, &args.zero)));
+    let mut fit = Vec::new();
+    for (option, value, usual) in [("--seed", args.seed, 1), ("--trials", args.trials as u64, 1)] {
+        if value != usual {
+            fit.extend([option.to_owned(), value.to_string()]);
+        }
+    }
+    if let Some(evaluations) = args.evaluations {
+        fit.extend(["--evaluations".to_owned(), evaluations.to_string()]);
+    }
+    let test = test.map_or_else(String::new, |test| format!(" --test {}", quoted(&test.name())));
+    let (kind, fit) = (best.kind, words(fit));
+    vec![
+        format!("hystctl fit {files}{reading} --model {kind}{fit} -o model.json"),
+        format!("hystctl diagnose {files}{test}{reading} --model model.json -o extended.json --report report.html"),
+    ]
 }
 
 /// One line for each model and record.

@@ -1,8 +1,9 @@
 //! `compensate`: the drive that makes the actuator follow a reference.
 
 use hyst_ident::compensate::{CompensateOptions, Drive, Missed, compensate};
-use hyst_ident::model::{Effect, Model};
+use hyst_ident::model::{Channel, Effect, Model};
 use hyst_ident::record::{Extra, Need, Record};
+use hyst_ident::simulate::Extrapolated;
 use serde::Serialize;
 
 use crate::cli::{CompensateArgs, LimitArgs};
@@ -30,11 +31,10 @@ pub(super) struct Compensation {
     /// Of these, rows at the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
-    /// Rows beyond the input that the model was fitted to.
-    extrapolated_rows: usize,
-    /// Inputs that the model was fitted to.
+    /// Where the drive leaves the range that the model was fitted to; rows count from 1.
+    extrapolated: Extrapolated,
     #[serde(skip)]
-    fitted: (f64, f64),
+    input: Channel,
     /// Effects that are in the sensor.
     not_compensated: Vec<&'static str>,
     /// What the model itself misses with this drive; none where it runs live.
@@ -102,12 +102,8 @@ impl Compensation {
             voltage_limited_rows: drive.voltage_limited.len(),
             voltage_limited_low_rows: drive.voltage_limited.iter().filter(|k| drive.voltage[**k] <= lowest).count(),
             slew_limited_rows: drive.slew_limited.len(),
-            extrapolated_rows: drive
-                .voltage
-                .iter()
-                .filter(|u| !(model.input.low..=model.input.high).contains(*u))
-                .count(),
-            fitted: (model.input.low, model.input.high),
+            extrapolated: text::from_one(Extrapolated::of(model, &drive.voltage)),
+            input: model.input.clone(),
             not_compensated: in_the_sensor.map(Effect::name).collect(),
             unit: model.input.unit.clone(),
             output_unit: model.output.unit.clone(),
@@ -138,13 +134,10 @@ impl Compensation {
                 lines.push(format!("in {} at {} {unit} the reference {advice}", text::count(rows, "row"), short(end)));
             }
         }
-        if self.extrapolated_rows > 0 {
-            lines.push(format!(
-                "in {} the drive goes beyond {} to {} {unit}, which the model was fitted to: what it says there is a guess; narrow --limit or fit a wider record",
-                text::count(self.extrapolated_rows, "row"),
-                short(self.fitted.0),
-                short(self.fitted.1)
-            ));
+        // The range is that of a measured voltage: it ends a little beside the wanted one.
+        if self.extrapolated.largest > 1e-3 * (self.input.high - self.input.low) {
+            let beyond = text::extrapolation("drive", &self.extrapolated, &self.input);
+            lines.push(format!("{beyond}: narrow --limit, or fit a wider record"));
         }
         if self.slew_limited_rows > 0 {
             lines.push(

@@ -5,7 +5,6 @@ use std::path::Path;
 use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
-use hyst_ident::simulate::Zero;
 use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
@@ -50,7 +49,7 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
         train: &train,
         test: test.as_ref(),
-        reading: reading(args),
+        reading: input::reading(&args.map, &args.zero),
         seed: args.seed,
     };
     if let Some(target) = &args.report {
@@ -64,13 +63,6 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         }
     }
     said_as.print(&said, findings)
-}
-
-/// Options with which records are read, as the command line takes them.
-fn reading(args: &DiagnoseArgs) -> Vec<String> {
-    let map = args.map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]);
-    let zero = (args.zero.get() == Zero::PerRecord).then(|| ["--zero".to_owned(), "per-record".to_owned()]);
-    map.chain(zero.into_iter().flatten()).collect()
 }
 
 /// Warns where the files are not what they should be for the figures to mean something.
@@ -88,10 +80,8 @@ fn warn(model: &Model, train: &Record, test: Option<&Record>) {
     }
     let of_model = |test: &Record| test.sources().iter().any(|s| s.sha256.as_deref().is_some_and(fitted));
     match test {
-        Some(test) if of_model(test) => say(input::TRAINED_ON),
-        Some(test) => {
-            input::tell_repeated(test, train);
-        }
+        Some(test) if of_model(test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
+        Some(test) => input::tell_repeated(test, train),
         None => {}
     }
 }

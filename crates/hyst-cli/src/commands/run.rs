@@ -56,9 +56,6 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     if args.drive.is_some() && written.is_empty() {
         return Err(CommandError::bad_input("what is measured would be lost: give --record, --log or both"));
     }
-    if written.is_empty() {
-        output::say("note: what is measured is not kept; give --record, --log or both");
-    }
     if args.log.as_deref() == Some(Path::new("-")) {
         return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
     }
@@ -76,6 +73,9 @@ where
     D::Error: Classified,
 {
     let mut job = Job::read(args, daq.capabilities())?;
+    if args.record.is_none() && args.log.is_none() {
+        output::say("note: what is measured is not kept; give --record, --log or both");
+    }
     let unit = recording::unit(daq.capabilities().output);
     let device = daq.capabilities().device.clone();
     let model = job.followed.as_ref().map(|followed| LoggedModel { model: &followed.model, json: &followed.json });

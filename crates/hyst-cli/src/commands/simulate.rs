@@ -2,7 +2,6 @@
 
 use hyst_ident::BetweenSamples;
 use hyst_ident::metrics::{Errors, Mape, mape};
-use hyst_ident::model::Channel;
 use hyst_ident::record::{Extra, Need};
 use hyst_ident::simulate::{Extrapolated, SimulateOptions, Zero, simulate_with};
 use serde::Serialize;
@@ -61,7 +60,8 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         say("note: without a measured output --zero per-record has no effect");
     }
     if simulated.extrapolated.rows > 0 {
-        say(&extrapolation(&simulated.extrapolated, &model.input));
+        let beyond = text::extrapolation("input", &text::from_one(simulated.extrapolated), &model.input);
+        say(&format!("warning: {beyond}; the prediction is extrapolated there"));
     }
     // What could not be compared is an error of the simulation already.
     let mape = record.output().and_then(|y| mape(y, &simulated.predicted, &simulated.settling).ok());
@@ -77,25 +77,10 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         zeros: simulated.zeros,
         errors: simulated.errors,
         // People and JSON count rows from 1, where there is one.
-        extrapolated: Extrapolated {
-            row: simulated.extrapolated.row + usize::from(simulated.extrapolated.rows > 0),
-            ..simulated.extrapolated
-        },
+        extrapolated: text::from_one(simulated.extrapolated),
         mape,
     };
     report.print(&summary.text(), &summary)
-}
-
-fn extrapolation(found: &Extrapolated, input: &Channel) -> String {
-    let Channel { low, high, unit, .. } = input;
-    format!(
-        "warning: in {} the input lies beyond {} to {} {unit}, the range that the model was identified on, by {} {unit} at most (row {}); the prediction is extrapolated there",
-        text::count(found.rows, "row"),
-        text::short(*low),
-        text::short(*high),
-        text::short(found.largest),
-        found.row + 1
-    )
 }
 
 impl Summary {

@@ -191,11 +191,15 @@ impl Story<'_> {
         }
         let (truth, named) = (self.truth(), self.named());
         let (modes, found) = (self.config.modes.len(), self.diagnosis.extended.effects.resonances.len());
-        let truth_modes =
-            if found > 0 && modes != found { format!(" ({modes} modes, {found} found)") } else { String::new() };
+        let of_modes = match (modes, found) {
+            (_, 0) => String::new(),
+            (modes, found) if found < modes => format!(", {found} of its {modes} modes"),
+            (modes, found) if found > modes => format!(", but with {found} modes instead of {modes}"),
+            _ => String::new(),
+        };
         let had = if truth.is_empty() { "no effect".to_owned() } else { text::listed(&truth) };
         lines.push(format!(
-            "revealed   the plant's file has {had}: {}{truth_modes}",
+            "revealed   the plant's file has {had}: {}{of_modes}",
             if truth == named { "as found" } else { "NOT as found" }
         ));
         lines.push(format!("written    {}", out.display()));

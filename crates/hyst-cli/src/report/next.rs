@@ -90,7 +90,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         }
         RemainderKind::None => {}
     }
-    if f.verdict == Verdict::NothingMissing || (f.verdict == Verdict::Explained && c.test.is_none()) {
+    if c.test.is_none() && matches!(f.verdict, Verdict::NothingMissing | Verdict::Explained) {
         advise("See what the model is worth on a drive that it has not seen:", &[identification(c, " --test")]);
     }
     all
@@ -102,7 +102,7 @@ pub(crate) fn files(train: &Record) -> String {
 }
 
 /// A word of the command line.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:=,@".contains(c);
     if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }

@@ -41,7 +41,7 @@ const BURSTS: usize = 64;
 impl Disturbances {
     pub(crate) fn new(config: &PlantConfig) -> Self {
         let numbered = (0..).zip(&config.disturbances);
-        Self(numbered.filter_map(|(k, disturbance)| Active::new(config.seed, k, disturbance)).collect())
+        Self(numbered.filter_map(|(k, disturbance)| Active::new(config, k, disturbance)).collect())
     }
 
     /// What they add to the reading at lab time `t`, after the drive went from `from_v` to `to_v` (µm).
@@ -52,15 +52,21 @@ impl Disturbances {
 
 impl Active {
     /// The disturbance of number `k`; none if it does not act on the reading.
-    fn new(seed: u64, k: u32, disturbance: &Disturbance) -> Option<Self> {
-        let draws = |purpose| Draws::numbered(seed, purpose, k);
+    fn new(config: &PlantConfig, k: u32, disturbance: &Disturbance) -> Option<Self> {
+        let draws = |purpose| Draws::numbered(config.seed, purpose, k);
         Some(match *disturbance {
             Disturbance::Jump { um, at_s } => Self::Jump { um, at_s },
             Disturbance::GainStep { .. } => return None,
             Disturbance::Bursts { um, seconds, every_s } => {
                 let mut moments = draws(Purpose::BurstMoments);
                 let begins = (0..BURSTS).map(|_| moments.between(0.0, every_s - seconds)).collect();
-                Self::Bursts(Bursts { noise: um, seconds, every_s, begins, draws: draws(Purpose::BurstNoise) })
+                Self::Bursts(Bursts {
+                    noise: um,
+                    seconds,
+                    every_s,
+                    begins,
+                    draws: Draws::numbered(config.noise(), Purpose::BurstNoise, k),
+                })
             }
             Disturbance::Wander { um, period_s } => {
                 Self::Wander(Waves::walk(&mut draws(Purpose::SensorWander), um, period_s))

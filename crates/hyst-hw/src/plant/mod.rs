@@ -102,7 +102,10 @@ impl Plant {
         let (temperature, load) = surroundings.recorded();
         let actuator = &config.actuator;
         let capabilities = Capabilities {
-            device: format!("simulated plant, seed {}", config.seed),
+            device: match config.noise_seed {
+                None => format!("simulated plant, seed {}", config.seed),
+                Some(noise) => format!("simulated plant, seed {}, noise of seed {noise}", config.seed),
+            },
             voltage: VoltageRange { min_v: actuator.min_v, max_v: actuator.max_v, rest_v: actuator.rest_v },
             min_rate_hz: 1.0,
             max_rate_hz: config.sensor.max_rate_hz,

@@ -61,6 +61,17 @@ fn another_noise_is_all_that_another_noise_seed_makes() {
     assert!(one.iter().zip(&other).filter(|(a, b)| a.output != b.output).count() > 300);
     let [one, other] = [None, Some(9)].map(|noise_seed| run(quiet(PlantConfig { noise_seed, ..noisy.clone() })));
     assert_eq!(one, other);
+    // Of the disturbances the noise of bursts alone is another one.
+    let without_bursts = |mut config: PlantConfig| {
+        config.disturbances.retain(|d| !matches!(d, Disturbance::Bursts { .. }));
+        config
+    };
+    let noisy = quiet(disturbed());
+    let [one, other] = [None, Some(9)].map(|noise_seed| run(PlantConfig { noise_seed, ..noisy.clone() }));
+    assert_ne!(one, other);
+    let [one, other] =
+        [None, Some(9)].map(|noise_seed| run(without_bursts(PlantConfig { noise_seed, ..noisy.clone() })));
+    assert_eq!(one, other);
 }
 
 #[test]

@@ -228,11 +228,19 @@ fn a_test_drive_differs_in_every_segment() {
         assert_eq!(train.shapes(), test.shapes());
         for (a, b) in train.segments().iter().zip(test.segments()) {
             let (a, b) = (&train.voltage()[a.clone()], &test.voltage()[b.clone()]);
-            assert_eq!(extremes(a).0, extremes(b).0);
-            let same = a.iter().zip(b).filter(|(a, b)| a == b).count();
-            assert!(10 * same < a.len(), "{same} of {} rows at {rate_hz} Hz", a.len());
+            let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+            let rms = (squares / a.len().min(b.len()) as f64).sqrt();
+            assert!(rms > 0.1 * (LIMITS.hi_v - LIMITS.lo_v), "{rms} V at {rate_hz} Hz");
         }
     }
+    // What makes a drive for the training makes one for the test.
+    for (slow_hz, fast_hz, band_hz) in [(4.0, 40.0, 5.0), (1.0, 1.01, 50.0)] {
+        let narrow = Identification { slow_hz, fast_hz, band_hz, ..Identification::at_rate(1000.0, 1) };
+        narrow.drive(&LIMITS).unwrap();
+        narrow.for_test().drive(&LIMITS).unwrap();
+    }
+    let wrong = Identification { slow_hz: -1.0, ..Identification::at_rate(1000.0, 1) };
+    assert!(wrong.for_test().drive(&LIMITS).unwrap_err().to_string().contains("slow_hz = -1"));
 }
 
 #[test]

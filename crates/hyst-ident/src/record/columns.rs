@@ -45,13 +45,15 @@ pub enum MapError {
     },
     /// Both sides are names of the record format, in different units.
     #[error(
-        "--map \"{argument}\": a map only renames, and \"{column}\" is in another unit than \"{name}\"; leave the map out, {column} is read as it is"
+        "--map \"{argument}\": a map only renames, and \"{column}\" is in another unit than \"{name}\"; it is read in its own with --map {column}={sign}{column}"
     )]
     OtherUnit {
         /// The argument.
         argument: String,
         /// Its left side.
         name: String,
+        /// The minus of its right side, or nothing.
+        sign: &'static str,
         /// Its right side, without a minus.
         column: String,
     },
@@ -122,9 +124,9 @@ impl ColumnMap {
             if turned && !matches!(role, Role::Input | Role::Output | Role::Load) {
                 return Err(MapError::Signless { argument: argument.to_owned(), role: role.words() });
             }
-            if Role::of_column(column).is_some() && unit_of(column) != unit_of(name) {
+            if Role::of_column(column) == Some(role) && unit_of(column) != unit_of(name) {
                 let (argument, name, column) = (argument.to_owned(), name.to_owned(), column.to_owned());
-                return Err(MapError::OtherUnit { argument, name, column });
+                return Err(MapError::OtherUnit { argument, name, sign: if turned { "-" } else { "" }, column });
             }
             for other in &entries {
                 let (first, second) = (other.argument.clone(), argument.to_owned());
@@ -144,7 +146,7 @@ impl ColumnMap {
 
 /// The unit at the end of a column's name.
 fn unit_of(name: &str) -> Option<&str> {
-    name.rsplit_once('_').map(|(_, unit)| unit)
+    name.split_once("_in_").or_else(|| name.rsplit_once('_')).map(|(_, unit)| unit)
 }
 
 /// What a column is for.
@@ -314,7 +316,11 @@ fn header_map<'a>(
             column: e.column.clone(),
             found: listed(names),
             hint: match names.iter().find(|name| name.starts_with(&format!("{} ", e.column))) {
-                Some(whole) => format!("; a name with spaces needs quotes: --map \"{}={whole}\"", e.canonical),
+                Some(whole) => format!(
+                    "; a name with spaces needs quotes: --map \"{}={}{whole}\"",
+                    e.canonical,
+                    if e.turned { "-" } else { "" }
+                ),
                 None => String::new(),
             },
         }),

@@ -19,6 +19,8 @@ struct Summary<'a> {
     verdict: Verdict,
     reason: &'a str,
     rows: usize,
+    /// Steepest slope \[V/s\].
+    steepest_v_per_s: f64,
     segments: &'a [&'static str],
     tried: &'a [Tried],
 }
@@ -46,6 +48,7 @@ pub(super) fn run(args: &SeparateArgs) -> CommandResult {
         verdict: found.verdict,
         reason: &found.reason,
         rows: found.drive.voltage().len(),
+        steepest_v_per_s: found.drive.steepest(),
         segments: found.drive.shapes(),
         tried: &found.tried,
     };
@@ -66,11 +69,12 @@ impl Summary<'_> {
         let rows: Vec<Vec<String>> =
             std::iter::once(head.map(str::to_owned).to_vec()).chain(found.tried.iter().take(LISTED).map(row)).collect();
         format!(
-            "{}\n\n{}\n{}: {}, {}: {}",
+            "{}\n\n{}\n{}: {}, steepest slope {} V/s, {}: {}",
             self.reason,
             text::table(&rows),
             self.output,
             text::count(self.rows, "row"),
+            text::short(self.steepest_v_per_s),
             text::count(self.segments.len(), "segment"),
             self.segments.join(", ")
         )
