@@ -155,3 +155,14 @@ fn records_that_do_not_go_together() {
         assert!(message.contains(part), "{message}");
     }
 }
+
+#[test]
+fn loops_that_are_passed_the_wrong_way_round_are_told() {
+    let lab = Lab::with_train("");
+    let said = "runs ahead of the input";
+    assert!(!lab.ok("fit train.csv --model pi -o a.json").stderr.contains(said));
+    let exchanged = lab.read("train.csv").replacen("voltage_v,displacement_um", "displacement_um,voltage_v", 1);
+    lab.write("exchanged.csv", exchanged);
+    let ran = lab.ok("fit exchanged.csv --model pi -o b.json");
+    assert!(ran.stderr.contains(said) && ran.stderr.contains("exchanged?"), "{}", ran.stderr);
+}

@@ -110,6 +110,13 @@ fn a_reference_is_followed_and_logged() {
         let error = sample["output"].as_f64().unwrap() - wanted;
         assert!((sample["error"].as_f64().unwrap() - error).abs() < 1e-12);
     }
+    // Two seconds at the first voltage are the usual time to settle there.
+    let held = |name: &str| log(&lab, name).iter().filter(|s| s["phase"] == "approach").count();
+    let usual = held("run.mcap");
+    lab.ok(&format!("{follow} --model extended.json --log short.mcap --settle 0.5"));
+    assert_eq!(usual - held("short.mcap"), 750);
+    let late = tracking["rmse_last_half"].as_f64().unwrap();
+    assert!(late > 0.0 && late < 2.0 * rmse, "{report}");
     // Ramps to the first voltage and back to rest are in the log and not in the record.
     assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
     assert_eq!(samples.last().unwrap()["phase"], "retreat");
@@ -223,6 +230,7 @@ fn arguments_have_to_make_sense_together() {
         ("--model model.json --record out.csv", "--reference"),
         ("--model model.json --reference reference.csv --drive u.csv --record out.csv", "--drive"),
         ("--drive u.csv --record out.csv --bandwidth 10", "--bandwidth"),
+        ("--drive u.csv --record out.csv --settle 1", "--settle"),
         ("--drive u.csv --record u.csv", "read by the same command"),
         ("--drive u.csv --log plant.toml", "read by the same command"),
         ("--drive u.csv --record out.csv --log out.csv", "two outputs"),

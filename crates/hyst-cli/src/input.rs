@@ -46,6 +46,32 @@ fn falls(record: &Record) -> bool {
     u.iter().zip(y).map(|(u, y)| (u - mean_u) * (y - mean_y)).sum::<f64>() < 0.0
 }
 
+/// Share of a whole loop's box from which on a loop is open.
+const OPEN: f64 = 0.003;
+
+/// Whether loops are passed the other way round than hysteresis makes them: with a falling branch below the rising one.
+fn leads(record: &Record) -> bool {
+    let (u, Some(y)) = (record.input(), record.output()) else { return false };
+    let span =
+        |x: &[f64]| x.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) - x.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+    let (mut area, mut path) = (0.0, 0.0);
+    for rows in record.segments() {
+        let (Some(u), Some(y)) = (u.get(rows.clone()), y.get(rows.clone())) else { return false };
+        let (&[u0, .., u1], &[y0, .., y1]) = (u, y) else { continue };
+        // What comes back, nearly, to where it began is closed by a straight line.
+        if (u1 - u0).abs() > 0.1 * span(u) {
+            continue;
+        }
+        area += 0.5 * (y1 - y0) * (u0 - u1);
+        for (u, y) in u.windows(2).zip(y.windows(2)) {
+            area += (0.5 * (y[0] + y[1]) - y0) * (u[1] - u[0]);
+            path += (u[1] - u[0]).abs();
+        }
+    }
+    let loops = path / (2.0 * span(u));
+    loops >= 1.0 && area > OPEN * loops * span(u) * span(y)
+}
+
 /// Sample rates that actuators are measured at \[Hz\].
 const ORDINARY_RATES: Range<f64> = 5.0..2e5;
 
@@ -54,8 +80,13 @@ fn tell_oddities(record: &Record) {
     let (name, rate) = (record.name(), 1.0 / record.sample_period());
     if !ORDINARY_RATES.contains(&rate) {
         say(&format!(
-            "note: {name} has {} samples per second; if its times are in another unit, name it, as with --map time_ms=COLUMN",
+            "note: {name} has {} samples per second; if its times are in another unit than their column says, rename that column in the file: time_s, time_ms or time_us",
             text::short(rate)
+        ));
+    }
+    if leads(record) {
+        say(&format!(
+            "note: {name}: the output runs ahead of the input in its loops, where hysteresis makes it follow; are the columns of input and output exchanged?"
         ));
     }
     let unit = record.output_unit().map_or("", |unit| unit.symbol());

@@ -10,6 +10,7 @@ use crate::model::{Compensator, InverseState, Model};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
+use crate::simulate::other_unit;
 
 /// What a compensation may be told.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +42,8 @@ pub struct Drive {
     pub bandwidth_hz: Option<f64>,
     /// Largest relative error of that inversion inside its band.
     pub band_error: f64,
+    /// Lowest and highest voltage that was allowed \[V\].
+    pub limits: (f64, f64),
     /// Rows at which the voltage limit acted.
     pub voltage_limited: Vec<usize>,
     /// Rows at which the slew limit acted.
@@ -184,6 +187,8 @@ pub struct Follower {
     compensator: Box<Compensator>,
     state: Box<State>,
     limits: Limits<f64>,
+    /// Lowest and highest voltage \[V\].
+    range: (f64, f64),
     samples: Samples,
     row: usize,
     segment: usize,
@@ -214,7 +219,7 @@ impl Follower {
         let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
         let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
         let state = Box::new(compensator.state());
-        Ok(Self { compensator, state, limits, samples, row: 0, segment: 0, before: 0.0 })
+        Ok(Self { compensator, state, limits, range: (low, high), samples, row: 0, segment: 0, before: 0.0 })
     }
 
     /// Segments of the reference.
@@ -229,6 +234,7 @@ impl Follower {
             lead: self.compensator.lead(),
             bandwidth_hz: self.compensator.bandwidth_hz(),
             band_error: self.compensator.error(),
+            limits: self.range,
             voltage_limited: Vec::new(),
             slew_limited: Vec::new(),
             missed: Missed::default(),
@@ -287,11 +293,10 @@ fn check(
     let missing = |column: &str, advice: &str| {
         Err(CompensateError::Missing { record: reference.name(), column: column.into(), advice: advice.into() })
     };
-    if reference.output_unit().is_none_or(|u| u.column() != model.output.column) {
-        return missing(
-            &model.output.column,
-            "the reference must be in the output that the model was fitted to; use --map if it has another name",
-        );
+    match reference.output_unit() {
+        Some(unit) if unit.column() == model.output.column => {}
+        Some(unit) => return missing(&model.output.column, &other_unit(unit)),
+        None => return missing(&model.output.column, "the reference says what the output is to do"),
     }
     if let Some((column, why)) = model.lacking(samples) {
         return missing(column, why);

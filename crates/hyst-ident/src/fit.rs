@@ -71,7 +71,7 @@ pub enum FitError {
     },
     /// The output falls where the input rises.
     #[error(
-        "{record}: the output falls where the input rises, and these models rise; turn its sign for every command with --map {column}=-COLUMN, where COLUMN is its name in the file"
+        "{record}: the output falls where the input rises, and these models rise; turn its sign for every command with --map {column}=-COLUMN, where COLUMN is its name in the file, or take out the minus that a --map has already"
     )]
     Falling {
         /// The record.

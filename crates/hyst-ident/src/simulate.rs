@@ -6,7 +6,7 @@ use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::metrics::Errors;
 use crate::model::Model;
-use crate::record::Record;
+use crate::record::{OutputUnit, Record};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
@@ -117,6 +117,14 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     Ok(Simulation { predicted, settling: samples.settling, zeros, errors, extrapolated })
 }
 
+/// What to do about a record whose output is in this unit, and not in the model's.
+pub(crate) fn other_unit(unit: OutputUnit) -> String {
+    format!(
+        "it has {} instead: convert its values and rename the column, or fit a model to records in that unit",
+        unit.column()
+    )
+}
+
 fn check(model: &Model, record: &Record, samples: &Samples) -> Result<(), FitError> {
     let missing =
         |column: &str, advice: String| Err(FitError::Missing { record: record.name(), column: column.into(), advice });
@@ -124,13 +132,7 @@ fn check(model: &Model, record: &Record, samples: &Samples) -> Result<(), FitErr
         return missing(&model.input.column, "the model was fitted with it; use --map if it has another name".into());
     }
     if let Some(unit) = record.output_unit().filter(|u| u.column() != model.output.column) {
-        return missing(
-            &model.output.column,
-            format!(
-                "the record has {} instead: convert its values and rename the column, or fit a model to records in that unit",
-                unit.column()
-            ),
-        );
+        return missing(&model.output.column, other_unit(unit));
     }
     match model.lacking(samples) {
         Some((column, why)) => missing(column, why.into()),

@@ -273,6 +273,10 @@ pub(crate) struct RunArgs {
     pub(crate) record: Option<Target>,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
+    /// Hold at the first value of a reference before it begins; 2 if not given. A model takes the actuator as settled there, and
+    /// creep takes its time
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    pub(crate) settle: Option<f64>,
     /// Seed of a simulated plant's noise, so that a second record has another one; that of its file if not given
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: Option<u64>,

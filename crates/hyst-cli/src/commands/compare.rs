@@ -130,7 +130,7 @@ impl Summary {
         }
         if !self.next.is_empty() {
             lines.push(
-                "these are bare models of the hysteresis; what the first of them lacks (creep, resonance, temperature …):"
+                "these are bare models of the hysteresis, and their order can turn once they have the effects that they lack (creep, resonance, temperature …). What the first of them lacks:"
                     .to_owned(),
             );
             lines.extend(self.next.iter().map(|command| format!("  {command}")));

@@ -31,12 +31,17 @@ pub(super) struct Compensation {
     /// Of these, rows at the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
+    #[serde(skip)]
+    limits: (f64, f64),
     /// Where the drive leaves the range that the model was fitted to; rows count from 1.
     extrapolated: Extrapolated,
     #[serde(skip)]
     input: Channel,
     /// Effects that are in the sensor.
     not_compensated: Vec<&'static str>,
+    /// How long the device was held at the first value before \[s\]; none where nothing was played.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) held_s: Option<f64>,
     /// What the model itself misses with this drive; none where it runs live.
     missed: Option<Missed>,
     #[serde(skip)]
@@ -84,6 +89,13 @@ pub(super) fn options(limits: &LimitArgs) -> CompensateOptions {
     }
 }
 
+/// Whether a row that the voltage limit acted on was to go below the lower one: one that the slew keeps from it is on its way there.
+fn below(drive: &Drive, row: usize) -> bool {
+    let (low, high) = drive.limits;
+    let volts = drive.voltage[row];
+    if volts <= low || volts >= high { volts <= low } else { row > 0 && volts < drive.voltage[row - 1] }
+}
+
 impl Compensation {
     pub(super) fn new(model: &Model, reference: &Record, drive: &Drive) -> Self {
         let (lowest, highest) =
@@ -100,13 +112,15 @@ impl Compensation {
             bandwidth_hz: drive.bandwidth_hz,
             band_error: drive.band_error,
             voltage_limited_rows: drive.voltage_limited.len(),
-            voltage_limited_low_rows: drive.voltage_limited.iter().filter(|k| drive.voltage[**k] <= lowest).count(),
+            voltage_limited_low_rows: drive.voltage_limited.iter().filter(|k| below(drive, **k)).count(),
+            limits: drive.limits,
             slew_limited_rows: drive.slew_limited.len(),
             extrapolated: text::from_one(Extrapolated::of(model, &drive.voltage)),
             input: model.input.clone(),
             not_compensated: in_the_sensor.map(Effect::name).collect(),
             unit: model.input.unit.clone(),
             output_unit: model.output.unit.clone(),
+            held_s: None,
             missed: None,
         }
     }
@@ -122,16 +136,21 @@ impl Compensation {
             text::count(self.slew_limited_rows, "row")
         )];
         let (low, all) = (self.voltage_limited_low_rows, self.voltage_limited_rows);
-        for (rows, end, advice) in [
-            (
-                low,
-                self.lowest,
-                "goes below what the actuator reaches on its way there: shift it up, or shrink it about a higher middle",
-            ),
-            (all - low, self.highest, "goes beyond what the actuator reaches: shift it down or shrink it"),
+        // Where dynamics are inverted a quick part of a reference asks for more than the place that it goes to.
+        let quick = match self.bandwidth_hz {
+            Some(_) => "; where only quick parts do, round them off or lower --bandwidth",
+            None => "",
+        };
+        for (rows, what, end, advice) in [
+            (low, "less", self.limits.0, "shift it up, or shrink it about a higher middle"),
+            (all - low, "more", self.limits.1, "shift it down or shrink it"),
         ] {
             if rows > 0 {
-                lines.push(format!("in {} at {} {unit} the reference {advice}", text::count(rows, "row"), short(end)));
+                lines.push(format!(
+                    "in {} the reference asks for {what} than {} {unit}: {advice}{quick}",
+                    text::count(rows, "row"),
+                    short(end)
+                ));
             }
         }
         // The range is that of a measured voltage: it ends a little beside the wanted one.
@@ -176,10 +195,15 @@ impl Compensation {
             lines.push(line);
         }
         if self.first.abs() > 0.01 * (self.highest - self.lowest) {
-            lines.push(format!(
-                "the drive starts at {} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value",
-                short(self.first)
-            ));
+            let first = short(self.first);
+            lines.push(match self.held_s {
+                None => format!(
+                    "the drive starts at {first} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value"
+                ),
+                Some(seconds) => format!(
+                    "before the reference began the device was ramped to {first} {unit} and held there for {seconds} s; the model takes the actuator as settled there, and what creeps longer shows at first: --settle holds longer"
+                ),
+            });
         }
         if !self.not_compensated.is_empty() {
             let (effects, verb) =

@@ -42,11 +42,13 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         let json = output::json(findings)?;
         target.write(|out| out.write_all(json.as_bytes()))?;
     }
+    let extended_file = args.output.as_ref().and_then(Target::file).map(|path| path.display().to_string());
     let contents = Contents {
         diagnosis: &diagnosis,
         model: &model,
         model_file: &args.model.file_name().map_or_else(|| "model".into(), |name| name.to_string_lossy()),
         model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
+        extended_file: extended_file.as_deref(),
         train: &train,
         test: test.as_ref(),
         reading: input::reading(&args.map, &args.zero),

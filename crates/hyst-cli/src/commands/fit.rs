@@ -23,6 +23,7 @@ use crate::cli::{FitArgs, FitFrom};
 use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
+use crate::report::next::{files, quoted};
 use crate::{input, text};
 
 /// What is said about a fit.
@@ -59,6 +60,9 @@ struct Summary {
     input_unit: String,
     #[serde(skip)]
     seen: String,
+    /// The diagnosis of what was fitted.
+    #[serde(skip)]
+    next: Option<String>,
 }
 
 /// How the drive goes on between samples.
@@ -155,6 +159,11 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         dynamics,
         input_unit: model.input.unit.clone(),
         seen: seen(&record, &model),
+        next: args.output.file().map(|path| {
+            let reading: String =
+                input::reading(&args.map, &args.zero).iter().map(|word| format!(" {}", quoted(word))).collect();
+            format!("hystctl diagnose {}{reading} --model {}", files(&record), quoted(&path.display().to_string()))
+        }),
     };
     report.print(&summary.text(), &summary)
 }
@@ -279,6 +288,13 @@ impl Summary {
         }
         lines.extend(self.estimate.as_ref().map(parameters));
         lines.extend(self.tables.iter().map(text::known));
+        if matches!(self.base, Some(BaseSummary::Pi { .. } | BaseSummary::Preisach { .. })) {
+            lines.push(
+                "(neighbouring plays and cells stand in for one another: what the record does not say of each alone does not harm predictions within its range)"
+                    .to_owned(),
+            );
+        }
+        lines.extend(self.next.iter().map(|command| format!("next, what the model lacks: {command}")));
         lines.join("\n")
     }
 }

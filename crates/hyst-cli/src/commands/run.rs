@@ -47,6 +47,8 @@ struct Tracking {
     /// In percent of the reference's span.
     nrmse_percent: f64,
     max_abs: f64,
+    /// RMSE over the last half, in which the start tells less.
+    rmse_last_half: f64,
 }
 
 /// Runs the command.
@@ -122,7 +124,10 @@ where
 impl Tracking {
     fn of(wanted: &[f64], measured: &[f64]) -> CommandResult<Self> {
         let errors = Errors::of(wanted, measured, &vec![false; wanted.len()]).map_err(CommandError::failed)?;
-        Ok(Self { rmse: errors.rmse, nrmse_percent: errors.nrmse_percent, max_abs: errors.max_abs })
+        let half = wanted.len() / 2;
+        let squares: f64 = wanted[half..].iter().zip(&measured[half..]).map(|(w, y)| (w - y) * (w - y)).sum();
+        let rmse_last_half = (squares / (wanted.len() - half).max(1) as f64).sqrt();
+        Ok(Self { rmse: errors.rmse, nrmse_percent: errors.nrmse_percent, max_abs: errors.max_abs, rmse_last_half })
     }
 }
 
@@ -140,7 +145,10 @@ impl Summary {
         )];
         lines.extend(self.tracking.map(|t| {
             let (rmse, share, most) = (short(t.rmse), text::percent(t.nrmse_percent), short(t.max_abs));
-            format!("tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}")
+            let late = short(t.rmse_last_half);
+            format!(
+                "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
+            )
         }));
         lines.extend(self.compensation.as_ref().map(Compensation::text));
         if self.temperature_followed {

@@ -26,6 +26,8 @@ pub(crate) struct Contents<'a> {
     pub(crate) model: &'a Model,
     pub(crate) model_file: &'a str,
     pub(crate) model_sha256: &'a str,
+    /// The file of the extended model, if it is written to one.
+    pub(crate) extended_file: Option<&'a str>,
     pub(crate) train: &'a Record,
     pub(crate) test: Option<&'a Record>,
     /// Options with which the records were read.

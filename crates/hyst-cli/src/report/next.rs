@@ -9,6 +9,9 @@ use super::html::Page;
 use super::{Contents, words};
 use crate::text::listed;
 
+/// Up to so many noise floors of error there is little left to look for.
+const NEAR_THE_FLOOR: f64 = 2.0;
+
 /// What to do next, and why.
 #[derive(Debug)]
 pub(crate) struct Advice {
@@ -71,6 +74,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
                 &[],
             );
         }
+        RemainderKind::Unexplained if f.after.train.is_some_and(|e| e.rmse <= NEAR_THE_FLOOR * f.noise_floor) => {}
         RemainderKind::Unexplained => {
             let missing: Vec<&str> = [
                 (c.train.temperature().is_none(), "the temperature (temperature_degc)"),
@@ -92,6 +96,12 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
     }
     if c.test.is_none() && matches!(f.verdict, Verdict::NothingMissing | Verdict::Explained) {
         advise("See what the model is worth on a drive that it has not seen:", &[identification(c, " --test")]);
+    }
+    if let (Some(extended), Verdict::Explained | Verdict::NothingMissing) = (c.extended_file, f.verdict)
+        && !words::worse_on_test(f)
+    {
+        let command = format!("hystctl compensate --model {} reference.csv -o drive.csv", quoted(extended));
+        advise("The drive that makes the actuator follow a reference:", &[command]);
     }
     all
 }

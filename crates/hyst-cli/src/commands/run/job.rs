@@ -35,6 +35,8 @@ pub(super) struct Followed {
     pub(super) drive: Drive,
     /// The drive as it is corrected on the way, where the model needs a temperature that the device measures.
     pub(super) live: Option<Live>,
+    /// How long the device is held at the first value of a segment \[s\].
+    held_s: f64,
 }
 
 impl Followed {
@@ -46,10 +48,14 @@ impl Followed {
     /// What there is to say about the drive that was played.
     pub(super) fn compensation(&self) -> Compensation {
         let drive = self.live.as_ref().map_or(&self.drive, Live::drive);
-        Compensation::new(&self.model, &self.reference, drive)
+        let mut said = Compensation::new(&self.model, &self.reference, drive);
+        said.held_s = Some(self.held_s);
+        said
     }
 }
 
+/// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
+const USUAL_SETTLE_S: f64 = 2.0;
 /// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
@@ -91,6 +97,7 @@ impl Job {
         });
         options.temperature = input::temperature(args.temperature, &model, &reference);
         let mut play = play_options(args, &reference);
+        play.settle_s = args.settle.unwrap_or(USUAL_SETTLE_S);
         // A temperature that is measured is followed; the plan starts from the given one, or the one that the gain is stated for.
         let measured = model.effects.temperature.filter(|_| device.temperature);
         if let Some(gain) = measured {
@@ -101,8 +108,8 @@ impl Job {
         let live = measured.map(|_| Live::new(&model, &reference, &options)).transpose()?;
         Ok(Self {
             segments: split(&reference, &drive.voltage),
+            followed: Some(Followed { model, json, reference, drive, live, held_s: play.settle_s }),
             options: play,
-            followed: Some(Followed { model, json, reference, drive, live }),
         })
     }
 
@@ -115,6 +122,11 @@ impl Job {
         if args.temperature.degc.is_some() {
             return Err(CommandError::bad_input(
                 "--temperature needs --model and --reference: a drive is played as it stands",
+            ));
+        }
+        if args.settle.is_some() {
+            return Err(CommandError::bad_input(
+                "--settle needs --model and --reference: a drive is played as it stands",
             ));
         }
         let drive = input::record(path, &args.map.map, Need::Input)?;
