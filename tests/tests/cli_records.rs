@@ -165,4 +165,7 @@ fn loops_that_are_passed_the_wrong_way_round_are_told() {
     lab.write("exchanged.csv", exchanged);
     let ran = lab.ok("fit exchanged.csv --model pi -o b.json");
     assert!(ran.stderr.contains(said) && ran.stderr.contains("exchanged?"), "{}", ran.stderr);
+    let turned = "--map displacement_um=-displacement_um";
+    assert!(!lab.refuses(&format!("fit train.csv --model pi -o c.json {turned}"), 2).contains(said));
+    assert!(lab.refuses(&format!("fit exchanged.csv --model pi -o c.json {turned}"), 2).contains(said));
 }

@@ -68,6 +68,8 @@ fn leads(record: &Record) -> bool {
             path += (u[1] - u[0]).abs();
         }
     }
+    // Of an output whose sign is turned a loop is passed the other way, and nothing is exchanged.
+    let area = if falls(record) { -area } else { area };
     let loops = path / (2.0 * span(u));
     loops >= 1.0 && area > OPEN * loops * span(u) * span(y)
 }

@@ -16,6 +16,9 @@ use crate::output;
 /// Length of the reference \[s\].
 const SECONDS: f64 = 12.0;
 
+/// Ramps to where the reference begins and back \[V/s\].
+const RAMP_V_PER_S: f64 = 1000.0;
+
 /// One tracking run.
 pub(crate) struct Run {
     /// Measured motion minus reference \[output unit\].
@@ -75,7 +78,8 @@ impl Task {
         let temperature = model.effects.temperature.map(|t| t.reference_degc);
         let options = CompensateOptions { temperature, ..CompensateOptions::default() };
         let plan = compensate(model, &reference, &options)?;
-        let mut follower = Follower::new(model, &reference, &options)?;
+        let mut follower =
+            Follower::new(model, &reference, &options)?.held_at(plan.voltage[..1].to_vec(), RAMP_V_PER_S);
         let revise = |r: &mut hyst_hw::Revision<'_>| {
             for v in r.drive_v.iter_mut() {
                 *v = follower.next(r.latest.and_then(|s| s.temperature_degc)).drive;
@@ -141,7 +145,7 @@ impl Task {
         mut each: impl FnMut(&Sample) -> CommandResult,
     ) -> CommandResult<Vec<Sample>> {
         // Small blocks, so that a revision is not stale.
-        let options = RecordOptions { block: 50, slew_v_per_s: 1000.0, ..RecordOptions::at(self.rate_hz) };
+        let options = RecordOptions { block: 50, slew_v_per_s: RAMP_V_PER_S, ..RecordOptions::at(self.rate_hz) };
         let mut failed = None;
         let recording = hyst_hw::record_with(daq, &[drive], &options, revise, |news| {
             if news.phase == Phase::Record {

@@ -193,6 +193,12 @@ pub struct Follower {
     row: usize,
     segment: usize,
     before: f64,
+    /// Where the actuator is held before each segment \[V\]; nowhere that is known if there are none.
+    held: Vec<f64>,
+    /// What the drive is still away from what it should be, because it was held elsewhere \[V\].
+    offset: f64,
+    /// How much of that goes in a row \[V\].
+    fade: f64,
 }
 
 type State = CompensatorState<f64, InverseState, CREEP, TAPS>;
@@ -219,7 +225,28 @@ impl Follower {
         let (low, high) = options.voltage.unwrap_or((model.input.low, model.input.high));
         let limits = Limits::new(low, high, options.slew, &Sampling { period: samples.period })?;
         let state = Box::new(compensator.state());
-        Ok(Self { compensator, state, limits, range: (low, high), samples, row: 0, segment: 0, before: 0.0 })
+        Ok(Self {
+            compensator,
+            state,
+            limits,
+            range: (low, high),
+            samples,
+            row: 0,
+            segment: 0,
+            before: 0.0,
+            held: Vec::new(),
+            offset: 0.0,
+            fade: 0.0,
+        })
+    }
+
+    /// From an actuator that is held at `held` \[V\] before each segment, a plan's first drives: a temperature that is measured asks
+    /// for others, and the difference goes at `slew` \[V/s\] instead of at once.
+    #[must_use]
+    pub fn held_at(mut self, held: Vec<f64>, slew: f64) -> Self {
+        self.fade = slew * self.samples.period;
+        self.held = held;
+        self
     }
 
     /// Segments of the reference.
@@ -274,7 +301,21 @@ impl Follower {
         } else {
             feed(self, self.row + lead)
         };
-        let limited = self.limits.apply(if starts { wanted } else { self.before }, wanted);
+        let wanted = if wanted.is_finite() { wanted } else { self.before };
+        let inside = self.limits.apply(wanted, wanted);
+        let before = match self.held.get(self.segment) {
+            Some(held) if starts => {
+                self.offset = held - inside.drive;
+                *held
+            }
+            None if starts => inside.drive,
+            _ => {
+                self.offset -= self.offset.clamp(-self.fade, self.fade);
+                self.before
+            }
+        };
+        let limited = self.limits.apply(before, inside.drive + self.offset);
+        let limited = Limited { voltage: inside.voltage || limited.voltage, ..limited };
         self.before = limited.drive;
         self.row += 1;
         if self.row == segment.end {

@@ -28,7 +28,7 @@ pub(super) struct Compensation {
     /// Largest relative error of the inversion inside its band.
     band_error: f64,
     voltage_limited_rows: usize,
-    /// Of these, rows at the lower limit.
+    /// Of these, rows in which the reference asks for less than the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
     #[serde(skip)]

@@ -74,7 +74,12 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
                 &[],
             );
         }
-        RemainderKind::Unexplained if f.after.train.is_some_and(|e| e.rmse <= NEAR_THE_FLOOR * f.noise_floor) => {}
+        RemainderKind::Unexplained
+            if f.verdict == Verdict::Explained
+                && f.after.train.is_some_and(|e| e.rmse <= NEAR_THE_FLOOR * f.noise_floor) =>
+        {
+            advise("What is left is within twice the noise floor: there is little to gain from looking further.", &[]);
+        }
         RemainderKind::Unexplained => {
             let missing: Vec<&str> = [
                 (c.train.temperature().is_none(), "the temperature (temperature_degc)"),

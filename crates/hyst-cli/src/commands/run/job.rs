@@ -105,7 +105,7 @@ impl Job {
             play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
         }
         let drive = compensate(&model, &reference, &options)?;
-        let live = measured.map(|_| Live::new(&model, &reference, &options)).transpose()?;
+        let live = measured.map(|_| Live::new(&model, &reference, &options, &drive, play.slew_v_per_s)).transpose()?;
         Ok(Self {
             segments: split(&reference, &drive.voltage),
             followed: Some(Followed { model, json, reference, drive, live, held_s: play.settle_s }),

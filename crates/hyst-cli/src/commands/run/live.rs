@@ -13,9 +13,18 @@ pub(super) struct Live {
 }
 
 impl Live {
-    /// A drive for `reference` from its first row on.
-    pub(super) fn new(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Self, CompensateError> {
+    /// A drive for `reference` from its first row on, of an actuator that is held at the first voltages of `plan`; it goes from there
+    /// to what a measured temperature asks for at `slew` \[V/s\].
+    pub(super) fn new(
+        model: &Model,
+        reference: &Record,
+        options: &CompensateOptions,
+        plan: &Drive,
+        slew: f64,
+    ) -> Result<Self, CompensateError> {
         let follower = Follower::new(model, reference, options)?;
+        let held = follower.segments().iter().map(|rows| plan.voltage[rows.start]).collect();
+        let follower = follower.held_at(held, slew);
         let drive = follower.stated();
         Ok(Self { follower, drive })
     }
