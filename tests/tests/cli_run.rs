@@ -147,12 +147,13 @@ fn a_measured_temperature_is_followed() {
         lab.ok(&line).json()
     };
     let (warm, plain) = (follow("extended.json"), follow("model.json"));
-    // The plan is for the temperature of the model's gain, the device's is another one: the drive goes there no faster than a ramp.
-    lab.ok("run --daq sim:plant.toml --model extended.json --reference reference.csv --log warm.mcap");
+    // The plan is for a temperature far from the device's: the drive goes from the one to the other no faster than a ramp.
+    lab.ok("run --daq sim:plant.toml --model extended.json --reference reference.csv --log warm.mcap --temperature 10");
     let samples = log(&lab, "warm.mcap");
     let begins = samples.iter().position(|sample| sample["phase"] == "record").unwrap();
-    let volts: Vec<f64> = samples[begins - 1..begins + 10].iter().map(|s| s["drive_v"].as_f64().unwrap()).collect();
-    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() < 0.4), "{volts:?}");
+    let volts: Vec<f64> = samples[begins - 1..begins + 30].iter().map(|s| s["drive_v"].as_f64().unwrap()).collect();
+    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() < 0.3), "{volts:?}");
+    assert!(volts[0] - volts[30] > 2.0, "{volts:?}");
     assert_eq!(
         (&warm["temperature_followed"], &plain["temperature_followed"]),
         (&Value::Bool(true), &Value::Bool(false))
