@@ -82,8 +82,9 @@ fn tell_oddities(record: &Record) {
     let (name, rate) = (record.name(), 1.0 / record.sample_period());
     if !ORDINARY_RATES.contains(&rate) {
         say(&format!(
-            "note: {name} has {} samples per second; if its times are in another unit than their column says, rename that column in the file: time_s, time_ms or time_us",
-            text::short(rate)
+            "note: {name} has {} samples per second; if its times are in another unit than their column says, name that, as with --map {}=COLUMN",
+            text::short(rate),
+            if rate < ORDINARY_RATES.start { "time_ms" } else { "time_s" }
         ));
     }
     if leads(record) {

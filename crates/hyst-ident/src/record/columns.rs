@@ -124,7 +124,8 @@ impl ColumnMap {
             if turned && !matches!(role, Role::Input | Role::Output | Role::Load) {
                 return Err(MapError::Signless { argument: argument.to_owned(), role: role.words() });
             }
-            if Role::of_column(column) == Some(role) && unit_of(column) != unit_of(name) {
+            // A clock's unit is often named wrongly, and an odd rate shows it; of the others such a map asks for a conversion.
+            if role != Role::Time && Role::of_column(column) == Some(role) && unit_of(column) != unit_of(name) {
                 let (argument, name, column) = (argument.to_owned(), name.to_owned(), column.to_owned());
                 return Err(MapError::OtherUnit { argument, name, sign: if turned { "-" } else { "" }, column });
             }
