@@ -52,14 +52,13 @@ const OPEN: f64 = 0.003;
 /// Whether loops are passed the other way round than hysteresis makes them: with a falling branch below the rising one.
 fn leads(record: &Record) -> bool {
     let (u, Some(y)) = (record.input(), record.output()) else { return false };
-    let span =
-        |x: &[f64]| x.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) - x.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+    let (wide, high) = (span(u), span(y));
     let (mut area, mut path) = (0.0, 0.0);
     for rows in record.segments() {
         let (Some(u), Some(y)) = (u.get(rows.clone()), y.get(rows.clone())) else { return false };
         let (&[u0, .., u1], &[y0, .., y1]) = (u, y) else { continue };
         // What comes back, nearly, to where it began is closed by a straight line.
-        if (u1 - u0).abs() > 0.1 * span(u) {
+        if (u1 - u0).abs() > 0.1 * wide {
             continue;
         }
         area += 0.5 * (y1 - y0) * (u0 - u1);
@@ -70,8 +69,14 @@ fn leads(record: &Record) -> bool {
     }
     // Of an output whose sign is turned a loop is passed the other way, and nothing is exchanged.
     let area = if falls(record) { -area } else { area };
-    let loops = path / (2.0 * span(u));
-    loops >= 1.0 && area > OPEN * loops * span(u) * span(y)
+    let loops = path / (2.0 * wide);
+    loops >= 1.0 && area > OPEN * loops * wide * high
+}
+
+/// Largest value less the smallest.
+fn span(x: &[f64]) -> f64 {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    high - low
 }
 
 /// Sample rates that actuators are measured at \[Hz\].
@@ -127,8 +132,6 @@ pub(crate) fn tell_repeated(test: &Record, train: &Record) {
 /// Rows of those whole segments whose drive is, but for noise, that of a segment of the training.
 fn repeated_rows(test: &Record, train: &Record) -> usize {
     let (new, old) = (test.input(), train.input());
-    let span =
-        |u: &[f64]| u.iter().fold(f64::NEG_INFINITY, |m, u| m.max(*u)) - u.iter().fold(f64::INFINITY, |m, u| m.min(*u));
     let alike = |a: &[f64], b: &[f64]| {
         let squares = || a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         a.len() == b.len() && (squares() / a.len() as f64).sqrt() < 2e-3 * span(b)
