@@ -125,6 +125,37 @@ impl<T: Real, const N: usize> Stage<T> for Creep<T, N> {
     }
 }
 
+/// Histories of `L` signals that run through one bank side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CreepSideBySide<T, const N: usize, const L: usize> {
+    x: [[T; L]; N],
+    v: [T; L],
+}
+
+impl<T: Real, const N: usize> Creep<T, N> {
+    /// [`reset`](Stage::reset) of several signals: their histories and outputs at rest at `u0`.
+    pub fn reset_side_by_side<const L: usize>(&self, u0: [T; L]) -> (CreepSideBySide<T, N, L>, [T; L]) {
+        let v = u0.map(|u| finite_or(u, T::ZERO));
+        (CreepSideBySide { x: [v; N], v }, v.map(|v| v + self.total() * v))
+    }
+
+    /// [`step`](Stage::step) of several signals, each the same bits as alone, in less time: a processor takes them together.
+    #[inline]
+    pub fn step_side_by_side<const L: usize>(&self, s: &mut CreepSideBySide<T, N, L>, u: [T; L]) -> [T; L] {
+        let mut v = u;
+        v.iter_mut().zip(&s.v).for_each(|(v, last)| *v = finite_or(*v, *last));
+        let mut y = v;
+        for ((x, e), c) in s.x.iter_mut().zip(&self.elements).zip(&self.shares).take(self.len) {
+            for (((x, y), last), v) in x.iter_mut().zip(&mut y).zip(&s.v).zip(&v) {
+                *x = e.step(*x, *last, *v);
+                *y += *c * *x;
+            }
+        }
+        s.v = v;
+        y
+    }
+}
+
 /// The exact inverse of a creep bank: the recursion solved for its input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CreepInverse<T, const N: usize> {
@@ -248,6 +279,26 @@ mod tests {
                 let reference = libm::sin(0.1 * f64::from(k)) + libm::sin(2.3 * f64::from(k));
                 let v = inverse.step(&mut i, &e, reference);
                 assert!((creep.step(&mut s, &e, v) - reference).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn signals_side_by_side_are_each_as_alone() {
+        let creep: Creep<f64, 6> = BANK.build(&Sampling { period: 0.01 }).unwrap();
+        let signals = |k: u32| -> [f64; 3] {
+            let gap = if k == 70 { f64::NAN } else { 1.0 };
+            [0.3 + libm::sin(0.1 * f64::from(k)), gap * libm::cos(0.7 * f64::from(k)), -2.0]
+        };
+        let (mut beside, first) = creep.reset_side_by_side(signals(0));
+        let (mut alone, e) = ([creep.state(); 3], Env::default());
+        for j in 0..3 {
+            assert_eq!(creep.reset(&mut alone[j], &e, signals(0)[j]), first[j]);
+        }
+        for k in 1..200 {
+            let together = creep.step_side_by_side(&mut beside, signals(k));
+            for j in 0..3 {
+                assert_eq!(creep.step(&mut alone[j], &e, signals(k)[j]), together[j]);
             }
         }
     }

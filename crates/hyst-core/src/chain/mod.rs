@@ -19,7 +19,7 @@ mod temperature;
 pub use asymmetry::{Asymmetry, AsymmetryInverse, AsymmetryParams};
 pub use chain::{Chain, ChainState, MAX_DEAD_ZONES, MAX_RESONANCES};
 pub use compensator::{Compensator, CompensatorOptions, CompensatorState, InverseHysteresis};
-pub use creep::{Creep, CreepInverse, CreepInverseState, CreepParams, CreepState};
+pub use creep::{Creep, CreepInverse, CreepInverseState, CreepParams, CreepSideBySide, CreepState};
 pub use delay::{Delay, DelayParams, DelayState};
 pub use drift::{Drift, DriftParams};
 pub(crate) use first_order::FirstOrder;

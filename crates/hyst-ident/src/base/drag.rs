@@ -30,6 +30,11 @@ impl Drag {
     /// Plays that follow at once.
     pub(crate) const NONE: Self = Self { period: 1.0, stiff: 1.0, root: 0.0, none: true };
 
+    /// Whether plays follow at once.
+    pub(crate) fn is_none(&self) -> bool {
+        self.none
+    }
+
     /// Where a play at `p` comes in a sample in which it would be at `to` without drag.
     pub(crate) fn towards(&self, p: f64, to: f64) -> f64 {
         let over = to - p;

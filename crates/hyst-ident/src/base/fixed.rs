@@ -36,11 +36,14 @@ impl FixedBasis {
 }
 
 impl Basis for FixedBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
         debug_assert_eq!(segments, self.samples.segments);
-        let mut column = vec![0.0; drive.len()];
-        Drive::of(&self.samples, drive, self.between, Passes::Once).run(&*self.operator, &mut column);
-        each(0, &mut column);
+        let column = |_| {
+            let mut column = vec![0.0; drive.len()];
+            Drive::of(&self.samples, drive, self.between, Passes::Once).run(&*self.operator, &mut column);
+            column
+        };
+        of.map(column).collect()
     }
 
     fn drags(&self) -> bool {

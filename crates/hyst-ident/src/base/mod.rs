@@ -23,10 +23,17 @@ use crate::lsq::Bounds;
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
 /// scale the motion and not an arbitrary zero.
 pub(crate) trait Basis: Sync {
-    /// Gives `each` the number and the values of every column φᵢ over the rows of `drive`, in order, memory reset at the start of
-    /// each segment; few of them are in memory at a time, and `each` may change the one that it is given. A base that
+    /// The columns φᵢ `of` these numbers over the rows of `drive`, memory reset at the start of each segment. A base that
     /// [cannot drag](Self::drags) does not look at `drag`.
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64]));
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>>;
+    /// How many columns are best made in one pass over the drive.
+    fn together(&self) -> usize {
+        8
+    }
+    /// `Σᵢ wᵢ φᵢ` over the rows of `drive`, where that is less work than its columns are.
+    fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
+        None
+    }
     /// Whether there is a drag: a rate-dependent form of the operator.
     fn drags(&self) -> bool {
         true
@@ -39,5 +46,57 @@ pub(crate) trait Basis: Sync {
     /// Number of columns.
     fn len(&self) -> usize {
         self.bounds().len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Samples;
+
+    /// Two segments with minor loops; virgin memory at the start of each.
+    fn samples() -> Samples {
+        let input: Vec<f64> =
+            (0..900).map(|k| f64::from(k) * 0.02).map(|t| 20.0 * t.sqrt() * (1.0 - t.cos())).collect();
+        let rows = input.len();
+        Samples {
+            period: 1e-3,
+            time: (0..900).map(|k| f64::from(k) * 1e-3).collect(),
+            output: input.iter().map(|u| 0.1 * u).collect(),
+            settling: vec![false; rows],
+            temperature: None,
+            load: None,
+            segments: vec![0..500, 500..rows],
+            file_of_segment: vec![0, 0],
+            input,
+        }
+    }
+
+    fn agrees(basis: &dyn Basis, samples: &Samples, drag: &Drag) {
+        let weights: Vec<f64> = (0..basis.len()).map(|i| 0.3 + (1.7 * i as f64).sin().powi(2)).collect();
+        let all = basis.columns(0..basis.len(), &samples.input, &samples.segments, drag);
+        assert_eq!(all.len(), basis.len());
+        // However many are made at a time.
+        for together in [1, 3, 8] {
+            for first in (0..basis.len()).step_by(together) {
+                let of = first..(first + together).min(basis.len());
+                assert_eq!(basis.columns(of.clone(), &samples.input, &samples.segments, drag), all[of]);
+            }
+        }
+        let combined = basis.combined(&weights, &samples.input, &samples.segments, drag).unwrap();
+        for (k, combined) in combined.iter().enumerate() {
+            let sum: f64 = all.iter().zip(&weights).map(|(column, w)| w * column[k]).sum();
+            assert!((sum - combined).abs() < 1e-9 * (1.0 + sum.abs()), "row {k}: {sum} {combined}");
+        }
+    }
+
+    #[test]
+    fn what_an_operator_gives_is_the_sum_of_its_columns() {
+        let samples = samples();
+        let viscous = DragParams { seconds: 2e-3, volt_seconds: 1e-4 }.at(samples.period);
+        let screening = ScreeningBasis::for_samples(&samples, true, None);
+        agrees(&screening, &samples, &Drag::NONE);
+        agrees(&screening, &samples, &viscous);
+        agrees(&PreisachBasis::for_samples(&samples, 8), &samples, &Drag::NONE);
     }
 }

@@ -43,13 +43,20 @@ impl PiBasis {
         &self,
         samples: &Samples,
         drag: &Drag,
-        through: &(dyn Fn(Vec<f64>) -> Vec<f64> + Sync),
+        through: &(dyn Fn(&mut [Vec<f64>]) + Sync),
         most: Option<usize>,
     ) -> Option<Self> {
-        let element = |r: f64| through(plays(&samples.input, &samples.segments, r, drag));
+        let elements = |r: &[f64]| {
+            let mut plays = plays(&samples.input, &samples.segments, r, drag);
+            through(&mut plays);
+            plays
+        };
         let bank = |rows| {
-            let identity = (through(samples.input.clone()), Bounds::above(self.floor));
-            Bank::new(samples, vec![identity], even(samples, CANDIDATES, CANDIDATES / 4), &element, rows)
+            let mut identity = [samples.input.clone()];
+            through(&mut identity);
+            let [identity] = identity;
+            let candidates = even(samples, CANDIDATES, CANDIDATES / 4);
+            Bank::new(samples, vec![(identity, Bounds::above(self.floor))], candidates, &elements, rows)
         };
         let quick = bank(choice::ROWS);
         let thresholds = most.map_or_else(|| quick.better_than(&self.thresholds), |most| quick.at_most(most))?;
@@ -72,11 +79,10 @@ fn even(samples: &Samples, loops: usize, virgin: usize) -> Vec<f64> {
 }
 
 impl Basis for PiBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
-        each(0, &mut drive.to_vec());
-        for (i, r) in self.thresholds.iter().enumerate() {
-            each(i + 1, &mut plays(drive, segments, *r, drag));
-        }
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
+        let identity = of.contains(&0).then(|| drive.to_vec());
+        let thresholds = &self.thresholds[of.start.max(1) - 1..of.end.max(1) - 1];
+        identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect()
     }
 
     fn bounds(&self) -> Vec<Bounds> {
@@ -100,16 +106,17 @@ pub(crate) struct SlidingPlays<'a> {
 }
 
 impl Basis for SlidingPlays<'_> {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let step = STEP * drive.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
-        let slope = |(r, w): (&f64, &f64)| -> Vec<f64> {
-            let (up, down) = (plays(drive, segments, r + step, drag), plays(drive, segments, r - step, drag));
+        let plain = self.plays.len();
+        let slope = |i: usize| -> Vec<f64> {
+            let (r, w) = (self.plays.thresholds[i], self.weights[i + 1]);
+            let (up, down) = (one_play(drive, segments, r + step, drag), one_play(drive, segments, r - step, drag));
             up.iter().zip(down).map(|(up, down)| 0.5 * w * (up - down) / step).collect()
         };
-        self.plays.columns(drive, segments, drag, each);
-        for (i, play) in self.plays.thresholds.iter().zip(&self.weights[1..]).enumerate() {
-            each(self.plays.len() + i, &mut slope(play));
-        }
+        let mut columns = self.plays.columns(of.start.min(plain)..of.end.min(plain), drive, segments, drag);
+        columns.extend((of.start.max(plain)..of.end.max(plain)).map(|c| slope(c - plain)));
+        columns
     }
 
     fn bounds(&self) -> Vec<Bounds> {
@@ -126,20 +133,65 @@ impl Basis for SlidingPlays<'_> {
 
 /// The play operator over a drive, virgin at each segment's start.
 pub(crate) fn play_column(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
-    plays(drive, segments, r, &Drag::NONE)
+    one_play(drive, segments, r, &Drag::NONE)
 }
 
 /// The play operator with drag over a drive, virgin at each segment's start.
-pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], r: f64, drag: &Drag) -> Vec<f64> {
-    let mut out = vec![0.0; drive.len()];
-    for segment in segments {
-        let mut p = 0.0;
-        for k in segment.clone() {
-            let to = play(p, drive[k], r);
-            // The device has rested at its first input.
-            p = if k == segment.start { to } else { drag.towards(p, to) };
-            out[k] = p;
+fn one_play(drive: &[f64], segments: &[Range<usize>], r: f64, drag: &Drag) -> Vec<f64> {
+    let mut column = vec![0.0; drive.len()];
+    beside([&mut column], drive, segments, [r], drag);
+    column
+}
+
+/// Plays that one pass over the drive makes: each waits for its own last sample only.
+const BESIDE: usize = 4;
+
+/// Play operators with drag over a drive, virgin at each segment's start.
+pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], thresholds: &[f64], drag: &Drag) -> Vec<Vec<f64>> {
+    let mut columns = vec![vec![0.0; drive.len()]; thresholds.len()];
+    for (columns, thresholds) in columns.chunks_mut(BESIDE).zip(thresholds.chunks(BESIDE)) {
+        if let ([a, b, c, d], [p, q, r, s]) = (&mut *columns, thresholds) {
+            beside([a, b, c, d], drive, segments, [*p, *q, *r, *s], drag);
+        } else {
+            columns.iter_mut().zip(thresholds).for_each(|(c, r)| beside([c], drive, segments, [*r], drag));
         }
     }
-    out
+    columns
+}
+
+fn beside<const N: usize>(
+    columns: [&mut Vec<f64>; N],
+    drive: &[f64],
+    segments: &[Range<usize>],
+    r: [f64; N],
+    drag: &Drag,
+) {
+    if drag.is_none() {
+        follow(columns, drive, segments, r, |_, to| to);
+    } else {
+        follow(columns, drive, segments, r, |p, to| drag.towards(p, to));
+    }
+}
+
+/// `follows(p, to)` is where a play at p comes in a sample in which it would be at `to` without drag.
+fn follow<const N: usize>(
+    mut columns: [&mut Vec<f64>; N],
+    drive: &[f64],
+    segments: &[Range<usize>],
+    r: [f64; N],
+    follows: impl Fn(f64, f64) -> f64,
+) {
+    for segment in segments {
+        let mut out = columns.each_mut().map(|c| &mut c[segment.clone()]);
+        let mut p = [0.0; N];
+        for (k, u) in drive[segment.clone()].iter().enumerate() {
+            let mut to = p;
+            to.iter_mut().zip(&r).for_each(|(p, r)| *p = play(*p, *u, *r));
+            // The device has rested at its first input.
+            p = if k == 0 { to } else { std::array::from_fn(|j| follows(p[j], to[j])) };
+            for (out, p) in out.iter_mut().zip(p) {
+                out[k] = p;
+            }
+        }
+    }
 }

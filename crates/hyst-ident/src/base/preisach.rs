@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use hyst_core::{Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
+use hyst_core::{Build, Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
 use nalgebra::DMatrix;
 
 use super::{Basis, Drag};
@@ -17,9 +17,6 @@ const FLOOR: f64 = 0.05;
 const MARGIN: f64 = 0.02;
 /// Weight of the differences between neighbouring cells against the record.
 const SMOOTHNESS: f64 = 3e-6;
-
-/// Columns that are made in one pass over the drive.
-const TOGETHER: usize = 64;
 
 /// A grid over the record's input.
 #[derive(Clone, Debug)]
@@ -173,14 +170,25 @@ impl PreisachBasis {
 }
 
 impl Basis for PreisachBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], _drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
-        let all = self.len();
-        for first in (0..all).step_by(TOGETHER) {
-            let of = first..(first + TOGETHER).min(all);
-            for (c, column) in of.clone().zip(&mut self.some(&of, drive, segments)) {
-                each(c, column);
-            }
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
+        self.some(&of, drive, segments)
+    }
+
+    fn together(&self) -> usize {
+        64
+    }
+
+    /// By the operator itself: its map holds all columns at once.
+    fn combined(&self, weights: &[f64], drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
+        let map: Box<Everett<f64, NODES>> = Box::new(self.spec(weights).build(&()).ok()?);
+        let env = Env::default();
+        let mut state = map.state();
+        let mut out = Vec::with_capacity(drive.len());
+        for segment in segments {
+            let zero = map.reset(&mut state, &env, self.rest);
+            out.extend(drive[segment.clone()].iter().map(|u| map.step(&mut state, &env, *u) - zero));
         }
+        Some(out)
     }
 
     fn drags(&self) -> bool {

@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::pi::plays;
 use super::{Basis, Drag, FixedBasis, PiBasis};
@@ -37,29 +38,76 @@ impl ScreeningBasis {
     }
 }
 
-impl Basis for ScreeningBasis {
-    fn columns(&self, drive: &[f64], segments: &[Range<usize>], drag: &Drag, each: &mut dyn FnMut(usize, &mut [f64])) {
-        self.linear.columns(drive, segments, drag, each);
+impl ScreeningBasis {
+    /// Square and cubic of a play's output, zero at its zero.
+    #[inline]
+    fn curves(&self, p: f64) -> [f64; 2] {
         let scale = 1.0 / self.half;
-        let x0 = -self.middle * scale;
         let cubic = |x: f64| x * (x * x - 0.6);
-        let (square0, cubic0) = (x0 * x0, cubic(x0));
-        for (i, r) in self.curved.iter().enumerate() {
-            let p = if *r == 0.0 { drive.to_vec() } else { plays(drive, segments, *r, drag) };
-            let x = |p: &f64| (p - self.middle) * scale;
-            let first = self.linear.len() + 2 * i;
-            each(first, &mut p.iter().map(|p| self.half * (x(p) * x(p) - square0)).collect::<Vec<_>>());
-            each(first + 1, &mut p.iter().map(|p| self.half * (cubic(x(p)) - cubic0)).collect::<Vec<_>>());
-        }
-        if let Some(kept) = &self.kept {
+        let (x, x0) = ((p - self.middle) * scale, -self.middle * scale);
+        [self.half * (x * x - x0 * x0), self.half * (cubic(x) - cubic(x0))]
+    }
+}
+
+impl Basis for ScreeningBasis {
+    fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
+        let (curved, kept) = (self.linear.len(), self.linear.len() + 2 * self.curved.len());
+        let mut columns = self.linear.columns(of.start.min(curved)..of.end.min(curved), drive, segments, drag);
+        let of_curved = of.start.max(curved).min(kept)..of.end.max(curved).min(kept);
+        // A square and a cubic of each play.
+        let first = (of_curved.start - curved) / 2;
+        let thresholds = &self.curved[first..(of_curved.end - curved).div_ceil(2).max(first)];
+        let mut plays = plays(drive, segments, thresholds, drag);
+        // The identity has no drag.
+        thresholds.iter().zip(&mut plays).filter(|(r, _)| **r == 0.0).for_each(|(_, p)| p.copy_from_slice(drive));
+        columns.extend(of_curved.map(|c| -> Vec<f64> {
+            let (p, which) = (plays[(c - curved) / 2 - first].iter(), (c - curved) % 2);
+            p.map(|p| self.curves(*p)[which]).collect()
+        }));
+        if let Some(own) = self.kept.as_ref().filter(|_| of.end > kept) {
             // In volts like the others, whatever its unit: one penalty is for all.
             let size = |column: &[f64]| column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-            kept.columns(drive, segments, drag, &mut |_, column| {
+            let mut own = own.columns(0..1, drive, segments, drag);
+            for column in &mut own {
                 let scale = size(drive) / size(column);
                 column.iter_mut().filter(|_| scale.is_finite()).for_each(|y| *y *= scale);
-                each(self.linear.len() + 2 * self.curved.len(), column);
-            });
+            }
+            columns.extend(own);
         }
+        columns
+    }
+
+    /// One pass for the line and the curves of a play.
+    fn combined(&self, weights: &[f64], drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Option<Vec<f64>> {
+        if self.kept.is_some() {
+            return None;
+        }
+        let (straight, bent) = weights.split_at(self.linear.len());
+        let curves: Vec<(f64, [f64; 2])> =
+            self.curved.iter().copied().zip(bent.chunks(2).map(|w| [w[0], w[1]])).collect();
+        // Of each threshold its line; the identity has the threshold 0 and no drag.
+        let add = |v: &mut [f64], p: &[f64], w: f64, bend: Option<[f64; 2]>| match bend {
+            Some([square, cube]) => v.iter_mut().zip(p).for_each(|(v, p)| {
+                let [s, c] = self.curves(*p);
+                *v += w * p + square * s + cube * c;
+            }),
+            None => v.iter_mut().zip(p).for_each(|(v, p)| *v += w * p),
+        };
+        let bend = |r: f64| curves.iter().find(|(threshold, _)| *threshold == r).map(|(_, w)| *w);
+        let part = |(thresholds, weights): (&[f64], &[f64])| {
+            let mut v = vec![0.0; drive.len()];
+            for (p, (r, w)) in plays(drive, segments, thresholds, drag).iter().zip(thresholds.iter().zip(weights)) {
+                add(&mut v, p, *w, bend(*r));
+            }
+            v
+        };
+        let thresholds = &self.linear.thresholds;
+        let pieces: Vec<(&[f64], &[f64])> = thresholds.chunks(4).zip(straight[1..].chunks(4)).collect();
+        let parts: Vec<Vec<f64>> = pieces.into_par_iter().map(part).collect();
+        let mut v = vec![0.0; drive.len()];
+        add(&mut v, drive, straight[0], bend(0.0));
+        parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
+        Some(v)
     }
 
     fn drags(&self) -> bool {

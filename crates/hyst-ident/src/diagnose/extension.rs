@@ -104,7 +104,7 @@ impl Own<'_> {
         let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
-        Ok(plays.chosen(&seen.samples, &drag, &|play| seen.through(play), None).map(BasisOf::Pi))
+        Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))
     }
 
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a

@@ -59,9 +59,11 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     fn trials(&self, from: &Fitted, cause: Cause) -> Result<Option<Trial>, Error> {
+        let starts = starts::starts(self.problem, from, cause)?;
+        let trials: Vec<Result<Option<Trial>, Error>> = starts.par_iter().map(|start| self.refit(start)).collect();
         let mut best: Option<Trial> = None;
-        for start in starts::starts(self.problem, from, cause)? {
-            let Some(trial) = self.problem.fit(&start)?.and_then(|f| Trial::of(self.problem, f)) else { continue };
+        for trial in trials {
+            let Some(trial) = trial? else { continue };
             if best.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 best = Some(trial);
             }

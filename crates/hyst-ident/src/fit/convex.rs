@@ -38,7 +38,7 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
         let model = to_model(record, &samples, &basis, &fitted, options.seed);
         return Ok(Fit { tables: vec![cells(&fitted, &samples, &left)], ..Fit::at_once(model, HOW) });
     };
-    let Some(chosen) = even.chosen(&samples, &Drag::NONE, &|play| play, options.thresholds) else {
+    let Some(chosen) = even.chosen(&samples, &Drag::NONE, &|_| {}, options.thresholds) else {
         if options.thresholds.is_some() {
             return Err(FitError::Unsolvable { record: name() });
         }

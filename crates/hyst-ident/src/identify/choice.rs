@@ -39,8 +39,8 @@ const AS_GOOD: f64 = 1.01;
 /// Elements of one kind that differ in one number, their place: the threshold of a play, the width of a backlash or spring.
 pub(crate) struct Bank<'a> {
     samples: &'a Samples,
-    /// Output of one element over all rows.
-    element: &'a (dyn Fn(f64) -> Vec<f64> + Sync),
+    /// Outputs of elements at these places over all rows.
+    elements: &'a Elements<'a>,
     /// Columns that are there in any case, over the rows that count: those of the caller, then one zero for each file.
     always: Vec<Vec<f64>>,
     bounds: Vec<Bounds>,
@@ -50,6 +50,12 @@ pub(crate) struct Bank<'a> {
     blocks: Vec<Range<usize>>,
     folds: Vec<Vec<usize>>,
 }
+
+/// Outputs of elements at these places over all rows of a record.
+pub(crate) type Elements<'a> = dyn Fn(&[f64]) -> Vec<Vec<f64>> + Sync + 'a;
+
+/// Elements whose outputs are computed at a time.
+const AT_A_TIME: usize = 4;
 
 /// Elements at their places.
 #[derive(Clone)]
@@ -68,7 +74,7 @@ impl<'a> Bank<'a> {
         samples: &'a Samples,
         always: Vec<(Vec<f64>, Bounds)>,
         candidates: Vec<f64>,
-        element: &'a (dyn Fn(f64) -> Vec<f64> + Sync),
+        elements: &'a Elements<'a>,
         rows: usize,
     ) -> Self {
         let cut = Blocks::new(samples, BLOCKS, rows);
@@ -90,16 +96,15 @@ impl<'a> Bank<'a> {
         let always = columns.iter().map(|c| rows.iter().map(|k| c[*k]).collect()).collect();
         let folds = folds_interleaved(&cut, FOLDS);
         // One that hardly moves in the rows that count cannot be told from the sensor's zero.
-        let moves = |place: &f64| {
-            let column = element(*place);
-            let (low, high) = crate::samples::range(rows.iter().map(|k| column[*k]));
+        let moves = |column: Vec<f64>| {
+            let (low, high) = crate::samples::range(column.into_iter());
             high - low
         };
-        let moves: Vec<f64> = candidates.iter().map(moves).collect();
+        let moves: Vec<f64> = over(&rows, elements, &candidates).into_par_iter().map(moves).collect();
         let enough = STANDS_STILL * moves.iter().fold(0.0, |m: f64, x| m.max(*x));
         let candidates =
             candidates.into_iter().zip(moves).filter(|(_, moves)| *moves > enough).map(|(c, _)| c).collect();
-        Self { samples, element, always, bounds, candidates, rows, blocks, folds }
+        Self { samples, elements, always, bounds, candidates, rows, blocks, folds }
     }
 
     /// At most `most` places in rising order; fewer where the record calls for fewer. `None` if the equations cannot be solved.
@@ -276,11 +281,7 @@ impl<'a> Bank<'a> {
 
     /// Outputs of elements over the rows that count.
     fn columns(&self, places: &[f64]) -> Vec<Vec<f64>> {
-        let column = |place: &f64| {
-            let all = (self.element)(*place);
-            self.rows.iter().map(|k| all[*k]).collect()
-        };
-        places.par_iter().map(column).collect()
+        over(&self.rows, self.elements, places)
     }
 
     fn gram_of(&self, columns: &[Vec<f64>]) -> Gram {
@@ -295,7 +296,7 @@ impl<'a> Bank<'a> {
             let own = self.always.get(c).or_else(|| columns.get(c - m));
             own.map_or_else(|| self.samples.output[self.rows[k]], |column| column[k])
         });
-        Gram { matrix: x.tr_mul(&x), rows: rows.len() }
+        Gram::of(&x)
     }
 
     /// The normal equations with these of its elements only.
@@ -315,6 +316,14 @@ impl<'a> Bank<'a> {
     fn weights(&self, z: &DVector<f64>, elements: usize) -> Vec<f64> {
         z.iter().skip(self.always.len()).take(elements).copied().collect()
     }
+}
+
+/// Outputs of elements at these places over some rows.
+fn over(rows: &[usize], elements: &Elements<'_>, places: &[f64]) -> Vec<Vec<f64>> {
+    let thinned = |column: Vec<f64>| rows.iter().map(|k| column[*k]).collect();
+    let some = |places: &[f64]| elements(places).into_iter().map(thinned).collect::<Vec<Vec<f64>>>();
+    let all: Vec<_> = places.par_chunks(AT_A_TIME).map(some).collect();
+    all.into_iter().flatten().collect()
 }
 
 /// The weighted mean place of neighbours, and their weight together.
@@ -360,7 +369,9 @@ mod tests {
 
     /// What `ask` gets of a bank of plays.
     fn asked<T>(samples: &Samples, ask: impl Fn(&Bank<'_>) -> T) -> T {
-        let element = |r: f64| play_column(&samples.input, &samples.segments, r);
+        let element = |r: &[f64]| -> Vec<Vec<f64>> {
+            r.iter().map(|r| play_column(&samples.input, &samples.segments, *r)).collect()
+        };
         let candidates = (1..=CANDIDATES).map(|i| 50.0 * i as f64 / (CANDIDATES + 1) as f64).collect();
         ask(&Bank::new(samples, vec![(samples.input.clone(), Bounds::above(0.0))], candidates, &element, ROWS))
     }
@@ -400,7 +411,9 @@ mod tests {
     fn elements_that_the_record_does_not_tell_apart_are_one() {
         // All candidates from 20 V on give the same output.
         let samples = samples(&[(20.0, 0.05)], 0.01);
-        let element = |r: f64| play_column(&samples.input, &samples.segments, r.min(20.0));
+        let element = |r: &[f64]| -> Vec<Vec<f64>> {
+            r.iter().map(|r| play_column(&samples.input, &samples.segments, r.min(20.0))).collect()
+        };
         let candidates = even(CANDIDATES as u32);
         let bank = Bank::new(&samples, vec![(samples.input.clone(), Bounds::above(0.0))], candidates, &element, ROWS);
         assert_eq!(bank.at_most(10).unwrap().len(), 1);

@@ -73,6 +73,23 @@ impl Gram {
         Self { matrix: DMatrix::zeros(columns, columns), rows: 0 }
     }
 
+    /// Of these rows.
+    pub(crate) fn of(rows: &DMatrix<f64>) -> Self {
+        Self { matrix: rows.transpose() * rows, rows: rows.nrows() }
+    }
+
+    /// Of each of these blocks of rows.
+    pub(crate) fn of_each(blocks: &[DMatrix<f64>]) -> Vec<Self> {
+        blocks.iter().map(Self::of).collect()
+    }
+
+    /// Of all of these blocks of rows, which are `columns` wide.
+    pub(crate) fn of_all(blocks: &[DMatrix<f64>], columns: usize) -> Self {
+        let mut total = Self::zeros(columns);
+        blocks.iter().for_each(|rows| total.add(&Self::of(rows)));
+        total
+    }
+
     pub(crate) fn add(&mut self, other: &Self) {
         self.matrix += &other.matrix;
         self.rows += other.rows;
@@ -101,5 +118,43 @@ impl Gram {
     pub(crate) fn score(&self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.unknowns();
         self.matrix.view((0, n), (n, 1)).column(0) - self.matrix.view((0, 0), (n, n)) * z
+    }
+}
+
+/// What further columns add to the normal equations of others: their products with those, and with each other.
+#[derive(Clone, Debug)]
+pub(crate) struct Bordered {
+    cross: DMatrix<f64>,
+    own: DMatrix<f64>,
+}
+
+impl Bordered {
+    /// No rows, for `further` columns beside `columns`.
+    pub(crate) fn zeros(columns: usize, further: usize) -> Self {
+        Self { cross: DMatrix::zeros(columns, further), own: DMatrix::zeros(further, further) }
+    }
+
+    /// Adds rows: the columns that there are, and those that come.
+    pub(crate) fn add(&mut self, x: &DMatrix<f64>, further: &DMatrix<f64>) {
+        self.cross += x.tr_mul(further);
+        self.own += further.tr_mul(further);
+    }
+
+    /// The normal equations of all columns: the old ones keep their place, the target moves behind the new ones.
+    pub(crate) fn around(&self, gram: &Gram) -> Gram {
+        let (n, q) = self.cross.shape();
+        let target = n - 1 + q;
+        let old = |i: usize| match i {
+            i if i < n - 1 => Some(i),
+            i if i == target => Some(n - 1),
+            _ => None,
+        };
+        let matrix = DMatrix::from_fn(n + q, n + q, |r, c| match (old(r), old(c)) {
+            (Some(r), Some(c)) => gram.matrix[(r, c)],
+            (Some(r), None) => self.cross[(r, c - (n - 1))],
+            (None, Some(c)) => self.cross[(c, r - (n - 1))],
+            (None, None) => self.own[(r - (n - 1), c - (n - 1))],
+        });
+        Gram { matrix, rows: gram.rows }
     }
 }

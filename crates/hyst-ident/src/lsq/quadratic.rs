@@ -25,8 +25,10 @@ impl Bounds {
 /// without moving what the record determines.
 const RIDGE: f64 = 1e-10;
 
-/// Steps of an active-set search after which starting from scratch is as quick.
-const NEAR_STEPS: usize = 100;
+/// Exchanges of a block pivoting after which an interior point is tried.
+const EXCHANGES: usize = 60;
+/// Of these, how many may leave more in their wrong place than before.
+const CHANCES: usize = 5;
 
 /// Minimises `|y − X z|² + zᵀ P z` within bounds. `penalty` is P's upper triangle or `None`.
 ///
@@ -67,20 +69,23 @@ pub(crate) fn solve_near(
         .zip(&scale)
         .map(|(b, s)| Bounds { lower: b.lower * s / size, upper: b.upper * s / size })
         .collect();
-    // Where no bound binds, the answer is the plain one.
-    let free = h.clone().cholesky().map(|c| c.solve(&g));
-    let inside = |z: &DVector<f64>| z.iter().zip(&scaled).all(|(z, b)| *z >= b.lower && *z <= b.upper);
-    let z = match free {
-        Some(z) if inside(&z) => z,
-        _ => {
-            let inside = |i: usize, z: f64| (z * scale[i] / size).max(scaled[i].lower).min(scaled[i].upper);
-            let start = near.map(|near| DVector::from_fn(n, |i, _| inside(i, near[i])));
-            let from_near = start.and_then(|start| polish(&h, &g, &scaled, start, NEAR_STEPS).ok());
-            match from_near {
-                Some(z) => z,
-                None => bounded(&h, &g, &scaled)?,
-            }
-        }
+    // From nothing, from where no bound binds.
+    let at: Vec<At> = match near {
+        None => vec![At::Free; n],
+        Some(near) => (0..n)
+            .map(|i| {
+                let room = 1e-12 * near[i].abs();
+                match bounds[i] {
+                    b if near[i] - b.lower <= room => At::Lower,
+                    b if b.upper - near[i] <= room => At::Upper,
+                    _ => At::Free,
+                }
+            })
+            .collect(),
+    };
+    let z = match pivoted(&h, &g, &scaled, at) {
+        Some(z) => z,
+        None => bounded(&h, &g, &scaled)?,
     };
     Some(DVector::from_fn(n, |i, _| z[i] / scale[i] * size))
 }
@@ -125,7 +130,7 @@ fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVec
     if !z.iter().all(|x| x.is_finite()) {
         return None;
     }
-    Some(polish(h, g, bounds, z, 10 * n).unwrap_or_else(|z| z))
+    Some(polish(h, g, bounds, z))
 }
 
 /// Where an unknown stands.
@@ -136,18 +141,49 @@ enum At {
     Free,
 }
 
-/// Carries an answer that is nearly right to the exact optimum by a primal active-set search of at most so many steps; where these do
-/// not suffice, what they led to is the error.
+/// The optimum by block principal pivoting: all unknowns that stand wrongly change their place together, one alone where that does not
+/// help (Júdice and Pires 1994). `None` if it takes too long, or where what is free is not determined.
+fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At>) -> Option<DVector<f64>> {
+    let n = g.len();
+    let tolerance = 1e-11 * g.amax();
+    let (mut least, mut chances) = (usize::MAX, CHANCES);
+    for _ in 0..EXCHANGES {
+        let mut z = DVector::from_fn(n, |i, _| match at[i] {
+            At::Lower => bounds[i].lower,
+            At::Upper => bounds[i].upper,
+            At::Free => 0.0,
+        });
+        let free: Vec<usize> = (0..n).filter(|i| at[*i] == At::Free).collect();
+        let minimum = minimum(h, g, &z, &free)?;
+        free.iter().zip(&minimum).for_each(|(i, m)| z[*i] = *m);
+        let pull = g - h * &z;
+        let belongs = |i: usize| match at[i] {
+            At::Free if z[i] < bounds[i].lower => At::Lower,
+            At::Free if z[i] > bounds[i].upper => At::Upper,
+            At::Lower if pull[i] > tolerance => At::Free,
+            At::Upper if -pull[i] > tolerance => At::Free,
+            stays => stays,
+        };
+        let wrong: Vec<(usize, At)> = (0..n).map(|i| (i, belongs(i))).filter(|(i, to)| *to != at[*i]).collect();
+        let Some(last) = wrong.last() else { return Some(z) };
+        if wrong.len() < least {
+            (least, chances) = (wrong.len(), CHANCES);
+        } else if chances > 0 {
+            chances -= 1;
+        } else {
+            at[last.0] = last.1;
+            continue;
+        }
+        wrong.iter().for_each(|(i, to)| at[*i] = *to);
+    }
+    None
+}
+
+/// Carries an answer that is nearly right to the exact optimum by a primal active-set search.
 ///
 /// Plays with near thresholds make the problem so ill-conditioned that a duality gap of 10⁻⁸ still
 /// leaves several times the smallest possible residual; the active set it points to is nearly right.
-fn polish(
-    h: &DMatrix<f64>,
-    g: &DVector<f64>,
-    bounds: &[Bounds],
-    mut z: DVector<f64>,
-    steps: usize,
-) -> Result<DVector<f64>, DVector<f64>> {
+fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<f64>) -> DVector<f64> {
     let n = g.len();
     let size = z.amax().max(f64::MIN_POSITIVE);
     let mut at: Vec<At> = (0..n)
@@ -164,11 +200,11 @@ fn polish(
         }
     }
     let tolerance = 1e-11 * g.amax();
-    for _ in 0..steps {
+    for _ in 0..10 * n {
         let free: Vec<usize> = (0..n).filter(|i| at[*i] == At::Free).collect();
         let target = match minimum(h, g, &z, &free) {
             Some(target) => target,
-            None => return Err(z),
+            None => return z,
         };
         // Towards the minimum over the free ones, as far as the bounds allow.
         let (mut reach, mut hit) = (1.0, None);
@@ -199,10 +235,10 @@ fn polish(
         };
         match (0..n).max_by(|a, b| outward(*a).total_cmp(&outward(*b))) {
             Some(i) if outward(i) > tolerance => at[i] = At::Free,
-            _ => return Ok(z),
+            _ => return z,
         }
     }
-    Err(z)
+    z
 }
 
 /// The minimum over the free unknowns, the others held.

@@ -18,7 +18,7 @@ const ROUNDS_NEAR: usize = 2;
 pub(super) struct Assembly {
     /// Rows of each block: the linear unknowns, measured output.
     pub(super) blocks: Vec<DMatrix<f64>>,
-    pub(super) grams: Vec<Gram>,
+    /// Normal equations of all blocks together.
     pub(super) total: Gram,
     pub(super) solution: DVector<f64>,
     pub(super) objective: f64,
@@ -58,13 +58,14 @@ impl Problem<'_> {
         Layout::of(h, self.width, self.zeros())
     }
 
-    /// Solves for the linear unknowns, from `near` if there is a point that is nearly right.
-    pub(super) fn assemble(&self, h: &Hypothesis, near: Option<&Point>) -> Result<Option<Assembly>, Error> {
+    /// Solves for the linear unknowns, from `near` if something is known that is nearly right.
+    pub(super) fn assemble(&self, h: &Hypothesis, near: Option<&Assembly>) -> Result<Option<Assembly>, Error> {
         let path = SignalPath::new(self.samples, h)?;
         let base = self.columns(&path, h);
         if !h.is_bent() {
-            return Ok(self.round(h, &path, &base, None));
+            return Ok(self.round(h, &path, &base, None, near.map(|n| &n.solution)));
         }
+        let near = near.and_then(|n| n.point.as_ref());
         let mut point = match near {
             Some(point) => point.clone(),
             None => {
@@ -72,13 +73,16 @@ impl Problem<'_> {
                 point
             }
         };
-        let mut last = None;
-        for _ in 0..if near.is_some() { ROUNDS_NEAR } else { ROUNDS } {
-            let Some(round) = self.round(h, &path, &base, Some(point)) else { return Ok(None) };
-            point = self.point(h, &path, &base, &round.solution);
-            last = Some(round);
+        for _ in 1..if near.is_some() { ROUNDS_NEAR } else { ROUNDS } {
+            let Some(round) = self.round(h, &path, &base, Some(point), None) else { return Ok(None) };
+            point = self.point(h, &path, self.combined(h, &base, &round.solution), &round.solution);
         }
-        Ok(last)
+        Ok(self.round(h, &path, &base, Some(point), None))
+    }
+
+    /// The output of the operator for a solution.
+    fn combined(&self, h: &Hypothesis, base: &BaseColumns<'_>, z: &DVector<f64>) -> Vec<f64> {
+        base.combined(&z.as_slice()[self.layout(h).weights], self.samples.len())
     }
 
     /// The straight model's motion; where the output stands in the knee of a stop, the motion that would show it.
@@ -91,8 +95,9 @@ impl Problem<'_> {
         let mut straight = h.clone();
         (straight.effects.asymmetry, straight.effects.saturation, straight.gain_wanders) = (None, None, false);
         let plain = SignalPath::new(self.samples, &straight)?;
-        let Some(first) = self.round(&straight, &plain, base, None) else { return Ok(None) };
-        let mut point = self.point(&straight, &plain, base, &first.solution);
+        let Some(first) = self.round(&straight, &plain, base, None, None) else { return Ok(None) };
+        let operator = self.combined(&straight, base, &first.solution);
+        let mut point = self.point(&straight, &plain, operator, &first.solution);
         if h.effects.saturation.is_some() {
             let zero = &first.solution.as_slice()[self.layout(&straight).zeros];
             for (segment, file) in self.samples.segments.iter().zip(&self.samples.file_of_segment) {
@@ -105,17 +110,10 @@ impl Problem<'_> {
         Ok(Some(point))
     }
 
-    /// The course of the motion for a solution.
-    pub(super) fn point(
-        &self,
-        h: &Hypothesis,
-        path: &SignalPath<'_>,
-        base: &BaseColumns<'_>,
-        z: &DVector<f64>,
-    ) -> Point {
+    /// The course of the motion for a solution at which the operator has this output.
+    pub(super) fn point(&self, h: &Hypothesis, path: &SignalPath<'_>, operator: Vec<f64>, z: &DVector<f64>) -> Point {
         let layout = self.layout(h);
         let z = z.as_slice();
-        let operator = base.combined(&z[layout.weights], self.samples.len());
         let mut motion = operator.clone();
         if let Some(p) = &h.effects.asymmetry {
             let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
@@ -131,84 +129,92 @@ impl Problem<'_> {
         Point { operator, motion, solution: DVector::from_column_slice(z) }
     }
 
-    /// One solution, linear around `point`.
+    /// The course of the motion for a solution.
+    pub(super) fn point_at(&self, h: &Hypothesis, path: &SignalPath<'_>, z: &DVector<f64>) -> Point {
+        let operator = self.operator(path, h, &z.as_slice()[self.layout(h).weights]);
+        self.point(h, path, operator, z)
+    }
+
+    /// One solution, linear around `point`; which bounds bind is looked for from those that bind `near`.
     fn round(
         &self,
         h: &Hypothesis,
         path: &SignalPath<'_>,
         base: &BaseColumns<'_>,
         point: Option<Point>,
+        near: Option<&DVector<f64>>,
     ) -> Option<Assembly> {
         let layout = self.layout(h);
         let width = layout.len() + 1;
-        let rows: Vec<Vec<usize>> =
-            (0..self.blocks.rows.len()).map(|b| self.blocks.used(b, self.samples).collect()).collect();
-        let mut blocks: Vec<DMatrix<f64>> = rows.iter().map(|r| DMatrix::zeros(r.len(), width)).collect();
-        let mut put = |c: usize, column: &[f64]| {
-            for (block, rows) in blocks.iter_mut().zip(&rows) {
-                for (x, k) in block.column_mut(c).iter_mut().zip(rows) {
-                    *x = column[*k];
-                }
+        let mut blocks: Vec<DMatrix<f64>> = self.used.iter().map(|r| DMatrix::zeros(r.len(), width)).collect();
+        let mut put = |c: usize, column: Vec<f64>| {
+            let mut rest = column.as_slice();
+            for block in &mut blocks {
+                let (own, others) = rest.split_at(block.nrows());
+                block.column_mut(c).copy_from_slice(own);
+                rest = others;
             }
         };
         // Behind a stop the output follows the motion by less, or not at all.
         let stopped: Option<Vec<(f64, f64)>> = match &point {
-            Some(p) if h.effects.saturation.is_some() => Some(p.motion.iter().map(|m| path.stopped(*m)).collect()),
+            Some(p) if h.effects.saturation.is_some() => Some(self.thinned(|k| path.stopped(p.motion[k]))),
             _ => None,
         };
-        let slowed = |column: &mut [f64]| {
+        let slowed = |column: &[f64]| {
+            let mut thinned = self.thinned(|k| column[k]);
             if let Some(stopped) = &stopped {
-                column.iter_mut().zip(stopped).for_each(|(x, (_, slope))| *x *= slope);
+                thinned.iter_mut().zip(stopped).for_each(|(x, (_, slope))| *x *= slope);
             }
+            thinned
         };
-        base.each(&mut |c, column| {
-            path.output_side(column);
-            slowed(column);
-            put(layout.weights.start + c, column);
+        let columns = base.map(|mut columns| {
+            path.output_side_of(&mut columns);
+            columns.iter().map(|column| slowed(column)).collect::<Vec<_>>()
         });
-        let mut filtered: Vec<f64>;
+        for (c, column) in layout.weights.clone().zip(columns.into_iter().flatten()) {
+            put(c, column);
+        }
         for (c, column) in (layout.zeros.start..).zip(self.extras(h)) {
-            put(c, &column);
+            put(c, self.thinned(|k| column[k]));
         }
         if let (Some(c), Some(mut load)) = (layout.load.clone().next(), self.samples.load.clone()) {
             path.structure(&mut load);
-            slowed(&mut load);
-            put(c, &load);
+            put(c, slowed(&load));
         }
         if let (Some(p), Some(point)) = (&h.effects.asymmetry, &point) {
-            for (c, s) in layout.zones.clone().zip(&p.thresholds) {
-                filtered = point.operator.iter().map(|v| dead_zone(*v, *s)).collect();
-                path.output_side(&mut filtered);
-                slowed(&mut filtered);
-                put(c, &filtered);
-            }
+            let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();
+            let mut zones: Vec<Vec<f64>> = p.thresholds.iter().map(|s| bend(*s)).collect();
+            path.output_side_of(&mut zones);
+            layout.zones.clone().zip(&zones).for_each(|(c, zone)| put(c, slowed(zone)));
         }
-        let n = self.samples.len();
-        let share = |k: usize| k as f64 / n.max(2) as f64;
+        let share = |k: usize| k as f64 / self.samples.len().max(2) as f64;
         for (j, c) in layout.zero_hats.clone().enumerate() {
-            filtered = (0..n).map(|k| hat(j, share(k))).collect();
-            put(c, &filtered);
+            put(c, self.thinned(|k| hat(j, share(k))));
         }
         if let Some(point) = &point {
             for (j, c) in layout.gain_hats.clone().enumerate() {
-                filtered = point.motion.iter().enumerate().map(|(k, m)| hat(j, share(k)) * m).collect();
-                put(c, &filtered);
+                put(c, self.thinned(|k| hat(j, share(k)) * point.motion[k]));
             }
         }
-        let mut target = self.samples.output.clone();
+        let mut target = self.thinned(|k| self.samples.output[k]);
         if let (Some(stopped), Some(point)) = (&stopped, &point) {
-            for (y, ((value, slope), m)) in target.iter_mut().zip(stopped.iter().zip(&point.motion)) {
+            let motion = self.thinned(|k| point.motion[k]);
+            for (y, ((value, slope), m)) in target.iter_mut().zip(stopped.iter().zip(motion)) {
                 *y += slope * m - value;
             }
         }
-        put(width - 1, &target);
-        let grams: Vec<Gram> = blocks.iter().map(|x| Gram { matrix: x.transpose() * x, rows: x.nrows() }).collect();
-        let total = Gram::sum(width, grams.iter());
+        put(width - 1, target);
+        let total = Gram::of_all(&blocks, width);
         let penalty = self.penalty(width - 1);
-        let near = point.as_ref().map(|p| &p.solution).filter(|z| z.len() == width - 1);
+        let near = point.as_ref().map(|p| &p.solution).or(near).filter(|z| z.len() == width - 1);
         let solution = solve_near(&total, Some(&penalty), &self.bounds(h), near)?;
         let objective = total.error(&solution) + (solution.transpose() * &penalty * &solution)[(0, 0)];
-        Some(Assembly { blocks, grams, total, solution, objective, point })
+        Some(Assembly { blocks, total, solution, objective, point })
+    }
+
+    /// What holds in the rows that count, block by block.
+    pub(super) fn thinned<T>(&self, of: impl Fn(usize) -> T) -> Vec<T> {
+        self.used.iter().flatten().map(|k| of(*k)).collect()
     }
 
     /// How far what wanders in time has wandered in a row, from the heights of its hats.
@@ -220,9 +226,8 @@ impl Problem<'_> {
     /// Measured minus predicted output, all rows.
     pub(super) fn residual_of(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, h)?;
-        let base = self.columns(&path, h);
         let layout = self.layout(h);
-        let motion = self.point(h, &path, &base, z).motion;
+        let motion = self.point_at(h, &path, z).motion;
         let extras = self.extras(h);
         let n = self.samples.len();
         let z = z.as_slice();

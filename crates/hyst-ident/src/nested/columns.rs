@@ -1,17 +1,30 @@
 //! The base's columns behind what leads to the hysteresis: kept where they are few, made anew where they would fill the memory.
 
 use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use super::{Hypothesis, Problem, SignalPath};
 use crate::Samples;
-use crate::base::Drag;
+use crate::base::{Basis, Drag};
 
 /// Numbers that are kept at most: 64 MB.
 const KEPT: usize = 8_000_000;
+/// Numbers that are made in one piece at most: 16 MB.
+const PIECE: usize = 2_000_000;
+/// Columns that are worth a pass over the drive.
+const LEAST: usize = 4;
 
 /// Whether the columns of a base of this width are kept for a record.
 pub(super) fn may_be_kept(samples: &Samples, width: usize) -> bool {
     samples.len().saturating_mul(width) <= KEPT
+}
+
+/// Numbers of the columns that are made in one pass each, in order.
+pub(super) fn passes(basis: &dyn Basis, rows: usize) -> Vec<Range<usize>> {
+    let (width, together) = (basis.len(), basis.together().min(PIECE / rows.max(1)).max(LEAST));
+    (0..width).step_by(together).map(|first| first..(first + together).min(width)).collect()
 }
 
 /// Columns of one base for one drive.
@@ -21,35 +34,47 @@ pub(super) enum BaseColumns<'a> {
 }
 
 impl BaseColumns<'_> {
-    /// Gives `each` the number and a copy of every column, in order.
-    pub(super) fn each(&self, each: &mut dyn FnMut(usize, &mut [f64])) {
+    /// What `f` makes of all columns, some of them at a time, in order.
+    pub(super) fn map<T: Send>(&self, f: impl Fn(Vec<Vec<f64>>) -> T + Sync) -> Vec<T> {
         match self {
-            Self::Kept(columns) => {
-                let mut copy = Vec::new();
-                for (c, column) in columns.iter().enumerate() {
-                    copy.clone_from(column);
-                    each(c, &mut copy);
-                }
-            }
+            Self::Kept(columns) => columns.par_chunks(2 * LEAST).map(|columns| f(columns.to_vec())).collect(),
             Self::Made { problem, drive, drag } => {
-                problem.basis.columns(drive, &problem.samples.segments, drag, each);
+                let Problem { samples, basis, .. } = problem;
+                let passes = passes(*basis, samples.len());
+                passes.into_par_iter().map(|of| f(basis.columns(of, drive, &samples.segments, drag))).collect()
             }
         }
     }
 
     /// Σ wᵢ φᵢ over the rows of a record.
     pub(super) fn combined(&self, weights: &[f64], rows: usize) -> Vec<f64> {
-        let mut v = vec![0.0; rows];
-        let mut add = |c: usize, column: &[f64]| {
-            if let Some(w) = weights.get(c) {
-                v.iter_mut().zip(column).for_each(|(v, x)| *v += w * x);
-            }
-        };
         match self {
-            Self::Kept(columns) => columns.iter().enumerate().for_each(|(c, column)| add(c, column)),
-            Self::Made { .. } => self.each(&mut |c, column| add(c, column)),
+            Self::Kept(columns) => {
+                let mut v = vec![0.0; rows];
+                // In pieces that stay in the nearest memory.
+                v.par_chunks_mut(2048).enumerate().for_each(|(i, v)| {
+                    let own = 2048 * i..2048 * i + v.len();
+                    for (w, column) in weights.iter().zip(columns.iter()) {
+                        v.iter_mut().zip(&column[own.clone()]).for_each(|(v, x)| *v += w * x);
+                    }
+                });
+                v
+            }
+            Self::Made { problem, drive, drag } => {
+                let Problem { samples, basis, .. } = problem;
+                basis.combined(weights, drive, &samples.segments, drag).unwrap_or_else(|| {
+                    let passes = passes(*basis, samples.len());
+                    let part = |of: Range<usize>| {
+                        let columns = basis.columns(of.clone(), drive, &samples.segments, drag);
+                        Self::Kept(Cow::Owned(columns)).combined(&weights[of], rows)
+                    };
+                    let parts: Vec<Vec<f64>> = passes.into_par_iter().map(part).collect();
+                    let mut v = vec![0.0; rows];
+                    parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
+                    v
+                })
+            }
         }
-        v
     }
 }
 
@@ -59,13 +84,25 @@ impl Problem<'_> {
         if let (false, Some(raw)) = (h.changes_the_base(), &self.raw) {
             return BaseColumns::Kept(Cow::Borrowed(raw));
         }
-        let drag = h.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
-        let made = BaseColumns::Made { problem: self, drive: path.input_side(), drag };
+        let made = self.made(path, h);
         if !may_be_kept(self.samples, self.width) {
             return made;
         }
-        let mut columns = Vec::with_capacity(self.width);
-        made.each(&mut |_, column| columns.push(column.to_vec()));
-        BaseColumns::Kept(Cow::Owned(columns))
+        BaseColumns::Kept(Cow::Owned(made.map(|columns| columns).into_iter().flatten().collect()))
+    }
+
+    /// The same, none of them kept.
+    fn made<'b>(&'b self, path: &SignalPath<'_>, h: &Hypothesis) -> BaseColumns<'b> {
+        let drag = h.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
+        BaseColumns::Made { problem: self, drive: path.input_side(), drag }
+    }
+
+    /// The output of the operator with these weights, where nothing else is asked of its columns.
+    pub(super) fn operator(&self, path: &SignalPath<'_>, h: &Hypothesis, weights: &[f64]) -> Vec<f64> {
+        match &self.raw {
+            Some(_) if !h.changes_the_base() => self.columns(path, h),
+            _ => self.made(path, h),
+        }
+        .combined(weights, self.samples.len())
     }
 }

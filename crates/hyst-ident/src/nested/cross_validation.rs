@@ -1,9 +1,10 @@
 //! Cross-validation inside the training record, from the blocks' normal equations.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::Fitted;
-use crate::lsq::{Blocks, Gram, solve};
+use crate::lsq::{Blocks, Gram, solve_near};
 
 /// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
 pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
@@ -29,16 +30,17 @@ pub(super) fn unpredictable(grams: &[Gram], penalty: &DMatrix<f64>, folds: &[Vec
     let scale: Vec<f64> = (0..n).map(|i| total.matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| m[(r, c)] / (scale[r] * scale[c]));
     let prior = scaled(penalty);
-    for fold in folds {
+    let of_fold = |fold: &Vec<usize>| -> Vec<(usize, bool)> {
         let mut others = scaled(&total.matrix) + &prior;
         fold.iter().for_each(|b| others -= scaled(&grams[*b].matrix));
         (0..n).for_each(|i| others[(i, i)] += 1e-12);
-        let factor = others.cholesky();
-        for b in fold {
-            let spread = factor.as_ref().map(|f| f.solve(&scaled(&grams[*b].matrix)).trace());
-            unknown[*b] = spread.is_none_or(|s| s > UNKNOWN * grams[*b].rows as f64);
-        }
-    }
+        let inverse = others.cholesky().map(|f| f.inverse());
+        // The trace of a product of two symmetric matrices is the sum of their products element by element.
+        let spread = |b: usize| inverse.as_ref().map(|inverse| inverse.dot(&scaled(&grams[b].matrix)));
+        fold.iter().map(|b| (*b, spread(*b).is_none_or(|s| s > UNKNOWN * grams[*b].rows as f64))).collect()
+    };
+    let found: Vec<Vec<(usize, bool)>> = folds.par_iter().map(of_fold).collect();
+    found.into_iter().flatten().for_each(|(b, is)| unknown[b] = is);
     unknown
 }
 
@@ -56,16 +58,19 @@ pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: 
         penalty[(i, i)] += 1e-6 * total.matrix[(i, i)];
     }
     let mut squares = vec![0.0; fit.grams.len()];
-    for fold in folds {
+    let of_fold = |fold: &Vec<usize>| -> Option<Vec<(usize, f64)>> {
         let mut others = total.clone();
         for b in fold {
             others.matrix -= &fit.grams[*b].matrix;
             others.rows -= fit.grams[*b].rows;
         }
-        let z = solve(&others, Some(&penalty), &fit.bounds)?;
-        for b in fold {
-            squares[*b] = fit.grams[*b].error(if unpredictable[*b] { &fit.solution } else { &z });
-        }
+        let z = solve_near(&others, Some(&penalty), &fit.bounds, Some(&fit.solution))?;
+        let error = |b: usize| fit.grams[b].error(if unpredictable[b] { &fit.solution } else { &z });
+        Some(fold.iter().map(|b| (*b, error(*b))).collect())
+    };
+    let found: Vec<Option<Vec<(usize, f64)>>> = folds.par_iter().map(of_fold).collect();
+    for found in found {
+        found?.into_iter().for_each(|(b, error)| squares[b] = error);
     }
     Some(squares)
 }

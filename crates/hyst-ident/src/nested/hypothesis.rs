@@ -94,6 +94,11 @@ impl Hypothesis {
         self.effects.on_input_side() || self.drag.is_some()
     }
 
+    /// Whether the hysteresis is driven, and follows, as in another set.
+    pub(super) fn drives_alike(&self, other: &Self) -> bool {
+        self.drag == other.drag && self.effects.delay == other.effects.delay && self.effects.lag == other.effects.lag
+    }
+
     /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.
     pub(super) fn is_bent(&self) -> bool {
         self.effects.asymmetry.is_some() || self.effects.saturation.is_some() || self.gain_wanders

@@ -53,25 +53,51 @@ impl<'a> SignalPath<'a> {
     /// What the hysteresis is driven with.
     pub(crate) fn input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
-        self.filter(&self.delay, &mut drive);
-        self.filter(&self.lag, &mut drive);
+        if let Some(delay) = &self.delay {
+            self.filter(delay, &mut [&mut drive]);
+        }
+        if let Some(lag) = &self.lag {
+            self.filter(lag, &mut [&mut drive]);
+        }
         drive
     }
 
     /// Carries what the hysteresis gives on to the stop, in place.
     pub(crate) fn output_side(&self, v: &mut [f64]) {
-        if let Some(factor) = &self.factor {
-            v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
+        self.carry([v]);
+    }
+
+    /// The same for several columns.
+    pub(super) fn output_side_of(&self, columns: &mut [Vec<f64>]) {
+        for columns in columns.chunks_mut(4) {
+            // Beside each other: each waits for its own last sample only.
+            if let [a, b, c, d] = columns {
+                self.carry([a, b, c, d]);
+            } else {
+                columns.iter_mut().for_each(|v| self.carry([v]));
+            }
         }
-        self.filter(&self.creep, v);
-        self.structure(v);
+    }
+
+    fn carry<const N: usize>(&self, mut columns: [&mut [f64]; N]) {
+        if let Some(factor) = &self.factor {
+            for v in &mut columns {
+                v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
+            }
+        }
+        if let Some(creep) = &self.creep {
+            self.creep(creep, &mut columns);
+        }
+        self.modes(&mut columns);
     }
 
     /// Carries a deflection through the modes, in place.
     pub(crate) fn structure(&self, v: &mut [f64]) {
-        for mode in &self.resonances {
-            self.filter(&Some(*mode), v);
-        }
+        self.modes(&mut [v]);
+    }
+
+    fn modes<const N: usize>(&self, columns: &mut [&mut [f64]; N]) {
+        self.resonances.iter().for_each(|mode| self.filter(mode, columns));
     }
 
     /// Where the motion is stopped, and by how much the output there follows it: value and slope.
@@ -86,17 +112,32 @@ impl<'a> SignalPath<'a> {
         self.stop.as_ref().map_or(output, |s| s.inverse.step(&mut (), &Env::default(), output))
     }
 
-    fn filter<G: Stage<f64>>(&self, stage: &Option<G>, x: &mut [f64]) {
-        let Some(stage) = stage else { return };
-        let env = Env::default();
-        let mut state = stage.state();
-        for segment in &self.samples.segments {
-            let mut rows = x[segment.clone()].iter_mut();
-            if let Some(first) = rows.next() {
-                *first = stage.reset(&mut state, &env, *first);
+    fn creep<const N: usize>(&self, creep: &Creep<f64, CREEP>, columns: &mut [&mut [f64]; N]) {
+        for segment in self.samples.segments.iter().filter(|s| !s.is_empty()) {
+            let mut columns = columns.each_mut().map(|c| &mut c[segment.clone()]);
+            let (mut state, first) = creep.reset_side_by_side(columns.each_ref().map(|c| c[0]));
+            columns.iter_mut().zip(first).for_each(|(column, y)| column[0] = y);
+            for k in 1..segment.len() {
+                let y = creep.step_side_by_side(&mut state, columns.each_ref().map(|c| c[k]));
+                columns.iter_mut().zip(y).for_each(|(column, y)| column[k] = y);
             }
-            for v in rows {
-                *v = stage.step(&mut state, &env, *v);
+        }
+    }
+
+    fn filter<G: Stage<f64>, const N: usize>(&self, stage: &G, columns: &mut [&mut [f64]; N]) {
+        let env = Env::default();
+        let mut states: [G::State; N] = std::array::from_fn(|_| stage.state());
+        for segment in &self.samples.segments {
+            let mut columns = columns.each_mut().map(|c| &mut c[segment.clone()]);
+            for (state, column) in states.iter_mut().zip(&mut columns) {
+                if let Some(first) = column.first_mut() {
+                    *first = stage.reset(state, &env, *first);
+                }
+            }
+            for k in 1..segment.len() {
+                for (state, column) in states.iter_mut().zip(&mut columns) {
+                    column[k] = stage.step(state, &env, column[k]);
+                }
             }
         }
     }

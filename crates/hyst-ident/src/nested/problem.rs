@@ -4,15 +4,16 @@ use std::sync::OnceLock;
 
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::assembly::Assembly;
+use super::assembly::{Assembly, Point};
 use super::bounds::{box_of, stepped};
-use super::columns::may_be_kept;
+use super::columns::{may_be_kept, passes};
 use super::cross_validation::{cross_validate, folds_interleaved, unpredictable};
 use super::{Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
-use crate::lsq::{Blocks, Bounds, Gram, solve};
+use crate::lsq::{Blocks, Bordered, Bounds, Gram, solve_near};
 use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
@@ -22,6 +23,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) samples: &'a Samples,
     pub(crate) basis: &'a dyn Basis,
     pub(crate) blocks: &'a Blocks,
+    /// The rows of each block that count.
+    pub(super) used: Vec<Vec<usize>>,
     /// One zero for each file instead of one for all.
     pub(crate) zero_per_file: bool,
     /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
@@ -71,16 +74,22 @@ impl Fitted {
 impl<'a> Problem<'a> {
     pub(crate) fn new(samples: &'a Samples, basis: &'a dyn Basis, blocks: &'a Blocks, zero_per_file: bool) -> Self {
         let width = basis.len();
-        let mut raw = may_be_kept(samples, width).then(|| Vec::with_capacity(width));
-        let mut squares = 0.0;
-        basis.columns(&samples.input, &samples.segments, &Drag::NONE, &mut |_, column| {
-            squares += blocks.all_used(samples).map(|k| column[k] * column[k]).sum::<f64>();
-            raw.iter_mut().for_each(|raw| raw.push(column.to_vec()));
-        });
+        let used: Vec<Vec<usize>> = (0..blocks.rows.len()).map(|b| blocks.used(b, samples).collect()).collect();
+        let kept = may_be_kept(samples, width);
+        let made: Vec<(f64, Vec<Vec<f64>>)> = passes(basis, samples.len())
+            .into_par_iter()
+            .map(|of| {
+                let columns = basis.columns(of, &samples.input, &samples.segments, &Drag::NONE);
+                let squares = columns.iter().flat_map(|c| used.iter().flatten().map(|k| c[*k] * c[*k])).sum();
+                (squares, if kept { columns } else { Vec::new() })
+            })
+            .collect();
+        let squares: f64 = made.iter().map(|(squares, _)| squares).sum();
+        let raw = kept.then(|| made.into_iter().flat_map(|(_, columns)| columns).collect());
         let penalty = basis.penalty(squares / width.max(1) as f64);
         let only_loop = only_loop(samples);
         let unpredictable = OnceLock::new();
-        Self { samples, basis, blocks, zero_per_file, raw, width, penalty, only_loop, unpredictable }
+        Self { samples, basis, blocks, used, zero_per_file, raw, width, penalty, only_loop, unpredictable }
     }
 
     /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
@@ -95,7 +104,7 @@ impl<'a> Problem<'a> {
             let folds = folds_interleaved(self.blocks, FOLDS);
             base.map_or_else(
                 || vec![false; self.blocks.rows.len()],
-                |base| unpredictable(&base.grams, &self.penalty(base.solution.len()), &folds),
+                |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), &folds),
             )
         })
     }
@@ -130,78 +139,77 @@ impl<'a> Problem<'a> {
     /// The output of the motion (without the sensor's zero, drift and tone, and without any wandering).
     pub(crate) fn motion(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, h)?;
-        let base = self.columns(&path, h);
-        let mut motion = self.point(h, &path, &base, solution).motion;
-        motion.iter_mut().for_each(|m| *m = path.stopped(*m).0);
-        Ok(motion)
+        let motion = self.point_at(h, &path, solution).motion;
+        Ok(motion.into_iter().map(|m| path.stopped(m).0).collect())
     }
 
     /// The output of the operator alone, before any curve behind it.
     pub(crate) fn operator_output(&self, fit: &Fitted) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, &fit.hypothesis)?;
-        let base = self.columns(&path, &fit.hypothesis);
-        Ok(self.point(&fit.hypothesis, &path, &base, &fit.solution).operator)
+        Ok(self.point_at(&fit.hypothesis, &path, &fit.solution).operator)
     }
 
-    /// Change of the output with every nonlinear parameter, by forward differences.
+    /// Change of the output in the rows that count with every nonlinear parameter, by forward differences.
     fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
-        let here = self.motion(h, solution)?;
+        let path = SignalPath::new(self.samples, h)?;
+        let Point { operator, motion, .. } = self.point_at(h, &path, solution);
+        let here = self.thinned(|k| path.stopped(motion[k]).0);
         let reached = range(here.iter().copied());
-        let mut columns = Vec::new();
-        let mut at = 0;
-        while let Some((moved, step, effect)) = stepped(h, at, self.samples, reached) {
-            let column = if step == 0.0 {
-                vec![0.0; self.samples.len()]
-            } else if effect == Effect::Interference {
+        let column = |at: usize| -> Result<Vec<f64>, Error> {
+            let Some((moved, step, effect)) = stepped(h, at, self.samples, reached) else { return Ok(Vec::new()) };
+            if step == 0.0 {
+                return Ok(vec![0.0; here.len()]);
+            }
+            if effect == Effect::Interference {
                 let first = self.layout(h).tone.start;
                 let (sine, cosine) = (solution[first], solution[first + 1]);
                 let tone = h.effects.interference.unwrap_or_default();
-                let slope = |t: &f64| {
+                let slope = |t: f64| {
                     let angle = 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
                     2.0 * std::f64::consts::PI
                         * (t - self.samples.time[0])
                         * (sine * angle.cos() - cosine * angle.sin())
                 };
-                self.samples.time.iter().map(slope).collect()
-            } else {
-                let there = self.motion(&moved, solution)?;
-                there.iter().zip(&here).map(|(a, b)| (a - b) / step).collect()
+                return Ok(self.thinned(|k| slope(self.samples.time[k])));
+            }
+            let path = SignalPath::new(self.samples, &moved)?;
+            // What follows the operator leaves its output as it is.
+            let there = match moved.drives_alike(h) {
+                true => self.point(&moved, &path, operator.clone(), solution),
+                false => self.point_at(&moved, &path, solution),
             };
-            columns.push(column);
-            at += 1;
-        }
-        Ok(columns)
+            let there = self.thinned(|k| path.stopped(there.motion[k]).0);
+            Ok(there.iter().zip(&here).map(|(a, b)| (a - b) / step).collect())
+        };
+        (0..h.nonlinear().len()).into_par_iter().map(column).collect()
     }
 
-    /// Adds the Jacobian's columns to an assembly's normal equations, before the target.
-    pub(super) fn with_jacobian(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Vec<Gram> {
-        let q = jacobian.len();
-        let place = |b: usize| {
-            let x = &assembly.blocks[b];
-            let rows: Vec<usize> = self.blocks.used(b, self.samples).collect();
-            let j = DMatrix::from_fn(rows.len(), q, |k, c| jacobian[c][rows[k]]);
-            let n = x.ncols();
-            let (cross, own) = (x.tr_mul(&j), j.tr_mul(&j));
-            let g = &assembly.grams[b].matrix;
-            // Old columns keep their place, the target moves behind the new ones.
-            let old = |i: usize| {
-                if i < n - 1 {
-                    Some(i)
-                } else if i == n - 1 + q {
-                    Some(n - 1)
-                } else {
-                    None
-                }
-            };
-            let matrix = DMatrix::from_fn(n + q, n + q, |r, c| match (old(r), old(c)) {
-                (Some(r), Some(c)) => g[(r, c)],
-                (Some(r), None) => cross[(r, c - (n - 1))],
-                (None, Some(c)) => cross[(c, r - (n - 1))],
-                (None, None) => own[(r - (n - 1), c - (n - 1))],
-            });
-            Gram { matrix, rows: x.nrows() }
+    /// The normal equations of an assembly with the Jacobian's columns before the target.
+    fn with_jacobian(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Gram {
+        let mut bordered = Bordered::zeros(assembly.total.matrix.ncols(), jacobian.len());
+        assembly.blocks.iter().zip(self.in_blocks(jacobian)).for_each(|(x, j)| bordered.add(x, &j));
+        bordered.around(&assembly.total)
+    }
+
+    /// The same of each block.
+    fn grams(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Vec<Gram> {
+        let jacobian: Vec<DMatrix<f64>> = self.in_blocks(jacobian).collect();
+        let of = |(x, j): (&DMatrix<f64>, &DMatrix<f64>)| {
+            let mut bordered = Bordered::zeros(x.ncols(), j.ncols());
+            bordered.add(x, j);
+            bordered.around(&Gram::of(x))
         };
-        (0..assembly.blocks.len()).map(place).collect()
+        assembly.blocks.par_iter().zip(&jacobian).map(of).collect()
+    }
+
+    /// Columns over the rows that count, cut into blocks.
+    fn in_blocks(&self, columns: &[Vec<f64>]) -> impl Iterator<Item = DMatrix<f64>> {
+        let mut next = 0;
+        self.used.iter().map(move |rows| {
+            let first = next;
+            next += rows.len();
+            DMatrix::from_fn(rows.len(), columns.len(), |k, c| columns[c][first + k])
+        })
     }
 
     /// Fits everything, searching from `start`. `None` if the equations cannot be solved.
@@ -212,23 +220,22 @@ impl<'a> Problem<'a> {
         let mut h = start.clone();
         let Some(mut here) = self.assemble(&h, None)? else { return Ok(None) };
         let mut damping = 1e-3;
-        let mut grams = self.with_jacobian(&here, &self.jacobian(&h, &here.solution)?);
+        let mut jacobian = self.jacobian(&h, &here.solution)?;
         for _ in 0..ITERATIONS {
-            let q = h.nonlinear().len();
-            if q == 0 {
+            if jacobian.is_empty() {
                 break;
             }
-            let total = Gram::sum(here.total.matrix.ncols() + q, grams.iter());
+            let total = self.with_jacobian(&here, &jacobian);
             let Some((better, there)) = self.step(&h, &here, &total, &mut damping)? else { break };
             let fall = (here.objective - there.objective) / here.objective.max(f64::MIN_POSITIVE);
             h = better;
             here = there;
-            grams = self.with_jacobian(&here, &self.jacobian(&h, &here.solution)?);
+            jacobian = self.jacobian(&h, &here.solution)?;
             if fall < TOLERANCE {
                 break;
             }
         }
-        Ok(Some(self.finish(h, &here, grams)))
+        Ok(Some(self.finish(h, &here, &jacobian)))
     }
 
     /// One damped step that lowers the objective, or `None` if none does.
@@ -243,12 +250,13 @@ impl<'a> Problem<'a> {
         let (q, n) = (values.len(), here.solution.len());
         let mut bounds = self.bounds(h);
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
+        let still = here.solution.clone().resize_vertically(n + q, 0.0);
         for _ in 0..5 {
             let mut penalty = self.penalty(n + q);
             for i in n..n + q {
                 penalty[(i, i)] = *damping * total.matrix[(i, i)];
             }
-            if let Some(z) = solve(total, Some(&penalty), &bounds) {
+            if let Some(z) = solve_near(total, Some(&penalty), &bounds, Some(&still)) {
                 let mut trial = h.clone();
                 let mut i = 0;
                 trial.visit_nonlinear(&mut |p| {
@@ -257,7 +265,7 @@ impl<'a> Problem<'a> {
                     i += 1;
                 });
                 // Two limits that cross make no stop.
-                let there = self.assemble(&trial, here.point.as_ref()).ok().flatten();
+                let there = self.assemble(&trial, Some(here)).ok().flatten();
                 if let Some(there) = there.filter(|t| t.objective < here.objective) {
                     *damping = (*damping * 0.1).max(1e-9);
                     return Ok(Some((trial, there)));
@@ -268,7 +276,7 @@ impl<'a> Problem<'a> {
         Ok(None)
     }
 
-    fn finish(&self, mut h: Hypothesis, at: &Assembly, grams: Vec<Gram>) -> Fitted {
+    fn finish(&self, mut h: Hypothesis, at: &Assembly, jacobian: &[Vec<f64>]) -> Fitted {
         let layout = self.layout(&h);
         let z = at.solution.as_slice();
         let mut zeros = z[layout.zeros.clone()].to_vec();
@@ -299,7 +307,7 @@ impl<'a> Problem<'a> {
             squares: at.total.error(&at.solution),
             rows: at.total.rows,
             solution: at.solution.clone().resize_vertically(unknowns, 0.0),
-            grams,
+            grams: self.grams(at, jacobian),
             bounds,
             penalty: self.penalty(unknowns),
         }
@@ -311,9 +319,8 @@ impl<'a> Problem<'a> {
     /// If a stage cannot be built.
     pub(crate) fn fit_linear(&self, h: &Hypothesis) -> Result<Option<Fitted>, Error> {
         let Some(here) = self.assemble(h, None)? else { return Ok(None) };
-        let columns = vec![vec![0.0; self.samples.len()]; h.nonlinear().len()];
-        let grams = self.with_jacobian(&here, &columns);
-        Ok(Some(self.finish(h.clone(), &here, grams)))
+        let columns = vec![self.thinned(|_| 0.0); h.nonlinear().len()];
+        Ok(Some(self.finish(h.clone(), &here, &columns)))
     }
 
     /// What separates a new column from those that a fit already has.

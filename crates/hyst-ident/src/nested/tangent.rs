@@ -19,12 +19,11 @@ pub(crate) struct Tangent<'a> {
 }
 
 impl Tangent<'_> {
-    /// The change of the output that this change of the operator's makes.
-    pub(crate) fn through(&self, mut change: Vec<f64>) -> Vec<f64> {
-        times(&mut change, self.curve.as_deref());
-        self.path.output_side(&mut change);
-        times(&mut change, self.gain.as_deref());
-        change
+    /// Puts the changes of the output that they make in the place of changes of the operator's.
+    pub(crate) fn through(&self, changes: &mut [Vec<f64>]) {
+        changes.iter_mut().for_each(|change| times(change, self.curve.as_deref()));
+        self.path.output_side_of(changes);
+        changes.iter_mut().for_each(|change| times(change, self.gain.as_deref()));
     }
 }
 
@@ -42,7 +41,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn tangent(&self, fit: &Fitted) -> Result<Tangent<'a>, Error> {
         let h = &fit.hypothesis;
         let path = SignalPath::new(self.samples, h)?;
-        let point = self.point(h, &path, &self.columns(&path, h), &fit.solution);
+        let point = self.point_at(h, &path, &fit.solution);
         let (layout, z) = (self.layout(h), fit.solution.as_slice());
         let curve = h.effects.asymmetry.as_ref().map(|p| {
             let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
@@ -58,7 +57,9 @@ impl<'a> Problem<'a> {
         });
         let input = path.input_side();
         let mut tangent = Tangent { samples: Samples { input, ..self.samples.clone() }, path, curve, gain };
-        tangent.samples.output = tangent.through(point.operator);
+        let mut output = [point.operator];
+        tangent.through(&mut output);
+        [tangent.samples.output] = output;
         tangent.samples.output.iter_mut().zip(self.residual(fit)?).for_each(|(y, left)| *y += left);
         Ok(tangent)
     }
@@ -121,7 +122,13 @@ mod tests {
         let tangent = problem.tangent(&fit).unwrap();
         // Its drive lags; its output is the operator's as it arrives, and what is left.
         assert_ne!(tangent.samples.input, samples.input);
-        let arrives = tangent.through(problem.operator_output(&fit).unwrap());
+        let through = |change: Vec<f64>| {
+            let mut changes = [change];
+            tangent.through(&mut changes);
+            let [arrived] = changes;
+            arrived
+        };
+        let arrives = through(problem.operator_output(&fit).unwrap());
         let left = problem.residual(&fit).unwrap();
         for ((seen, arrives), left) in tangent.samples.output.iter().zip(&arrives).zip(&left) {
             assert_eq!(*seen, arrives + left);
@@ -134,7 +141,7 @@ mod tests {
         let seen = difference(problem.residual(&fit).unwrap(), problem.residual(&other).unwrap());
         let largest = seen.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let mut hidden = 0;
-        for (k, (said, seen)) in tangent.through(change).iter().zip(&seen).enumerate() {
+        for (k, (said, seen)) in through(change).iter().zip(&seen).enumerate() {
             assert!((said - seen).abs() < 1e-3 * largest, "row {k}: {said} said, {seen} seen");
             hidden += usize::from(seen.abs() < 0.1 * largest && samples.input[k] > 40.0);
         }

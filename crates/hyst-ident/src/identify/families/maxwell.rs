@@ -30,16 +30,17 @@ impl<'a> SlipFamily<'a> {
     /// At most so many elements. Where the record chooses none, their widths are even over the range of the input.
     pub(super) fn new(samples: &'a Samples, elements: usize, reading: SlipReading) -> Self {
         let elements = elements.clamp(1, PLAYS);
-        let element = |width: f64| {
+        let element = |width: &f64| {
             let mut y = vec![0.0; samples.len()];
             let element: Result<MaxwellSlip<f64, 1>, Error> =
-                MaxwellSlipParams { reading, widths: [width], gains: [1.0] }.build(&());
+                MaxwellSlipParams { reading, widths: [*width], gains: [1.0] }.build(&());
             if let Ok(element) = element {
                 run(samples, &element, &mut y);
             }
             y
         };
-        let bank = |rows| Bank::new(samples, Vec::new(), even(samples, CANDIDATES, reading), &element, rows);
+        let slipping = |widths: &[f64]| widths.iter().map(element).collect();
+        let bank = |rows| Bank::new(samples, Vec::new(), even(samples, CANDIDATES, reading), &slipping, rows);
         let chosen = bank(choice::ROWS).at_most(elements).and_then(|widths| bank(fit::ROWS).from(widths));
         let chosen = chosen.filter(|w| !w.is_empty());
         let is_chosen = chosen.is_some();
