@@ -71,8 +71,16 @@ pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
             Ok(()) => return Ok(name),
             // Somebody's, perhaps of this very moment.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            Err(_) if name.symlink_metadata().is_ok() => number += 1,
-            Err(_) => return fs::rename(target, &name).map(|()| name),
+            Err(_) => match File::options().write(true).create_new(true).open(&name) {
+                // The name is taken by an empty file first: of two programs only one can make it.
+                Ok(_) => {
+                    return fs::rename(target, &name).map(|()| name.clone()).inspect_err(|_| {
+                        let _ = fs::remove_file(&name);
+                    });
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+                Err(error) => return Err(error),
+            },
         }
     }
 }

@@ -12,9 +12,20 @@ impl<'py> Signal<'py> {
     /// Looks at the argument `name`.
     ///
     /// # Errors
-    /// `TypeError` if it is no array of `float64`, `ValueError` if it has not one dimension, is not contiguous or holds a
-    /// number that is not finite.
+    /// As [`unread`](Self::unread), and `ValueError` if it holds a number that is not finite.
     pub(crate) fn new(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let signal = Self::unread(name, x)?;
+        match not_finite(signal.values()?) {
+            Some(k) => Err(signal.refused(name, k)),
+            None => Ok(signal),
+        }
+    }
+
+    /// Looks at the argument `name`, but not at its numbers: who reads them checks them then.
+    ///
+    /// # Errors
+    /// `TypeError` if it is no array of `float64`, `ValueError` if it has not one dimension or is not contiguous.
+    pub(crate) fn unread(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
         let Ok(array) = x.cast::<PyUntypedArray>() else {
             return Err(PyTypeError::new_err(format!(
                 "{name} must be a one-dimensional numpy array of float64, not {}; numpy.asarray({name}, dtype=float) makes one",
@@ -34,15 +45,18 @@ impl<'py> Signal<'py> {
             )));
         };
         let array = array.try_readonly()?;
-        let Ok(values) = array.as_slice() else {
+        if array.as_slice().is_err() {
             return Err(PyValueError::new_err(format!(
                 "{name} is not contiguous in memory; numpy.ascontiguousarray({name}) makes a copy that is"
             )));
-        };
-        if let Some(k) = not_finite(values) {
-            return Err(PyValueError::new_err(format!("{name}[{k}] is {}; signals must be finite", values[k])));
         }
         Ok(Self(array))
+    }
+
+    /// What to say about a number at `k` that is not finite.
+    pub(crate) fn refused(&self, name: &str, k: usize) -> PyErr {
+        let number = self.values().ok().and_then(|values| values.get(k)).copied().unwrap_or(f64::NAN);
+        PyValueError::new_err(format!("{name}[{k}] is {number}; signals must be finite"))
     }
 
     pub(crate) fn values(&self) -> PyResult<&[f64]> {
@@ -51,7 +65,7 @@ impl<'py> Signal<'py> {
 }
 
 /// Place of the first value that is not finite. In blocks without an early end, which the processor takes several values at a time.
-fn not_finite(values: &[f64]) -> Option<usize> {
+pub(crate) fn not_finite(values: &[f64]) -> Option<usize> {
     let block = values.chunks(256).position(|block| !block.iter().fold(true, |finite, v| finite & v.is_finite()))?;
     values.iter().skip(256 * block).position(|v| !v.is_finite()).map(|k| 256 * block + k)
 }

@@ -64,9 +64,9 @@ impl Clamp {
         if !found.iter().any(at_end) {
             return None;
         }
-        let rest = |u: f64| self.model.simulate(env, &[u]).first().copied().unwrap_or_default();
-        let fine = (rest(high) - rest(low)).abs() * (ROUNDING + 10.0 * tolerance / (high - low));
-        let reached = self.model.simulate(env, found);
+        let rest = |u: f64| self.model.simulate(env, &[u]).ok()?.first().copied();
+        let fine = (rest(high)? - rest(low)?).abs() * (ROUNDING + 10.0 * tolerance / (high - low));
+        let reached = self.model.simulate(env, found).ok()?;
         let misses = reached.iter().zip(reference).map(|(y, wanted)| (y - wanted).abs());
         let missed = found.iter().zip(misses).enumerate().filter(|(_, (u, miss))| at_end(u) && *miss > fine);
         missed.fold(None, |sum, (k, (_, miss))| {

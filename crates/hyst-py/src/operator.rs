@@ -14,7 +14,7 @@ use crate::clamp::Clamp;
 use crate::inverse::Inverse;
 use crate::inversion::{Inverted, Options};
 use crate::model::{Model, save};
-use crate::runner::Engine;
+use crate::runner::{Engine, NotFinite};
 
 type Inversion = dyn Fn(&Options) -> PyResult<Inverted> + Send + Sync;
 type Filing = dyn Fn(&Channels) -> PyResult<core::Model> + Send + Sync;
@@ -62,11 +62,11 @@ impl Operator {
         (engine, lead): (&dyn Engine, usize),
         clamp: Option<&Clamp>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let signal = Signal::new(name, u)?;
+        let signal = Signal::unread(name, u)?;
         let u = signal.values()?;
         let given = GivenSurroundings::new(&self.name, self.needs, given[0], given[1], given[2])?;
         let env = given.rows(u.len())?;
-        let y = py.detach(|| engine.follow(&env, u, lead));
+        let y = py.detach(|| engine.follow(&env, u, lead)).map_err(|NotFinite(k)| signal.refused(name, k))?;
         if let Some(clamp) = clamp {
             clamp.warn(py, &env, (name, u), &y)?;
         }

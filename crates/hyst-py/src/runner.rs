@@ -4,23 +4,38 @@ use std::sync::{Mutex, PoisonError};
 
 use hyst_core::{Env, Stage};
 
-use crate::arrays::Surroundings;
+use crate::arrays::{Surroundings, not_finite};
 
 /// Samples whose surroundings are laid out at a time.
 const BLOCK: usize = 512;
 
+/// The first input that is no finite number stands here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NotFinite(pub(crate) usize);
+
 /// What Python can do with a stage.
 pub(crate) trait Engine: Send + Sync {
     /// The output for a whole input, from a fresh history.
-    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Vec<f64>;
+    ///
+    /// # Errors
+    /// If an input is not finite.
+    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite>;
     /// As [`simulate`](Self::simulate) for a stage whose output belongs to `lead` samples before its input: the
     /// input is held at its ends, and the outputs stand at the rows that they belong to.
-    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Vec<f64>;
+    ///
+    /// # Errors
+    /// If an input is not finite.
+    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite>;
     /// Sets the stage's own history to rest at `u0`.
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64;
     /// One sample of the stage's own history; the first one sets it to rest. An input that is not finite counts as the
     /// last finite one; `None` if there was none yet.
     fn step(&self, env: &Env<f64>, u: f64) -> Option<f64>;
+}
+
+/// Refuses inputs, the first of which is the one with the number `from`.
+fn finite(from: usize, inputs: &[f64]) -> Result<(), NotFinite> {
+    not_finite(inputs).map_or(Ok(()), |k| Err(NotFinite(from + k)))
 }
 
 /// A stage and its own history.
@@ -46,14 +61,17 @@ where
     S: Stage<f64> + Send + Sync,
     S::State: Send,
 {
-    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Vec<f64> {
-        let Some((first, rest)) = u.split_first() else { return Vec::new() };
+    fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite> {
+        let Some((first, rest)) = u.split_first() else { return Ok(Vec::new()) };
+        finite(0, &u[..1])?;
         let mut state = Box::new(self.stage.state());
         // Written once: memory that is first zeroed and then filled takes longer than a light model.
         let mut y = Vec::with_capacity(u.len());
         y.push(self.stage.reset(&mut state, &env.at(0), *first));
         let (mut surroundings, mut outputs) = ([env.at(0); BLOCK], [0.0; BLOCK]);
         for inputs in rest.chunks(BLOCK) {
+            // Here, where they are at hand for the model: a look at all of them before would fetch each twice.
+            finite(y.len(), inputs)?;
             if !env.constant() {
                 for (slot, k) in surroundings.iter_mut().zip(y.len()..y.len() + inputs.len()) {
                     *slot = env.at(k);
@@ -62,14 +80,15 @@ where
             self.stage.block(&mut state, &surroundings, inputs, &mut outputs);
             y.extend_from_slice(&outputs[..inputs.len()]);
         }
-        y
+        Ok(y)
     }
 
-    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Vec<f64> {
+    fn follow(&self, env: &Surroundings<'_>, u: &[f64], lead: usize) -> Result<Vec<f64>, NotFinite> {
         if lead == 0 {
             return self.simulate(env, u);
         }
-        let (Some(first), Some(last)) = (u.first(), u.len().checked_sub(1)) else { return Vec::new() };
+        let (Some(first), Some(last)) = (u.first(), u.len().checked_sub(1)) else { return Ok(Vec::new()) };
+        finite(0, u)?;
         let mut state = Box::new(self.stage.state());
         self.stage.reset(&mut state, &env.at(0), *first);
         let mut ahead = |k: usize| {
@@ -79,7 +98,7 @@ where
         for k in 1..lead {
             ahead(k);
         }
-        (0..u.len()).map(|k| ahead(k + lead)).collect()
+        Ok((0..u.len()).map(|k| ahead(k + lead)).collect())
     }
 
     fn reset(&self, env: &Env<f64>, u0: f64) -> f64 {

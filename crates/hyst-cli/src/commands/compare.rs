@@ -14,7 +14,7 @@ use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report};
 use crate::progress::Progress;
-use crate::report::next::{files, quoted};
+use crate::report::next::{files, further, quoted};
 use crate::{input, text};
 
 /// What is said about a comparison.
@@ -141,8 +141,7 @@ impl Summary {
 
 /// The fit and the diagnosis of one of the models, as it was compared.
 fn next(args: &CompareArgs, train: &Record, test: Option<&Record>, best: &Compared) -> Vec<String> {
-    let words = |words: Vec<String>| words.iter().map(|word| format!(" {}", quoted(word))).collect::<String>();
-    let (files, reading) = (files(train), words(input::reading(&args.map, &args.zero)));
+    let (files, reading) = (files(train), further(&input::reading(&args.map, &args.zero)));
     let mut fit = Vec::new();
     for (option, value, usual) in [("--seed", args.seed, 1), ("--trials", args.trials as u64, 1)] {
         if value != usual {
@@ -153,7 +152,7 @@ fn next(args: &CompareArgs, train: &Record, test: Option<&Record>, best: &Compar
         fit.extend(["--evaluations".to_owned(), evaluations.to_string()]);
     }
     let test = test.map_or_else(String::new, |test| format!(" --test {}", quoted(&test.name())));
-    let (kind, fit) = (best.kind, words(fit));
+    let (kind, fit) = (best.kind, further(&fit));
     vec![
         format!("hystctl fit {files}{reading} --model {kind}{fit} -o model.json"),
         format!("hystctl diagnose {files}{test}{reading} --model model.json -o extended.json --report report.html"),

@@ -23,7 +23,7 @@ use crate::cli::{FitArgs, FitFrom};
 use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
 use crate::progress::Progress;
-use crate::report::next::{files, quoted};
+use crate::report::next::{files, further, quoted};
 use crate::{input, text};
 
 /// What is said about a fit.
@@ -160,8 +160,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         input_unit: model.input.unit.clone(),
         seen: seen(&record, &model),
         next: args.output.file().map(|path| {
-            let reading: String =
-                input::reading(&args.map, &args.zero).iter().map(|word| format!(" {}", quoted(word))).collect();
+            let reading = further(&input::reading(&args.map, &args.zero));
             format!("hystctl diagnose {}{reading} --model {}", files(&record), quoted(&path.display().to_string()))
         }),
     };

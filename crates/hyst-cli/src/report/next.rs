@@ -57,7 +57,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
             let files = files(c.train);
             let test = c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())));
-            let reading: String = c.reading.iter().map(|word| format!(" {}", quoted(word))).collect();
+            let reading = further(&c.reading);
             advise(
                 "Most of what is left is the base's own misfit. A finer base, and its diagnosis:",
                 &[
@@ -122,6 +122,11 @@ pub(crate) fn quoted(word: &str) -> String {
     if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
+/// Further words of the command line, each behind a space.
+pub(crate) fn further(words: &[String]) -> String {
+    words.iter().map(|word| format!(" {}", quoted(word))).collect()
+}
+
 /// Range and rate of the record's drive.
 fn limits(c: &Contents<'_>) -> String {
     let rate = 1.0 / c.train.sample_period();
@@ -149,5 +154,7 @@ mod tests {
         assert_eq!(quoted("train.csv"), "train.csv");
         assert_eq!(quoted("my record;rm.csv"), "'my record;rm.csv'");
         assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(further(&["--map".into(), "u (V)=voltage_v".into()]), " --map 'u (V)=voltage_v'");
+        assert_eq!(further(&[]), "");
     }
 }

@@ -111,7 +111,8 @@ impl<T: Real, const N: usize> Pi<T, N> {
     }
 
     /// The output of plays that are pushed by `left` and pulled by `right`, and of the play of radius 0, which is at `g`.
-    #[inline]
+    // A call for each sample would cost as much as some plays.
+    #[inline(always)]
     pub(super) fn between(&self, plays: &mut [T; N], left: T, right: T, g: T) -> T {
         let mut y = self.gain * g;
         let plays = plays.iter_mut().zip(&self.thresholds).zip(&self.weights);

@@ -156,6 +156,9 @@ fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At
         let free: Vec<usize> = (0..n).filter(|i| at[*i] == At::Free).collect();
         let minimum = minimum(h, g, &z, &free)?;
         free.iter().zip(&minimum).for_each(|(i, m)| z[*i] = *m);
+        if !z.iter().all(|x| x.is_finite()) {
+            return None;
+        }
         let pull = g - h * &z;
         let belongs = |i: usize| match at[i] {
             At::Free if z[i] < bounds[i].lower => At::Lower,
