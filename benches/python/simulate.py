@@ -13,7 +13,7 @@ import numpy as np
 
 ROWS, TURNS, MOST = 1_000_000, 60, 1.2
 ROOT = Path(__file__).parents[2]
-RUST = ["cargo", "run", "--quiet", "--release", "--package", "hyst-benches", "--example", "simulate_pi"]
+EXAMPLE = ["--quiet", "--release", "--package", "hyst-benches", "--example", "simulate_pi"]
 
 
 def main():
@@ -21,7 +21,8 @@ def main():
     u = 60.0 * (1.0 - np.cos(0.01 * k)) * (0.5 + 0.5 * np.sin(0.0013 * k))
     pi = hyst.Pi(gain=0.1, thresholds=3.5 * np.arange(1, 17), weights=np.full(16, 0.01))
     rust, python = [], []
-    with subprocess.Popen(RUST, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    subprocess.run(["cargo", "build", *EXAMPLE], cwd=ROOT, check=True)
+    with subprocess.Popen(["cargo", "run", *EXAMPLE], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         # Turn by turn, so that both see the machine as it is.
         for _ in range(TURNS):
             print(file=process.stdin, flush=True)

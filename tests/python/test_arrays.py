@@ -62,6 +62,18 @@ def test_what_is_no_signal_is_refused(u, error, message):
         PI.compensate(u)
 
 
+@pytest.mark.parametrize("row", [0, 1, 512, 513, 1024, 1199])
+@pytest.mark.parametrize("number", [np.nan, -np.inf])
+def test_a_number_that_is_not_finite_is_named_wherever_it_stands(row, number):
+    u = np.linspace(0.0, 50.0, 1200)
+    u[row] = number
+    # The last one of the three looks ahead.
+    ahead = hyst.Resonance(hz=50.0, damping=0.5, period=1e-3)
+    for run, name in ((PI.simulate, "u"), (PI.compensate, "y_ref"), (ahead.compensate, "y_ref")):
+        with pytest.raises(ValueError, match=rf"^{name}\[{row}\] is (?i:{number}); signals must be finite"):
+            run(u)
+
+
 def test_surroundings():
     t = np.linspace(20.0, 30.0, len(U))
     assert np.array_equal(WARM.simulate(U, temperature=20.0), U)

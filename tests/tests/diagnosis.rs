@@ -115,14 +115,16 @@ fn parameters_are_those_of_the_plant() {
 
 /// Whatever the number of threads, the same bits.
 #[test]
-fn one_thread_and_two_give_the_same_bits() {
+fn one_thread_two_and_three_give_the_same_bits() {
     let (_, train, test) = records(750, &["resonance"]);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (_, d) = pool.install(|| diagnosed(&train, &test));
         (d.extended.to_json(), serde_json::to_string(&d.findings).unwrap())
     };
-    assert_eq!(run(1), run(2));
+    let alone = run(1);
+    assert_eq!(alone, run(2));
+    assert_eq!(alone, run(3));
 }
 
 /// The figures of the findings are those of `simulate`, and a model file says all that there is to say.

@@ -57,7 +57,8 @@ pub fn write_beside_older(
 }
 
 /// Gives the regular file `target` a second name, `target.~1~` or the next free number, under which it stays when `target` is
-/// replaced. Where the file system knows no second names, the file is renamed.
+/// replaced. Where the file system knows no second names, the file is renamed; what fails between taking the new name and that may leave
+/// an empty file there.
 ///
 /// # Errors
 /// When the folder refuses.
@@ -71,6 +72,7 @@ pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
             Ok(()) => return Ok(name),
             // Somebody's, perhaps of this very moment.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            // Perhaps there are no second names here.
             Err(_) => match File::options().write(true).create_new(true).open(&name) {
                 // The name is taken by an empty file first: of two programs only one can make it.
                 Ok(_) => {

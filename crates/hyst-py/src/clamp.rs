@@ -64,6 +64,7 @@ impl Clamp {
         if !found.iter().any(at_end) {
             return None;
         }
+        // The ends and what an inverse answers between them are finite.
         let rest = |u: f64| self.model.simulate(env, &[u]).ok()?.first().copied();
         let fine = (rest(high)? - rest(low)?).abs() * (ROUNDING + 10.0 * tolerance / (high - low));
         let reached = self.model.simulate(env, found).ok()?;

@@ -18,6 +18,9 @@ use nalgebra::DMatrix;
 
 use crate::lsq::Bounds;
 
+/// Columns that run through an operator or a filter side by side: each waits for its own last sample only.
+pub(crate) const BESIDE: usize = 4;
+
 /// A family of operators, linear in their weights.
 ///
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
@@ -98,5 +101,9 @@ mod tests {
         agrees(&screening, &samples, &Drag::NONE);
         agrees(&screening, &samples, &viscous);
         agrees(&PreisachBasis::for_samples(&samples, 8), &samples, &Drag::NONE);
+        // Driven to both sides there is no virgin strip.
+        let input: Vec<f64> = samples.input.iter().map(|u| u - 60.0).collect();
+        let both = Samples { input, ..samples };
+        agrees(&PreisachBasis::for_samples(&both, 9), &both, &Drag::NONE);
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use hyst_core::play;
 use nalgebra::DMatrix;
 
-use super::{Basis, Drag};
+use super::{BESIDE, Basis, Drag};
 use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
@@ -143,17 +143,17 @@ fn one_play(drive: &[f64], segments: &[Range<usize>], r: f64, drag: &Drag) -> Ve
     column
 }
 
-/// Plays that one pass over the drive makes: each waits for its own last sample only.
-const BESIDE: usize = 4;
-
 /// Play operators with drag over a drive, virgin at each segment's start.
 pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], thresholds: &[f64], drag: &Drag) -> Vec<Vec<f64>> {
     let mut columns = vec![vec![0.0; drive.len()]; thresholds.len()];
     for (columns, thresholds) in columns.chunks_mut(BESIDE).zip(thresholds.chunks(BESIDE)) {
-        if let ([a, b, c, d], [p, q, r, s]) = (&mut *columns, thresholds) {
-            beside([a, b, c, d], drive, segments, [*p, *q, *r, *s], drag);
-        } else {
-            columns.iter_mut().zip(thresholds).for_each(|(c, r)| beside([c], drive, segments, [*r], drag));
+        match (columns, thresholds) {
+            ([a, b, c, d], [p, q, r, s]) => beside([a, b, c, d], drive, segments, [*p, *q, *r, *s], drag),
+            ([a, b, c], [p, q, r]) => beside([a, b, c], drive, segments, [*p, *q, *r], drag),
+            ([a, b], [p, q]) => beside([a, b], drive, segments, [*p, *q], drag),
+            (columns, thresholds) => {
+                columns.iter_mut().zip(thresholds).for_each(|(c, r)| beside([c], drive, segments, [*r], drag));
+            }
         }
     }
     columns
@@ -191,6 +191,32 @@ fn follow<const N: usize>(
             p = if k == 0 { to } else { std::array::from_fn(|j| follows(p[j], to[j])) };
             for (out, p) in out.iter_mut().zip(p) {
                 out[k] = p;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plays_side_by_side_are_each_as_alone() {
+        let drive: Vec<f64> =
+            (0..700).map(|k| 5.0 * (0.01 * f64::from(k)).sin() + (0.3 * f64::from(k)).sin()).collect();
+        let segments = [0..1, 1..300, 300..700];
+        let thresholds = [0.2, 0.5, 1.0, 1.7, 2.6, 3.0, 4.1];
+        for count in 0..=thresholds.len() {
+            let columns = plays(&drive, &segments, &thresholds[..count], &Drag::NONE);
+            assert_eq!(columns.len(), count);
+            for (column, r) in columns.iter().zip(thresholds) {
+                for segment in segments.clone() {
+                    let mut p = 0.0;
+                    for k in segment {
+                        p = play(p, drive[k], r);
+                        assert_eq!(column[k], p, "row {k}, threshold {r} of {count}");
+                    }
+                }
             }
         }
     }

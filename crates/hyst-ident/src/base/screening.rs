@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::pi::plays;
-use super::{Basis, Drag, FixedBasis, PiBasis};
+use super::{BESIDE, Basis, Drag, FixedBasis, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
 
@@ -102,7 +102,7 @@ impl Basis for ScreeningBasis {
             v
         };
         let thresholds = &self.linear.thresholds;
-        let pieces: Vec<(&[f64], &[f64])> = thresholds.chunks(4).zip(straight[1..].chunks(4)).collect();
+        let pieces: Vec<(&[f64], &[f64])> = thresholds.chunks(BESIDE).zip(straight[1..].chunks(BESIDE)).collect();
         let parts: Vec<Vec<f64>> = pieces.into_par_iter().map(part).collect();
         let mut v = vec![0.0; drive.len()];
         add(&mut v, drive, straight[0], bend(0.0));

@@ -90,7 +90,9 @@ impl MirrorProblem<'_> {
             let raised = self.output(weights, fade)?;
             Ok(used.iter().map(|k| raised[*k] - classical[*k]).collect())
         };
-        let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(column).collect::<Result<_, _>>()?;
+        // Of several errors the first one, whichever thread was quicker.
+        let columns: Vec<Result<Vec<f64>, hyst_core::Error>> = (0..n).into_par_iter().map(column).collect();
+        let columns: Vec<Vec<f64>> = columns.into_iter().collect::<Result<_, _>>()?;
         let grams = self.grams(&columns, &used, &classical, zeros);
         let total = Gram::sum(n + zeros + 1, grams.iter());
         let level = (0..n).map(|c| total.matrix[(c, c)]).sum::<f64>() / n as f64;

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::Samples;
+use crate::base::BESIDE;
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::nested::folds_interleaved;
 
@@ -53,9 +54,6 @@ pub(crate) struct Bank<'a> {
 
 /// Outputs of elements at these places over all rows of a record.
 pub(crate) type Elements<'a> = dyn Fn(&[f64]) -> Vec<Vec<f64>> + Sync + 'a;
-
-/// Elements whose outputs are computed at a time.
-const AT_A_TIME: usize = 4;
 
 /// Elements at their places.
 #[derive(Clone)]
@@ -322,7 +320,7 @@ impl<'a> Bank<'a> {
 fn over(rows: &[usize], elements: &Elements<'_>, places: &[f64]) -> Vec<Vec<f64>> {
     let thinned = |column: Vec<f64>| rows.iter().map(|k| column[*k]).collect();
     let some = |places: &[f64]| elements(places).into_iter().map(thinned).collect::<Vec<Vec<f64>>>();
-    let all: Vec<_> = places.par_chunks(AT_A_TIME).map(some).collect();
+    let all: Vec<_> = places.par_chunks(BESIDE).map(some).collect();
     all.into_iter().flatten().collect()
 }
 

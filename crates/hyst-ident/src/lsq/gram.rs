@@ -1,4 +1,4 @@
-//! Normal equations per block.
+//! Normal equations: of all rows while a fit goes on, per block once it has converged.
 //!
 //! A block is a contiguous piece of one segment. With the matrices `XᵀX` of every block at hand, a
 //! fit to any union of blocks and its error on the others cost no further pass over the record: that
@@ -156,5 +156,26 @@ impl Bordered {
             (None, None) => self.own[(r - (n - 1), c - (n - 1))],
         });
         Gram { matrix, rows: gram.rows }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn further_columns_stand_between_the_old_ones_and_the_target() {
+        let of = |columns: &[usize], rows: Range<usize>| {
+            let at = |k: usize, c: usize| ((c + 2) as f64 * 0.3 * (k + rows.start) as f64).cos();
+            DMatrix::from_fn(rows.len(), columns.len(), |k, c| at(k, columns[c]))
+        };
+        let (old, further, all) = ([0, 1, 4], [2, 3], [0, 1, 2, 3, 4]);
+        let mut bordered = Bordered::zeros(3, 2);
+        let blocks = [0..7, 7..20];
+        blocks.iter().for_each(|rows| bordered.add(&of(&old, rows.clone()), &of(&further, rows.clone())));
+        let old: Vec<DMatrix<f64>> = blocks.iter().map(|rows| of(&old, rows.clone())).collect();
+        let whole = bordered.around(&Gram::of_all(&old, 3));
+        assert_eq!(whole.rows, 20);
+        assert!((whole.matrix - Gram::of(&of(&all, 0..20)).matrix).amax() < 1e-12);
     }
 }

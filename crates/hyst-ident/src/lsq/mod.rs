@@ -1,4 +1,4 @@
-//! Least squares by normal equations that are kept per block of the record, and the nearest values in an order.
+//! Least squares by normal equations, of the whole record and of each of its blocks, and the nearest values in an order.
 
 mod gram;
 mod ordered;

@@ -16,6 +16,11 @@ pub(crate) struct Bounds {
 impl Bounds {
     pub(crate) const FREE: Self = Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
 
+    /// Whether there is nothing to choose.
+    fn is_fixed(self) -> bool {
+        self.lower == self.upper
+    }
+
     pub(crate) fn above(lower: f64) -> Self {
         Self { lower, ..Self::FREE }
     }
@@ -27,7 +32,7 @@ const RIDGE: f64 = 1e-10;
 
 /// Exchanges of a block pivoting after which an interior point is tried.
 const EXCHANGES: usize = 60;
-/// Of these, how many may leave more in their wrong place than before.
+/// How many in a row may leave no fewer in their wrong place than there have been before.
 const CHANCES: usize = 5;
 
 /// Minimises `|y − X z|² + zᵀ P z` within bounds. `penalty` is P's upper triangle or `None`.
@@ -70,24 +75,19 @@ pub(crate) fn solve_near(
         .map(|(b, s)| Bounds { lower: b.lower * s / size, upper: b.upper * s / size })
         .collect();
     // From nothing, from where no bound binds.
-    let at: Vec<At> = match near {
-        None => vec![At::Free; n],
-        Some(near) => (0..n)
-            .map(|i| {
-                let room = 1e-12 * near[i].abs();
-                match bounds[i] {
-                    b if near[i] - b.lower <= room => At::Lower,
-                    b if b.upper - near[i] <= room => At::Upper,
-                    _ => At::Free,
-                }
-            })
-            .collect(),
+    let place = |i: usize| match (bounds[i], near.map(|near| (near[i], 1e-12 * near[i].abs()))) {
+        (b, _) if b.is_fixed() => At::Lower,
+        (b, Some((z, room))) if z - b.lower <= room => At::Lower,
+        (b, Some((z, room))) if b.upper - z <= room => At::Upper,
+        _ => At::Free,
     };
+    let at = (0..n).map(place).collect();
     let z = match pivoted(&h, &g, &scaled, at) {
         Some(z) => z,
         None => bounded(&h, &g, &scaled)?,
     };
-    Some(DVector::from_fn(n, |i, _| z[i] / scale[i] * size))
+    // Scaling back may miss a bound by a last digit.
+    Some(DVector::from_fn(n, |i, _| (z[i] / scale[i] * size).max(bounds[i].lower).min(bounds[i].upper)))
 }
 
 fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVector<f64>> {
@@ -161,6 +161,7 @@ fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At
         }
         let pull = g - h * &z;
         let belongs = |i: usize| match at[i] {
+            stays if bounds[i].is_fixed() => stays,
             At::Free if z[i] < bounds[i].lower => At::Lower,
             At::Free if z[i] > bounds[i].upper => At::Upper,
             At::Lower if pull[i] > tolerance => At::Free,
@@ -277,6 +278,21 @@ mod tests {
         for near in [exact.clone(), beside, DVector::zeros(n), DVector::from_element(n, 0.4), outside] {
             let found = solve_near(&gram, None, &bounds, Some(&near)).unwrap();
             assert!((&found - &exact).amax() < 1e-8, "{}", (&found - &exact).amax());
+        }
+    }
+
+    /// Whichever way what is fixed is pulled, and wherever the search begins.
+    #[test]
+    fn what_is_fixed_stays() {
+        let column = |c: usize, k: usize| ((c + 1) as f64 * 0.7 * k as f64).sin() + 0.2;
+        for fixed in [-3.0, 0.4, 3.0] {
+            let y = |k: usize| 0.5 * column(0, k) + column(1, k) + 0.8 * column(2, k);
+            let x = DMatrix::from_fn(50, 4, |k, c| if c < 3 { column(c, k) } else { y(k) });
+            let bounds = [Bounds::FREE, Bounds { lower: fixed, upper: fixed }, Bounds::above(0.0)];
+            let cold = solve(&Gram::of(&x), None, &bounds).unwrap();
+            assert_eq!(cold[1], fixed);
+            let warm = solve_near(&Gram::of(&x), None, &bounds, Some(&cold)).unwrap();
+            assert!((cold - warm).amax() < 1e-12);
         }
     }
 

@@ -214,9 +214,9 @@ impl Effects {
         less
     }
 
-    /// Whether any stage acts before the hysteresis.
-    pub(crate) fn on_input_side(&self) -> bool {
-        self.delay.is_some() || self.lag.is_some()
+    /// The stages that act before the hysteresis, in their order.
+    pub(crate) fn input_side(&self) -> (Option<DelayParams>, Option<LagParams>) {
+        (self.delay, self.lag)
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.

@@ -52,7 +52,7 @@ fn range_of(samples: &Samples) -> f64 {
 const OUT_OF_REACH: f64 = 1.0;
 
 /// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much: not at all where it leaves no trace.
-/// `motion` is the lowest and the highest motion that the hypothesis gives \[y\].
+/// `motion` is the lowest and the highest motion that the hypothesis gives in the rows that count \[y\].
 pub(super) fn stepped(
     h: &Hypothesis,
     index: usize,

@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::{Hypothesis, Problem, SignalPath};
 use crate::Samples;
-use crate::base::{Basis, Drag};
+use crate::base::{BESIDE, Basis, Drag};
 
 /// Numbers that are kept at most: 64 MB.
 const KEPT: usize = 8_000_000;
-/// Numbers that are made in one piece at most: 16 MB.
-const PIECE: usize = 2_000_000;
-/// Columns that are worth a pass over the drive.
-const LEAST: usize = 4;
+/// Numbers that are made in one pass over a drive at most, unless [`BESIDE`] columns are more: 16 MB.
+const PASS: usize = 2_000_000;
+/// Rows of many columns that stay in the nearest memory while they are added.
+const ROWS: usize = 2048;
 
 /// Whether the columns of a base of this width are kept for a record.
 pub(super) fn may_be_kept(samples: &Samples, width: usize) -> bool {
@@ -23,7 +23,7 @@ pub(super) fn may_be_kept(samples: &Samples, width: usize) -> bool {
 
 /// Numbers of the columns that are made in one pass each, in order.
 pub(super) fn passes(basis: &dyn Basis, rows: usize) -> Vec<Range<usize>> {
-    let (width, together) = (basis.len(), basis.together().min(PIECE / rows.max(1)).max(LEAST));
+    let (width, together) = (basis.len(), basis.together().min(PASS / rows.max(1)).max(BESIDE));
     (0..width).step_by(together).map(|first| first..(first + together).min(width)).collect()
 }
 
@@ -37,7 +37,7 @@ impl BaseColumns<'_> {
     /// What `f` makes of all columns, some of them at a time, in order.
     pub(super) fn map<T: Send>(&self, f: impl Fn(Vec<Vec<f64>>) -> T + Sync) -> Vec<T> {
         match self {
-            Self::Kept(columns) => columns.par_chunks(2 * LEAST).map(|columns| f(columns.to_vec())).collect(),
+            Self::Kept(columns) => columns.par_chunks(2 * BESIDE).map(|columns| f(columns.to_vec())).collect(),
             Self::Made { problem, drive, drag } => {
                 let Problem { samples, basis, .. } = problem;
                 let passes = passes(*basis, samples.len());
@@ -51,9 +51,8 @@ impl BaseColumns<'_> {
         match self {
             Self::Kept(columns) => {
                 let mut v = vec![0.0; rows];
-                // In pieces that stay in the nearest memory.
-                v.par_chunks_mut(2048).enumerate().for_each(|(i, v)| {
-                    let own = 2048 * i..2048 * i + v.len();
+                v.par_chunks_mut(ROWS).enumerate().for_each(|(i, v)| {
+                    let own = ROWS * i..ROWS * i + v.len();
                     for (w, column) in weights.iter().zip(columns.iter()) {
                         v.iter_mut().zip(&column[own.clone()]).for_each(|(v, x)| *v += w * x);
                     }
@@ -68,9 +67,12 @@ impl BaseColumns<'_> {
                         let columns = basis.columns(of.clone(), drive, &samples.segments, drag);
                         Self::Kept(Cow::Owned(columns)).combined(&weights[of], rows)
                     };
-                    let parts: Vec<Vec<f64>> = passes.into_par_iter().map(part).collect();
                     let mut v = vec![0.0; rows];
-                    parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
+                    // Some at a time, whatever the number of threads: each is as long as the record.
+                    for some in passes.chunks(BESIDE) {
+                        let parts: Vec<Vec<f64>> = some.par_iter().cloned().map(part).collect();
+                        parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
+                    }
                     v
                 })
             }

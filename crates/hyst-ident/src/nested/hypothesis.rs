@@ -91,12 +91,12 @@ impl Hypothesis {
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
     pub(super) fn changes_the_base(&self) -> bool {
-        self.effects.on_input_side() || self.drag.is_some()
+        self.effects.input_side() != (None, None) || self.drag.is_some()
     }
 
     /// Whether the hysteresis is driven, and follows, as in another set.
     pub(super) fn drives_alike(&self, other: &Self) -> bool {
-        self.drag == other.drag && self.effects.delay == other.effects.delay && self.effects.lag == other.effects.lag
+        self.drag == other.drag && self.effects.input_side() == other.effects.input_side()
     }
 
     /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.

@@ -6,6 +6,7 @@ use hyst_core::{
 
 use super::Hypothesis;
 use crate::Samples;
+use crate::base::BESIDE;
 use crate::model::capacity::{CREEP, DELAY};
 
 /// What leads to the hysteresis and what follows it, for one set of causes.
@@ -31,6 +32,7 @@ impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let cx = Sampling { period: samples.period };
         let effects = &h.effects;
+        let (delay, lag) = effects.input_side();
         let factor = match (&effects.temperature, &samples.temperature) {
             (Some(p), Some(t)) => Some(t.iter().map(|t| 1.0 + p.per_kelvin * (t - p.reference_degc)).collect()),
             _ => None,
@@ -41,8 +43,8 @@ impl<'a> SignalPath<'a> {
         });
         Ok(Self {
             samples,
-            delay: effects.delay.as_ref().map(|p| p.build(&cx)).transpose()?,
-            lag: effects.lag.as_ref().map(|p| p.build(&cx)).transpose()?,
+            delay: delay.map(|p| p.build(&cx)).transpose()?,
+            lag: lag.map(|p| p.build(&cx)).transpose()?,
             factor,
             creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
             resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
@@ -69,12 +71,12 @@ impl<'a> SignalPath<'a> {
 
     /// The same for several columns.
     pub(super) fn output_side_of(&self, columns: &mut [Vec<f64>]) {
-        for columns in columns.chunks_mut(4) {
-            // Beside each other: each waits for its own last sample only.
-            if let [a, b, c, d] = columns {
-                self.carry([a, b, c, d]);
-            } else {
-                columns.iter_mut().for_each(|v| self.carry([v]));
+        for columns in columns.chunks_mut(BESIDE) {
+            match columns {
+                [a, b, c, d] => self.carry([a, b, c, d]),
+                [a, b, c] => self.carry([a, b, c]),
+                [a, b] => self.carry([a, b]),
+                columns => columns.iter_mut().for_each(|v| self.carry([v])),
             }
         }
     }
@@ -138,6 +140,48 @@ impl<'a> SignalPath<'a> {
                 for (state, column) in states.iter_mut().zip(&mut columns) {
                     column[k] = stage.step(state, &env, column[k]);
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Effects;
+    use hyst_core::{CreepParams, ResonanceParams, TemperatureParams};
+
+    #[test]
+    fn columns_side_by_side_are_each_as_alone() {
+        let rows = 500;
+        let signal = |c: usize| (0..rows).map(|k| (0.05 * (c + 1) as f64 * k as f64).sin()).collect::<Vec<f64>>();
+        let samples = Samples {
+            period: 1e-3,
+            time: (0..rows).map(|k| k as f64 * 1e-3).collect(),
+            input: signal(0),
+            output: signal(1),
+            temperature: Some((0..rows).map(|k| 23.0 + 0.01 * k as f64).collect()),
+            load: None,
+            segments: vec![0..1, 1..200, 200..rows],
+            file_of_segment: vec![0, 0, 0],
+            settling: vec![false; rows],
+        };
+        let mode = |hz| ResonanceParams { hz, damping: 0.05, gain: 0.8 };
+        let h = Hypothesis::of(Effects {
+            temperature: Some(TemperatureParams { per_kelvin: 0.01, reference_degc: 23.0 }),
+            creep: Some(CreepParams { seconds: vec![0.02, 0.3], shares: vec![0.05, 0.02] }),
+            resonances: vec![mode(60.0), mode(140.0)],
+            ..Effects::default()
+        });
+        let path = SignalPath::new(&samples, &h).unwrap();
+        for count in 1..=9 {
+            let mut together: Vec<Vec<f64>> = (0..count).map(signal).collect();
+            path.output_side_of(&mut together);
+            for (c, column) in together.iter().enumerate() {
+                let mut alone = signal(c);
+                path.output_side(&mut alone);
+                assert_eq!(*column, alone, "column {c} of {count}");
+                assert_ne!(alone, signal(c));
             }
         }
     }

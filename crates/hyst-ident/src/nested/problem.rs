@@ -98,15 +98,18 @@ impl<'a> Problem<'a> {
     }
 
     fn unpredictable(&self) -> &[bool] {
-        // The same for all that are compared: what moves the base depends little on the effects.
-        self.unpredictable.get_or_init(|| {
-            let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
-            let folds = folds_interleaved(self.blocks, FOLDS);
-            base.map_or_else(
-                || vec![false; self.blocks.rows.len()],
-                |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), &folds),
-            )
-        })
+        if let Some(known) = self.unpredictable.get() {
+            return known;
+        }
+        // The same for all that are compared: what moves the base depends little on the effects. Found outside of the cell: a thread that
+        // waits for others in here may come by again with another job.
+        let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
+        let folds = folds_interleaved(self.blocks, FOLDS);
+        let found = base.map_or_else(
+            || vec![false; self.blocks.rows.len()],
+            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), &folds),
+        );
+        self.unpredictable.get_or_init(|| found)
     }
 
     /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
@@ -150,16 +153,16 @@ impl<'a> Problem<'a> {
     }
 
     /// Change of the output in the rows that count with every nonlinear parameter, by forward differences.
-    fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
+    pub(super) fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
         let path = SignalPath::new(self.samples, h)?;
         let Point { operator, motion, .. } = self.point_at(h, &path, solution);
         let here = self.thinned(|k| path.stopped(motion[k]).0);
         let reached = range(here.iter().copied());
         let column = |at: usize| -> Result<Vec<f64>, Error> {
-            let Some((moved, step, effect)) = stepped(h, at, self.samples, reached) else { return Ok(Vec::new()) };
-            if step == 0.0 {
+            let Some((moved, step, effect)) = stepped(h, at, self.samples, reached).filter(|(_, step, _)| *step != 0.0)
+            else {
                 return Ok(vec![0.0; here.len()]);
-            }
+            };
             if effect == Effect::Interference {
                 let first = self.layout(h).tone.start;
                 let (sine, cosine) = (solution[first], solution[first + 1]);
@@ -181,7 +184,9 @@ impl<'a> Problem<'a> {
             let there = self.thinned(|k| path.stopped(there.motion[k]).0);
             Ok(there.iter().zip(&here).map(|(a, b)| (a - b) / step).collect())
         };
-        (0..h.nonlinear().len()).into_par_iter().map(column).collect()
+        // Of several errors the first one, whichever thread was quicker.
+        let columns: Vec<Result<Vec<f64>, Error>> = (0..h.nonlinear().len()).into_par_iter().map(column).collect();
+        columns.into_iter().collect()
     }
 
     /// The normal equations of an assembly with the Jacobian's columns before the target.

@@ -32,12 +32,10 @@ impl<'a> Projector<'a> {
         let n = factor.l_dirty().ncols();
         let mut cross = DVector::zeros(n);
         let (mut own, mut with) = (0.0, 0.0);
-        for (b, x) in self.blocks.iter().enumerate() {
-            let rows = self.problem.blocks.used(b, self.problem.samples);
-            let part = DVector::from_iterator(x.nrows(), rows.map(|k| column[k]));
+        for (rows, x) in self.problem.used.iter().zip(&self.blocks) {
+            let part = DVector::from_iterator(x.nrows(), rows.iter().map(|k| column[*k]));
             own += part.norm_squared();
-            let rows = self.problem.blocks.used(b, self.problem.samples);
-            with += rows.map(|k| column[k] * residual[k]).sum::<f64>();
+            with += rows.iter().map(|k| column[*k] * residual[*k]).sum::<f64>();
             cross += x.columns(0, n).tr_mul(&part);
         }
         let left = own - cross.dot(&factor.solve(&cross));

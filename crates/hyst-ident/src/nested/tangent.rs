@@ -68,11 +68,15 @@ impl<'a> Problem<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::PiBasis;
+    use crate::base::{DragParams, PiBasis, ScreeningBasis};
     use crate::lsq::Blocks;
     use crate::model::Effects;
     use crate::nested::Hypothesis;
-    use hyst_core::{AsymmetryParams, CreepParams, LagParams, ResonanceParams, SaturationParams, TemperatureParams};
+    use crate::nested::bounds::stepped;
+    use crate::samples::range;
+    use hyst_core::{
+        AsymmetryParams, CreepParams, DelayParams, LagParams, ResonanceParams, SaturationParams, TemperatureParams,
+    };
 
     /// A drive of growing swing and an output that follows it somehow.
     fn samples() -> Samples {
@@ -91,6 +95,43 @@ mod tests {
             time,
             input,
             output,
+        }
+    }
+
+    /// What a parameter leaves as it is need not be computed anew.
+    #[test]
+    fn the_jacobian_is_how_the_output_changes() {
+        let samples = samples();
+        let effects = Effects {
+            delay: Some(DelayParams { seconds: 0.0023 }),
+            lag: Some(LagParams { seconds: 0.01 }),
+            creep: Some(CreepParams { seconds: vec![0.3, 2.0], shares: vec![0.05, 0.03] }),
+            temperature: Some(TemperatureParams { per_kelvin: 0.01, reference_degc: 23.0 }),
+            resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
+            saturation: Some(SaturationParams { low: 0.3, high: 4.5, knee: 0.05 }),
+            ..Effects::default()
+        };
+        let drag = Some(DragParams { seconds: 2e-3, volt_seconds: 1e-3 });
+        let h = Hypothesis { drag, ..Hypothesis::of(effects) };
+        let basis = ScreeningBasis::for_samples(&samples, true, None);
+        let blocks = Blocks::new(&samples, 20, 1000);
+        let problem = Problem::new(&samples, &basis, &blocks, false);
+        let fit = problem.fit_linear(&h).unwrap().unwrap();
+        let jacobian = problem.jacobian(&h, &fit.solution).unwrap();
+        let mut parameters = 0;
+        h.clone().visit_nonlinear(&mut |_| parameters += 1);
+        assert_eq!(jacobian.len(), parameters);
+        let motion = |h: &Hypothesis| problem.motion(h, &fit.solution).unwrap();
+        let here = motion(&h);
+        for (at, column) in jacobian.iter().enumerate() {
+            let (moved, step, _) = stepped(&h, at, &samples, range(here.iter().copied())).unwrap();
+            let there = motion(&moved);
+            let slopes = problem.thinned(|k| (there[k] - here[k]) / step);
+            let largest = slopes.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            assert!(largest > 0.0, "parameter {at}");
+            for (said, seen) in column.iter().zip(&slopes) {
+                assert!((said - seen).abs() < 1e-4 * largest, "parameter {at}: {said} {seen}");
+            }
         }
     }
 
