@@ -71,7 +71,7 @@ fn wolves(cores: usize) {
 /// A Bouc-Wen fit of 50,000 samples on one thread and on two, turn by turn so that both see the machine as it is. What it does on two
 /// threads is two such fits at once, each on one of its own.
 fn second_core() {
-    const RUNS: usize = 15;
+    const RUNS: usize = 40;
     let record = Task::bouc_wen(50_000).record();
     let options = FitOptions { seed: 1, ..FitOptions::default() };
     let pool = |n: usize| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads");

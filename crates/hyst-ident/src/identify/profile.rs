@@ -25,63 +25,60 @@ impl Interval {
     }
 }
 
-/// Where a sum of squares is no more than `least + rise` along one side of the box (a section of the likelihood); `least` is that at
-/// `place`. A slope at the minimum does not show what this does: an activation that is saturated stays so, however far its sharpness
-/// goes.
-pub(crate) fn interval(squares: impl Fn(f64) -> f64 + Sync, place: f64, (least, rise): (f64, f64)) -> Interval {
-    let end = |side: f64| {
-        let at = |distance: f64| if distance < 0.0 { place + distance.exp() * (side - place) } else { side };
-        // Over logarithms of the distance a parabola is a straight line; 0 where it has risen by `rise`.
-        let height = |distance: f64| {
-            let squares = squares(at(distance));
-            if squares.is_nan() { f64::INFINITY } else { 0.5 * ((squares - least) / rise).max(LOWEST).ln() }
-        };
-        let (mut outside, mut far) = (0.0, height(0.0));
-        if far <= 0.0 {
-            return side;
-        }
-        let (mut inside, mut near) = (NEAREST.ln(), height(NEAREST.ln()));
-        if near > 0.0 {
-            return place;
-        }
-        // Regula falsi; an end that stays counts half as much each time (Illinois), so that none stays for long.
-        let mut stayed = 0.0;
-        for _ in 0..TRIALS {
-            let part = if far.is_finite() { near / (near - far) } else { 0.5 };
-            let between = inside + part * (outside - inside);
-            let here = height(between);
-            if here.abs() <= NEAR || outside - inside <= NEAR {
-                return at(between);
-            }
-            if here < 0.0 {
-                (inside, near) = (between, here);
-                far *= if stayed > 0.0 { 0.5 } else { 1.0 };
-                stayed = 1.0;
-            } else {
-                (outside, far) = (between, here);
-                near *= if stayed < 0.0 { 0.5 } else { 1.0 };
-                stayed = -1.0;
-            }
-        }
-        at(inside)
+/// How far from `place` towards a `side` of the box, 0 or 1, a sum of squares is no more than `least + rise` (a section of the
+/// likelihood); `least` is that at `place`. A slope at the minimum does not show what this does: an activation that is saturated stays
+/// so, however far its sharpness goes.
+pub(crate) fn end(squares: impl Fn(f64) -> f64, place: f64, side: f64, (least, rise): (f64, f64)) -> f64 {
+    let at = |distance: f64| if distance < 0.0 { place + distance.exp() * (side - place) } else { side };
+    // Over logarithms of the distance a parabola is a straight line; 0 where it has risen by `rise`.
+    let height = |distance: f64| {
+        let squares = squares(at(distance));
+        if squares.is_nan() { f64::INFINITY } else { 0.5 * ((squares - least) / rise).max(LOWEST).ln() }
     };
-    let (low, high) = rayon::join(|| end(0.0), || end(1.0));
-    Interval { low, high }
+    let (mut outside, mut far) = (0.0, height(0.0));
+    if far <= 0.0 {
+        return side;
+    }
+    let (mut inside, mut near) = (NEAREST.ln(), height(NEAREST.ln()));
+    if near > 0.0 {
+        return place;
+    }
+    // Regula falsi; an end that stays counts half as much each time (Illinois), so that none stays for long.
+    let mut stayed = 0.0;
+    for _ in 0..TRIALS {
+        let part = if far.is_finite() { near / (near - far) } else { 0.5 };
+        let between = inside + part * (outside - inside);
+        let here = height(between);
+        if here.abs() <= NEAR || outside - inside <= NEAR {
+            return at(between);
+        }
+        if here < 0.0 {
+            (inside, near) = (between, here);
+            far *= if stayed > 0.0 { 0.5 } else { 1.0 };
+            stayed = 1.0;
+        } else {
+            (outside, far) = (between, here);
+            near *= if stayed < 0.0 { 0.5 } else { 1.0 };
+            stayed = -1.0;
+        }
+    }
+    at(inside)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::cell::Cell;
 
     /// The interval of a section that has risen by 1 at the ends, and how often it was looked at.
-    fn of(place: f64, rise: impl Fn(f64) -> f64 + Sync) -> (Interval, usize) {
-        let looks = AtomicUsize::new(0);
+    fn of(place: f64, rise: impl Fn(f64) -> f64) -> (Interval, usize) {
+        let looks = Cell::new(0);
         let squares = |x: f64| {
-            looks.fetch_add(1, Ordering::Relaxed);
+            looks.set(looks.get() + 1);
             7.0 + rise(x)
         };
-        (interval(squares, place, (7.0, 1.0)), looks.into_inner())
+        let [low, high] = [0.0, 1.0].map(|side| end(squares, place, side, (7.0, 1.0)));
+        (Interval { low, high }, looks.get())
     }
 
     #[test]
@@ -119,6 +116,8 @@ mod tests {
 
     #[test]
     fn a_fit_that_leaves_nothing_allows_nothing() {
-        assert_eq!(interval(|x| (x - 0.5).abs(), 0.5, (0.0, 0.0)), Interval { low: 0.5, high: 0.5 });
+        for side in [0.0, 1.0] {
+            assert_eq!(end(|x| (x - 0.5).abs(), 0.5, side, (0.0, 0.0)), 0.5);
+        }
     }
 }

@@ -27,8 +27,9 @@ pub(crate) struct Projection<'a> {
     pub(super) groups: usize,
     /// Rows without a gap that count and have one file, at most [`PIECE`] each, with that file.
     pieces: Vec<(Range<usize>, usize)>,
-    /// Room for trials, so that a trial makes none.
-    spare: Mutex<Vec<Room>>,
+    /// Rooms for trials, so that a trial makes none, each with the thread that it was last used by: what another one has written
+    /// lies in another core's cache.
+    spare: Mutex<Vec<(Option<usize>, Room)>>,
 }
 
 /// Rows whose products are summed up at once: so many of each column stay in the processor's cache.
@@ -82,15 +83,20 @@ impl<'a> Projection<'a> {
         Self { family, samples, linear, bounds, rows, lengths, group, groups, pieces, spare: Mutex::new(Vec::new()) }
     }
 
-    /// Does something in a room for trials.
+    /// Does something in a room for trials, this thread's own.
     fn within<T>(&self, f: impl FnOnce(&mut Room) -> T) -> T {
-        let mut room = self.spare.lock().ok().and_then(|mut s| s.pop()).unwrap_or_else(|| Room {
+        let thread = rayon::current_thread_index();
+        let own = self.spare.lock().ok().and_then(|mut spare| {
+            let place = spare.iter().position(|(last, _)| *last == thread)?;
+            Some(spare.swap_remove(place).1)
+        });
+        let mut room = own.unwrap_or_else(|| Room {
             columns: DMatrix::zeros(self.samples.len(), self.linear.len()),
             gram: Gram::zeros(self.linear.len() + self.groups + 1),
         });
         let result = f(&mut room);
         if let Ok(mut spare) = self.spare.lock() {
-            spare.push(room);
+            spare.push((thread, room));
         }
         result
     }
@@ -150,6 +156,15 @@ impl<'a> Projection<'a> {
             let projected =
                 Projected { linear: z.as_slice()[..m].to_vec(), zeros: z.as_slice()[m..].to_vec(), residual };
             projected.squares().is_finite().then_some(projected)
+        })
+    }
+
+    /// Output over the rows that count with these linear parameters, without the zeros; `None` if there is no model.
+    pub(super) fn output(&self, values: &[f64], linear: &[f64]) -> Option<Vec<f64>> {
+        self.within(|room| {
+            self.family.columns(values, &mut room.columns).ok()?;
+            let row = |k: &usize| linear.iter().enumerate().map(|(j, l)| l * room.columns[(*k, j)]).sum();
+            Some(self.rows.iter().map(row).collect())
         })
     }
 

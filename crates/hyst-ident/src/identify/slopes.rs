@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::convex;
 use super::family::{Beside, Family};
-use super::profile::interval;
+use super::profile::{Interval, end};
 use super::projection::{Projected, Projection};
 use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
 use crate::Samples;
@@ -147,7 +147,7 @@ impl Optimum<'_> {
             noise: &noise,
             unknowns: freedom,
             fitted,
-            at_least: free.par_iter().map(|u| self.section(&unknowns[*u], rise)).collect(),
+            at_least: self.sections(&free.iter().map(|u| &unknowns[*u]).collect::<Vec<_>>(), rise),
             held: (0..all.len()).filter(told).filter(at_bound).map(|i| all[i].0.clone()).collect(),
         });
         let ended = unknowns.iter().filter(|u| u.held).filter_map(|u| self.ended(u)).collect();
@@ -169,7 +169,8 @@ impl Optimum<'_> {
         let unknown = |place: &Place| match *place {
             Place::Searched(d) => {
                 let scale = self.variable(d).map_or(1.0, largest);
-                let slope = self.quotient(scale, |step| self.predicted(&self.moved(d, step)));
+                let slope =
+                    self.quotient(scale, |step| self.projection.output(&self.moved(d, step), &self.projected.linear));
                 let alone = (noise.variance(0) / product(&slope, &slope).max(f64::MIN_POSITIVE)).sqrt();
                 // One that leaves no trace may end anywhere: nothing has pushed it there.
                 Unknown { place: *place, scale, slope, held: alone <= VAGUE && self.side(d).is_some() }
@@ -187,7 +188,7 @@ impl Optimum<'_> {
                 Unknown { place: *place, scale, slope, held: false }
             }
         };
-        places.par_iter().map(unknown).collect()
+        places.par_iter().with_max_len(1).map(unknown).collect()
     }
 
     /// Which linear parameters are held at their bounds.
@@ -225,18 +226,33 @@ impl Optimum<'_> {
         Some(Ended { name: v.name.clone(), bound, beyond })
     }
 
-    /// The least standard error of an unknown, per scale, that a section of the likelihood leaves it, the linear parameters solved for
-    /// anew and the other searched ones held; 0 if it is no searched one.
-    fn section(&self, unknown: &Unknown, rise: f64) -> f64 {
-        let (Place::Searched(d), Some(space)) = (unknown.place, self.space) else { return 0.0 };
-        let Some(v) = self.variable(d) else { return 0.0 };
-        let point = space.point(self.values);
-        let squares = |place: f64| {
-            let mut to = point.clone();
-            to[d] = place;
-            self.projection.squares(&space.values(&to))
+    /// The least standard errors of unknowns, per scale, that sections of the likelihood leave them, the linear parameters solved for
+    /// anew and the other searched ones held; 0 of one that was not searched.
+    fn sections(&self, unknowns: &[&Unknown], rise: f64) -> Vec<f64> {
+        let Some(space) = self.space else { return vec![0.0; unknowns.len()] };
+        let (point, least) = (space.point(self.values), self.projected.squares());
+        let searched = |u: &&Unknown| if let Place::Searched(d) = u.place { Some(d) } else { None };
+        let of: Vec<usize> = unknowns.iter().filter_map(searched).collect();
+        // One by one from one queue: nobody knows which takes how long.
+        let ends: Vec<f64> = (0..2 * of.len())
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|i| {
+                let d = of[i / 2];
+                let squares = |place: f64| {
+                    let mut to = point.clone();
+                    to[d] = place;
+                    self.projection.squares(&space.values(&to))
+                };
+                end(squares, point[d], (i % 2) as f64, (least, rise))
+            })
+            .collect();
+        let mut intervals = ends.chunks(2).map(|ends| Interval { low: ends[0], high: ends[1] });
+        let error = |u: &&Unknown| {
+            let v = searched(u).and_then(|d| self.variable(d))?;
+            Some(intervals.next()?.std_error() * extent(v) / u.scale)
         };
-        interval(squares, point[d], (self.projected.squares(), rise)).std_error() * extent(v) / unknown.scale
+        unknowns.iter().map(error).map(|e| e.unwrap_or(0.0)).collect()
     }
 
     /// Change of each parameter of the file with an unknown, per scale.
@@ -255,15 +271,7 @@ impl Optimum<'_> {
         side(step).iter().zip(side(-step)).map(|(a, b)| 0.5 * (a - b) / FINE).collect()
     }
 
-    /// Output over the rows that count, or `None` if there is no model.
-    fn predicted(&self, values: &[f64]) -> Option<Vec<f64>> {
-        let columns = self.projection.columns(values)?;
-        let linear = &self.projected.linear;
-        let row = |k: &usize| linear.iter().enumerate().map(|(j, l)| l * columns[(*k, j)]).sum();
-        Some(self.projection.rows.iter().map(row).collect())
-    }
-
-    /// The same of any model.
+    /// Output over the rows that count of any model, or `None` if there is none.
     fn simulated(&self, base: &Base) -> Option<Vec<f64>> {
         let (low, high) = self.samples.input_range();
         let drive = Drive::new(self.samples, self.family.between_samples(), Passes::Once);

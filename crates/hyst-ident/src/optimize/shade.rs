@@ -149,7 +149,8 @@ impl Shade {
     fn shrink(&mut self) {
         let share = (self.spent as f64 / self.budget.max(1) as f64).min(1.0);
         let wanted = self.initial as f64 + (FEWEST as f64 - self.initial as f64) * share;
-        let wanted = (wanted.round() as usize).max(FEWEST);
+        // In steps of two: an odd generation leaves a core idle for half a trial.
+        let wanted = (wanted.round() as usize).next_multiple_of(2).max(FEWEST);
         if wanted < self.members.len() {
             let mut kept = self.members.ranked();
             kept.truncate(wanted);
