@@ -8,7 +8,8 @@ use super::{Asked, MethodError, Optimizer, SearchError};
 ///
 /// Rivals are `v = xᵢ + F (x_p − xᵢ) + F (x_a − x_b)`, x_p one of the best `p N`, x_b also from an archive of members that were
 /// beaten; F and CR are drawn about means that follow what succeeded. Settings of the paper: memory of 6, p = 0.11, archive 2.6 N,
-/// 4 members at the end. The population shrinks with the evaluations spent, so it has to be told how many there will be.
+/// 4 members at the end. The population shrinks with the evaluations spent, in steps of two (here only), so it has to be told how many there
+/// will be.
 ///
 /// Half of the rivals are crossed along the principal axes of the better half of the members instead of the coordinates (Guo & Yang
 /// 2015, IEEE Trans. Evol. Comput. 19): the parameters of a hysteresis model trade against each other, and a valley that lies
