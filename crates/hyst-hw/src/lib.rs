@@ -30,6 +30,8 @@ mod daq;
 #[cfg(feature = "std")]
 mod plant;
 #[cfg(feature = "std")]
+mod remote;
+#[cfg(feature = "std")]
 mod runner;
 
 #[cfg(feature = "std")]
@@ -43,6 +45,8 @@ pub use plant::config::{
 pub use plant::error::{ConfigError, PlantError};
 #[cfg(feature = "std")]
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
+#[cfg(feature = "std")]
+pub use remote::{Line, Remote, RemoteError, RemoteOptions};
 #[cfg(feature = "std")]
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,

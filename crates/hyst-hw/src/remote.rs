@@ -1,0 +1,507 @@
+//! A device at the other end of a line, as a [`Daq`].
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use crate::daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
+use crate::wire::{
+    Ask, Chunk, Deframer, Exchange, Fault, FrameError, Identity, MAX_FRAME, MOST_CHUNK, MOST_DRIVES, Measured, Mode,
+    PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode,
+};
+
+/// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
+pub trait Line {
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// When the line is gone.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits for at most `patience`, and gives how many bytes came; none is no error.
+    ///
+    /// # Errors
+    /// When the line is gone.
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize>;
+}
+
+/// What can go wrong with a device at the other end of a line.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RemoteError {
+    /// The line is gone.
+    #[error(
+        "{line}: the line is gone: {source}; look at the cable and whether the device is powered, then start again"
+    )]
+    Line {
+        /// What the line is called.
+        line: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Nothing, or nothing whole, came back.
+    #[error("{line}: no answer within {seconds} s ({broken} broken frames came): {advice}")]
+    Silent {
+        /// What the line is called.
+        line: String,
+        /// How long was waited \[s\].
+        seconds: f64,
+        /// Frames that came but were broken.
+        broken: u32,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// Host and device speak different versions.
+    #[error(
+        "{line}: the device speaks version {device} of the protocol, this program version {PROTOCOL}; update the older one"
+    )]
+    Version {
+        /// What the line is called.
+        line: String,
+        /// The device's version.
+        device: u16,
+    },
+    /// The device does not do what was asked.
+    #[error("{line}: {refusal}")]
+    Refused {
+        /// What the line is called.
+        line: String,
+        /// Why.
+        refusal: Refusal,
+    },
+    /// The device ended the run by itself.
+    #[error("{line}: the device ended the run (fault {}): {fault}", fault.code())]
+    Fault {
+        /// What the line is called.
+        line: String,
+        /// Why.
+        fault: Fault,
+    },
+    /// A value that cannot be asked for.
+    #[error("{what} = {value}: {advice}")]
+    Value {
+        /// Name of the value.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// What to give instead.
+        advice: &'static str,
+    },
+    /// The device answers what was not asked.
+    #[error("{line}: the device answers something else than what was asked; is it hystctl's protocol?")]
+    Answer {
+        /// What the line is called.
+        line: String,
+    },
+    /// Out of order.
+    #[error("the device runs already, or does not run: start it first, stop it last")]
+    Order,
+}
+
+/// How a device is talked to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RemoteOptions {
+    /// How long to wait for an answer before the request is sent again.
+    pub repeat: Duration,
+    /// How long to go without any answer before the device counts as lost.
+    pub lost: Duration,
+    /// Silence of this host after which the device comes to rest \[s\].
+    pub silence_s: f64,
+    /// Lowest and highest voltage of a run \[V\]; the device's own if not given.
+    pub voltage: Option<(f64, f64)>,
+    /// Steepest slope \[V/s\]; the device's own if not given.
+    pub slew_v_per_s: Option<f64>,
+    /// Highest temperature \[°C\].
+    pub hottest_degc: f64,
+    /// Whether voltages are driven, or references followed.
+    pub mode: Mode,
+    /// Greatest tracking error \[output unit\].
+    pub error: f64,
+    /// Number of the run: another one for each. Drawn by the caller, so that two programs do not meet in one.
+    pub session: u32,
+}
+
+impl RemoteOptions {
+    /// Voltages within the device's own limits; half a second of silence; run number `session`.
+    #[must_use]
+    pub const fn with_session(session: u32) -> Self {
+        Self {
+            repeat: Duration::from_millis(50),
+            lost: Duration::from_secs(2),
+            silence_s: 0.5,
+            voltage: None,
+            slew_v_per_s: None,
+            hottest_degc: f64::INFINITY,
+            mode: Mode::Voltage,
+            error: f64::INFINITY,
+            session,
+        }
+    }
+}
+
+/// A device at the other end of a line.
+#[derive(Debug)]
+pub struct Remote<L> {
+    line: L,
+    name: String,
+    options: RemoteOptions,
+    deframer: Deframer,
+    number: u32,
+    identity: Identity,
+    capabilities: Capabilities,
+    run: Option<Run>,
+    present_v: f64,
+    broken: u32,
+}
+
+/// What is known of a run.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    session: u32,
+    rate_hz: f64,
+    /// Drives that the device has had.
+    sent: u32,
+    /// Samples that have come.
+    heard: u32,
+    /// Number of the first drive that it has no room for.
+    room: u32,
+}
+
+impl<L: Line> Remote<L> {
+    /// Greets the device at the other end of `line`, which messages call `name`.
+    ///
+    /// # Errors
+    /// When nobody answers, or in another version.
+    pub fn open(line: L, name: impl Into<String>, options: RemoteOptions) -> Result<Self, RemoteError> {
+        let nobody = Identity {
+            name: heapless::Vec::new(),
+            min_v: 0.0,
+            max_v: 0.0,
+            rest_v: 0.0,
+            max_slew_v_per_s: 0.0,
+            min_rate_hz: 0.0,
+            max_rate_hz: 0.0,
+            output: Unit::Micrometre,
+            temperature: false,
+            load: false,
+            follows: false,
+            queue: 0,
+            model: 0,
+        };
+        let mut remote = Self {
+            line,
+            name: name.into(),
+            options,
+            deframer: Deframer::new(),
+            // An answer to an earlier program's request is told from one to this one's.
+            number: options.session.rotate_left(16),
+            capabilities: capabilities(&nobody, "nobody"),
+            identity: nobody,
+            run: None,
+            present_v: 0.0,
+            broken: 0,
+        };
+        match remote.ask(Ask::Hello)? {
+            Tell::Version(PROTOCOL) => {}
+            Tell::Version(device) => return Err(RemoteError::Version { line: remote.name, device }),
+            _ => return Err(remote.odd()),
+        }
+        let Tell::Identity(identity) = remote.ask(Ask::Describe)? else { return Err(remote.odd()) };
+        remote.capabilities = capabilities(&identity, &remote.name);
+        remote.present_v = f64::from(identity.rest_v);
+        remote.identity = identity;
+        Ok(remote)
+    }
+
+    /// What the device is.
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// The line.
+    pub fn line_mut(&mut self) -> &mut L {
+        &mut self.line
+    }
+
+    /// Hands over a model, with which the device follows references.
+    ///
+    /// # Errors
+    /// When the device has no room for it or cannot run it, or is lost.
+    pub fn upload(&mut self, block: &[u8]) -> Result<(), RemoteError> {
+        let total = block.len() as u32;
+        let mut offset = 0;
+        loop {
+            let end = block.len().min(offset as usize + MOST_CHUNK);
+            let bytes = block[offset as usize..end].iter().copied().collect();
+            match self.ask(Ask::Model(Chunk { offset, total, bytes }))? {
+                Tell::ModelBytes(have) if have >= total => return Ok(()),
+                Tell::ModelBytes(have) => offset = have,
+                Tell::Refused(Refusal::ModelGap, _) => offset = 0,
+                Tell::Refused(refusal, _) => return Err(self.refused(refusal)),
+                _ => return Err(self.odd()),
+            }
+        }
+    }
+
+    /// Ends whatever the device does and keeps it from starting again before [`clear`](Self::clear).
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn emergency_stop(&mut self) -> Result<(), RemoteError> {
+        self.run = None;
+        self.stated(Ask::Emergency).map(|_| ())
+    }
+
+    /// Clears a fault, once the device is at rest.
+    ///
+    /// # Errors
+    /// When it is not at rest yet, or lost.
+    pub fn clear(&mut self) -> Result<(), RemoteError> {
+        self.stated(Ask::Clear).map(|_| ())
+    }
+
+    fn odd(&self) -> RemoteError {
+        RemoteError::Answer { line: self.name.clone() }
+    }
+
+    fn refused(&self, refusal: Refusal) -> RemoteError {
+        RemoteError::Refused { line: self.name.clone(), refusal }
+    }
+
+    fn gone(&self, source: io::Error) -> RemoteError {
+        RemoteError::Line { line: self.name.clone(), source }
+    }
+
+    /// Asks for something that is answered by a status.
+    fn stated(&mut self, ask: Ask) -> Result<Status, RemoteError> {
+        match self.ask(ask)? {
+            Tell::Status(status) => {
+                self.present_v = f64::from(status.present_v);
+                Ok(status)
+            }
+            Tell::Refused(refusal, _) => Err(self.refused(refusal)),
+            _ => Err(self.odd()),
+        }
+    }
+
+    /// Asks until there is an answer.
+    fn ask(&mut self, ask: Ask) -> Result<Tell, RemoteError> {
+        self.number = self.number.wrapping_add(1);
+        let request = Request { number: self.number, ask };
+        let mut buffer = [0; MAX_FRAME];
+        let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
+        let began = Instant::now();
+        let mut bytes = [0; 4096];
+        while began.elapsed() < self.options.lost {
+            // A zero ends what a line may have left of an earlier frame.
+            self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
+            let sent = Instant::now();
+            while let Some(patience) = self.options.repeat.checked_sub(sent.elapsed()).filter(|d| !d.is_zero()) {
+                let came = self.line.receive(&mut bytes, patience).map_err(|source| self.gone(source))?;
+                let mut fresh = &bytes[..came];
+                while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
+                    match reply {
+                        Ok(reply) if reply.number == self.number => return Ok(reply.tell),
+                        // Of a request that was sent twice.
+                        Ok(_) => {}
+                        Err(FrameError::Message) if matches!(request.ask, Ask::Hello) => return Err(self.odd()),
+                        Err(_) => self.broken += 1,
+                    }
+                }
+            }
+        }
+        let advice = if matches!(request.ask, Ask::Hello) {
+            "is this the right port, its speed the device's, and the device powered?"
+        } else {
+            "look at the cable; the device comes to rest by itself"
+        };
+        let seconds = self.options.lost.as_secs_f64();
+        Err(RemoteError::Silent { line: self.name.clone(), seconds, broken: self.broken, advice })
+    }
+
+    /// One request of a run: gives how many drives were taken.
+    fn trade(&mut self, run: &mut Run, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
+        let free = run.room.saturating_sub(run.sent) as usize;
+        let drives = drive_v.iter().take(free.min(MOST_DRIVES)).map(|v| *v as f32).collect();
+        let exchange = Exchange { session: run.session, heard: run.heard, first: run.sent, drives };
+        match self.ask(Ask::Exchange(exchange))? {
+            Tell::Samples { status, first, samples } => {
+                if let State::Fault(fault) = status.state {
+                    self.hear(run, first, &samples, measured);
+                    return Err(RemoteError::Fault { line: self.name.clone(), fault });
+                }
+                let taken = status.received.wrapping_sub(run.sent) as usize;
+                if taken > drive_v.len() || !self.hear(run, first, &samples, measured) {
+                    return Err(self.odd());
+                }
+                (run.sent, run.room) = (status.received, status.room);
+                self.present_v = match drive_v[..taken].last() {
+                    Some(last) => *last,
+                    None => self.present_v,
+                };
+                Ok(taken)
+            }
+            Tell::Refused(refusal, status) => match status.state {
+                State::Fault(fault) => Err(RemoteError::Fault { line: self.name.clone(), fault }),
+                _ => Err(self.refused(refusal)),
+            },
+            _ => Err(self.odd()),
+        }
+    }
+
+    /// Takes samples that follow those that have come; whether they do.
+    fn hear(&self, run: &mut Run, first: u32, samples: &[Measured], measured: &mut Vec<Sample>) -> bool {
+        let Some(known) = run.heard.checked_sub(first) else { return samples.is_empty() };
+        for sample in samples.iter().skip(known as usize) {
+            run.heard += 1;
+            let has = |there: bool, value: f32| there.then_some(f64::from(value));
+            measured.push(Sample {
+                time_s: f64::from(sample.tick) / run.rate_hz,
+                drive_v: f64::from(sample.drive_v),
+                output: f64::from(sample.output),
+                temperature_degc: has(self.identity.temperature, sample.temperature_degc),
+                load_n: has(self.identity.load, sample.load_n),
+            });
+        }
+        true
+    }
+
+    /// Waits until the device has done something more.
+    fn trade_until_news(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
+        let mut run = self.run.ok_or(RemoteError::Order)?;
+        let (before, began) = (measured.len(), Instant::now());
+        loop {
+            let outcome = self.trade(&mut run, drive_v, measured);
+            self.run = Some(run);
+            let taken = outcome?;
+            let outstanding = run.sent != run.heard;
+            if taken > 0 || measured.len() > before || !outstanding && drive_v.is_empty() {
+                return Ok(taken);
+            }
+            if began.elapsed() > self.options.lost {
+                // The runner calls that a stalled device.
+                return Ok(0);
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+}
+
+fn capabilities(identity: &Identity, line: &str) -> Capabilities {
+    Capabilities {
+        device: format!("{} at {line}", String::from_utf8_lossy(&identity.name)),
+        voltage: VoltageRange {
+            min_v: f64::from(identity.min_v),
+            max_v: f64::from(identity.max_v),
+            rest_v: f64::from(identity.rest_v),
+        },
+        min_rate_hz: f64::from(identity.min_rate_hz),
+        max_rate_hz: f64::from(identity.max_rate_hz),
+        max_block: MOST_DRIVES,
+        output: match identity.output {
+            Unit::Micrometre => OutputUnit::Micrometre,
+            Unit::Nanometre => OutputUnit::Nanometre,
+            Unit::Millimetre => OutputUnit::Millimetre,
+            Unit::Newton => OutputUnit::Newton,
+        },
+        temperature: identity.temperature,
+        load: identity.load,
+    }
+}
+
+impl<L: Line> Daq for Remote<L> {
+    type Error = RemoteError;
+
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn present_v(&self) -> f64 {
+        self.present_v
+    }
+
+    fn start(&mut self, rate_hz: f64) -> Result<f64, RemoteError> {
+        if self.run.is_some() {
+            return Err(RemoteError::Order);
+        }
+        let o = self.options;
+        let i = &self.identity;
+        let (low, high) = o.voltage.map_or((i.min_v, i.max_v), |(low, high)| (low as f32, high as f32));
+        let start = Start {
+            session: o.session,
+            mode: o.mode,
+            rate_hz: rate_hz as f32,
+            low_v: low,
+            high_v: high,
+            slew_v_per_s: o.slew_v_per_s.map_or(i.max_slew_v_per_s, |slew| slew as f32),
+            hottest_degc: o.hottest_degc as f32,
+            error: o.error as f32,
+            silence_s: o.silence_s as f32,
+        };
+        let status = self.stated(Ask::Start(start))?;
+        let rate_hz = f64::from(rate_hz as f32);
+        self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room });
+        // The next run of this program is another one.
+        self.options.session = o.session.wrapping_add(1);
+        Ok(rate_hz)
+    }
+
+    fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
+        let range = self.capabilities.voltage;
+        if self.options.mode == Mode::Voltage
+            && let Some(bad) = drive_v.iter().find(|v| !range.contains(**v))
+        {
+            let advice = "give voltages within the device's range; nothing of the block was applied";
+            return Err(RemoteError::Value { what: "drive", value: *bad, advice });
+        }
+        self.trade_until_news(drive_v, measured)
+    }
+
+    fn rest(&mut self, seconds: f64) -> Result<(), RemoteError> {
+        if !(0.0..=1e6).contains(&seconds) {
+            return Err(RemoteError::Value { what: "rest", value: seconds, advice: "give a time from 0 to 1e6 s" });
+        }
+        let Some(run) = self.run else { return Ok(()) };
+        // Its samples are nobody's: the device is only kept from missing its host.
+        let rest = self.capabilities.voltage.rest_v;
+        let step = self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s)) / run.rate_hz;
+        let (from, ramp) = (self.present_v, ((self.present_v - rest).abs() / step).ceil() as usize);
+        let total = ramp + (seconds * run.rate_hz).round() as usize;
+        let volts = |k: usize| if k + 1 >= ramp { rest } else { from + (rest - from) * (k + 1) as f64 / ramp as f64 };
+        let (mut sent, mut nobody) = (0, Vec::new());
+        while sent < total {
+            let block: Vec<f64> = (sent..total.min(sent + MOST_DRIVES)).map(volts).collect();
+            sent += self.trade_until_news(&block, &mut nobody)?;
+        }
+        while self.run.is_some_and(|run| run.heard != run.sent) {
+            self.trade_until_news(&[], &mut nobody)?;
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), RemoteError> {
+        if self.run.take().is_none() {
+            return Ok(());
+        }
+        let began = Instant::now();
+        loop {
+            let status = self.stated(Ask::Stop)?;
+            match status.state {
+                State::Idle => return Ok(()),
+                State::Fault(_) if status.present_v == self.identity.rest_v => return Ok(()),
+                _ if began.elapsed() > Duration::from_secs(60) => {
+                    let advice = "the device does not come to rest; switch its amplifier off";
+                    return Err(RemoteError::Silent {
+                        line: self.name.clone(),
+                        seconds: 60.0,
+                        broken: self.broken,
+                        advice,
+                    });
+                }
+                _ => std::thread::sleep(Duration::from_millis(2)),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

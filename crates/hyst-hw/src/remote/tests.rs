@@ -1,0 +1,343 @@
+//! A device over a line that loses, changes, doubles and swaps what it carries.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::wire::{Board, Device, Open, Shown};
+use crate::{Cause, RecordOptions, record};
+use proptest::prelude::*;
+
+/// An amplifier whose sensor shows what the period before put out, and that remembers all of it.
+#[derive(Debug, Default)]
+struct Echo {
+    volts: f32,
+    put_out: Vec<f32>,
+}
+
+impl Board for Echo {
+    fn measure(&mut self) -> Shown {
+        Shown { output: 0.5 * self.volts, temperature_degc: 20.0, load_n: 0.0 }
+    }
+    fn put_out(&mut self, volts: f32) {
+        self.volts = volts;
+        self.put_out.push(volts);
+    }
+}
+
+fn identity() -> Identity {
+    Identity {
+        name: b"echo".iter().copied().collect(),
+        min_v: -10.0,
+        max_v: 100.0,
+        rest_v: 0.0,
+        max_slew_v_per_s: 50_000.0,
+        min_rate_hz: 1.0,
+        max_rate_hz: 10_000.0,
+        output: Unit::Micrometre,
+        temperature: true,
+        load: false,
+        follows: false,
+        queue: 0,
+        model: 0,
+    }
+}
+
+/// What happens to frames on their way, each time with the next of these numbers.
+#[derive(Debug)]
+struct Luck(u64);
+
+impl Luck {
+    /// A number below `n`.
+    fn below(&mut self, n: u64) -> u64 {
+        // SplitMix64 (Steele, Lea and Flood 2014).
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) % n
+    }
+}
+
+/// A device and the line to it. Time goes on with each look at the line.
+struct Bench {
+    device: Device<Open, 128, 0>,
+    board: Echo,
+    deframer: Deframer,
+    /// One frame in so many has an accident; none if zero.
+    accident: u64,
+    luck: Luck,
+    /// Frames that are late.
+    late: Vec<Vec<u8>>,
+    answers: VecDeque<u8>,
+    cut: bool,
+}
+
+impl Bench {
+    fn new(accident: u64, seed: u64) -> Self {
+        Self {
+            device: Device::new(identity(), Open),
+            board: Echo::default(),
+            deframer: Deframer::new(),
+            accident,
+            luck: Luck(seed),
+            late: Vec::new(),
+            answers: VecDeque::new(),
+            cut: false,
+        }
+    }
+
+    fn pass(&mut self, periods: u32) {
+        (0..periods).for_each(|_| self.device.tick(&mut self.board));
+    }
+
+    /// What arrives of a frame.
+    fn carried(&mut self, frame: &[u8]) -> Vec<u8> {
+        let mut bytes = frame.to_vec();
+        if self.accident == 0 || self.luck.below(self.accident) > 0 {
+            return bytes;
+        }
+        let at = self.luck.below(bytes.len() as u64) as usize;
+        match self.luck.below(6) {
+            0 => bytes.clear(),
+            1 => bytes[at] ^= 1 << self.luck.below(8),
+            2 => bytes.truncate(at),
+            3 => bytes.extend_from_slice(frame),
+            4 => {
+                // It comes after a later one, once or twice.
+                self.late.push(bytes.clone());
+                bytes.clear();
+            }
+            _ => drop(bytes.remove(at)),
+        }
+        if self.luck.below(2) == 0
+            && let Some(late) = self.late.pop()
+        {
+            bytes.extend(late);
+        }
+        bytes
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        let mut fresh = bytes;
+        let mut deframer = self.deframer.clone();
+        while let Some(request) = deframer.next::<Request>(&mut fresh) {
+            let Ok(request) = request else { continue };
+            let reply = self.device.answer(&request);
+            let frame = encode(&reply, &mut [0; MAX_FRAME]).unwrap().to_vec();
+            let carried = self.carried(&frame);
+            self.answers.extend(carried);
+        }
+        self.deframer = deframer;
+    }
+}
+
+impl Line for &mut Bench {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if self.cut {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        let carried = if bytes.len() > 1 { self.carried(bytes) } else { bytes.to_vec() };
+        self.take(&carried);
+        Ok(())
+    }
+
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
+        if self.cut {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        self.pass(3);
+        if self.answers.is_empty() {
+            std::thread::sleep(patience.min(Duration::from_micros(300)));
+        }
+        let n = bytes.len().min(self.answers.len());
+        self.answers.drain(..n).zip(bytes).for_each(|(from, to)| *to = from);
+        Ok(n)
+    }
+}
+
+fn options() -> RemoteOptions {
+    RemoteOptions {
+        repeat: Duration::from_millis(1),
+        // Time is what the test makes of it.
+        silence_s: 50.0,
+        ..RemoteOptions::with_session(7)
+    }
+}
+
+fn wave(n: usize) -> Vec<f64> {
+    (0..n).map(|k| 50.0 - 50.0 * (k as f64 * 0.01).cos()).collect()
+}
+
+/// Plays two segments and compares what comes back with what was sent.
+fn all_is_played(bench: &mut Bench) {
+    let mut remote = Remote::open(&mut *bench, "bench", options()).unwrap();
+    let drive = [wave(700), wave(300)];
+    let recording = record(&mut remote, &drive, &RecordOptions { rest_s: 0.1, ..RecordOptions::at(1000.0) }, |_| {
+        ControlFlow::Continue(())
+    });
+    let recording = recording.unwrap();
+    for (segment, drive) in recording.segments.iter().zip(&drive) {
+        assert_eq!(segment.samples.len(), drive.len());
+        for (sample, volts) in segment.samples.iter().zip(drive) {
+            assert_eq!(sample.drive_v, f64::from(*volts as f32));
+            // What was put out is shown one period later, when it is measured.
+            assert_eq!(sample.output, f64::from(0.5 * *volts as f32));
+            assert_eq!(sample.temperature_degc, Some(20.0));
+        }
+        assert!(segment.samples.windows(2).all(|w| w[1].time_s > w[0].time_s));
+    }
+    assert_eq!(bench.device.state(), State::Idle);
+    assert_eq!(bench.board.volts, 0.0);
+    assert!(bench.board.put_out.iter().all(|v| (-10.0..=100.0).contains(v)));
+}
+
+#[test]
+fn a_run_over_a_sound_line() {
+    all_is_played(&mut Bench::new(0, 1));
+}
+
+#[test]
+fn a_run_over_a_line_with_accidents_is_the_same() {
+    for seed in 0..20 {
+        all_is_played(&mut Bench::new(4, seed));
+    }
+}
+
+#[test]
+fn silence_brings_the_device_to_rest_within_its_slew() {
+    let mut bench = Bench::new(0, 1);
+    let mut remote =
+        Remote::open(&mut bench, "bench", RemoteOptions { silence_s: 0.1, slew_v_per_s: Some(1000.0), ..options() })
+            .unwrap();
+    remote.start(1000.0).unwrap();
+    let mut measured = Vec::new();
+    let drive: Vec<f64> = (1..=40).map(f64::from).collect();
+    let mut sent = 0;
+    while sent < drive.len() {
+        sent += remote.exchange(&drive[sent..], &mut measured).unwrap();
+    }
+    drop(remote);
+    bench.pass(40);
+    assert_eq!(bench.board.volts, 40.0);
+    bench.pass(100);
+    assert_eq!(bench.device.state(), State::Fault(Fault::Silence));
+    bench.pass(100);
+    assert_eq!(bench.board.volts, 0.0);
+    assert!(bench.board.put_out.windows(2).all(|w| (w[1] - w[0]).abs() <= 1.001), "{:?}", bench.board.put_out);
+
+    // Another program finds a device that says why, and starts once that is cleared.
+    let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { session: 99, ..options() }).unwrap();
+    let message = remote.start(1000.0).unwrap_err().to_string();
+    assert!(message.contains("clear its fault"), "{message}");
+    remote.clear().unwrap();
+    assert_eq!(remote.start(1000.0).unwrap(), 1000.0);
+}
+
+#[test]
+fn an_emergency_stop_holds_until_it_is_cleared() {
+    let mut bench = Bench::new(0, 1);
+    let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
+    remote.start(1000.0).unwrap();
+    let mut measured = Vec::new();
+    remote.exchange(&[30.0; 20], &mut measured).unwrap();
+    remote.emergency_stop().unwrap();
+    remote.line_mut().pass(100);
+    assert_eq!(
+        (remote.line_mut().device.state(), remote.line_mut().board.volts),
+        (State::Fault(Fault::Emergency), 0.0)
+    );
+    remote.start(1000.0).unwrap_err();
+    remote.clear().unwrap();
+    remote.start(1000.0).unwrap();
+}
+
+#[test]
+fn what_a_device_refuses_is_said() {
+    let mut bench = Bench::new(0, 1);
+    let mut remote =
+        Remote::open(&mut bench, "bench", RemoteOptions { voltage: Some((0.0, 200.0)), ..options() }).unwrap();
+    let message = remote.start(1000.0).unwrap_err().to_string();
+    assert!(message.starts_with("bench: ") && message.contains("voltage limits"), "{message}");
+    let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
+    assert!(remote.start(1e6).unwrap_err().to_string().contains("rate"));
+    assert!(remote.upload(&[1, 2, 3]).unwrap_err().to_string().contains("room"));
+    let mut remote =
+        Remote::open(&mut bench, "bench", RemoteOptions { voltage: Some((0.0, 50.0)), ..options() }).unwrap();
+    let failure =
+        record(&mut remote, &[vec![60.0; 10]], &RecordOptions::at(1000.0), |_| ControlFlow::Continue(())).unwrap_err();
+    assert!(
+        matches!(failure.cause, Cause::Device(RemoteError::Refused { refusal: Refusal::Drive(_), .. })),
+        "{failure}"
+    );
+    assert!(bench.board.put_out.iter().all(|v| *v <= 50.0));
+}
+
+#[test]
+fn a_line_that_is_cut_is_told_and_the_device_comes_to_rest() {
+    let mut bench = Bench::new(0, 1);
+    let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { silence_s: 0.05, ..options() }).unwrap();
+    remote.start(1000.0).unwrap();
+    remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap();
+    remote.line_mut().cut = true;
+    let message = remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap_err().to_string();
+    assert!(message.contains("the line is gone"), "{message}");
+    remote.stop().unwrap_err();
+    bench.pass(200);
+    assert_eq!((bench.device.state(), bench.board.volts), (State::Fault(Fault::Silence), 0.0));
+}
+
+#[test]
+fn nobody_at_the_other_end_is_told() {
+    struct Deaf;
+    impl Line for Deaf {
+        fn send(&mut self, _: &[u8]) -> io::Result<()> {
+            Ok(())
+        }
+        fn receive(&mut self, _: &mut [u8], patience: Duration) -> io::Result<usize> {
+            std::thread::sleep(patience);
+            Ok(0)
+        }
+    }
+    let options = RemoteOptions { lost: Duration::from_millis(20), ..options() };
+    let message = Remote::open(Deaf, "/dev/ttyX", options).err().unwrap().to_string();
+    assert!(message.contains("/dev/ttyX") && message.contains("right port"), "{message}");
+}
+
+proptest! {
+    /// Whatever requests a device gets, its output stays within its range and its slew.
+    #[test]
+    fn no_request_moves_a_device_beyond_its_limits(seed in any::<u64>()) {
+        let mut luck = Luck(seed);
+        let mut bench = Bench::new(0, seed);
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 0.0, 50.0, 99.0, 101.0, -11.0];
+        for _ in 0..200 {
+            let mut value = || odd[luck.below(odd.len() as u64) as usize];
+            let start = Start {
+                session: 1, mode: Mode::Voltage, rate_hz: 1000.0, low_v: value().min(0.0), high_v: value().max(1.0),
+                slew_v_per_s: value(), hottest_degc: value(), error: value(), silence_s: 1.0,
+            };
+            let drives: heapless::Vec<f32, MOST_DRIVES> = (0..5).map(|_| value()).collect();
+            let sound = Start { low_v: 0.0, high_v: 99.0, slew_v_per_s: 5000.0, hottest_degc: 50.0, error: 1.0, ..start };
+            let session = luck.below(4) as u32;
+            let ask = match luck.below(8) {
+                0 => Ask::Start(Start { session, ..start }),
+                1 => Ask::Start(Start { session, ..sound }),
+                2 if luck.below(4) == 0 => Ask::Stop,
+                3 if luck.below(4) == 0 => Ask::Emergency,
+                4 => Ask::Clear,
+                _ => {
+                    let have = bench.device.status().received;
+                    let (heard, first) = (luck.below(20) as u32, (have + 2).saturating_sub(luck.below(5) as u32));
+                    Ask::Exchange(Exchange { session, heard, first, drives })
+                }
+            };
+            bench.device.answer(&Request { number: 1, ask });
+            let periods = luck.below(4) as u32;
+            bench.pass(periods);
+        }
+        prop_assert!(bench.board.put_out.iter().all(|v| (-10.0..=100.0).contains(v)));
+        let steepest = 50_000.0 / 1000.0 * 1.001;
+        let from_rest = std::iter::once(0.0).chain(bench.board.put_out.iter().copied());
+        prop_assert!(from_rest.zip(&bench.board.put_out).all(|(a, b)| (b - a).abs() <= steepest));
+    }
+}

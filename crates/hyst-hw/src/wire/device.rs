@@ -1,0 +1,414 @@
+//! The device's side: what it does with requests and with each period of its clock. No bytes, no clock and no pins: firmware brings
+//! those, tests bring others.
+
+use heapless::{Deque, Vec};
+
+use super::message::{
+    Ask, Chunk, Exchange, Fault, Field, Identity, MOST_SAMPLES, Measured, Mode, PROTOCOL, Refusal, Reply, Request,
+    Start, State, Status, Tell,
+};
+
+/// What the sensors show.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shown {
+    /// The output, in the device's unit.
+    pub output: f32,
+    /// Temperature \[°C\]; zero where there is none.
+    pub temperature_degc: f32,
+    /// Load \[N\]; zero where there is none.
+    pub load_n: f32,
+}
+
+/// The amplifier and the sensors.
+pub trait Board {
+    /// What the sensors show now.
+    fn measure(&mut self) -> Shown;
+    /// Puts out a voltage \[V\].
+    fn put_out(&mut self, volts: f32);
+}
+
+/// What follows a reference: an inverse, a controller, both.
+pub trait Control {
+    /// Takes a model, as [`hyst-core`'s block](https://docs.rs/hyst-core) of bytes. Gives whether it can run it.
+    fn load(&mut self, block: &[u8]) -> bool;
+    /// Whether there is a model to follow with.
+    fn ready(&self) -> bool;
+    /// Begins a run of this period \[s\], at the first reference, from what is shown and put out. Gives whether it can.
+    fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool;
+    /// The drive that the reference asks for \[V\], which the limits may still change.
+    fn step(&mut self, reference: f32, shown: &Shown) -> f32;
+}
+
+/// Without a model: a device that only plays voltages.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Open;
+
+impl Control for Open {
+    fn load(&mut self, _: &[u8]) -> bool {
+        false
+    }
+    fn ready(&self) -> bool {
+        false
+    }
+    fn begin(&mut self, _: f32, _: f32, _: &Shown, _: f32) -> bool {
+        false
+    }
+    fn step(&mut self, reference: f32, _: &Shown) -> f32 {
+        reference
+    }
+}
+
+/// Periods for which the drive may stand at a limit, or the output be away from the reference, before that is a fault.
+const PATIENCE: u32 = 200;
+/// Longest silence that a run may allow \[s\].
+const LONGEST_SILENCE_S: f32 = 60.0;
+
+/// A device with room for `Q` drives and samples, and for `M` bytes of a model.
+#[derive(Debug)]
+pub struct Device<C, const Q: usize, const M: usize> {
+    identity: Identity,
+    control: C,
+    model: Vec<u8, M>,
+    /// Whether all bytes of the model have come and are one that runs.
+    loaded: bool,
+    state: State,
+    run: Start,
+    /// Whether there was a run.
+    started: bool,
+    tick: u32,
+    present_v: f32,
+    /// Drives that wait.
+    queue: Deque<f32, Q>,
+    received: u32,
+    /// Samples that the host has not heard yet, the last of them number `measured - 1`.
+    history: Deque<Measured, Q>,
+    measured: u32,
+    /// A drive was put out that has not been measured yet.
+    out: bool,
+    /// The reference that is followed now.
+    reference: Option<f32>,
+    quiet: u32,
+    saturated: u32,
+    astray: u32,
+}
+
+impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
+    /// At rest.
+    pub fn new(identity: Identity, control: C) -> Self {
+        let present_v = identity.rest_v;
+        let follows = identity.follows;
+        let identity = Identity { queue: Q as u32, model: if follows { M as u32 } else { 0 }, ..identity };
+        Self {
+            identity,
+            control,
+            model: Vec::new(),
+            loaded: false,
+            state: State::Idle,
+            run: Start {
+                session: 0,
+                mode: Mode::Voltage,
+                rate_hz: 1.0,
+                low_v: present_v,
+                high_v: present_v,
+                slew_v_per_s: 1.0,
+                hottest_degc: f32::INFINITY,
+                error: f32::INFINITY,
+                silence_s: 1.0,
+            },
+            started: false,
+            tick: 0,
+            present_v,
+            queue: Deque::new(),
+            received: 0,
+            history: Deque::new(),
+            measured: 0,
+            out: false,
+            reference: None,
+            quiet: 0,
+            saturated: 0,
+            astray: 0,
+        }
+    }
+
+    /// What it does.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Rate at which [`tick`](Self::tick) has to come \[Hz\].
+    pub fn rate_hz(&self) -> f32 {
+        self.run.rate_hz
+    }
+
+    /// How it stands.
+    pub fn status(&self) -> Status {
+        // A drive needs a place in the queue now and one in the history later.
+        let waiting = self.queue.len() + self.history.len() + usize::from(self.out);
+        let free = Q.saturating_sub(waiting) as u32;
+        Status {
+            state: self.state,
+            session: self.run.session,
+            tick: self.tick,
+            present_v: self.present_v,
+            received: self.received,
+            room: self.received.saturating_add(free),
+            measured: self.measured,
+        }
+    }
+
+    /// One period of the clock: what the last drive made is measured, the next one is put out.
+    pub fn tick(&mut self, board: &mut impl Board) {
+        let shown = board.measure();
+        self.tick = self.tick.wrapping_add(1);
+        if core::mem::take(&mut self.out) {
+            let Shown { output, temperature_degc, load_n } = shown;
+            let sample = Measured { tick: self.tick, drive_v: self.present_v, output, temperature_degc, load_n };
+            // There is room: a drive is only taken where there is.
+            let _ = self.history.push_back(sample);
+            self.measured = self.measured.wrapping_add(1);
+        }
+        self.watch(&shown);
+        match self.state {
+            State::Idle => {}
+            State::Running => self.play(board, &shown),
+            State::Stopping | State::Fault(_) => self.come_to_rest(board),
+        }
+    }
+
+    fn step_v(&self) -> f32 {
+        self.run.slew_v_per_s / self.run.rate_hz
+    }
+
+    fn watch(&mut self, shown: &Shown) {
+        if self.state != State::Running {
+            return;
+        }
+        self.quiet = self.quiet.saturating_add(1);
+        let has_number = shown.output.is_finite() && shown.temperature_degc.is_finite() && shown.load_n.is_finite();
+        let fault = if !has_number {
+            Some(Fault::Sensor)
+        } else if self.identity.temperature && shown.temperature_degc > self.run.hottest_degc {
+            Some(Fault::Temperature)
+        } else if self.quiet as f32 > self.run.silence_s * self.run.rate_hz {
+            Some(Fault::Silence)
+        } else {
+            self.reference.and_then(|reference| {
+                let away = (reference - shown.output).abs() > self.run.error;
+                self.astray = if away { self.astray + 1 } else { 0 };
+                (self.astray > PATIENCE).then_some(Fault::TrackingError)
+            })
+        };
+        if let Some(fault) = fault {
+            self.fail(fault);
+        }
+    }
+
+    fn fail(&mut self, fault: Fault) {
+        self.state = State::Fault(fault);
+        self.queue.clear();
+        self.reference = None;
+    }
+
+    /// The next drive; without one the last voltage, or reference, is held.
+    fn play(&mut self, board: &mut impl Board, shown: &Shown) {
+        let next = self.queue.pop_front();
+        let wanted = match (self.run.mode, next, self.reference) {
+            (Mode::Voltage, Some(volts), _) => volts,
+            (Mode::Voltage, None, _) | (Mode::Reference, None, None) => return,
+            (Mode::Reference, Some(reference), None) => {
+                self.reference = Some(reference);
+                if !self.control.begin(1.0 / self.run.rate_hz, reference, shown, self.present_v) {
+                    self.fail(Fault::Sensor);
+                    return;
+                }
+                self.control.step(reference, shown)
+            }
+            (Mode::Reference, Some(reference), Some(_)) | (Mode::Reference, None, Some(reference)) => {
+                self.reference = Some(reference);
+                self.control.step(reference, shown)
+            }
+        };
+        let (low, high, step) = (self.run.low_v, self.run.high_v, self.step_v());
+        let wanted = if wanted.is_finite() { wanted } else { self.present_v };
+        let inside = wanted.clamp(low, high);
+        let beyond = self.run.mode == Mode::Reference && inside != wanted;
+        self.saturated = if beyond { self.saturated + 1 } else { 0 };
+        self.present_v = inside.clamp(self.present_v - step, self.present_v + step);
+        board.put_out(self.present_v);
+        self.out = next.is_some();
+        if self.saturated > PATIENCE {
+            self.fail(Fault::Saturation);
+        }
+    }
+
+    fn come_to_rest(&mut self, board: &mut impl Board) {
+        let (rest, step) = (self.identity.rest_v, self.step_v());
+        if self.present_v != rest {
+            self.present_v = rest.clamp(self.present_v - step, self.present_v + step);
+            board.put_out(self.present_v);
+        } else if self.state == State::Stopping {
+            self.state = State::Idle;
+        }
+    }
+
+    /// Answers a request.
+    pub fn answer(&mut self, request: &Request) -> Reply {
+        let tell = match &request.ask {
+            Ask::Hello => Tell::Version(PROTOCOL),
+            Ask::Describe => Tell::Identity(self.identity.clone()),
+            Ask::Start(start) => self.told(|device| device.start(start)),
+            Ask::Exchange(exchange) => match self.exchange(exchange) {
+                Ok(tell) => tell,
+                Err(refusal) => Tell::Refused(refusal, self.status()),
+            },
+            Ask::Stop => self.told(|device| {
+                device.stop();
+                Ok(())
+            }),
+            Ask::Emergency => self.told(|device| {
+                device.fail(Fault::Emergency);
+                Ok(())
+            }),
+            Ask::Clear => self.told(Self::clear),
+            Ask::Model(chunk) => match self.take_model(chunk) {
+                Ok(bytes) => Tell::ModelBytes(bytes),
+                Err(refusal) => Tell::Refused(refusal, self.status()),
+            },
+        };
+        Reply { number: request.number, tell }
+    }
+
+    fn told(&mut self, does: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Tell {
+        match does(self) {
+            Ok(()) => Tell::Status(self.status()),
+            Err(refusal) => Tell::Refused(refusal, self.status()),
+        }
+    }
+
+    fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        if self.started && start.session == self.run.session {
+            // Asked twice. A run that is over does not begin again.
+            return if self.state == State::Running { Ok(()) } else { Err(Refusal::Session) };
+        }
+        if self.state != State::Idle {
+            return Err(Refusal::State);
+        }
+        let i = &self.identity;
+        let within = |x: f32, low: f32, high: f32| x >= low && x <= high;
+        for (fits, field) in [
+            (within(start.rate_hz, i.min_rate_hz, i.max_rate_hz), Field::Rate),
+            (
+                start.low_v >= i.min_v
+                    && start.high_v <= i.max_v
+                    && within(i.rest_v, start.low_v, start.high_v)
+                    && start.low_v < start.high_v,
+                Field::Voltage,
+            ),
+            (start.slew_v_per_s > 0.0 && start.slew_v_per_s <= i.max_slew_v_per_s, Field::Slew),
+            (start.silence_s > 0.0 && start.silence_s <= LONGEST_SILENCE_S, Field::Silence),
+            (!start.hottest_degc.is_nan(), Field::Temperature),
+            (start.error > 0.0, Field::Error),
+        ] {
+            if !fits {
+                return Err(Refusal::Start(field));
+            }
+        }
+        if start.mode == Mode::Reference && !(self.loaded && self.control.ready()) {
+            return Err(Refusal::NoModel);
+        }
+        self.run = *start;
+        self.started = true;
+        self.state = State::Running;
+        self.queue.clear();
+        self.history.clear();
+        (self.tick, self.received, self.measured, self.quiet, self.saturated, self.astray) = (0, 0, 0, 0, 0, 0);
+        (self.out, self.reference) = (false, None);
+        Ok(())
+    }
+
+    fn stop(&mut self) {
+        if self.state == State::Running {
+            self.state = State::Stopping;
+            self.queue.clear();
+            self.reference = None;
+        }
+    }
+
+    fn clear(&mut self) -> Result<(), Refusal> {
+        match self.state {
+            State::Fault(_) if self.present_v == self.identity.rest_v => self.state = State::Idle,
+            State::Idle => {}
+            _ => return Err(Refusal::State),
+        }
+        Ok(())
+    }
+
+    fn exchange(&mut self, exchange: &Exchange) -> Result<Tell, Refusal> {
+        if !self.started || exchange.session != self.run.session {
+            return Err(Refusal::Session);
+        }
+        // What it hears no more it need not keep; the host cannot have heard what was not measured.
+        let kept = self.measured.wrapping_sub(self.history.len() as u32);
+        for _ in kept..exchange.heard.min(self.measured) {
+            self.history.pop_front();
+        }
+        if self.state == State::Running {
+            self.quiet = 0;
+            self.take_drives(exchange)?;
+        }
+        let first = self.measured.wrapping_sub(self.history.len() as u32);
+        let samples = self.history.iter().take(MOST_SAMPLES).copied().collect();
+        Ok(Tell::Samples { status: self.status(), first, samples })
+    }
+
+    fn take_drives(&mut self, exchange: &Exchange) -> Result<(), Refusal> {
+        // Those that came before are passed over; after a gap nothing is taken.
+        let Some(known) = self.received.checked_sub(exchange.first) else { return Ok(()) };
+        let Some(fresh) = exchange.drives.get(known as usize..) else { return Ok(()) };
+        let (low, high) = match self.run.mode {
+            Mode::Voltage => (self.run.low_v, self.run.high_v),
+            Mode::Reference => (f32::MIN, f32::MAX),
+        };
+        if let Some(k) = fresh.iter().position(|drive| !(low..=high).contains(drive)) {
+            return Err(Refusal::Drive(self.received.wrapping_add(k as u32)));
+        }
+        let room = (self.status().room - self.received) as usize;
+        for drive in fresh.iter().take(room) {
+            if self.queue.push_back(*drive).is_err() {
+                break;
+            }
+            self.received += 1;
+        }
+        Ok(())
+    }
+
+    fn take_model(&mut self, chunk: &Chunk) -> Result<u32, Refusal> {
+        if self.state == State::Running {
+            return Err(Refusal::State);
+        }
+        if chunk.total as usize > M || !self.identity.follows {
+            return Err(Refusal::ModelSize);
+        }
+        if chunk.offset == 0 && (self.loaded || self.model.len() > chunk.bytes.len()) {
+            self.model.clear();
+            self.loaded = false;
+        }
+        let have = self.model.len() as u32;
+        let Some(known) = have.checked_sub(chunk.offset) else { return Err(Refusal::ModelGap) };
+        if let Some(fresh) = chunk.bytes.get(known as usize..)
+            && !self.loaded
+        {
+            if self.model.len() + fresh.len() > chunk.total as usize || self.model.extend_from_slice(fresh).is_err() {
+                return Err(Refusal::ModelSize);
+            }
+            if self.model.len() == chunk.total as usize {
+                self.loaded = self.control.load(&self.model);
+                if !self.loaded {
+                    self.model.clear();
+                    return Err(Refusal::Model);
+                }
+            }
+        }
+        Ok(self.model.len() as u32)
+    }
+}
