@@ -46,7 +46,7 @@ pub use plant::error::{ConfigError, PlantError};
 #[cfg(feature = "std")]
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
 #[cfg(feature = "std")]
-pub use remote::{Line, Remote, RemoteError, RemoteOptions};
+pub use remote::{Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Tcp, ports};
 #[cfg(feature = "std")]
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,

@@ -1,5 +1,7 @@
 //! A device at the other end of a line, as a [`Daq`].
 
+mod lines;
+
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -8,6 +10,8 @@ use crate::wire::{
     Ask, Chunk, Deframer, Exchange, Fault, FrameError, Identity, MAX_FRAME, MOST_CHUNK, MOST_DRIVES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode,
 };
+
+pub use lines::{OpenError, Port, Serial, Tcp, ports};
 
 /// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
 pub trait Line {
