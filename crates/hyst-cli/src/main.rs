@@ -7,6 +7,7 @@ mod chart;
 mod cli;
 mod commands;
 mod demo;
+mod device;
 mod exit;
 mod input;
 mod log;

@@ -33,6 +33,8 @@ mod plant;
 mod remote;
 #[cfg(feature = "std")]
 mod runner;
+#[cfg(feature = "std")]
+mod serve;
 
 #[cfg(feature = "std")]
 pub use daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
@@ -51,3 +53,5 @@ pub use remote::{Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Seri
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,
 };
+#[cfg(feature = "std")]
+pub use serve::{PlantBoard, serve};

@@ -251,7 +251,7 @@ pub(crate) struct CompensateArgs {
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
-    /// Device: sim:PLANT.toml, the simulated actuator that the file describes
+    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD] or tcp:HOST:PORT
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
     /// Model file

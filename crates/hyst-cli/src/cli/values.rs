@@ -1,6 +1,6 @@
 //! Arguments that are more than a number or a path.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use hyst_ident::record::ABSOLUTE_ZERO;
@@ -31,6 +31,28 @@ impl FromStr for VoltageLimits {
 pub(crate) enum Device {
     /// The simulated plant of this file.
     Simulated(PathBuf),
+    /// At a serial port.
+    Serial {
+        /// What the system calls it.
+        port: String,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// At a socket, as `host:port`.
+    Tcp(String),
+}
+
+/// Bits a second of a serial port, if nothing is said.
+const USUAL_BAUD: u32 = 115_200;
+
+impl Device {
+    /// The file that describes it, if there is one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Simulated(path) => Some(path),
+            Self::Serial { .. } | Self::Tcp(_) => None,
+        }
+    }
 }
 
 impl FromStr for Device {
@@ -38,10 +60,20 @@ impl FromStr for Device {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
-            Some((kind @ ("serial" | "slcan" | "can"), _)) => {
-                Err(format!("this version has no {kind}: devices, only the simulated plant: give sim:PLANT.toml"))
+            Some(("serial", port)) if !port.is_empty() => match port.rsplit_once('@') {
+                None => Ok(Self::Serial { port: port.to_owned(), baud: USUAL_BAUD }),
+                Some((port, baud)) => {
+                    let baud = baud.parse().ok().filter(|baud| *baud > 0);
+                    let baud = baud.ok_or("give the bits a second behind the @, as serial:/dev/ttyACM0@921600")?;
+                    Ok(Self::Serial { port: port.to_owned(), baud })
+                }
+            },
+            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
+            Some((kind @ ("slcan" | "can"), _)) => {
+                Err(format!("this version has no {kind}: devices; give sim:PLANT.toml, serial:PORT or tcp:HOST:PORT"))
             }
-            _ => Err("give sim:PLANT.toml, with the file that describes the simulated plant".to_owned()),
+            _ => Err("give sim:PLANT.toml, with the file that describes the simulated plant, serial:PORT[@BAUD] or tcp:HOST:PORT"
+                .to_owned()),
         }
     }
 }
@@ -87,7 +119,12 @@ mod tests {
     #[test]
     fn devices_have_a_kind_and_a_place() {
         assert_eq!("sim:a:b.toml".parse(), Ok(Device::Simulated("a:b.toml".into())));
-        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:x", "serial:COM3"] {
+        let serial = |port: &str, baud| Ok(Device::Serial { port: port.into(), baud });
+        assert_eq!("serial:/dev/ttyACM0".parse(), serial("/dev/ttyACM0", 115_200));
+        assert_eq!("serial:COM3@921600".parse(), serial("COM3", 921_600));
+        assert_eq!("tcp:localhost:4000".parse(), Ok(Device::Tcp("localhost:4000".into())));
+        assert!("serial:COM3@fast".parse::<Device>().unwrap_err().contains("921600"));
+        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:x", "serial:", "tcp:here"] {
             assert!(text.parse::<Device>().unwrap_err().contains("sim:PLANT.toml"), "{text}");
         }
     }

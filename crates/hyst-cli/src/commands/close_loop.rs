@@ -15,7 +15,8 @@ use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
 
-use crate::cli::{CloseLoopArgs, Device};
+use crate::cli::CloseLoopArgs;
+use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::progress::Progress;
@@ -63,13 +64,12 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
         let message = format!("{}: the folder is not empty; give another one with --out", out.display());
         return Err(CommandError::bad_input(message));
     }
-    let Device::Simulated(described) = &args.daq;
-    let mut plant = input::plant(described, None)?;
+    let mut device = AnyDevice::open(&args.daq, &Wishes::default())?;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
     let report = Report::new(args.json.json, &[])?;
     let progress = Progress::spinner("closing the loop");
-    let summary = turns(&mut plant, args, &progress)?;
+    let summary = turns(&mut device, args, &progress)?;
     drop(progress);
     write(out, "summary.json", &output::json(&summary)?)?;
     report.print(&said(&summary), &summary)

@@ -12,11 +12,12 @@ use hyst_ident::record::Extra;
 use serde::Serialize;
 
 use super::compensate::Compensation;
-use crate::cli::{Device, RunArgs};
+use crate::cli::RunArgs;
+use crate::device::{AnyDevice, Wishes};
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
-use crate::{input, recording, text};
+use crate::{recording, text};
 use job::{Followed, Job};
 
 /// What is said about a run.
@@ -61,12 +62,16 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     if args.log.as_deref() == Some(Path::new("-")) {
         return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
     }
-    let Device::Simulated(described) = &args.daq;
-    let mut read: Vec<&Path> = vec![described];
+    let mut read: Vec<&Path> = args.daq.file().into_iter().collect();
     read.extend([&args.model, &args.reference, &args.drive].into_iter().filter_map(|path| path.as_deref()));
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    on_device(&mut input::plant(described, args.seed)?, args, report)
+    let wishes = Wishes {
+        noise: args.seed,
+        voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
+        slew_v_per_s: args.limits.slew,
+    };
+    on_device(&mut AnyDevice::open(&args.daq, &wishes)?, args, report)
 }
 
 /// The run on any device.

@@ -1,11 +1,13 @@
 //! What goes over a serial line, a CAN bus or a socket, the same source on host and board: no heap, no clock, no device.
 //!
 //! - `frame.rs`: bytes to frames and back.
+//! - `iso_tp.rs`: messages over a CAN bus.
 //! - `message.rs`: what host and device say to each other.
 //! - `device.rs`: what a device does with it.
 
 mod device;
 mod frame;
+mod iso_tp;
 mod message;
 
 pub use device::{Board, Control, Device, Open, Shown};
@@ -14,3 +16,4 @@ pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit,
 };
+pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};

@@ -1,0 +1,111 @@
+//! The device that an argument names, whichever kind it is.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use hyst_hw::{Capabilities, Daq, Plant, PlantError, Remote, RemoteError, RemoteOptions, Sample, Serial, Tcp};
+
+use crate::cli::Device;
+use crate::exit::{Classified, CommandError, CommandResult, Exit};
+use crate::input;
+
+/// A device of any kind.
+pub(crate) enum AnyDevice {
+    Plant(Box<Plant>),
+    Serial(Box<Remote<Serial>>),
+    Tcp(Box<Remote<Tcp>>),
+}
+
+/// What any of them may say.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum DeviceError {
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    #[error(transparent)]
+    Remote(#[from] RemoteError),
+}
+
+impl Classified for DeviceError {
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Plant(error) => error.exit(),
+            Self::Remote(RemoteError::Refused { .. } | RemoteError::Value { .. } | RemoteError::Version { .. }) => {
+                Exit::BadInput
+            }
+            Self::Remote(_) => Exit::DeviceLost,
+        }
+    }
+}
+
+/// What a run may be told beyond its drive.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wishes {
+    /// Seed of a simulated plant's noise.
+    pub(crate) noise: Option<u64>,
+    /// Lowest and highest voltage \[V\].
+    pub(crate) voltage: Option<(f64, f64)>,
+    /// Steepest slope \[V/s\].
+    pub(crate) slew_v_per_s: Option<f64>,
+}
+
+impl AnyDevice {
+    /// Opens it. Nothing moves by that.
+    pub(crate) fn open(device: &Device, wishes: &Wishes) -> CommandResult<Self> {
+        // No two runs have the same number, so that a late request of one does nothing to another.
+        let clock = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+        let session = (clock ^ (clock >> 32)) as u32 ^ std::process::id().rotate_left(16);
+        let options = RemoteOptions {
+            voltage: wishes.voltage,
+            slew_v_per_s: wishes.slew_v_per_s,
+            ..RemoteOptions::with_session(session)
+        };
+        let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
+        Ok(match device {
+            Device::Simulated(described) => Self::Plant(Box::new(input::plant(described, wishes.noise)?)),
+            Device::Serial { port, baud } => {
+                let line = Serial::open(port, *baud).map_err(|error| CommandError::new(Exit::DeviceLost, error))?;
+                Self::Serial(Box::new(Remote::open(line, port, options).map_err(lost)?))
+            }
+            Device::Tcp(address) => {
+                let line = Tcp::connect(address).map_err(|error| {
+                    let message = format!("{address}: nobody answers: {error}; is the simulator or the bridge running?");
+                    CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"))
+                })?;
+                Self::Tcp(Box::new(Remote::open(line, address, options).map_err(lost)?))
+            }
+        })
+    }
+}
+
+/// The same call on whichever it is.
+macro_rules! each {
+    ($device:expr, $it:ident => $call:expr) => {
+        match $device {
+            AnyDevice::Plant($it) => $call,
+            AnyDevice::Serial($it) => $call,
+            AnyDevice::Tcp($it) => $call,
+        }
+    };
+}
+
+impl Daq for AnyDevice {
+    type Error = DeviceError;
+
+    fn capabilities(&self) -> &Capabilities {
+        each!(self, it => it.capabilities())
+    }
+    fn present_v(&self) -> f64 {
+        each!(self, it => it.present_v())
+    }
+    fn start(&mut self, rate_hz: f64) -> Result<f64, DeviceError> {
+        each!(self, it => Ok(it.start(rate_hz)?))
+    }
+    fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, DeviceError> {
+        each!(self, it => Ok(it.exchange(drive_v, measured)?))
+    }
+    fn rest(&mut self, seconds: f64) -> Result<(), DeviceError> {
+        each!(self, it => Ok(it.rest(seconds)?))
+    }
+    fn stop(&mut self) -> Result<(), DeviceError> {
+        each!(self, it => Ok(it.stop()?))
+    }
+}
