@@ -17,7 +17,9 @@ const REACH: Duration = Duration::from_secs(5);
 fn came(read: io::Result<usize>) -> io::Result<usize> {
     match read {
         Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other end closed it")),
-        Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+        Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+            Ok(0)
+        }
         other => other,
     }
 }
@@ -118,6 +120,11 @@ fn found(there: &[String]) -> String {
 }
 
 impl Serial {
+    /// Over a port that is open.
+    pub fn over(port: Box<dyn SerialPort>) -> Self {
+        Self { port }
+    }
+
     /// Opens the port `name` at `baud` bits a second, for this program alone.
     ///
     /// # Errors

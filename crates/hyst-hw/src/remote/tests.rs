@@ -303,6 +303,64 @@ fn nobody_at_the_other_end_is_told() {
     assert!(message.contains("/dev/ttyX") && message.contains("right port"), "{message}");
 }
 
+/// A device on its own clock behind `line`, until the host is gone, and how it stands then and shortly after.
+fn served(mut line: impl Line + Send + 'static) -> std::thread::JoinHandle<(Device<Open, 128, 0>, Echo)> {
+    std::thread::spawn(move || {
+        let (mut device, mut board) = (Device::new(identity(), Open), Echo::default());
+        // The end of the line is no error here.
+        let _ = crate::serve(&mut device, &mut board, &mut line, || false);
+        (0..4000).for_each(|_| device.tick(&mut board));
+        (device, board)
+    })
+}
+
+/// What was sent comes back over a real line, on the device's own clock; a host that is gone leaves it to its watchdog.
+fn over(host: impl Line, device: impl Line + Send + 'static) {
+    let device = served(device);
+    let options = RemoteOptions {
+        silence_s: 0.5,
+        repeat: Duration::from_millis(200),
+        lost: Duration::from_secs(20),
+        ..options()
+    };
+    let mut remote = Remote::open(host, "line", options).unwrap();
+    let drive = wave(900);
+    let recording =
+        record(&mut remote, std::slice::from_ref(&drive), &RecordOptions::at(2000.0), |_| ControlFlow::Continue(()))
+            .unwrap();
+    let samples = &recording.segments[0].samples;
+    assert_eq!(samples.len(), drive.len());
+    assert!(samples.iter().zip(&drive).all(|(s, v)| s.drive_v == f64::from(*v as f32) && s.output == 0.5 * s.drive_v));
+    remote.start(2000.0).unwrap();
+    remote.exchange(&[30.0; 50], &mut Vec::new()).unwrap();
+    drop(remote);
+    let (device, board) = device.join().unwrap();
+    assert_eq!((device.state(), board.volts), (State::Fault(Fault::Silence), 0.0));
+}
+
+#[test]
+fn a_run_over_a_socket() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let host = Tcp::connect(listener.local_addr().unwrap()).unwrap();
+    over(host, Tcp::over(listener.accept().unwrap().0).unwrap());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_over_a_pseudo_terminal() {
+    let (host, device) = serialport::TTYPort::pair().unwrap();
+    over(Serial::over(Box::new(host)), Serial::over(Box::new(device)));
+}
+
+#[test]
+fn ports_that_are_not_there_are_told() {
+    let message = Serial::open("/dev/tty-of-nobody", 115_200).unwrap_err().to_string();
+    assert!(message.starts_with("/dev/tty-of-nobody: there is no such port"), "{message}");
+    // Nobody listens at a port that was just given back.
+    let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    Tcp::connect(address).unwrap_err();
+}
+
 proptest! {
     /// Whatever requests a device gets, its output stays within its range and its slew.
     #[test]

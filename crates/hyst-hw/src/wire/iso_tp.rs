@@ -1,6 +1,6 @@
 //! Messages over a CAN bus: ISO 15765-2 (ISO-TP), classic frames of 8 bytes and FD frames of up to 64.
 //!
-//! No bus and no clock: [`IsoTp::next`] gives the frames that are to be sent, [`IsoTp::take`] takes those that came. A message that
+//! No bus and no clock: [`IsoTp::frame`] gives the frames that are to be sent, [`IsoTp::take`] takes those that came. A message that
 //! lost a frame is given up; who wants it asks again.
 
 use heapless::Vec;
@@ -111,7 +111,7 @@ impl<const N: usize> IsoTp<N> {
     }
 
     /// The next frame to send; none if there is nothing to send, or the other end has to be heard first.
-    pub fn next(&mut self) -> Option<CanData> {
+    pub fn frame(&mut self) -> Option<CanData> {
         if core::mem::take(&mut self.permission) {
             return Some(filled(&[0x30, 0, 0], &[]));
         }
@@ -234,7 +234,7 @@ mod tests {
         let mut arrived = std::vec::Vec::new();
         loop {
             let mut quiet = true;
-            while let Some(frame) = from.next() {
+            while let Some(frame) = from.frame() {
                 quiet = false;
                 if !lost()
                     && let Some(message) = to.take(&frame)
@@ -242,7 +242,7 @@ mod tests {
                     arrived.push(message.to_vec());
                 }
             }
-            while let Some(frame) = to.next() {
+            while let Some(frame) = to.frame() {
                 quiet = false;
                 if !lost() {
                     assert_eq!(from.take(&frame), None);
@@ -259,26 +259,26 @@ mod tests {
         let mut end = End::new(false);
         end.send(&[1, 2, 3]).unwrap();
         assert_eq!(end.send(&[4]), Err(IsoTpError::Busy));
-        assert_eq!(end.next().unwrap(), [3, 1, 2, 3, FILL, FILL, FILL, FILL]);
-        assert_eq!(end.next(), None);
+        assert_eq!(end.frame().unwrap(), [3, 1, 2, 3, FILL, FILL, FILL, FILL]);
+        assert_eq!(end.frame(), None);
         let message: std::vec::Vec<u8> = (0..20).collect();
         end.send(&message).unwrap();
-        assert_eq!(end.next().unwrap(), [0x10, 20, 0, 1, 2, 3, 4, 5]);
-        assert_eq!(end.next(), None);
+        assert_eq!(end.frame().unwrap(), [0x10, 20, 0, 1, 2, 3, 4, 5]);
+        assert_eq!(end.frame(), None);
         assert!(end.waits());
         // One frame, then another word; wait; go on.
         end.take(&[0x30, 1, 0]);
-        assert_eq!(end.next().unwrap(), [0x21, 6, 7, 8, 9, 10, 11, 12]);
-        assert_eq!(end.next(), None);
+        assert_eq!(end.frame().unwrap(), [0x21, 6, 7, 8, 9, 10, 11, 12]);
+        assert_eq!(end.frame(), None);
         end.take(&[0x31, 0, 0]);
-        assert_eq!(end.next(), None);
+        assert_eq!(end.frame(), None);
         end.take(&[0x30, 0, 0]);
-        assert_eq!(end.next().unwrap(), [0x22, 13, 14, 15, 16, 17, 18, 19]);
+        assert_eq!(end.frame().unwrap(), [0x22, 13, 14, 15, 16, 17, 18, 19]);
         assert!(!end.busy());
         // Of CAN FD.
         let mut end = End::new(true);
         end.send(&message).unwrap();
-        let frame = end.next().unwrap();
+        let frame = end.frame().unwrap();
         assert_eq!((frame.len(), &frame[..4]), (24, &[0, 20, 0, 1][..]));
         assert_eq!(end.send(&[0; 1025]), Err(IsoTpError::TooLong));
     }
@@ -315,7 +315,7 @@ mod tests {
             let _ = end.send(&[7; 500]);
             for frame in &frames {
                 let _ = end.take(frame);
-                let _ = end.next();
+                let _ = end.frame();
             }
         }
     }

@@ -12,8 +12,8 @@ mod message;
 
 pub use device::{Board, Control, Device, Open, Shown};
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
+pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
 pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit,
 };
-pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
