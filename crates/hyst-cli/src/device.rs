@@ -2,7 +2,10 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use hyst_hw::{Capabilities, Daq, Plant, PlantError, Remote, RemoteError, RemoteOptions, Sample, Serial, Tcp};
+use hyst_hw::{
+    CanLine, Capabilities, Daq, FROM_DEVICE, Line, Plant, PlantError, Remote, RemoteError, RemoteOptions, Sample,
+    Serial, Slcan, TO_DEVICE, Tcp,
+};
 
 use crate::cli::Device;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
@@ -11,8 +14,8 @@ use crate::input;
 /// A device of any kind.
 pub(crate) enum AnyDevice {
     Plant(Box<Plant>),
-    Serial(Box<Remote<Serial>>),
-    Tcp(Box<Remote<Tcp>>),
+    /// At the other end of a line.
+    Remote(Box<Remote<Box<dyn Line>>>),
 }
 
 /// What any of them may say.
@@ -59,20 +62,26 @@ impl AnyDevice {
             ..RemoteOptions::with_session(session)
         };
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
-        Ok(match device {
-            Device::Simulated(described) => Self::Plant(Box::new(input::plant(described, wishes.noise)?)),
-            Device::Serial { port, baud } => {
-                let line = Serial::open(port, *baud).map_err(|error| CommandError::new(Exit::DeviceLost, error))?;
-                Self::Serial(Box::new(Remote::open(line, port, options).map_err(lost)?))
+        let port = |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
+        let gone = |message: String| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"));
+        let (line, name): (Box<dyn Line>, &str) = match device {
+            Device::Simulated(described) => {
+                return Ok(Self::Plant(Box::new(input::plant(described, wishes.noise)?)));
+            }
+            Device::Serial { port: name, baud } => (Box::new(port(name, *baud)?), name),
+            Device::Slcan { port: name, baud, bits_per_s } => {
+                let bus = Slcan::open(port(name, *baud)?, *bits_per_s)
+                    .map_err(|error| gone(format!("{name}: the CAN adapter cannot be opened: {error}")))?;
+                (Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false)), name)
             }
             Device::Tcp(address) => {
                 let line = Tcp::connect(address).map_err(|error| {
-                    let message = format!("{address}: nobody answers: {error}; is the simulator or the bridge running?");
-                    CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"))
+                    gone(format!("{address}: nobody answers: {error}; is the simulator or the bridge running?"))
                 })?;
-                Self::Tcp(Box::new(Remote::open(line, address, options).map_err(lost)?))
+                (Box::new(line), address)
             }
-        })
+        };
+        Ok(Self::Remote(Box::new(Remote::open(line, name, options).map_err(lost)?)))
     }
 }
 
@@ -81,8 +90,7 @@ macro_rules! each {
     ($device:expr, $it:ident => $call:expr) => {
         match $device {
             AnyDevice::Plant($it) => $call,
-            AnyDevice::Serial($it) => $call,
-            AnyDevice::Tcp($it) => $call,
+            AnyDevice::Remote($it) => $call,
         }
     };
 }

@@ -48,7 +48,10 @@ pub use plant::error::{ConfigError, PlantError};
 #[cfg(feature = "std")]
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
 #[cfg(feature = "std")]
-pub use remote::{Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Tcp, ports};
+pub use remote::{
+    Bus, CanLine, FROM_DEVICE, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Slcan, TO_DEVICE, Tcp,
+    ports,
+};
 #[cfg(feature = "std")]
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,

@@ -1,6 +1,8 @@
 //! A device at the other end of a line, as a [`Daq`].
 
+mod can;
 mod lines;
+mod slcan;
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -11,7 +13,9 @@ use crate::wire::{
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode,
 };
 
+pub use can::{Bus, CanLine, FROM_DEVICE, TO_DEVICE};
 pub use lines::{OpenError, Port, Serial, Tcp, ports};
+pub use slcan::Slcan;
 
 /// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
 pub trait Line {
@@ -26,6 +30,16 @@ pub trait Line {
     /// # Errors
     /// When the line is gone.
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize>;
+}
+
+impl<L: Line + ?Sized> Line for Box<L> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).send(bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
+        (**self).receive(bytes, patience)
+    }
 }
 
 /// What can go wrong with a device at the other end of a line.

@@ -1,7 +1,8 @@
 //! The firmware check: the core on a Cortex-M4F.
 //!
 //! It depends on nothing that needs an operating system; every model builds for the target; nothing in it can panic; in
-//! QEMU it computes the same bits as on this machine, within a bounded stack; and `docs/firmware.md` says what that costs.
+//! QEMU it computes the same bits as on this machine, within a bounded stack; `docs/firmware.md` says what that costs; and the
+//! reference firmware talks to a host over a serial line.
 
 mod figures;
 mod link;
@@ -100,6 +101,8 @@ fn steps(write: bool) -> Result<(), Ended> {
     }
     let agree = ["test", "--quiet", "--package", "hyst-cases", "--test", "agree", "--", "--nocapture"];
     done(cargo().args(agree).env("HYST_FIRMWARE", &printed))?;
+    let line = ["test", "--quiet", "--package", "hyst-tests", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
+    done(cargo().args(line).env("HYST_SERVO", built.join("servo")))?;
 
     let figures = Figures::collect(&toolchain, &library, &small, &printed)?;
     let document = root().join("docs/firmware.md");

@@ -48,6 +48,7 @@ pub(crate) enum Command {
     Gain(GainArgs),
     Loop(LoopArgs),
     Run(RunArgs),
+    Devices(DevicesArgs),
     Export(ExportArgs),
     Demo(DemoArgs),
     /// Print a completion script for a shell
@@ -315,6 +316,16 @@ pub(crate) struct MapArg {
     /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
+}
+
+/// List the serial ports at which a device may be
+///
+/// Nothing is sent and nothing moves: the ports are only looked at.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl devices")]
+pub(crate) struct DevicesArgs {
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
 }
 
 #[derive(Debug, Args)]

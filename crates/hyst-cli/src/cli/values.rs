@@ -38,19 +38,30 @@ pub(crate) enum Device {
         /// Bits a second.
         baud: u32,
     },
+    /// On a CAN bus, behind an adapter at a serial port.
+    Slcan {
+        /// What the system calls the port.
+        port: String,
+        /// Bits a second of the port.
+        baud: u32,
+        /// Bits a second of the bus.
+        bits_per_s: u32,
+    },
     /// At a socket, as `host:port`.
     Tcp(String),
 }
 
 /// Bits a second of a serial port, if nothing is said.
 const USUAL_BAUD: u32 = 115_200;
+/// Bits a second of a CAN bus, if nothing is said.
+const USUAL_BUS: u32 = 500_000;
 
 impl Device {
     /// The file that describes it, if there is one.
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Simulated(path) => Some(path),
-            Self::Serial { .. } | Self::Tcp(_) => None,
+            Self::Serial { .. } | Self::Slcan { .. } | Self::Tcp(_) => None,
         }
     }
 }
@@ -60,22 +71,31 @@ impl FromStr for Device {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
-            Some(("serial", port)) if !port.is_empty() => match port.rsplit_once('@') {
-                None => Ok(Self::Serial { port: port.to_owned(), baud: USUAL_BAUD }),
-                Some((port, baud)) => {
-                    let baud = baud.parse().ok().filter(|baud| *baud > 0);
-                    let baud = baud.ok_or("give the bits a second behind the @, as serial:/dev/ttyACM0@921600")?;
-                    Ok(Self::Serial { port: port.to_owned(), baud })
-                }
-            },
-            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
-            Some((kind @ ("slcan" | "can"), _)) => {
-                Err(format!("this version has no {kind}: devices; give sim:PLANT.toml, serial:PORT or tcp:HOST:PORT"))
+            Some(("serial", port)) if !port.is_empty() => {
+                let (port, baud) = at_rate(port, USUAL_BAUD, "serial:/dev/ttyACM0@921600")?;
+                Ok(Self::Serial { port, baud })
             }
-            _ => Err("give sim:PLANT.toml, with the file that describes the simulated plant, serial:PORT[@BAUD] or tcp:HOST:PORT"
-                .to_owned()),
+            Some(("slcan", port)) if !port.is_empty() => {
+                let (port, bits_per_s) = at_rate(port, USUAL_BUS, "slcan:/dev/ttyACM0@250000")?;
+                Ok(Self::Slcan { port, baud: USUAL_BAUD, bits_per_s })
+            }
+            Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
+            Some(("can", _)) => Err(format!("this version has no can: devices; give {FORMS}")),
+            _ => Err(format!("give {FORMS}")),
         }
     }
+}
+
+/// What a device can be given as.
+const FORMS: &str =
+    "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S] or tcp:HOST:PORT";
+
+/// A port and the bits a second behind its `@`, if there is one.
+fn at_rate(port: &str, usual: u32, example: &str) -> Result<(String, u32), String> {
+    let Some((port, rate)) = port.rsplit_once('@') else { return Ok((port.to_owned(), usual)) };
+    let rate = rate.parse().ok().filter(|rate| *rate > 0);
+    let rate = rate.ok_or_else(|| format!("give the bits a second behind the @, as {example}"))?;
+    Ok((port.to_owned(), rate))
 }
 
 /// A positive, finite number.
@@ -123,8 +143,10 @@ mod tests {
         assert_eq!("serial:/dev/ttyACM0".parse(), serial("/dev/ttyACM0", 115_200));
         assert_eq!("serial:COM3@921600".parse(), serial("COM3", 921_600));
         assert_eq!("tcp:localhost:4000".parse(), Ok(Device::Tcp("localhost:4000".into())));
+        let slcan = Device::Slcan { port: "COM4".into(), baud: 115_200, bits_per_s: 250_000 };
+        assert_eq!("slcan:COM4@250000".parse(), Ok(slcan));
         assert!("serial:COM3@fast".parse::<Device>().unwrap_err().contains("921600"));
-        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:x", "serial:", "tcp:here"] {
+        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:", "serial:", "tcp:here"] {
             assert!(text.parse::<Device>().unwrap_err().contains("sim:PLANT.toml"), "{text}");
         }
     }

@@ -21,7 +21,7 @@ use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::tracking::{Files, Run, Task};
-use crate::{input, recording, text};
+use crate::{recording, text};
 
 /// One turn.
 #[derive(Debug, Serialize)]

@@ -3,6 +3,7 @@
 mod close_loop;
 mod compare;
 mod compensate;
+mod devices;
 mod diagnose;
 mod excite;
 mod export;
@@ -34,6 +35,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Gain(args) => gain::run(&args),
         Command::Loop(args) => hysteresis_loop::run(&args),
         Command::Run(args) => run::run(&args),
+        Command::Devices(args) => devices::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions { shell } => {

@@ -68,6 +68,14 @@ impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
         self.pid.take_over(&mut s.pid, drive, y, ff);
     }
 
+    /// At rest at reference `r0`, the drive where the inverse has it: nothing is taken over. Gives that drive.
+    pub fn reset_to_feedforward(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, r0: T) -> T {
+        let ff = self.feedforward.reset(&mut s.feedforward, env, r0);
+        self.late.reset(&mut s.late, env, r0);
+        self.pid.take_over(&mut s.pid, ff, r0, ff);
+        ff
+    }
+
     /// The drive of time k from the reference (and surroundings) of time k + lead and the output measured at time k.
     #[inline]
     pub fn step(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, reference: T, measured: T) -> T {

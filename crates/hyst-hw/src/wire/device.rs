@@ -37,6 +37,8 @@ pub trait Control {
     fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool;
     /// The drive that the reference asks for \[V\], which the limits may still change.
     fn step(&mut self, reference: f32, shown: &Shown) -> f32;
+    /// The reference at which the output should be now: what looks ahead is given references before they are due.
+    fn due(&self) -> Option<f32>;
 }
 
 /// Without a model: a device that only plays voltages.
@@ -55,6 +57,9 @@ impl Control for Open {
     }
     fn step(&mut self, reference: f32, _: &Shown) -> f32 {
         reference
+    }
+    fn due(&self) -> Option<f32> {
+        None
     }
 }
 
@@ -192,7 +197,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         } else if self.quiet as f32 > self.run.silence_s * self.run.rate_hz {
             Some(Fault::Silence)
         } else {
-            self.reference.and_then(|reference| {
+            self.reference.and_then(|_| self.control.due()).and_then(|reference| {
                 let away = (reference - shown.output).abs() > self.run.error;
                 self.astray = if away { self.astray + 1 } else { 0 };
                 (self.astray > PATIENCE).then_some(Fault::TrackingError)

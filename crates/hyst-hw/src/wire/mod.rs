@@ -4,16 +4,22 @@
 //! - `iso_tp.rs`: messages over a CAN bus.
 //! - `message.rs`: what host and device say to each other.
 //! - `device.rs`: what a device does with it.
+//! - `recipe.rs`: a model and a PID as bytes.
+//! - `follower.rs`: how a device follows references with them.
 
 mod device;
+mod follower;
 mod frame;
 mod iso_tp;
 mod message;
+mod recipe;
 
 pub use device::{Board, Control, Device, Open, Shown};
+pub use follower::Follower;
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
 pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit,
 };
+pub use recipe::{MOST_ELEMENTS, MOST_HEAD, MOST_PLAYS, Model, RECIPE, Recipe, RecipeError, head as recipe_head, read as read_recipe};

@@ -1,0 +1,32 @@
+//! `hystctl devices`: what is connected. Nothing is sent, nothing moves.
+
+use hyst_hw::{Port, ports};
+use serde::Serialize;
+
+use crate::cli::DevicesArgs;
+use crate::exit::CommandResult;
+use crate::output::Report;
+use crate::text::table;
+
+/// A port as `--daq` takes it.
+#[derive(Serialize)]
+struct Found {
+    daq: String,
+    port: String,
+    what: String,
+}
+
+pub(super) fn run(args: &DevicesArgs) -> CommandResult {
+    let found: Vec<Found> = ports()
+        .into_iter()
+        .map(|Port { name, what }| Found { daq: format!("serial:{name}"), port: name, what })
+        .collect();
+    let text = if found.is_empty() {
+        "no serial port is connected\na device without one: sim:PLANT.toml (the simulated plant), tcp:HOST:PORT (a simulator or a bridge)"
+            .to_owned()
+    } else {
+        let rows = found.iter().map(|f| vec![f.daq.clone(), f.what.clone()]);
+        table(&std::iter::once(vec!["--daq".to_owned(), "what".to_owned()]).chain(rows).collect::<Vec<_>>())
+    };
+    Report::new(args.json.json, &[])?.print(&text, &found)
+}

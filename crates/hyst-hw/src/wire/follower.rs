@@ -1,0 +1,114 @@
+//! A model's inverse in front and a PID behind it: how a device follows references.
+
+use heapless::Deque;
+use hyst_core::{
+    Build, Chain, Compensator, CompensatorOptions, Env, OperatorParams, Pi, PidParams, Sampling, Stage, Tracking,
+    TrackingState,
+};
+
+use super::device::{Control, Shown};
+use super::recipe::{self, MOST_ELEMENTS, MOST_PLAYS, Recipe};
+
+/// Samples of dead time that a device has room for.
+const DELAY: usize = 32;
+/// Taps of a preview filter that a device has room for.
+const TAPS: usize = 257;
+/// Samples by which a device may lag behind the references, because its inverse looks ahead.
+const LEAD: usize = 320;
+
+type Actuator = Chain<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS>;
+type Inverse = Compensator<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS, TAPS>;
+type Loop = Tracking<f32, Inverse, LEAD>;
+
+/// Follows references with a model of plays and what surrounds them. All arithmetic is `f32`, in `hyst-core`: a host gets the same bits.
+#[derive(Debug, Default)]
+pub struct Follower {
+    recipe: Option<Recipe>,
+    running: Option<Running>,
+}
+
+#[derive(Debug)]
+struct Running {
+    tracking: Loop,
+    state: TrackingState<f32, <Inverse as Stage<f32>>::State, LEAD>,
+    lead: usize,
+    /// References that are not due yet.
+    early: Deque<f32, LEAD>,
+    due: f32,
+}
+
+impl Follower {
+    /// Without a model.
+    pub const fn new() -> Self {
+        Self { recipe: None, running: None }
+    }
+
+    /// The loop at a sample period \[s\]. `None` where this device has no room for it, or where there is no such loop.
+    fn built(recipe: &Recipe, period: f32) -> Option<(Loop, usize)> {
+        let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
+        let sampling = Sampling { period: f64::from(period) };
+        let pi: Pi<f32, MOST_PLAYS> = pi.build(&()).ok()?;
+        let chain: Actuator = recipe.model.around(pi, &sampling).ok()?;
+        let inverse: Inverse = chain.compensator(&sampling, &CompensatorOptions::default()).ok()?;
+        let lead = inverse.lead();
+        let [low, high] = recipe.model.input;
+        let still = PidParams {
+            proportional: 0.0,
+            integral: 0.0,
+            derivative: 0.0,
+            derivative_hz: 1.0,
+            proportional_weight: 0.0,
+            derivative_weight: 0.0,
+            anti_windup_seconds: 1.0,
+            low,
+            high,
+        };
+        let pid = recipe.pid.unwrap_or(still).build(&sampling).ok()?;
+        Some((Tracking::new(inverse, lead, pid).ok()?, lead))
+    }
+}
+
+fn env(shown: &Shown) -> Env<f32> {
+    Env { time: 0.0, temperature: shown.temperature_degc, load: shown.load_n }
+}
+
+impl Control for Follower {
+    fn load(&mut self, bytes: &[u8]) -> bool {
+        self.running = None;
+        self.recipe = recipe::read(bytes).ok().filter(|r| matches!(r.model.operator, OperatorParams::Pi(_)));
+        self.recipe.is_some()
+    }
+
+    fn ready(&self) -> bool {
+        self.recipe.is_some()
+    }
+
+    fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool {
+        let built = self.recipe.as_ref().and_then(|recipe| Self::built(recipe, period));
+        self.running = built.map(|(tracking, lead)| {
+            let mut state = tracking.state();
+            if self.recipe.as_ref().is_some_and(|r| r.pid.is_some()) {
+                tracking.reset(&mut state, &env(shown), reference, shown.output, volts);
+            } else {
+                // Without a PID nothing would ever take a first difference back: the drive goes where the model has it, at the slew limit.
+                tracking.reset_to_feedforward(&mut state, &env(shown), reference);
+            }
+            Running { tracking, state, lead, early: Deque::new(), due: reference }
+        });
+        self.running.is_some()
+    }
+
+    fn step(&mut self, reference: f32, shown: &Shown) -> f32 {
+        let Some(run) = &mut self.running else { return f32::NAN };
+        // There is room: no loop is built that looks further ahead.
+        let _ = run.early.push_back(reference);
+        if run.early.len() > run.lead {
+            run.due = run.early.pop_front().unwrap_or(run.due);
+        }
+        run.tracking.step(&mut run.state, &env(shown), reference, shown.output)
+    }
+
+    fn due(&self) -> Option<f32> {
+        self.running.as_ref().map(|run| run.due)
+    }
+}

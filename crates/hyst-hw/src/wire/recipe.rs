@@ -1,0 +1,138 @@
+//! What a device follows references with, as bytes.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 4 | `HYCT` |
+//! | 1 | version of this format |
+//! | 1 | 1 with a PID, 0 without |
+//! | 0 or 72 | the nine numbers of [`PidParams`] in their order, `f64`, little endian |
+//! | 4 | CRC-32 (ISO-HDLC) of everything before, little endian |
+//! | n | the model: a [block](hyst_core::read_block), which has a check sum of its own |
+
+use core::fmt;
+
+use hyst_core::{BlockError, ChainParams, List, PidParams, read_block};
+
+/// Version of these bytes.
+pub const RECIPE: u8 = 1;
+
+const MAGIC: [u8; 4] = *b"HYCT";
+const NUMBERS: usize = 9;
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+/// Bytes in front of the model at most.
+pub const MOST_HEAD: usize = MAGIC.len() + 2 + 8 * NUMBERS + 4;
+
+/// Plays and elements of a model that a device has room for.
+pub const MOST_PLAYS: usize = 64;
+/// Creep elements, or dead zones of a curve, that a device has room for.
+pub const MOST_ELEMENTS: usize = 16;
+
+/// A model with room for what a device can run.
+pub type Model = ChainParams<List<MOST_PLAYS>, List<MOST_ELEMENTS>>;
+
+/// A model whose inverse leads, and a PID that corrects it, if there is one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recipe {
+    /// The correction.
+    pub pid: Option<PidParams>,
+    /// The model.
+    pub model: Model,
+}
+
+/// Why bytes are no recipe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecipeError {
+    /// They do not begin with `HYCT`.
+    NotARecipe,
+    /// They are of another version.
+    Version(u8),
+    /// There are fewer than there should be.
+    Truncated,
+    /// The gains were changed on the way.
+    Corrupt,
+    /// The model cannot be read.
+    Model(BlockError),
+}
+
+impl fmt::Display for RecipeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotARecipe => f.write_str("not a controller: it does not begin with HYCT"),
+            Self::Version(version) => {
+                write!(f, "controller version {version}, this build reads {RECIPE}: update the older of the two")
+            }
+            Self::Truncated => f.write_str("controller cut short: send it again"),
+            Self::Corrupt => f.write_str("controller damaged: send it again"),
+            Self::Model(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for RecipeError {}
+
+fn numbers(pid: &PidParams) -> [f64; NUMBERS] {
+    [
+        pid.proportional,
+        pid.integral,
+        pid.derivative,
+        pid.derivative_hz,
+        pid.proportional_weight,
+        pid.derivative_weight,
+        pid.anti_windup_seconds,
+        pid.low,
+        pid.high,
+    ]
+}
+
+/// What stands in front of the model's block.
+pub fn head(pid: Option<&PidParams>) -> heapless::Vec<u8, MOST_HEAD> {
+    let mut bytes = heapless::Vec::new();
+    // All of it fits: that is what `MOST_HEAD` counts.
+    let _ = bytes.extend_from_slice(&MAGIC);
+    let _ = bytes.extend_from_slice(&[RECIPE, u8::from(pid.is_some())]);
+    for number in pid.map(numbers).iter().flatten() {
+        let _ = bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    let sum = CRC.checksum(&bytes).to_le_bytes();
+    let _ = bytes.extend_from_slice(&sum);
+    bytes
+}
+
+/// Reads a recipe.
+///
+/// # Errors
+/// See [`RecipeError`].
+pub fn read(bytes: &[u8]) -> Result<Recipe, RecipeError> {
+    let fixed = MAGIC.len() + 2;
+    if bytes.get(..MAGIC.len()) != Some(&MAGIC[..]) {
+        return Err(RecipeError::NotARecipe);
+    }
+    let (Some(version), Some(with)) = (bytes.get(fixed - 2), bytes.get(fixed - 1)) else {
+        return Err(RecipeError::Truncated);
+    };
+    if *version != RECIPE {
+        return Err(RecipeError::Version(*version));
+    }
+    let end = fixed + if *with == 0 { 0 } else { 8 * NUMBERS };
+    let (Some(front), Some(stated), Some(block)) = (bytes.get(..end), bytes.get(end..end + 4), bytes.get(end + 4..))
+    else {
+        return Err(RecipeError::Truncated);
+    };
+    if CRC.checksum(front).to_le_bytes() != *stated {
+        return Err(RecipeError::Corrupt);
+    }
+    let mut read = front[fixed..].chunks_exact(8).filter_map(|b| b.try_into().ok()).map(f64::from_le_bytes);
+    let mut next = || read.next().unwrap_or_default();
+    let pid = (*with != 0).then(|| PidParams {
+        proportional: next(),
+        integral: next(),
+        derivative: next(),
+        derivative_hz: next(),
+        proportional_weight: next(),
+        derivative_weight: next(),
+        anti_windup_seconds: next(),
+        low: next(),
+        high: next(),
+    });
+    Ok(Recipe { pid, model: read_block(block).map_err(RecipeError::Model)? })
+}

@@ -1,0 +1,97 @@
+//! What belongs to this board: a serial line and a clock. Another board changes this file, and the memory map.
+
+use core::ptr::{read_volatile, write_volatile};
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::exception;
+
+/// Core clock of the mps2-an386 \[Hz\].
+const CLOCK_HZ: f32 = 25_000_000.0;
+
+/// Periods of the clock that have passed.
+static PERIODS: AtomicU32 = AtomicU32::new(0);
+
+#[exception]
+fn SysTick() {
+    PERIODS.fetch_add(1, Ordering::Relaxed);
+}
+
+/// The clock.
+pub struct Clock {
+    systick: SYST,
+    seen: u32,
+}
+
+impl Clock {
+    /// Starts it. Only once: `None` from then on.
+    pub fn start(rate_hz: f32) -> Option<Self> {
+        let mut systick = Peripherals::take()?.SYST;
+        systick.set_clock_source(SystClkSource::Core);
+        systick.set_reload((CLOCK_HZ / rate_hz) as u32 - 1);
+        systick.clear_current();
+        systick.enable_interrupt();
+        systick.enable_counter();
+        Some(Self { systick, seen: 0 })
+    }
+
+    /// Whether another period has passed. None is lost, however late it is asked.
+    pub fn passed(&mut self) -> bool {
+        let passed = PERIODS.load(Ordering::Relaxed) != self.seen;
+        self.seen = self.seen.wrapping_add(u32::from(passed));
+        passed
+    }
+
+    /// Stops it.
+    pub fn stop(&mut self) {
+        self.systick.disable_counter();
+    }
+}
+
+/// The first serial line of the CMSDK (Arm DDI 0479).
+pub struct Uart(());
+
+const UART: usize = 0x4000_4000;
+const DATA: usize = UART;
+const STATE: usize = UART + 0x04;
+const CONTROL: usize = UART + 0x08;
+const DIVIDER: usize = UART + 0x10;
+const SEND_FULL: u32 = 1;
+const RECEIVED: u32 = 2;
+
+fn read(register: usize) -> u32 {
+    // SAFETY: a register of the UART, which this board has there; only `Uart`, of which there is one, reads and writes it.
+    unsafe { read_volatile(register as *const u32) }
+}
+
+fn write(register: usize, value: u32) {
+    // SAFETY: as in `read`.
+    unsafe { write_volatile(register as *mut u32, value) }
+}
+
+impl Uart {
+    /// 115,200 bit/s, both ways.
+    pub fn open() -> Self {
+        write(DIVIDER, 217);
+        write(CONTROL, 0b11);
+        // What stood there before is nobody's.
+        read(DATA);
+        Self(())
+    }
+
+    /// A byte, if one has come.
+    pub fn receive(&mut self) -> Option<u8> {
+        (read(STATE) & RECEIVED != 0).then(|| read(DATA) as u8)
+    }
+
+    /// Sends a byte, if there is room for it.
+    pub fn send(&mut self, byte: u8) -> bool {
+        let room = read(STATE) & SEND_FULL == 0;
+        if room {
+            write(DATA, byte.into());
+        }
+        room
+    }
+}

@@ -1,0 +1,193 @@
+//! The reference firmware (`tests/firmware/servo`) in QEMU, at the end of a pseudo terminal.
+//!
+//! `HYST_SERVO` names its program, as `cargo xtask firmware` builds it; without it these tests say that they skip.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use hyst_core::{ChainParams, EffectParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
+use hyst_hw::wire::{
+    Ask, Chunk, Exchange, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, Tell, recipe_head,
+};
+use hyst_hw::{Daq, Remote, RemoteError, RemoteOptions, Sample, Serial};
+use hyst_onboard::{OnBoard, RANGE_V, RATE_HZ, SLEW_V_PER_S, servo};
+
+/// The machine, which ends with it.
+struct Machine {
+    process: Child,
+    port: String,
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// QEMU with the firmware; `None` without them.
+fn machine() -> Option<Machine> {
+    let Some(program) = std::env::var_os("HYST_SERVO").filter(|path| Path::new(path).is_file()) else {
+        println!("skipped: HYST_SERVO names no firmware; cargo xtask firmware builds it");
+        return None;
+    };
+    let started = Command::new("qemu-system-arm")
+        .args(["-machine", "mps2-an386", "-display", "none", "-monitor", "none"])
+        .args(["-chardev", "pty,id=line", "-serial", "chardev:line"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(program)
+        .stdout(Stdio::piped())
+        .spawn();
+    let Ok(mut process) = started else {
+        println!("skipped: there is no qemu-system-arm");
+        return None;
+    };
+    // "char device redirected to /dev/pts/3 (label line)"
+    let mut said = String::new();
+    let stdout = process.stdout.take().expect("it is piped");
+    BufReader::new(stdout).read_line(&mut said).expect("QEMU says where the line is");
+    let port = said.split_whitespace().find(|word| word.starts_with("/dev/")).expect("a pseudo terminal").to_owned();
+    Some(Machine { process, port })
+}
+
+fn remote(machine: &Machine, session: u32, mode: Mode) -> Remote<Serial> {
+    let line = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
+    let options = RemoteOptions { mode, ..RemoteOptions::with_session(session) };
+    Remote::open(line, &machine.port, options).expect("the firmware answers")
+}
+
+/// A model of about that actuator, and a PID.
+fn recipe() -> Vec<u8> {
+    let operator = OperatorParams::Pi(PiParams {
+        gain: 0.07,
+        thresholds: (0..12).map(|i| 1.5 + 4.0 * f64::from(i)).collect(),
+        weights: (0..12).map(|i| 0.022 * (-0.25 * f64::from(i)).exp()).collect(),
+    });
+    let effects: EffectParams<Vec<f64>> =
+        EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
+    let model: ChainParams<Vec<f64>> =
+        ChainParams { operator, effects, zero: 0.0, input: RANGE_V.map(f64::from) };
+    let pid = PidParams {
+        proportional: 0.5,
+        integral: 60.0,
+        derivative: 0.0,
+        derivative_hz: 50.0,
+        proportional_weight: 1.0,
+        derivative_weight: 0.0,
+        anti_windup_seconds: 0.05,
+        low: RANGE_V[0].into(),
+        high: RANGE_V[1].into(),
+    };
+    let mut room = [0; 4096];
+    let block = write_block(&model, &mut room).expect("there is room");
+    [recipe_head(Some(&pid)).as_slice(), block].concat()
+}
+
+/// Sines of two frequencies that begin at rest \[µm\].
+fn references(rows: usize) -> Vec<f64> {
+    let at = |k: usize| std::f64::consts::TAU * k as f64 / f64::from(RATE_HZ);
+    (0..rows).map(|k| 6.0 * (1.0 - (0.8 * at(k)).cos()) + 1.5 * (1.0 - (5.0 * at(k)).cos())).collect()
+}
+
+/// The same source on the host: what the device measures, drive and output.
+fn on_host(references: &[f64]) -> Vec<(f32, f32)> {
+    let (mut device, mut actuator) = (servo(), OnBoard::default());
+    let ask = |device: &mut hyst_onboard::Servo, ask: Ask| -> Reply { device.answer(&Request { number: 0, ask }) };
+    let bytes = recipe();
+    for (i, part) in bytes.chunks(MOST_CHUNK).enumerate() {
+        let chunk = Chunk {
+            offset: (i * MOST_CHUNK) as u32,
+            total: bytes.len() as u32,
+            bytes: part.iter().copied().collect(),
+        };
+        assert!(matches!(ask(&mut device, Ask::Model(chunk)).tell, Tell::ModelBytes(_)));
+    }
+    let start = Start {
+        session: 1,
+        mode: Mode::Reference,
+        rate_hz: RATE_HZ,
+        low_v: RANGE_V[0],
+        high_v: RANGE_V[1],
+        slew_v_per_s: SLEW_V_PER_S,
+        hottest_degc: f32::INFINITY,
+        error: f32::INFINITY,
+        silence_s: 0.5,
+    };
+    assert!(matches!(ask(&mut device, Ask::Start(start)).tell, Tell::Status(_)));
+    let (mut sent, mut measured) = (0, Vec::new());
+    while measured.len() < references.len() {
+        let drives = references[sent..].iter().take(MOST_DRIVES).map(|r| *r as f32).collect();
+        let exchange = Exchange { session: 1, heard: measured.len() as u32, first: sent as u32, drives };
+        let Tell::Samples { status, samples, .. } = ask(&mut device, Ask::Exchange(exchange)).tell else {
+            panic!("the device refuses");
+        };
+        sent = status.received as usize;
+        measured.extend(samples.iter().map(|s| (s.drive_v, s.output)));
+        device.tick(&mut actuator);
+    }
+    measured
+}
+
+/// Ten seconds at 500 Hz: every sample once and in its period, and the bits that the host computes.
+#[test]
+fn the_firmware_tracks_with_the_hosts_bits() {
+    let Some(machine) = machine() else { return };
+    let mut remote = remote(&machine, 7, Mode::Reference);
+    assert!(remote.identity().follows);
+    remote.upload(&recipe()).expect("the firmware takes the model");
+    let references = references((10.0 * RATE_HZ) as usize);
+    let rate = remote.start(RATE_HZ.into()).expect("the run starts");
+    let (mut sent, mut measured) = (0, Vec::<Sample>::new());
+    let began = Instant::now();
+    while measured.len() < references.len() {
+        sent += remote.exchange(&references[sent..], &mut measured).expect("the run goes on");
+    }
+    let took = began.elapsed().as_secs_f64();
+    remote.stop().expect("the run stops");
+    assert_eq!(measured.len(), references.len());
+    assert!(took > 9.0, "{took} s for ten: it is not the board's clock that runs");
+    for pair in measured.windows(2) {
+        assert!((pair[1].time_s - pair[0].time_s - 1.0 / rate).abs() < 1e-9, "a gap at {} s", pair[1].time_s);
+    }
+    let expected = on_host(&references);
+    for (k, (sample, (drive, output))) in measured.iter().zip(&expected).enumerate() {
+        assert_eq!((sample.drive_v as f32).to_bits(), drive.to_bits(), "drive of sample {k}");
+        assert_eq!((sample.output as f32).to_bits(), output.to_bits(), "output of sample {k}");
+    }
+    let rmse = |of: &dyn Fn(usize) -> f64| {
+        let late = measured.len() / 4..measured.len();
+        (late.clone().map(|k| of(k).powi(2)).sum::<f64>() / late.len() as f64).sqrt()
+    };
+    // The inverse of the lag looks ahead: the output is late by as many samples.
+    let errors = (0..40).map(|lead| rmse(&|k| measured[k].output - references[k.saturating_sub(lead)]));
+    let least = errors.fold(f64::INFINITY, f64::min);
+    println!("10 s at {rate} Hz: RMSE {least:.3} µm");
+    assert!(least < 0.5, "{least} µm");
+}
+
+/// A host that goes leaves the device alone: it comes to rest by itself, within its slew limit, and says why.
+#[test]
+fn without_a_host_the_firmware_comes_to_rest() {
+    let Some(machine) = machine() else { return };
+    {
+        let mut remote = remote(&machine, 11, Mode::Voltage);
+        remote.start(RATE_HZ.into()).expect("the run starts");
+        let drive: Vec<f64> = (0..400).map(|k| 0.2 * f64::from(k)).collect();
+        let (mut sent, mut measured) = (0, Vec::new());
+        while sent < drive.len() {
+            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run goes on");
+        }
+        // Neither stopped nor told: the port closes in the middle of the run.
+    }
+    sleep(Duration::from_millis(1500));
+    let mut remote = remote(&machine, 12, Mode::Voltage);
+    let refused = remote.start(RATE_HZ.into());
+    assert!(matches!(refused, Err(RemoteError::Refused { .. })), "{refused:?}");
+    remote.clear().expect("at rest the fault can be cleared");
+    assert_eq!(remote.present_v(), 0.0);
+    remote.start(RATE_HZ.into()).expect("and the next run starts");
+    remote.stop().expect("and stops");
+}
