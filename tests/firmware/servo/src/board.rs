@@ -4,7 +4,6 @@ use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::Peripherals;
-use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
 
@@ -21,7 +20,6 @@ fn SysTick() {
 
 /// The clock.
 pub struct Clock {
-    systick: SYST,
     seen: u32,
 }
 
@@ -34,7 +32,7 @@ impl Clock {
         systick.clear_current();
         systick.enable_interrupt();
         systick.enable_counter();
-        Some(Self { systick, seen: 0 })
+        Some(Self { seen: 0 })
     }
 
     /// Whether another period has passed. None is lost, however late it is asked.
@@ -42,11 +40,6 @@ impl Clock {
         let passed = PERIODS.load(Ordering::Relaxed) != self.seen;
         self.seen = self.seen.wrapping_add(u32::from(passed));
         passed
-    }
-
-    /// Stops it.
-    pub fn stop(&mut self) {
-        self.systick.disable_counter();
     }
 }
 
