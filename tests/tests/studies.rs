@@ -1,7 +1,7 @@
 //! The comparisons of the examples, on actuators of other seeds.
 
 use hyst_ident::model::Kind;
-use hyst_tests::{activation_study, dpm_study, fod_study, force_study};
+use hyst_tests::{activation_study, control_study, dpm_study, fod_study, force_study};
 
 #[test]
 fn half_sine_curves_measure_a_valid_surface_in_a_structure_that_rings_and_triangles_do_not() {
@@ -26,6 +26,20 @@ fn the_dynamic_model_predicts_and_tracks_better_than_the_classical_one_at_every_
         assert!(dynamic <= 0.73 * classical, "{row:?}");
         assert!(by_dynamic <= 0.46 * none && by_dynamic < by_classical, "{row:?}");
     }
+}
+
+#[test]
+fn feedback_and_a_model_do_better_than_either_where_the_reference_is_quicker_than_the_feedback() {
+    let study = control_study::run(12);
+    assert!(study.pid_hz > 1.0, "{}", study.gains);
+    for row in &study.rows {
+        let [gain, base, extended, pid, both] = [0, 1, 2, 3, 4].map(|k| row.errors[k].rmse);
+        assert!(extended < base && extended < gain, "{}: {:?}", row.name, row.errors);
+        if row.band_hz > study.pid_hz {
+            assert!(both < pid && both < extended, "{}: {:?}", row.name, row.errors);
+        }
+    }
+    assert!(study.rows.iter().any(|row| row.band_hz > study.pid_hz), "{}", study.pid_hz);
 }
 
 #[test]

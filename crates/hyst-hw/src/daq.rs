@@ -75,6 +75,9 @@ pub struct Capabilities {
     pub temperature: bool,
     /// Whether each sample holds a load force.
     pub load: bool,
+    /// Whether drives wait in a queue, so that what is measured comes later than drives that were sent after it: no loop can be closed
+    /// from here.
+    pub queued: bool,
 }
 
 /// One instant of a record: what was applied and what was measured then.

@@ -423,6 +423,7 @@ fn capabilities(identity: &Identity, line: &str) -> Capabilities {
         },
         temperature: identity.temperature,
         load: identity.load,
+        queued: true,
     }
 }
 

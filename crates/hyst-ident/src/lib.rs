@@ -19,10 +19,12 @@ pub mod everett;
 pub mod excite;
 pub mod export;
 pub mod fit;
+pub mod force;
 pub mod full_memory;
 pub mod identify;
 pub mod linear;
 mod lsq;
+mod loop_gains;
 pub mod metrics;
 pub mod model;
 mod nested;
@@ -35,4 +37,5 @@ mod settle;
 pub mod simulate;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
+pub use loop_gains::{LoopGains, loop_gains};
 pub use samples::Samples;

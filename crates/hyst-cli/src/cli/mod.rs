@@ -16,6 +16,7 @@ use clap_complete::Shell;
 use hyst_ident::export::CName;
 use hyst_ident::model::Kind;
 use hyst_ident::simulate::Zero;
+use serde::Serialize;
 
 use crate::output::Target;
 pub(crate) use close_loop::CloseLoopArgs;
@@ -24,7 +25,7 @@ pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
 pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
 pub(crate) use search::SearchArgs;
-pub(crate) use values::{Device, VoltageLimits};
+pub(crate) use values::{Device, PidGains, VoltageLimits};
 use values::{celsius, positive, seconds};
 
 /// Identify, diagnose and compensate piezo actuators and others with hysteresis.
@@ -47,8 +48,10 @@ pub(crate) enum Command {
     Response(ResponseArgs),
     Gain(GainArgs),
     Loop(LoopArgs),
+    Force(ForceArgs),
     Run(RunArgs),
     Devices(DevicesArgs),
+    Log(LogArgs),
     Export(ExportArgs),
     Demo(DemoArgs),
     /// Print a completion script for a shell
@@ -182,6 +185,38 @@ pub(crate) struct SimulateArgs {
     pub(crate) json: JsonArg,
 }
 
+/// Estimate an external force without a force sensor
+///
+/// What a model of the free actuator does not explain of the measured displacement, times the output's stiffness; the record's columns are kept,
+/// and estimated_force_n is added. Where the record has load_n, the estimate is compared with it.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl force --model free.json record.csv --kout 1.08 --free-until 2 -o force.csv")]
+pub(crate) struct ForceArgs {
+    /// Model of the actuator without a force
+    #[arg(long)]
+    pub(crate) model: PathBuf,
+    /// Record with input and output
+    pub(crate) record: PathBuf,
+    /// Stiffness of the output, in N per output unit; that of the model's compliance if not given
+    #[arg(long, value_name = "N_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) kout: Option<f64>,
+    /// Record without a force, of the same day: gain and zero of the model are corrected by it
+    #[arg(long, value_name = "RECORD", conflicts_with = "free_until")]
+    pub(crate) free: Option<PathBuf>,
+    /// The same from the beginning of the record itself, as long as no force acts there
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    pub(crate) free_until: Option<f64>,
+    #[command(flatten)]
+    pub(crate) temperature: TemperatureArg,
+    /// CSV file to write; stdout if not given
+    #[arg(short, long, value_name = "CSV", default_value = "-", hide_default_value = true)]
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
 /// Find out which effects a model lacks, name them and add them
 ///
 /// Effects are searched on the training records alone; the test record is only simulated.
@@ -264,6 +299,12 @@ pub(crate) struct RunArgs {
     /// Record of the voltages to play, as excite or compensate writes it
     #[arg(long)]
     pub(crate) drive: Option<PathBuf>,
+    /// What makes the drive of the reference
+    #[arg(long, value_enum, default_value_t = Control::Feedforward, requires = "reference", conflicts_with = "drive")]
+    pub(crate) control: Control,
+    /// Gains of the PID: V per output unit, V per output unit and second, V s per output unit; from the model if not given
+    #[arg(long, value_name = "KP,KI[,KD]", allow_hyphen_values = true, conflicts_with = "drive")]
+    pub(crate) pid: Option<PidGains>,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
     /// Log to write while the device runs (MCAP): all samples, ramps included
@@ -288,6 +329,90 @@ pub(crate) struct RunArgs {
     pub(crate) map: MapArg,
     #[command(flatten)]
     pub(crate) json: JsonArg,
+}
+
+/// Look into the log of a run, make a record of it, or recover one that was cut off
+///
+/// fit, diagnose and the other commands read logs as they read records.
+#[derive(Debug, Args)]
+pub(crate) struct LogArgs {
+    #[command(subcommand)]
+    pub(crate) command: LogCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum LogCommand {
+    Info(LogInfoArgs),
+    Convert(LogConvertArgs),
+    Recover(LogRecoverArgs),
+}
+
+/// Say what ran, how long, and whether the log is whole
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl log info run.mcap")]
+pub(crate) struct LogInfoArgs {
+    /// Log (MCAP)
+    pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Make a record of a log
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl log convert run.mcap -o run.csv")]
+pub(crate) struct LogConvertArgs {
+    /// Log (MCAP)
+    pub(crate) log: PathBuf,
+    /// CSV file to write; stdout if not given
+    #[arg(short, long, value_name = "CSV", default_value = "-", hide_default_value = true)]
+    pub(crate) output: Target,
+    /// Ramps before and after each segment too
+    #[arg(long)]
+    pub(crate) ramps: bool,
+}
+
+/// Make a closed log of one that was cut off
+///
+/// Everything up to the cut is kept: with hystctl's own logs all but the last second.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl log recover run.mcap -o whole.mcap")]
+pub(crate) struct LogRecoverArgs {
+    /// Log (MCAP)
+    pub(crate) log: PathBuf,
+    /// Log to write
+    #[arg(short, long, value_name = "MCAP")]
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// What makes the drive of a reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Control {
+    /// A straight line through the ends of what the model was fitted to: no compensation
+    Gain,
+    /// The model's inverse
+    #[default]
+    Feedforward,
+    /// A PID on the measured output
+    Pid,
+    /// Both
+    #[value(name = "pid+feedforward")]
+    #[serde(rename = "pid+feedforward")]
+    PidFeedforward,
+}
+
+impl Control {
+    /// Whether the model's inverse takes part.
+    pub(crate) fn inverts(self) -> bool {
+        matches!(self, Self::Feedforward | Self::PidFeedforward)
+    }
+
+    /// Whether the measured output takes part.
+    pub(crate) fn closes(self) -> bool {
+        matches!(self, Self::Pid | Self::PidFeedforward)
+    }
 }
 
 /// What keeps a drive in bounds.

@@ -98,6 +98,32 @@ fn at_rate(port: &str, usual: u32, example: &str) -> Result<(String, u32), Strin
     Ok((port.to_owned(), rate))
 }
 
+/// Gains of a PID.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PidGains {
+    /// kₚ \[V/y\].
+    pub(crate) proportional: f64,
+    /// kᵢ \[V/(y s)\].
+    pub(crate) integral: f64,
+    /// k_d \[V s/y\].
+    pub(crate) derivative: f64,
+}
+
+impl FromStr for PidGains {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        match numbers.as_deref() {
+            Some([proportional, integral, rest @ ..]) if rest.len() < 2 => {
+                let (proportional, integral) = (*proportional, *integral);
+                Ok(Self { proportional, integral, derivative: rest.first().copied().unwrap_or_default() })
+            }
+            _ => Err("give KP,KI or KP,KI,KD, as 0.4,250".to_owned()),
+        }
+    }
+}
+
 /// A positive, finite number.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let usable = |x: &f64| x.is_finite() && *x > 0.0;
@@ -133,6 +159,16 @@ mod tests {
         assert_eq!("0, 120".parse(), Ok(VoltageLimits { low: 0.0, high: 120.0 }));
         for text in ["120", "120,0", "1,1", "a,1", "0,inf", "0,NaN", ""] {
             text.parse::<VoltageLimits>().unwrap_err();
+        }
+    }
+
+    #[test]
+    fn gains_are_two_or_three_numbers() {
+        let gains = |proportional, integral, derivative| PidGains { proportional, integral, derivative };
+        assert_eq!("0.4, 250".parse(), Ok(gains(0.4, 250.0, 0.0)));
+        assert_eq!("0.4,250,1e-3".parse(), Ok(gains(0.4, 250.0, 1e-3)));
+        for text in ["", "1", "1,2,3,4", "1,x", "1,NaN", "1,inf"] {
+            text.parse::<PidGains>().unwrap_err();
         }
     }
 

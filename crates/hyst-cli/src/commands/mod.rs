@@ -8,8 +8,10 @@ mod diagnose;
 mod excite;
 mod export;
 mod fit;
+mod force;
 mod gain;
 mod hysteresis_loop;
+mod log;
 mod response;
 mod run;
 mod simulate;
@@ -27,6 +29,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Fit(args) => fit::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Force(args) => force::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::CloseLoop(args) => close_loop::run(&args),
         Command::Compensate(args) => compensate::run(&args),
@@ -36,6 +39,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Loop(args) => hysteresis_loop::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Devices(args) => devices::run(&args),
+        Command::Log(args) => log::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions { shell } => {

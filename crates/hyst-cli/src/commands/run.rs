@@ -1,24 +1,26 @@
 //! `run`: plays a drive, or a reference through a model, on a device.
 
+mod control;
 mod job;
 mod live;
 mod play;
 
 use std::path::{Path, PathBuf};
 
+use hyst_core::PidParams;
 use hyst_hw::Daq;
 use hyst_ident::metrics::Errors;
 use hyst_ident::record::Extra;
 use serde::Serialize;
 
 use super::compensate::Compensation;
-use crate::cli::RunArgs;
+use crate::cli::{Control, RunArgs};
 use crate::device::{AnyDevice, Wishes};
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::{recording, text};
-use job::{Followed, Job};
+use job::{Closed, Followed, Job};
 
 /// What is said about a run.
 #[derive(Debug, Serialize)]
@@ -33,6 +35,10 @@ struct Summary {
     /// None when a drive was played.
     tracking: Option<Tracking>,
     compensation: Option<Compensation>,
+    /// None when a drive was played.
+    control: Option<Control>,
+    /// None without a PID.
+    pid: Option<Gains>,
     /// Whether the drive was corrected by the measured temperature on the way.
     temperature_followed: bool,
     log: Option<String>,
@@ -50,6 +56,23 @@ struct Tracking {
     max_abs: f64,
     /// RMSE over the last half, in which the start tells less.
     rmse_last_half: f64,
+}
+
+/// A PID that took part.
+#[derive(Debug, Serialize)]
+struct Gains {
+    /// \[V/y\]
+    proportional: f64,
+    /// \[V/(y s)\]
+    integral: f64,
+    /// \[V s/y\]
+    derivative: f64,
+    /// Where the loop's gain falls below one, as the model has it; none for given gains \[Hz\].
+    crossover_hz: Option<f64>,
+    /// Share of the samples in which a limit held the drive \[%\].
+    limited_percent: f64,
+    /// Why the gains are these, in words.
+    why: String,
 }
 
 /// Runs the command.
@@ -117,7 +140,9 @@ where
         lowest_output: low,
         highest_output: high,
         tracking: wanted.map(|wanted| Tracking::of(wanted, &measured)).transpose()?,
-        compensation: job.followed.as_ref().map(Followed::compensation),
+        compensation: job.followed.as_ref().and_then(Followed::compensation),
+        control: job.followed.as_ref().map(|followed| followed.control),
+        pid: job.followed.as_ref().and_then(|followed| followed.closed.as_ref()).map(Gains::of),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.record.as_ref().map(ToString::to_string),
@@ -133,6 +158,30 @@ impl Tracking {
         let squares: f64 = wanted[half..].iter().zip(&measured[half..]).map(|(w, y)| (w - y) * (w - y)).sum();
         let rmse_last_half = (squares / (wanted.len() - half).max(1) as f64).sqrt();
         Ok(Self { rmse: errors.rmse, nrmse_percent: errors.nrmse_percent, max_abs: errors.max_abs, rmse_last_half })
+    }
+}
+
+impl Gains {
+    fn of(closed: &Closed) -> Self {
+        let PidParams { proportional, integral, derivative, .. } = closed.gains;
+        let limited_percent = closed.running.limited_percent();
+        let (crossover_hz, why) = (closed.crossover_hz, closed.why.clone());
+        Self { proportional, integral, derivative, crossover_hz, limited_percent, why }
+    }
+
+    fn text(&self, symbol: &str) -> String {
+        let short = text::short;
+        let mut line = format!(
+            "PID: {} V/{symbol}, {} V/({symbol} s), {} V s/{symbol} ({})",
+            short(self.proportional),
+            short(self.integral),
+            short(self.derivative),
+            self.why
+        );
+        if self.limited_percent > 0.0 {
+            line += &format!("; a limit held its drive in {} of the samples", text::percent(self.limited_percent));
+        }
+        line
     }
 }
 
@@ -155,6 +204,7 @@ impl Summary {
                 "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
             )
         }));
+        lines.extend(self.pid.as_ref().map(|pid| pid.text(self.symbol)));
         lines.extend(self.compensation.as_ref().map(Compensation::text));
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());

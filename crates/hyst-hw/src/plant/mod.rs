@@ -113,6 +113,7 @@ impl Plant {
             output: OutputUnit::Micrometre,
             temperature,
             load,
+            queued: false,
         };
         Ok(Self {
             capabilities,

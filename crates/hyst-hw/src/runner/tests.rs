@@ -35,6 +35,7 @@ impl Queued {
             output: OutputUnit::Newton,
             temperature: false,
             load: true,
+            queued: true,
         };
         Self {
             capabilities,

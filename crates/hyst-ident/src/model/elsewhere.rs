@@ -96,6 +96,21 @@ impl Model {
         Ok(crate::samples::range(outputs.into_iter()))
     }
 
+    /// The straight line through the ends of the record that it was fitted to: its slope \[output/input\], which falls where the model does, and its
+    /// output at the lowest input. What somebody without a model of the hysteresis would use.
+    ///
+    /// # Errors
+    /// If the model cannot be run.
+    pub fn straight_line(&self) -> Result<(f64, f64), Error> {
+        let chain = Box::new(self.without_sensor().build(1.0 / self.recorded_at_hz)?);
+        let mut state = Box::new(chain.state());
+        let env = Env { temperature: self.stated_degc(), ..Env::default() };
+        let mut at = |u: f64| chain.reset(&mut state, &env, u);
+        let rises = at(self.input.low) <= at(self.input.high);
+        let (span, stroke) = (self.input.high - self.input.low, self.output.high - self.output.low);
+        Ok(if rises { (stroke / span, self.output.low) } else { (-stroke / span, self.output.high) })
+    }
+
     /// The model without what is in the sensor only: a drive does not follow that.
     pub(crate) fn without_sensor(&self) -> Self {
         let effects = self.effects.without(Effect::Drift).without(Effect::Interference);

@@ -32,6 +32,14 @@ pub enum RecordError {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// An MCAP file that is no log of a run.
+    #[error("{file}: {what}; records are read from logs that hystctl run --log writes, and from CSV files")]
+    Log {
+        /// The file.
+        file: String,
+        /// What is not as it should be.
+        what: String,
+    },
     /// The file has no header line.
     #[error(
         "{file}, line 1: the file is empty; a record starts with a header line such as \"time_s,voltage_v,displacement_um\""

@@ -9,6 +9,7 @@ use super::ABSOLUTE_ZERO;
 use super::columns::{ColumnMap, Layout, Need};
 use super::error::{Place, RecordError};
 use super::grid::Printed;
+use super::log::is_log;
 use super::{Columns, Origin, Record};
 
 impl Record {
@@ -29,6 +30,9 @@ impl Record {
     /// # Errors
     /// When the bytes break a rule of the record format.
     pub fn parse(name: &str, bytes: &[u8], map: &ColumnMap, need: Need) -> Result<Self, RecordError> {
+        if is_log(bytes) {
+            return Self::parse_log(name, bytes, map, need);
+        }
         let text = decode(name, bytes)?;
         let mut reader = rows_of(text);
         let mut fields = ByteRecord::new();

@@ -3,15 +3,18 @@
 use std::path::Path;
 
 use hyst_hw::{Capabilities, RecordOptions};
+use hyst_core::PidParams;
 use hyst_ident::compensate::{Drive, compensate};
+use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
 
+use super::control::ClosedLoop;
 use super::live::Live;
-use crate::cli::{RunArgs, VoltageLimits};
+use crate::cli::{Control, PidGains, RunArgs, VoltageLimits};
 use crate::commands::compensate::{Compensation, options};
 use crate::exit::{CommandError, CommandResult};
-use crate::input;
+use crate::{input, text};
 
 /// Everything that has to be known before a device moves.
 #[derive(Debug)]
@@ -31,12 +34,27 @@ pub(super) struct Followed {
     /// The text of the model's file.
     pub(super) json: String,
     pub(super) reference: Record,
-    /// The drive as planned.
-    pub(super) drive: Drive,
+    /// What makes the drive.
+    pub(super) control: Control,
+    /// The drive as planned by the model's inverse, where that takes part.
+    pub(super) drive: Option<Drive>,
     /// The drive as it is corrected on the way, where the model needs a temperature that the device measures.
     pub(super) live: Option<Live>,
+    /// The PID, where one takes part.
+    pub(super) closed: Option<Closed>,
     /// How long the device is held at the first value of a segment \[s\].
     held_s: f64,
+}
+
+/// A PID, and why it has these gains.
+#[derive(Debug)]
+pub(super) struct Closed {
+    pub(super) running: ClosedLoop,
+    pub(super) gains: PidParams,
+    /// Of gains from the model \[Hz\].
+    pub(super) crossover_hz: Option<f64>,
+    /// In words.
+    pub(super) why: String,
 }
 
 impl Followed {
@@ -46,11 +64,11 @@ impl Followed {
     }
 
     /// What there is to say about the drive that was played.
-    pub(super) fn compensation(&self) -> Compensation {
-        let drive = self.live.as_ref().map_or(&self.drive, Live::drive);
+    pub(super) fn compensation(&self) -> Option<Compensation> {
+        let drive = self.live.as_ref().map(Live::drive).or(self.drive.as_ref())?;
         let mut said = Compensation::new(&self.model, &self.reference, drive);
         said.held_s = Some(self.held_s);
-        said
+        Some(said)
     }
 }
 
@@ -89,6 +107,12 @@ impl Job {
             return Err(CommandError::bad_input(message));
         }
         let reference = input::record(reference, &args.map.map, Need::Output)?;
+        if args.pid.is_some() && !args.control.closes() {
+            return Err(CommandError::bad_input("--pid needs --control pid or --control pid+feedforward"));
+        }
+        if args.limits.bandwidth.is_some() && !args.control.inverts() {
+            return Err(CommandError::bad_input("--bandwidth needs --control feedforward or --control pid+feedforward"));
+        }
         let mut options = options(&args.limits);
         // Not given, the limits are the model's, as far as the device goes along.
         options.voltage = Some(match args.limits.limit {
@@ -99,18 +123,37 @@ impl Job {
         let mut play = play_options(args, &reference);
         play.settle_s = args.settle.unwrap_or(USUAL_SETTLE_S);
         // A temperature that is measured is followed; the plan starts from the given one, or the one that the gain is stated for.
-        let measured = model.effects.temperature.filter(|_| device.temperature);
+        let measured = model.effects.temperature.filter(|_| device.temperature && args.control.inverts());
         if let Some(gain) = measured {
             options.temperature = options.temperature.or(Some(gain.reference_degc));
             play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
         }
-        let drive = compensate(&model, &reference, &options)?;
-        let live = measured.map(|_| Live::new(&model, &reference, &options, &drive, play.slew_v_per_s)).transpose()?;
-        Ok(Self {
-            segments: split(&reference, &drive.voltage),
-            followed: Some(Followed { model, json, reference, drive, live, held_s: play.settle_s }),
-            options: play,
-        })
+        let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
+        let drive = args.control.inverts().then(|| compensate(&model, &reference, &options)).transpose()?;
+        let planned = match &drive {
+            Some(drive) => drive.voltage.clone(),
+            None => straight(&model, &reference, low, high)?,
+        };
+        let live = match (&drive, measured) {
+            (Some(drive), Some(_)) => Some(Live::new(&model, &reference, &options, drive, play.slew_v_per_s)?),
+            _ => None,
+        };
+        let segments = split(&reference, &planned);
+        let closed = if args.control.closes() {
+            if device.queued {
+                return Err(CommandError::bad_input(
+                    "what this device measures comes too late for a loop that is closed on this computer; --control feedforward or gain need no loop",
+                ));
+            }
+            play.block = 1;
+            let wanted = split(&reference, reference.output().unwrap_or_default());
+            Some(Closed::new(args, &model, (low, high), wanted, 1.0 / play.rate_hz)?)
+        } else {
+            None
+        };
+        let followed =
+            Followed { model, json, reference, control: args.control, drive, live, closed, held_s: play.settle_s };
+        Ok(Self { segments, followed: Some(followed), options: play })
     }
 
     fn play(args: &RunArgs, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
@@ -154,6 +197,52 @@ impl Job {
         }
         Ok(Self { segments: split(&drive, volts), options: play_options(args, &drive), followed: None })
     }
+}
+
+impl Closed {
+    fn new(
+        args: &RunArgs,
+        model: &Model,
+        limits: (f64, f64),
+        wanted: Vec<Vec<f64>>,
+        period: f64,
+    ) -> CommandResult<Self> {
+        let own = loop_gains(model, period, limits).map_err(CommandError::bad_input)?;
+        let (gains, why) = match args.pid {
+            Some(PidGains { proportional, integral, derivative }) => {
+                // Where nothing is integrated, nothing winds up.
+                let back = if integral == 0.0 { 1.0 } else { (proportional / integral).abs().max(10.0 * period) };
+                let given = PidParams { proportional, integral, derivative, anti_windup_seconds: back, ..own.pid };
+                (given, "as given".to_owned())
+            }
+            None => {
+                let why = match own.mode_hz {
+                    Some(hz) => format!("the model's mode at {} Hz allows no more", text::short(hz)),
+                    None => "sample period and dead time allow no more".to_owned(),
+                };
+                (own.pid, format!("bandwidth {} Hz: {why}", text::short(own.crossover_hz)))
+            }
+        };
+        let slew = args.limits.slew.unwrap_or(f64::INFINITY);
+        let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew)?;
+        let crossover_hz = args.pid.is_none().then_some(own.crossover_hz);
+        Ok(Self { running, gains, crossover_hz, why })
+    }
+}
+
+/// A drive along the straight line through the ends of what the model was fitted to, within the limits.
+fn straight(model: &Model, reference: &Record, low: f64, high: f64) -> CommandResult<Vec<f64>> {
+    let wanted = match reference.output_unit() {
+        Some(unit) if unit.column() == model.output.column => reference.output().unwrap_or_default(),
+        _ => {
+            let (column, file) = (&model.output.column, reference.name());
+            return Err(CommandError::bad_input(format!(
+                "{file}: column {column} is missing; the reference says what the output is to do"
+            )));
+        }
+    };
+    let (gain, at_low) = model.straight_line().map_err(CommandError::bad_input)?;
+    Ok(wanted.iter().map(|y| (model.input.low + (y - at_low) / gain).clamp(low, high)).collect())
 }
 
 /// The voltages that may be applied: what the device can do, and no more than what the command line allows.

@@ -25,11 +25,14 @@ where
     }
     let mut log_error = None;
     let bar = Progress::bar("playing", job.segments.iter().map(Vec::len).sum());
-    let (wanted, mut live) = match &mut job.followed {
-        Some(followed) => (followed.reference.output(), followed.live.as_mut()),
-        None => (None, None),
+    let (wanted, mut live, mut closed) = match &mut job.followed {
+        Some(followed) => (followed.reference.output(), followed.live.as_mut(), followed.closed.as_mut()),
+        None => (None, None, None),
     };
-    let revise = |revision: &mut Revision<'_>| live.iter_mut().for_each(|live| live.revise(revision));
+    let revise = |revision: &mut Revision<'_>| {
+        live.iter_mut().for_each(|live| live.revise(revision));
+        closed.iter_mut().for_each(|closed| closed.running.revise(revision));
+    };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
         bar.at(news.done);
         let first = news.done - if news.phase == Phase::Record { news.samples.len() } else { 0 };

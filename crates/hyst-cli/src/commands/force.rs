@@ -1,0 +1,123 @@
+//! `force`: an external force without a force sensor.
+
+use hyst_ident::force::{Free, ForceOptions, estimate_force};
+use hyst_ident::metrics::Errors;
+use hyst_ident::model::Effect;
+use hyst_ident::record::{Extra, Need};
+use hyst_ident::simulate::Extrapolated;
+use serde::Serialize;
+
+use crate::cli::ForceArgs;
+use crate::exit::{CommandError, CommandResult};
+use crate::output::{self, Report, say};
+use crate::{input, text};
+
+/// Column of the estimate.
+const COLUMN: &str = "estimated_force_n";
+
+/// What is said about an estimate.
+#[derive(Debug, Serialize)]
+struct Summary {
+    record: String,
+    output: String,
+    rows: usize,
+    /// \[N/output unit\]
+    stiffness: f64,
+    kappa: f64,
+    /// \[output unit\]
+    chi: f64,
+    /// Rows that κ and χ follow from.
+    free_rows: usize,
+    lowest_n: f64,
+    highest_n: f64,
+    /// Against the record's `load_n`; none without it.
+    errors: Option<Errors>,
+    extrapolated: Extrapolated,
+    #[serde(skip)]
+    unit: &'static str,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ForceArgs) -> CommandResult {
+    let mut read = vec![args.model.as_path(), args.record.as_path()];
+    read.extend(args.free.as_deref());
+    output::check(&read, &[&args.output])?;
+    let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
+    let (model, _) = input::model(&args.model)?;
+    let record = input::record(&args.record, &args.map.map, Need::InputAndOutput)?;
+    let other = args.free.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let free = match (&other, args.free_until) {
+        (Some(other), _) => Free::Record(other),
+        (None, Some(seconds)) => Free::Until(record.time().first().copied().unwrap_or_default() + seconds),
+        (None, None) => Free::Unknown,
+    };
+    let own = model.effects.load.as_ref().filter(|load| load.per_newton > 0.0).map(|load| 1.0 / load.per_newton);
+    let stiffness = args.kout.or(own).ok_or_else(|| {
+        CommandError::bad_input("--kout is needed: the model has no compliance that the stiffness could follow from")
+    })?;
+    let temperature = input::temperature(args.temperature, &model, &record);
+    let estimated = estimate_force(&model, &record, &ForceOptions { stiffness, free, temperature })
+        .map_err(CommandError::bad_input)?;
+
+    let replaced = input::present(&args.record, &[COLUMN])?;
+    let extra = [Extra::numbers(COLUMN, &estimated.force)];
+    args.output.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
+    if !replaced.is_empty() {
+        say(&format!("note: {} has {COLUMN} already; in the output this estimate stands in its place", args.record.display()));
+    }
+    if model.effects.names().contains(&Effect::Load) {
+        say("note: the model's compliance is left out: what it explains is what is looked for");
+    }
+    if estimated.extrapolated.rows > 0 {
+        let beyond = text::extrapolation("input", &text::from_one(estimated.extrapolated), &model.input);
+        say(&format!("warning: {beyond}; the estimate is extrapolated there"));
+    }
+    let (low, high) = estimated.force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
+    let summary = Summary {
+        record: args.record.display().to_string(),
+        output: args.output.to_string(),
+        rows: record.rows(),
+        stiffness,
+        kappa: estimated.params.kappa,
+        chi: estimated.params.chi,
+        free_rows: estimated.free_rows,
+        lowest_n: low,
+        highest_n: high,
+        errors: estimated.errors,
+        extrapolated: text::from_one(estimated.extrapolated),
+        unit: text::symbol(&model.output.unit),
+    };
+    report.print(&summary.text(), &summary)
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let short = text::short;
+        let mut lines = vec![format!(
+            "{}: {}, force {} to {} N with {} N/{}",
+            self.record,
+            text::count(self.rows, "row"),
+            short(self.lowest_n),
+            short(self.highest_n),
+            short(self.stiffness),
+            self.unit
+        )];
+        lines.push(if self.free_rows > 0 {
+            format!(
+                "κ = {}, χ = {} {} from {} without a force",
+                short(self.kappa),
+                short(self.chi),
+                self.unit,
+                text::count(self.free_rows, "row")
+            )
+        } else {
+            "κ = 1, χ = 0: a gain or zero that has changed since the fit shows as a force; --free or --free-until takes it out".to_owned()
+        });
+        lines.extend(self.errors.as_ref().map(|errors| {
+            let (rmse, share) = (short(errors.rmse), text::percent(errors.nrmse_percent));
+            format!("against load_n: RMSE {rmse} N ({share} of its span), largest {} N", short(errors.max_abs))
+        }));
+        lines.push(format!("written: {}", self.output));
+        lines.join("\n")
+    }
+}

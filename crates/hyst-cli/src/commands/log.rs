@@ -1,0 +1,178 @@
+//! `log`: what stands in the log of a run, as a record, and what is left of one that was cut off.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use hyst_ident::record::{LogSample, RunLog};
+use mcap::read::{ChunkFlattener, Options};
+use mcap::records::{Metadata, Record as Entry};
+use mcap::{Attachment, McapError, WriteOptions, Writer};
+use serde::Serialize;
+
+use crate::cli::{LogArgs, LogCommand, LogConvertArgs, LogInfoArgs, LogRecoverArgs};
+use crate::exit::{CommandError, CommandResult};
+use crate::output::{self, Report};
+use crate::text;
+
+/// Runs the command.
+pub(super) fn run(args: &LogArgs) -> CommandResult {
+    match &args.command {
+        LogCommand::Info(args) => info(args),
+        LogCommand::Convert(args) => convert(args),
+        LogCommand::Recover(args) => recover(args),
+    }
+}
+
+fn read(path: &Path) -> CommandResult<(Vec<u8>, RunLog)> {
+    let name = path.display().to_string();
+    let bytes = fs::read(path).map_err(|error| CommandError::bad_input(format!("{name}: cannot be read: {error}")))?;
+    let log = RunLog::parse(&name, &bytes)?;
+    Ok((bytes, log))
+}
+
+/// What is said about a log.
+#[derive(Debug, Serialize)]
+struct Summary {
+    log: String,
+    /// Whether it was closed; else it was cut off.
+    closed: bool,
+    samples: usize,
+    /// Of the samples, those that are part of what was asked for.
+    record_samples: usize,
+    segments: usize,
+    /// \[s\]
+    seconds: f64,
+    /// Root of the mean squared output less reference; none where nothing was followed \[output unit\].
+    tracking_rmse: Option<f64>,
+    model: bool,
+    metadata: BTreeMap<String, String>,
+    #[serde(skip)]
+    symbol: &'static str,
+}
+
+impl Summary {
+    fn new(path: &Path, log: &RunLog) -> Self {
+        let record = || log.samples.iter().filter(|s| s.is_record());
+        let errors: Vec<f64> = record().filter_map(|s| Some(s.output - s.reference?)).collect();
+        let rmse = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
+        let time = |s: Option<&LogSample>| s.map_or(0.0, |s| s.time_s);
+        let mut segments: Vec<u64> = record().map(|s| s.segment).collect();
+        segments.dedup();
+        Self {
+            log: path.display().to_string(),
+            closed: log.closed,
+            samples: log.samples.len(),
+            record_samples: record().count(),
+            segments: segments.len(),
+            seconds: time(log.samples.last()) - time(log.samples.first()),
+            tracking_rmse: (!errors.is_empty()).then_some(rmse),
+            model: log.model.is_some(),
+            metadata: log.metadata.clone(),
+            symbol: log.unit().map_or("", |unit| unit.symbol()),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut lines = vec![format!(
+            "{}: {} over {} s, {} of them in {}; {}",
+            self.log,
+            text::count(self.samples, "sample"),
+            text::short(self.seconds),
+            self.record_samples,
+            text::count(self.segments, "segment"),
+            if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
+        )];
+        lines.extend(
+            self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
+        );
+        lines.extend(self.metadata.iter().map(|(key, value)| format!("  {key}: {value}")));
+        lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
+        lines.join("\n")
+    }
+}
+
+fn info(args: &LogInfoArgs) -> CommandResult {
+    let (_, log) = read(&args.log)?;
+    let summary = Summary::new(&args.log, &log);
+    Report::new(args.json.json, &[])?.print(&summary.text(), &summary)
+}
+
+fn convert(args: &LogConvertArgs) -> CommandResult {
+    output::check(&[&args.log], &[&args.output])?;
+    let (_, log) = read(&args.log)?;
+    let text = log.csv(&args.log.display().to_string(), args.ramps)?;
+    args.output.write(|out| out.write_all(text.as_bytes()))
+}
+
+/// What is said about a recovery.
+#[derive(Debug, Serialize)]
+struct Recovered {
+    log: String,
+    output: String,
+    samples: usize,
+    /// Whether there was anything to recover.
+    was_closed: bool,
+}
+
+fn recover(args: &LogRecoverArgs) -> CommandResult {
+    output::check(&[&args.log], &[&args.output])?;
+    let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
+    let (bytes, log) = read(&args.log)?;
+    let whole = rewritten(&bytes).map_err(CommandError::failed)?;
+    args.output.write(|out| out.write_all(&whole))?;
+    let recovered = Recovered {
+        log: args.log.display().to_string(),
+        output: args.output.to_string(),
+        samples: log.samples.len(),
+        was_closed: log.closed,
+    };
+    let how = if log.closed { "was closed already" } else { "had been cut off" };
+    let said = format!("{} {how}; {}: {}", recovered.log, recovered.output, text::count(recovered.samples, "sample"));
+    report.print(&said, &recovered)
+}
+
+/// Everything that is whole in an MCAP file, as a closed one.
+fn rewritten(bytes: &[u8]) -> Result<Vec<u8>, McapError> {
+    let options = WriteOptions::new().library(concat!("hystctl ", env!("CARGO_PKG_VERSION"))).compression_threads(0);
+    let mut writer = options.create(Cursor::new(Vec::new()))?;
+    let (mut schemas, mut channels) = (BTreeMap::from([(0, 0)]), BTreeMap::new());
+    let entries = ChunkFlattener::new_with_options(bytes, Options::IgnoreEndMagic.into())?;
+    for entry in entries.map_while(Result::ok) {
+        match entry {
+            Entry::Schema { header, data } => {
+                schemas.insert(header.id, writer.add_schema(&header.name, &header.encoding, &data)?);
+            }
+            Entry::Channel(channel) => {
+                if let Some(schema) = schemas.get(&channel.schema_id) {
+                    let id =
+                        writer.add_channel(*schema, &channel.topic, &channel.message_encoding, &channel.metadata)?;
+                    channels.insert(channel.id, id);
+                }
+            }
+            Entry::Message { mut header, data } => {
+                if let Some(id) = channels.get(&header.channel_id) {
+                    header.channel_id = *id;
+                    writer.write_to_known_channel(&header, &data)?;
+                }
+            }
+            Entry::Metadata(Metadata { name, metadata }) => writer.write_metadata(&Metadata { name, metadata })?,
+            Entry::Attachment { header, data, .. } => writer.attach(&Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data: Cow::Borrowed(&data),
+            })?,
+            _ => {}
+        }
+    }
+    finished(writer)
+}
+
+fn finished(mut writer: Writer<Cursor<Vec<u8>>>) -> Result<Vec<u8>, McapError> {
+    writer.finish()?;
+    Ok(writer.into_inner().into_inner())
+}

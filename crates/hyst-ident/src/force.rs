@@ -1,0 +1,196 @@
+//! An external force without a force sensor: what a model of the free actuator does not explain of the measured displacement is a
+//! force on the output's stiffness, `f̂ = k_out (x − (κ x̂₀ + χ))` ([`hyst_core::ForceObserver`]).
+
+use hyst_core::{AffineFit, Build, ForceObservation, ForceParams};
+
+use crate::fit::FitError;
+use crate::metrics::Errors;
+use crate::model::{Effect, Model};
+use crate::record::Record;
+use crate::simulate::{Extrapolated, SimulateOptions, simulate_with};
+
+/// Where nothing but the drive acts: κ and χ follow from that by least squares.
+#[derive(Clone, Copy, Debug)]
+pub enum Free<'a> {
+    /// Nowhere known: κ = 1 and χ = 0.
+    Unknown,
+    /// In all of another record.
+    Record(&'a Record),
+    /// In the record itself, up to this time \[s\].
+    Until(f64),
+}
+
+/// What an estimation may be told.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceOptions<'a> {
+    /// Output stiffness k_out \[N/output unit\].
+    pub stiffness: f64,
+    /// Where nothing but the drive acts.
+    pub free: Free<'a>,
+    /// Temperature \[°C\] where the record has no column of it.
+    pub temperature: Option<f64>,
+}
+
+/// A force over a record.
+#[derive(Clone, Debug)]
+pub struct EstimatedForce {
+    /// At each row \[N\].
+    pub force: Vec<f64>,
+    /// Stiffness, κ and χ as they were used.
+    pub params: ForceParams,
+    /// Rows that κ and χ follow from.
+    pub free_rows: usize,
+    /// Against the column `load_n`, where the record has it.
+    pub errors: Option<Errors>,
+    /// Inputs beyond the model's own range.
+    pub extrapolated: Extrapolated,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ForceError {
+    /// The model cannot be run over the record.
+    #[error(transparent)]
+    Simulate(#[from] FitError),
+    /// No displacement.
+    #[error("{record}: column {column} is missing: the force is what the model does not explain of it")]
+    NoOutput {
+        /// The record.
+        record: String,
+        /// The column.
+        column: String,
+    },
+    /// κ and χ cannot be told.
+    #[error(
+        "{record}: {rows} rows without a force, over which the model says the actuator stands still: κ cannot be told; give rows in which the drive moves, or leave κ and χ away"
+    )]
+    Still {
+        /// The record with these rows.
+        record: String,
+        /// How many they are.
+        rows: usize,
+    },
+    /// The stiffness is no stiffness.
+    #[error(transparent)]
+    Params(#[from] hyst_core::Error),
+}
+
+/// Estimates the force over a record with a model of the free actuator. A compliance in the model is left out: what it explains is what is looked for.
+///
+/// # Errors
+/// See [`ForceError`].
+pub fn estimate_force(
+    model: &Model,
+    record: &Record,
+    options: &ForceOptions<'_>,
+) -> Result<EstimatedForce, ForceError> {
+    let model = Model { effects: model.effects.without(Effect::Load), ..model.clone() };
+    let free = |record: &Record| -> Result<_, ForceError> {
+        let options = SimulateOptions { temperature: options.temperature, ..SimulateOptions::default() };
+        let simulated = simulate_with(&model, record, &options)?;
+        let no_output = || ForceError::NoOutput { record: record.name(), column: model.output.column.clone() };
+        Ok((simulated, record.output().ok_or_else(no_output)?.to_vec()))
+    };
+    let (simulated, measured) = free(record)?;
+    let (mut kappa, mut chi, mut free_rows) = (1.0, 0.0, 0);
+    let mut fit = AffineFit::default();
+    let mut still = record.name();
+    let mut rows = |count: usize, free: &[f64], measured: &[f64]| {
+        free_rows = count;
+        free.iter().zip(measured).for_each(|(x0, x)| fit.add(*x0, *x));
+    };
+    match options.free {
+        Free::Unknown => {}
+        Free::Record(other) => {
+            let (simulated, measured) = free(other)?;
+            still = other.name();
+            rows(measured.len(), &simulated.predicted, &measured);
+        }
+        Free::Until(end) => {
+            let count = record.time().iter().take_while(|t| **t <= end).count();
+            rows(count, &simulated.predicted[..count], &measured[..count]);
+        }
+    }
+    if !matches!(options.free, Free::Unknown) {
+        (kappa, chi) = fit.solve().ok_or(ForceError::Still { record: still, rows: free_rows })?;
+    }
+    let params = ForceParams { stiffness: options.stiffness, kappa, chi };
+    let observation: ForceObservation<f64> = params.build(&())?;
+    let force: Vec<f64> =
+        measured.iter().zip(&simulated.predicted).map(|(x, x0)| observation.force(*x, *x0)).collect();
+    let of = |load: &[f64]| Errors::of(load, &force, &vec![false; force.len()]).ok();
+    let errors = record.load().and_then(of);
+    Ok(EstimatedForce { params, free_rows, errors, extrapolated: simulated.extrapolated, force })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{FitOptions, fit_with};
+    use crate::record::{Columns, OutputUnit};
+    use hyst_core::Kind;
+    use std::f64::consts::TAU;
+    use std::ops::ControlFlow;
+
+    /// A straight actuator of 0.2 µm/V, from 3 s on under a force of 4 N on 0.8 N/µm.
+    fn record(gain: f64, zero: f64, name: &str) -> Record {
+        let time: Vec<f64> = (0..6000).map(|k| f64::from(k) * 1e-3).collect();
+        let input: Vec<f64> = time.iter().map(|t| 40.0 - 40.0 * (TAU * 0.7 * t).cos()).collect();
+        let force = |t: &f64| if *t > 3.0 { -4.0 * (TAU * 2.0 * (t - 3.0)).sin().powi(2) } else { 0.0 };
+        let output = time.iter().zip(&input).map(|(t, u)| zero + gain * u + force(t) / 0.8).collect();
+        let load = time.iter().map(force).collect();
+        Record::from_samples(Columns {
+            name: name.into(),
+            time,
+            input: Some(input),
+            output: Some((OutputUnit::Micrometre, output)),
+            load: Some(load),
+            ..Columns::default()
+        })
+        .unwrap()
+    }
+
+    fn model() -> Model {
+        let mut free = record(0.2, 0.0, "free");
+        let rows = free.time().iter().take_while(|t| **t <= 3.0).count();
+        free = Record::from_samples(Columns {
+            name: "free".into(),
+            time: free.time()[..rows].to_vec(),
+            input: Some(free.input()[..rows].to_vec()),
+            output: Some((OutputUnit::Micrometre, free.output().unwrap()[..rows].to_vec())),
+            ..Columns::default()
+        })
+        .unwrap();
+        let options = FitOptions { seed: 1, ..FitOptions::default() };
+        fit_with(&free, Kind::Pi, &options, &mut |_| ControlFlow::Continue(())).unwrap().model
+    }
+
+    #[test]
+    fn a_force_is_found_behind_a_gain_and_a_zero_that_have_changed() {
+        let (model, loaded) = (model(), record(0.21, 1.5, "loaded"));
+        let estimate = |free| {
+            estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None }).unwrap()
+        };
+        let told = estimate(Free::Until(3.0));
+        assert!((told.params.kappa - 1.05).abs() < 1e-3 && (told.params.chi - 1.5).abs() < 1e-2, "{:?}", told.params);
+        assert_eq!(told.free_rows, 3001);
+        assert!(told.errors.unwrap().max_abs < 0.02, "{:?}", told.errors);
+        // Gain and zero of another day show as a force.
+        let untold = estimate(Free::Unknown);
+        assert!(untold.errors.unwrap().max_abs > 1.0, "{:?}", untold.errors);
+        assert_eq!((untold.params.kappa, untold.params.chi), (1.0, 0.0));
+    }
+
+    #[test]
+    fn rows_that_stand_still_tell_no_kappa() {
+        let (model, loaded) = (model(), record(0.2, 0.0, "loaded"));
+        let free = Free::Until(0.0);
+        let refused = estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None });
+        assert!(matches!(refused, Err(ForceError::Still { rows: 1, .. })), "{refused:?}");
+        for stiffness in [0.0, -1.0, f64::NAN] {
+            let options = ForceOptions { stiffness, free: Free::Unknown, temperature: None };
+            assert!(matches!(estimate_force(&model, &loaded, &options), Err(ForceError::Params(_))));
+        }
+    }
+}

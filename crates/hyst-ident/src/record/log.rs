@@ -1,0 +1,149 @@
+//! Logs of runs: MCAP files of samples, read as records.
+//!
+//! A log says every sample as JSON on the channel [`TOPIC`]; a metadata record `run` says what ran, and the model is attached as `model.json`. Of a log
+//! that was cut off, as by a loss of power, everything up to the cut is read.
+
+use std::collections::BTreeMap;
+
+use mcap::read::{ChunkFlattener, Options};
+use mcap::records::{Metadata, Record as Entry};
+use serde::Deserialize;
+
+use super::error::RecordError;
+use super::{OutputUnit, Record};
+
+/// Channel of the samples.
+pub const TOPIC: &str = "/actuator/sample";
+
+/// What an MCAP file begins with.
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// One sample of a log, as it stands there.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct LogSample {
+    /// Time of the device's clock \[s\].
+    pub time_s: f64,
+    /// Segment, from 0.
+    pub segment: u64,
+    /// What it is part of: `approach`, `record` or `retreat`.
+    pub phase: String,
+    /// Voltage that was applied \[V\].
+    pub drive_v: f64,
+    /// Measured output \[output unit\].
+    pub output: f64,
+    /// Wanted output \[output unit\].
+    pub reference: Option<f64>,
+    /// Temperature \[°C\].
+    pub temperature_degc: Option<f64>,
+    /// Load \[N\].
+    pub load_n: Option<f64>,
+}
+
+impl LogSample {
+    /// Whether it belongs to what was asked for, and not to a ramp before or after.
+    pub fn is_record(&self) -> bool {
+        self.phase == "record"
+    }
+}
+
+/// A log as read.
+#[derive(Clone, Debug, Default)]
+pub struct RunLog {
+    /// What ran, by key: device, unit, version and more.
+    pub metadata: BTreeMap<String, String>,
+    /// The text of the model's file, if one made the drive.
+    pub model: Option<String>,
+    /// The samples, in order.
+    pub samples: Vec<LogSample>,
+    /// Whether the log was closed; else its writer was cut off.
+    pub closed: bool,
+}
+
+/// Whether these are the bytes of an MCAP file.
+pub fn is_log(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+impl RunLog {
+    /// Reads a log; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// If the bytes are no MCAP file, or one without samples of a run.
+    pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, RecordError> {
+        let foreign = |what: String| RecordError::Log { file: name.to_owned(), what };
+        let entries = ChunkFlattener::new_with_options(bytes, Options::IgnoreEndMagic.into())
+            .map_err(|error| foreign(error.to_string()))?;
+        let mut log = Self::default();
+        let mut channel = None;
+        // What is not whole at the end is what a cut takes.
+        for entry in entries.map_while(Result::ok) {
+            match entry {
+                Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata = metadata,
+                Entry::Attachment { header, data, .. } if header.name == "model.json" => {
+                    log.model = Some(String::from_utf8_lossy(&data).into_owned());
+                }
+                Entry::Channel(c) if c.topic == TOPIC && c.message_encoding == "json" => channel = Some(c.id),
+                Entry::Message { header, data } if Some(header.channel_id) == channel => {
+                    let number = log.samples.len() + 1;
+                    let sample = serde_json::from_slice(&data)
+                        .map_err(|error| foreign(format!("message {number} of {TOPIC} is no sample: {error}")))?;
+                    log.samples.push(sample);
+                }
+                Entry::Footer(_) => log.closed = true,
+                _ => {}
+            }
+        }
+        match channel {
+            Some(_) => Ok(log),
+            None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
+        }
+    }
+
+    /// Unit of output and reference; `None` where the log does not say it.
+    pub fn unit(&self) -> Option<OutputUnit> {
+        self.metadata.get("output_column").and_then(|column| OutputUnit::of_column(column))
+    }
+
+    /// The samples as a record file: those that were asked for, or the ramps and rests too.
+    ///
+    /// # Errors
+    /// If the log does not say its unit.
+    pub fn csv(&self, name: &str, with_ramps: bool) -> Result<String, RecordError> {
+        let no_unit =
+            || RecordError::Log { file: name.to_owned(), what: "its metadata do not say the unit of the output".into() };
+        let unit = self.unit().ok_or_else(no_unit)?;
+        let chosen = || self.samples.iter().filter(|s| with_ramps || s.is_record());
+        let reference = format!("reference_{}", unit.suffix());
+        type Of = fn(&LogSample) -> Option<f64>;
+        let optional: [(&str, Of); 3] = [
+            (&reference, |s| s.reference),
+            ("temperature_degc", |s| s.temperature_degc),
+            ("load_n", |s| s.load_n),
+        ];
+        // A column that some samples lack has no place in a record.
+        let optional: Vec<(&str, Of)> =
+            optional.into_iter().filter(|(_, of)| chosen().next().is_some() && chosen().all(|s| of(s).is_some())).collect();
+        let mut text = format!("segment,time_s,voltage_v,{}", unit.column());
+        optional.iter().for_each(|(column, _)| text.extend([",", column]));
+        text.push('\n');
+        for s in chosen() {
+            text += &format!("{},{},{},{}", s.segment, s.time_s, s.drive_v, s.output);
+            optional.iter().for_each(|(_, of)| text += &format!(",{}", of(s).unwrap_or(f64::NAN)));
+            text.push('\n');
+        }
+        Ok(text)
+    }
+}
+
+impl Record {
+    /// A log's samples as a record, checked as a record file is; lines in messages are those of [`RunLog::csv`].
+    pub(super) fn parse_log(
+        name: &str,
+        bytes: &[u8],
+        map: &super::ColumnMap,
+        need: super::Need,
+    ) -> Result<Self, RecordError> {
+        let text = RunLog::parse(name, bytes)?.csv(name, false)?;
+        Ok(Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes))
+    }
+}
