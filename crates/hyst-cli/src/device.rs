@@ -85,6 +85,17 @@ impl AnyDevice {
     }
 }
 
+impl AnyDevice {
+    /// Lets the device follow references with this controller; drives are references from then on.
+    pub(crate) fn follow(&mut self, recipe: &[u8], range: (f64, f64)) -> Result<(), CommandError> {
+        match self {
+            // It has no controller, and needs none: what it measures comes at once.
+            Self::Plant(_) => Ok(()),
+            Self::Remote(remote) => Ok(remote.follow(recipe, range).map_err(DeviceError::from)?),
+        }
+    }
+}
+
 /// The same call on whichever it is.
 macro_rules! each {
     ($device:expr, $it:ident => $call:expr) => {

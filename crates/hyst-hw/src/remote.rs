@@ -260,6 +260,23 @@ impl<L: Line> Remote<L> {
         }
     }
 
+    /// Hands over what [`recipe_head`](crate::wire::recipe_head) and a model's block make, and from then on drives are references \[output unit\] between
+    /// `low` and `high`, which the device follows: the ramps before and after a run begin and end where the output is now.
+    ///
+    /// # Errors
+    /// When the device follows no references, has no room for the model or cannot run it, or is lost.
+    pub fn follow(&mut self, recipe: &[u8], (low, high): (f64, f64)) -> Result<(), RemoteError> {
+        if self.run.is_some() {
+            return Err(RemoteError::Order);
+        }
+        self.upload(recipe)?;
+        self.options.mode = Mode::Reference;
+        // It stands: told to stop, it says where.
+        let output = f64::from(self.stated(Ask::Stop)?.output);
+        self.capabilities.voltage = VoltageRange { min_v: low.min(output), max_v: high.max(output), rest_v: output };
+        Ok(())
+    }
+
     /// Ends whatever the device does and keeps it from starting again before [`clear`](Self::clear).
     ///
     /// # Errors
@@ -293,7 +310,10 @@ impl<L: Line> Remote<L> {
     fn stated(&mut self, ask: Ask) -> Result<Status, RemoteError> {
         match self.ask(ask)? {
             Tell::Status(status) => {
-                self.present_v = f64::from(status.present_v);
+                self.present_v = f64::from(match self.options.mode {
+                    Mode::Voltage => status.present_v,
+                    Mode::Reference => status.output,
+                });
                 Ok(status)
             }
             Tell::Refused(refusal, _) => Err(self.refused(refusal)),
@@ -466,10 +486,11 @@ impl<L: Line> Daq for Remote<L> {
 
     fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
         let range = self.capabilities.voltage;
-        if self.options.mode == Mode::Voltage
-            && let Some(bad) = drive_v.iter().find(|v| !range.contains(**v))
-        {
-            let advice = "give voltages within the device's range; nothing of the block was applied";
+        if let Some(bad) = drive_v.iter().find(|v| !range.contains(**v)) {
+            let advice = match self.options.mode {
+                Mode::Voltage => "give voltages within the device's range; nothing of the block was applied",
+                Mode::Reference => "give references within the range that was agreed on; nothing of the block was applied",
+            };
             return Err(RemoteError::Value { what: "drive", value: *bad, advice });
         }
         self.trade_until_news(drive_v, measured)
@@ -481,8 +502,13 @@ impl<L: Line> Daq for Remote<L> {
         }
         let Some(run) = self.run else { return Ok(()) };
         // Its samples are nobody's: the device is only kept from missing its host.
-        let rest = self.capabilities.voltage.rest_v;
-        let step = self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s)) / run.rate_hz;
+        let VoltageRange { min_v, max_v, rest_v: rest } = self.capabilities.voltage;
+        let slew = match self.options.mode {
+            Mode::Voltage => self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s)),
+            // From one end to the other in a second.
+            Mode::Reference => (max_v - min_v).max(f64::MIN_POSITIVE),
+        };
+        let step = slew / run.rate_hz;
         let (from, ramp) = (self.present_v, ((self.present_v - rest).abs() / step).ceil() as usize);
         let total = ramp + (seconds * run.rate_hz).round() as usize;
         let volts = |k: usize| if k + 1 >= ramp { rest } else { from + (rest - from) * (k + 1) as f64 / ramp as f64 };

@@ -16,11 +16,11 @@ use serde::Serialize;
 use super::compensate::Compensation;
 use crate::cli::{Control, RunArgs};
 use crate::device::{AnyDevice, Wishes};
-use crate::exit::{Classified, CommandError, CommandResult, Exit};
+use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::{recording, text};
-use job::{Closed, Followed, Job};
+use job::{Followed, HandedOver, Job, Told};
 
 /// What is said about a run.
 #[derive(Debug, Serialize)]
@@ -39,6 +39,8 @@ struct Summary {
     control: Option<Control>,
     /// None without a PID.
     pid: Option<Gains>,
+    /// Whether the device closed the loop.
+    loop_on_device: bool,
     /// Whether the drive was corrected by the measured temperature on the way.
     temperature_followed: bool,
     log: Option<String>,
@@ -69,8 +71,8 @@ struct Gains {
     derivative: f64,
     /// Where the loop's gain falls below one, as the model has it; none for given gains \[Hz\].
     crossover_hz: Option<f64>,
-    /// Share of the samples in which a limit held the drive \[%\].
-    limited_percent: f64,
+    /// Share of the samples in which a limit held the drive; none where the device closed the loop \[%\].
+    limited_percent: Option<f64>,
     /// Why the gains are these, in words.
     why: String,
 }
@@ -97,11 +99,8 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     on_device(&mut AnyDevice::open(&args.daq, &wishes)?, args, report)
 }
 
-/// The run on any device.
-fn on_device<D: Daq>(daq: &mut D, args: &RunArgs, report: Report) -> CommandResult
-where
-    D::Error: Classified,
-{
+/// The run on a device.
+fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResult {
     let mut job = Job::read(args, daq.capabilities())?;
     if args.record.is_none() && args.log.is_none() {
         output::say("note: what is measured is not kept; give --record, --log or both");
@@ -113,14 +112,18 @@ where
     let create =
         |path: &PathBuf| RunLog::beside_older(path, &info).map_err(|error| CommandError::new(Exit::Failed, error));
     let mut log = args.log.as_ref().map(create).transpose()?;
+    if let Some(HandedOver { recipe, range, .. }) = &job.handed_over {
+        daq.follow(recipe, *range)?;
+    }
     let played = play::play(daq, &mut job, log.as_mut());
     // What was measured is kept in any case; the first error is the one to tell.
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
         output::tell_set_aside(path, older);
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-    let recording = played?;
+    let mut recording = played?;
     closed?;
+    job.align(&mut recording);
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
     if let Some(target) = &args.record {
@@ -142,7 +145,8 @@ where
         tracking: wanted.map(|wanted| Tracking::of(wanted, &measured)).transpose()?,
         compensation: job.followed.as_ref().and_then(Followed::compensation),
         control: job.followed.as_ref().map(|followed| followed.control),
-        pid: job.followed.as_ref().and_then(|followed| followed.closed.as_ref()).map(Gains::of),
+        pid: job.pid().map(Gains::of),
+        loop_on_device: job.handed_over.is_some(),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.record.as_ref().map(ToString::to_string),
@@ -162,10 +166,8 @@ impl Tracking {
 }
 
 impl Gains {
-    fn of(closed: &Closed) -> Self {
-        let PidParams { proportional, integral, derivative, .. } = closed.gains;
-        let limited_percent = closed.running.limited_percent();
-        let (crossover_hz, why) = (closed.crossover_hz, closed.why.clone());
+    fn of(Told { gains, why, crossover_hz, limited_percent }: Told<'_>) -> Self {
+        let (PidParams { proportional, integral, derivative, .. }, why) = (*gains, why.to_owned());
         Self { proportional, integral, derivative, crossover_hz, limited_percent, why }
     }
 
@@ -178,8 +180,8 @@ impl Gains {
             short(self.derivative),
             self.why
         );
-        if self.limited_percent > 0.0 {
-            line += &format!("; a limit held its drive in {} of the samples", text::percent(self.limited_percent));
+        if let Some(share) = self.limited_percent.filter(|share| *share > 0.0) {
+            line += &format!("; a limit held its drive in {} of the samples", text::percent(share));
         }
         line
     }
@@ -206,6 +208,9 @@ impl Summary {
         }));
         lines.extend(self.pid.as_ref().map(|pid| pid.text(self.symbol)));
         lines.extend(self.compensation.as_ref().map(Compensation::text));
+        if self.loop_on_device {
+            lines.push("the loop was closed on the device".to_owned());
+        }
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
         }

@@ -82,6 +82,8 @@ pub struct Device<C, const Q: usize, const M: usize> {
     started: bool,
     tick: u32,
     present_v: f32,
+    /// What the sensors showed last.
+    shown: Shown,
     /// Drives that wait.
     queue: Deque<f32, Q>,
     received: u32,
@@ -123,6 +125,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             started: false,
             tick: 0,
             present_v,
+            shown: Shown::default(),
             queue: Deque::new(),
             received: 0,
             history: Deque::new(),
@@ -155,6 +158,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             session: self.run.session,
             tick: self.tick,
             present_v: self.present_v,
+            output: self.shown.output,
             received: self.received,
             room: self.received.saturating_add(free),
             measured: self.measured,
@@ -164,6 +168,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     /// One period of the clock: what the last drive made is measured, the next one is put out.
     pub fn tick(&mut self, board: &mut impl Board) {
         let shown = board.measure();
+        self.shown = shown;
         self.tick = self.tick.wrapping_add(1);
         if core::mem::take(&mut self.out) {
             let Shown { output, temperature_degc, load_n } = shown;

@@ -68,6 +68,13 @@ impl Follower {
     }
 }
 
+/// Samples by which the output is later than the references: the inverse of what these bytes describe looks ahead. `None` where no device of this kind can
+/// follow with it at a sample period \[s\].
+pub fn lateness(bytes: &[u8], period: f32) -> Option<usize> {
+    let recipe = recipe::read(bytes).ok()?;
+    Follower::built(&recipe, period).map(|(_, lead)| lead)
+}
+
 fn env(shown: &Shown) -> Env<f32> {
     Env { time: 0.0, temperature: shown.temperature_degc, load: shown.load_n }
 }

@@ -195,6 +195,8 @@ pub struct Status {
     pub tick: u32,
     /// What it puts out \[V\].
     pub present_v: f32,
+    /// What the sensor shows, in the device's unit.
+    pub output: f32,
     /// Drives that it has had, without a gap, from the beginning of the run.
     pub received: u32,
     /// Number of the first drive for which it has no room.

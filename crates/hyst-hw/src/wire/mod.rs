@@ -15,7 +15,7 @@ mod message;
 mod recipe;
 
 pub use device::{Board, Control, Device, Open, Shown};
-pub use follower::Follower;
+pub use follower::{Follower, lateness};
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
 pub use message::{

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use hyst_hw::{Capabilities, RecordOptions};
+use hyst_hw::wire::{lateness, recipe_head};
+use hyst_hw::{Capabilities, RecordOptions, Recording};
 use hyst_core::PidParams;
 use hyst_ident::compensate::{Drive, compensate};
+use hyst_ident::export::block;
 use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
@@ -25,6 +27,23 @@ pub(super) struct Job {
     pub(super) options: RecordOptions,
     /// What is followed, unless a drive is played as it stands.
     pub(super) followed: Option<Followed>,
+    /// Wanted output at each of the voltages, where there is one.
+    pub(super) wanted: Vec<Option<f64>>,
+    /// What the device is to follow references with: then the voltages above are references.
+    pub(super) handed_over: Option<HandedOver>,
+}
+
+/// A controller that runs on the device.
+#[derive(Debug)]
+pub(super) struct HandedOver {
+    /// As the device reads it.
+    pub(super) recipe: Vec<u8>,
+    /// Lowest and highest reference \[output unit\].
+    pub(super) range: (f64, f64),
+    /// Rows by which the output is later than the references.
+    pub(super) late: usize,
+    gains: PidParams,
+    why: String,
 }
 
 /// A reference, and the model that computes its drive.
@@ -55,6 +74,37 @@ pub(super) struct Closed {
     pub(super) crossover_hz: Option<f64>,
     /// In words.
     pub(super) why: String,
+}
+
+impl Job {
+    /// Takes the rows away in which the output had not come to a reference's beginning yet.
+    pub(super) fn align(&self, recording: &mut Recording) {
+        let Some(HandedOver { late, .. }) = self.handed_over else { return };
+        for segment in &mut recording.segments {
+            segment.samples.drain(..late.min(segment.samples.len()));
+        }
+    }
+
+    /// The PID that took part: its gains, where they come from, bandwidth \[Hz\] and share of limited samples \[%\].
+    pub(super) fn pid(&self) -> Option<Told<'_>> {
+        if let Some(HandedOver { gains, why, .. }) = &self.handed_over {
+            return Some(Told { gains, why, crossover_hz: None, limited_percent: None });
+        }
+        let Closed { running, gains, crossover_hz, why } = self.followed.as_ref()?.closed.as_ref()?;
+        let limited_percent = Some(running.limited_percent());
+        Some(Told { gains, why, crossover_hz: *crossover_hz, limited_percent })
+    }
+}
+
+/// A PID that took part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Told<'a> {
+    pub(super) gains: &'a PidParams,
+    pub(super) why: &'a str,
+    /// \[Hz\]
+    pub(super) crossover_hz: Option<f64>,
+    /// \[%\]
+    pub(super) limited_percent: Option<f64>,
 }
 
 impl Followed {
@@ -129,6 +179,9 @@ impl Job {
             play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
         }
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
+        if args.control.closes() && device.queued {
+            return Self::hand_over(args, model, json, reference, (low, high), play);
+        }
         let drive = args.control.inverts().then(|| compensate(&model, &reference, &options)).transpose()?;
         let planned = match &drive {
             Some(drive) => drive.voltage.clone(),
@@ -140,20 +193,61 @@ impl Job {
         };
         let segments = split(&reference, &planned);
         let closed = if args.control.closes() {
-            if device.queued {
-                return Err(CommandError::bad_input(
-                    "what this device measures comes too late for a loop that is closed on this computer; --control feedforward or gain need no loop",
-                ));
-            }
             play.block = 1;
             let wanted = split(&reference, reference.output().unwrap_or_default());
             Some(Closed::new(args, &model, (low, high), wanted, 1.0 / play.rate_hz)?)
         } else {
             None
         };
+        let wanted = reference.output().unwrap_or_default().iter().copied().map(Some).collect();
         let followed =
             Followed { model, json, reference, control: args.control, drive, live, closed, held_s: play.settle_s };
-        Ok(Self { segments, followed: Some(followed), options: play })
+        Ok(Self { segments, followed: Some(followed), options: play, wanted, handed_over: None })
+    }
+
+    /// For a device that closes the loop itself: what it measures comes too late for one that is closed here.
+    fn hand_over(
+        args: &RunArgs,
+        model: Model,
+        json: String,
+        reference: Record,
+        limits: (f64, f64),
+        mut play: RecordOptions,
+    ) -> CommandResult<Self> {
+        if args.control != Control::PidFeedforward {
+            return Err(CommandError::bad_input(
+                "what this device measures comes too late for a loop that is closed on this computer, and its own loop is around a model's inverse: give --control pid+feedforward",
+            ));
+        }
+        let period = 1.0 / play.rate_hz;
+        let Chosen { gains, why, .. } = Chosen::new(args, &model, limits, period)?;
+        let block = block(&model).map_err(CommandError::bad_input)?;
+        let recipe = [recipe_head(Some(&gains)).as_slice(), &block].concat();
+        let late = lateness(&recipe, period as f32).ok_or_else(|| {
+            CommandError::bad_input(
+                "the device has no inverse of this model at this rate: it takes models of kind pi with what an inverse needs room for; fit one with --model pi, or use --control feedforward",
+            )
+        })?;
+        let rows = split(&reference, reference.output().unwrap_or_default());
+        let range = rows.iter().flatten().fold((model.output.low, model.output.high), |(l, h), y| (l.min(*y), h.max(*y)));
+        // From one end to the other in a second.
+        play.slew_v_per_s = (range.1 - range.0).max(f64::MIN_POSITIVE);
+        let held = |rows: &Vec<f64>| [&rows[..], &vec![rows.last().copied().unwrap_or_default(); late]].concat();
+        let segments = rows.iter().map(held).collect();
+        let told = |rows: &Vec<f64>| std::iter::repeat_n(None, late).chain(rows.iter().copied().map(Some)).collect::<Vec<_>>();
+        let wanted = rows.iter().flat_map(told).collect();
+        let followed = Followed {
+            model,
+            json,
+            reference,
+            control: args.control,
+            drive: None,
+            live: None,
+            closed: None,
+            held_s: play.settle_s,
+        };
+        let handed_over = Some(HandedOver { recipe, range, late, gains, why });
+        Ok(Self { segments, followed: Some(followed), options: play, wanted, handed_over })
     }
 
     fn play(args: &RunArgs, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
@@ -195,18 +289,21 @@ impl Job {
                 format!("{file}: after {} s the drive is steeper than {slew} V/s; nothing was played", time[row]);
             return Err(CommandError::bad_input(message));
         }
-        Ok(Self { segments: split(&drive, volts), options: play_options(args, &drive), followed: None })
+        let wanted = vec![None; volts.len()];
+        let options = play_options(args, &drive);
+        Ok(Self { segments: split(&drive, volts), options, followed: None, wanted, handed_over: None })
     }
 }
 
-impl Closed {
-    fn new(
-        args: &RunArgs,
-        model: &Model,
-        limits: (f64, f64),
-        wanted: Vec<Vec<f64>>,
-        period: f64,
-    ) -> CommandResult<Self> {
+/// Gains, as given or from the model.
+struct Chosen {
+    gains: PidParams,
+    crossover_hz: Option<f64>,
+    why: String,
+}
+
+impl Chosen {
+    fn new(args: &RunArgs, model: &Model, limits: (f64, f64), period: f64) -> CommandResult<Self> {
         let own = loop_gains(model, period, limits).map_err(CommandError::bad_input)?;
         let (gains, why) = match args.pid {
             Some(PidGains { proportional, integral, derivative }) => {
@@ -223,9 +320,21 @@ impl Closed {
                 (own.pid, format!("bandwidth {} Hz: {why}", text::short(own.crossover_hz)))
             }
         };
+        Ok(Self { gains, crossover_hz: args.pid.is_none().then_some(own.crossover_hz), why })
+    }
+}
+
+impl Closed {
+    fn new(
+        args: &RunArgs,
+        model: &Model,
+        limits: (f64, f64),
+        wanted: Vec<Vec<f64>>,
+        period: f64,
+    ) -> CommandResult<Self> {
+        let Chosen { gains, crossover_hz, why } = Chosen::new(args, model, limits, period)?;
         let slew = args.limits.slew.unwrap_or(f64::INFINITY);
         let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew)?;
-        let crossover_hz = args.pid.is_none().then_some(own.crossover_hz);
         Ok(Self { running, gains, crossover_hz, why })
     }
 }

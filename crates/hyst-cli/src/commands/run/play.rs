@@ -25,9 +25,10 @@ where
     }
     let mut log_error = None;
     let bar = Progress::bar("playing", job.segments.iter().map(Vec::len).sum());
-    let (wanted, mut live, mut closed) = match &mut job.followed {
-        Some(followed) => (followed.reference.output(), followed.live.as_mut(), followed.closed.as_mut()),
-        None => (None, None, None),
+    let told = &job.wanted;
+    let (mut live, mut closed) = match &mut job.followed {
+        Some(followed) => (followed.live.as_mut(), followed.closed.as_mut()),
+        None => (None, None),
     };
     let revise = |revision: &mut Revision<'_>| {
         live.iter_mut().for_each(|live| live.revise(revision));
@@ -36,10 +37,10 @@ where
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
         bar.at(news.done);
         let first = news.done - if news.phase == Phase::Record { news.samples.len() } else { 0 };
-        let wanted = wanted.filter(|_| news.phase == Phase::Record);
+        let asked_for = news.phase == Phase::Record;
         if let (Some(log), None) = (&mut log, &log_error) {
             let mut samples = news.samples.iter().enumerate().map(|(k, sample)| {
-                let wanted = wanted.and_then(|wanted| wanted.get(first + k)).copied();
+                let wanted = told.get(first + k).copied().flatten().filter(|_| asked_for);
                 LoggedSample::new(news.segment, news.phase, sample, wanted)
             });
             log_error = samples.try_for_each(|sample| log.sample(&sample)).err();
