@@ -34,7 +34,7 @@ struct Summary {
     errors: Option<Errors>,
     extrapolated: Extrapolated,
     #[serde(skip)]
-    unit: &'static str,
+    unit: String,
 }
 
 /// Runs the command.
@@ -85,7 +85,7 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
         highest_n: high,
         errors: estimated.errors,
         extrapolated: text::from_one(estimated.extrapolated),
-        unit: text::symbol(&model.output.unit),
+        unit: text::symbol(&model.output.unit).to_owned(),
     };
     report.print(&summary.text(), &summary)
 }
