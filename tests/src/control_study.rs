@@ -58,8 +58,8 @@ fn plant(seed: u64) -> String {
          [actuator]\nmax_v = 120\ngain_um_per_v = 0.2\nloop_share = 0.13\nrelays = 4000\n\
          [sensor]\nrange_um = [-10, 45]\nnoise_um = 0.004\n\
          [lag]\nseconds = 0.0015\n\
-         [creep]\nshare_per_decade = 0.015\n\
-         [[mode]]\nhz = 180.0\ndamping = 0.03\n"
+         [creep]\nstrength = 0.06\ntau_min_s = 0.05\ntau_max_s = 60\n\
+         [[mode]]\nhz = 180.0\ndamping = 0.03\ngain = 0.9\n"
     )
 }
 

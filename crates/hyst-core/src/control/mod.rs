@@ -4,8 +4,10 @@ mod force;
 mod limits;
 mod pid;
 mod tracking;
+mod watch;
 
 pub use force::{AffineFit, ForceObservation, ForceObserver, ForceParams};
 pub use limits::{Limited, Limits};
 pub use pid::{Pid, PidParams, PidState};
 pub use tracking::{Tracking, TrackingState};
+pub use watch::{Watch, WatchState};
