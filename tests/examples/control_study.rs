@@ -29,7 +29,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(path, (1200, 900)).into_drawing_area();
     root.fill(&WHITE)?;
-    let colours = [RGBColor(150, 150, 150), RGBColor(230, 140, 30), RGBColor(40, 110, 190), RGBColor(190, 50, 60), BLACK];
+    let colours =
+        [RGBColor(150, 150, 150), RGBColor(230, 140, 30), RGBColor(40, 110, 190), RGBColor(190, 50, 60), BLACK];
     for (area, row) in root.split_evenly((study.rows.len(), 1)).iter().zip(&study.rows) {
         let most = row.errors.iter().skip(1).fold(0.0f64, |m, e| m.max(e.max));
         let end = row.time.last().copied().unwrap_or(1.0);
@@ -39,7 +40,12 @@ fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
             .x_label_area_size(32)
             .y_label_area_size(60)
             .build_cartesian_2d(0.0..end, -most..most)?;
-        chart.configure_mesh().x_desc("time [s]").y_desc("output less reference [µm]").light_line_style(WHITE).draw()?;
+        chart
+            .configure_mesh()
+            .x_desc("time [s]")
+            .y_desc("output less reference [µm]")
+            .light_line_style(WHITE)
+            .draw()?;
         for (k, measured) in row.measured.iter().enumerate() {
             let points = row.time.iter().zip(measured).zip(&row.wanted);
             let line = points.map(|((t, y), r)| (*t, (y - r).clamp(-most, most))).step_by(4);

@@ -71,7 +71,9 @@ const REFERENCES: [Shape; 3] = [
         let smooth = |x: f64| 0.5 - 0.5 * (std::f64::consts::PI * x.clamp(0.0, 1.0)).cos();
         [(0.0, 0.35), (1.5, 0.4), (3.0, -0.55), (4.5, 0.45)].iter().map(|(at, by)| by * smooth((t - at) / 0.5)).sum()
     }),
-    ("sine of 10 Hz that swells and fades", 10.5, |t| 0.5 - 0.4 * (TAU * 0.25 * t).sin().abs() * (TAU * 10.0 * t).sin()),
+    ("sine of 10 Hz that swells and fades", 10.5, |t| {
+        0.5 - 0.4 * (TAU * 0.25 * t).sin().abs() * (TAU * 10.0 * t).sin()
+    }),
     ("five sines, 5 to 30 Hz", 30.0, |t| {
         let sines = [5.0, 10.0, 15.0, 20.0, 30.0].iter().enumerate();
         0.5 + 0.09 * sines.map(|(k, hz)| (TAU * hz * t + 1.3 * k as f64).sin()).sum::<f64>()

@@ -19,7 +19,10 @@ fn a_pid_takes_out_what_a_plain_gain_leaves_and_a_feedforward_helps_it() {
     let rmse = |said: &Value| said["tracking"]["rmse"].as_f64().unwrap();
     let [gain, forward, pid, both] =
         ["gain", "feedforward", "pid", "pid+feedforward"].map(|control| run(&lab, control, ""));
-    assert!(rmse(&both) < 0.5 * rmse(&gain) && rmse(&both) < rmse(&forward) && rmse(&both) < rmse(&pid), "{both} {pid} {forward} {gain}");
+    assert!(
+        rmse(&both) < 0.5 * rmse(&gain) && rmse(&both) < rmse(&forward) && rmse(&both) < rmse(&pid),
+        "{both} {pid} {forward} {gain}"
+    );
     assert_eq!(gain["control"], "gain");
     assert_eq!(both["control"], "pid+feedforward");
     assert!(gain["pid"].is_null() && gain["compensation"].is_null());
@@ -61,7 +64,10 @@ fn a_log_is_read_as_the_record_is() {
     assert!(all.lines().count() > 1001);
 
     let info = lab.ok("log info run.mcap --json").json();
-    assert_eq!((info["closed"].as_bool(), info["record_samples"].as_u64(), info["model"].as_bool()), (Some(true), Some(1000), Some(true)));
+    assert_eq!(
+        (info["closed"].as_bool(), info["record_samples"].as_u64(), info["model"].as_bool()),
+        (Some(true), Some(1000), Some(true))
+    );
     assert_eq!(info["metadata"]["output_column"], "displacement_um");
 }
 

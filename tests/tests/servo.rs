@@ -9,9 +9,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hyst_core::{ChainParams, EffectParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
-use hyst_hw::wire::{
-    Ask, Chunk, Exchange, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, Tell, recipe_head,
-};
+use hyst_hw::wire::{Ask, Chunk, Exchange, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, Tell, recipe_head};
 use hyst_hw::{Daq, Remote, RemoteError, RemoteOptions, Sample, Serial};
 use hyst_onboard::{OnBoard, RANGE_V, RATE_HZ, SLEW_V_PER_S, servo};
 
@@ -68,8 +66,7 @@ fn recipe() -> Vec<u8> {
     });
     let effects: EffectParams<Vec<f64>> =
         EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
-    let model: ChainParams<Vec<f64>> =
-        ChainParams { operator, effects, zero: 0.0, input: RANGE_V.map(f64::from) };
+    let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, zero: 0.0, input: RANGE_V.map(f64::from) };
     let pid = PidParams {
         proportional: 0.5,
         integral: 60.0,
@@ -98,11 +95,8 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32)> {
     let ask = |device: &mut hyst_onboard::Servo, ask: Ask| -> Reply { device.answer(&Request { number: 0, ask }) };
     let bytes = recipe();
     for (i, part) in bytes.chunks(MOST_CHUNK).enumerate() {
-        let chunk = Chunk {
-            offset: (i * MOST_CHUNK) as u32,
-            total: bytes.len() as u32,
-            bytes: part.iter().copied().collect(),
-        };
+        let chunk =
+            Chunk { offset: (i * MOST_CHUNK) as u32, total: bytes.len() as u32, bytes: part.iter().copied().collect() };
         assert!(matches!(ask(&mut device, Ask::Model(chunk)).tell, Tell::ModelBytes(_)));
     }
     let start = Start {

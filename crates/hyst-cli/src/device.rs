@@ -62,7 +62,8 @@ impl AnyDevice {
             ..RemoteOptions::with_session(session)
         };
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
-        let port = |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
+        let port =
+            |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
         let gone = |message: String| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"));
         let (line, name): (Box<dyn Line>, &str) = match device {
             Device::Simulated(described) => {

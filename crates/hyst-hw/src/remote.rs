@@ -489,7 +489,9 @@ impl<L: Line> Daq for Remote<L> {
         if let Some(bad) = drive_v.iter().find(|v| !range.contains(**v)) {
             let advice = match self.options.mode {
                 Mode::Voltage => "give voltages within the device's range; nothing of the block was applied",
-                Mode::Reference => "give references within the range that was agreed on; nothing of the block was applied",
+                Mode::Reference => {
+                    "give references within the range that was agreed on; nothing of the block was applied"
+                }
             };
             return Err(RemoteError::Value { what: "drive", value: *bad, advice });
         }

@@ -117,8 +117,7 @@ pub fn estimate_force(
     }
     let params = ForceParams { stiffness: options.stiffness, kappa, chi };
     let observation: ForceObservation<f64> = params.build(&())?;
-    let force: Vec<f64> =
-        measured.iter().zip(&simulated.predicted).map(|(x, x0)| observation.force(*x, *x0)).collect();
+    let force: Vec<f64> = measured.iter().zip(&simulated.predicted).map(|(x, x0)| observation.force(*x, *x0)).collect();
     let of = |load: &[f64]| Errors::of(load, &force, &vec![false; force.len()]).ok();
     let errors = record.load().and_then(of);
     Ok(EstimatedForce { params, free_rows, errors, extrapolated: simulated.extrapolated, force })
@@ -169,9 +168,8 @@ mod tests {
     #[test]
     fn a_force_is_found_behind_a_gain_and_a_zero_that_have_changed() {
         let (model, loaded) = (model(), record(0.21, 1.5, "loaded"));
-        let estimate = |free| {
-            estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None }).unwrap()
-        };
+        let estimate =
+            |free| estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None }).unwrap();
         let told = estimate(Free::Until(3.0));
         assert!((told.params.kappa - 1.05).abs() < 1e-3 && (told.params.chi - 1.5).abs() < 1e-2, "{:?}", told.params);
         assert_eq!(told.free_rows, 3001);

@@ -101,7 +101,8 @@ fn steps(write: bool) -> Result<(), Ended> {
     }
     let agree = ["test", "--quiet", "--package", "hyst-cases", "--test", "agree", "--", "--nocapture"];
     done(cargo().args(agree).env("HYST_FIRMWARE", &printed))?;
-    let line = ["test", "--quiet", "--package", "hyst-tests", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
+    let line =
+        ["test", "--quiet", "--package", "hyst-tests", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
     done(cargo().args(line).env("HYST_SERVO", built.join("servo")))?;
 
     let figures = Figures::collect(&toolchain, &library, &small, &printed)?;

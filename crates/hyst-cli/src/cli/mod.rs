@@ -190,7 +190,9 @@ pub(crate) struct SimulateArgs {
 /// What a model of the free actuator does not explain of the measured displacement, times the output's stiffness; the record's columns are kept,
 /// and estimated_force_n is added. Where the record has load_n, the estimate is compared with it.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  hystctl force --model free.json record.csv --kout 1.08 --free-until 2 -o force.csv")]
+#[command(
+    after_help = "Example:\n  hystctl force --model free.json record.csv --kout 1.08 --free-until 2 -o force.csv"
+)]
 pub(crate) struct ForceArgs {
     /// Model of the actuator without a force
     #[arg(long)]

@@ -87,8 +87,7 @@ impl FromStr for Device {
 }
 
 /// What a device can be given as.
-const FORMS: &str =
-    "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S] or tcp:HOST:PORT";
+const FORMS: &str = "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S] or tcp:HOST:PORT";
 
 /// A port and the bits a second behind its `@`, if there is one.
 fn at_rate(port: &str, usual: u32, example: &str) -> Result<(String, u32), String> {

@@ -1,6 +1,6 @@
 //! `force`: an external force without a force sensor.
 
-use hyst_ident::force::{Free, ForceOptions, estimate_force};
+use hyst_ident::force::{ForceOptions, Free, estimate_force};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::Effect;
 use hyst_ident::record::{Extra, Need};
@@ -63,7 +63,10 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
     let extra = [Extra::numbers(COLUMN, &estimated.force)];
     args.output.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     if !replaced.is_empty() {
-        say(&format!("note: {} has {COLUMN} already; in the output this estimate stands in its place", args.record.display()));
+        say(&format!(
+            "note: {} has {COLUMN} already; in the output this estimate stands in its place",
+            args.record.display()
+        ));
     }
     if model.effects.names().contains(&Effect::Load) {
         say("note: the model's compliance is left out: what it explains is what is looked for");
@@ -72,7 +75,8 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
         let beyond = text::extrapolation("input", &text::from_one(estimated.extrapolated), &model.input);
         say(&format!("warning: {beyond}; the estimate is extrapolated there"));
     }
-    let (low, high) = estimated.force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
+    let (low, high) =
+        estimated.force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
     let summary = Summary {
         record: args.record.display().to_string(),
         output: args.output.to_string(),

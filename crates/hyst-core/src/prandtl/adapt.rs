@@ -40,11 +40,7 @@ impl<T: Real> Adaptation<T> {
     ///
     /// # Errors
     /// If `M` is not `N + 2`, or the gain is not positive.
-    pub fn begin<const N: usize, const M: usize>(
-        &self,
-        first: &Pi<T, N>,
-        zero: T,
-    ) -> Result<Adapted<T, N, M>, Error> {
+    pub fn begin<const N: usize, const M: usize>(&self, first: &Pi<T, N>, zero: T) -> Result<Adapted<T, N, M>, Error> {
         if M != N + 2 {
             return Err(Error::Capacity { name: "adapted numbers", needed: N + 2, holds: M });
         }
@@ -147,7 +143,8 @@ impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
     fn settle(&mut self) {
         for i in 0..M {
             for j in 0..i {
-                let of = |a: usize, b: usize| self.covariance.get(a).and_then(|row| row.get(b)).copied().unwrap_or_default();
+                let of =
+                    |a: usize, b: usize| self.covariance.get(a).and_then(|row| row.get(b)).copied().unwrap_or_default();
                 let mean = T::from_f64(0.5) * (of(i, j) + of(j, i));
                 for (a, b) in [(i, j), (j, i)] {
                     if let Some(p) = self.covariance.get_mut(a).and_then(|row| row.get_mut(b)) {

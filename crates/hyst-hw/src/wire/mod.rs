@@ -22,4 +22,6 @@ pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit,
 };
-pub use recipe::{MOST_ELEMENTS, MOST_HEAD, MOST_PLAYS, Model, RECIPE, Recipe, RecipeError, head as recipe_head, read as read_recipe};
+pub use recipe::{
+    MOST_ELEMENTS, MOST_HEAD, MOST_PLAYS, Model, RECIPE, Recipe, RecipeError, head as recipe_head, read as read_recipe,
+};

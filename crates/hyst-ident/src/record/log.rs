@@ -109,20 +109,21 @@ impl RunLog {
     /// # Errors
     /// If the log does not say its unit.
     pub fn csv(&self, name: &str, with_ramps: bool) -> Result<String, RecordError> {
-        let no_unit =
-            || RecordError::Log { file: name.to_owned(), what: "its metadata do not say the unit of the output".into() };
+        let no_unit = || RecordError::Log {
+            file: name.to_owned(),
+            what: "its metadata do not say the unit of the output".into(),
+        };
         let unit = self.unit().ok_or_else(no_unit)?;
         let chosen = || self.samples.iter().filter(|s| with_ramps || s.is_record());
         let reference = format!("reference_{}", unit.suffix());
         type Of = fn(&LogSample) -> Option<f64>;
-        let optional: [(&str, Of); 3] = [
-            (&reference, |s| s.reference),
-            ("temperature_degc", |s| s.temperature_degc),
-            ("load_n", |s| s.load_n),
-        ];
+        let optional: [(&str, Of); 3] =
+            [(&reference, |s| s.reference), ("temperature_degc", |s| s.temperature_degc), ("load_n", |s| s.load_n)];
         // A column that some samples lack has no place in a record.
-        let optional: Vec<(&str, Of)> =
-            optional.into_iter().filter(|(_, of)| chosen().next().is_some() && chosen().all(|s| of(s).is_some())).collect();
+        let optional: Vec<(&str, Of)> = optional
+            .into_iter()
+            .filter(|(_, of)| chosen().next().is_some() && chosen().all(|s| of(s).is_some()))
+            .collect();
         let mut text = format!("segment,time_s,voltage_v,{}", unit.column());
         optional.iter().for_each(|(column, _)| text.extend([",", column]));
         text.push('\n');

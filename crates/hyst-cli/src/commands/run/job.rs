@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use hyst_core::PidParams;
 use hyst_hw::wire::{lateness, recipe_head};
 use hyst_hw::{Capabilities, RecordOptions, Recording};
-use hyst_core::PidParams;
 use hyst_ident::compensate::{Drive, compensate};
 use hyst_ident::export::block;
 use hyst_ident::loop_gains;
@@ -161,7 +161,9 @@ impl Job {
             return Err(CommandError::bad_input("--pid needs --control pid or --control pid+feedforward"));
         }
         if args.limits.bandwidth.is_some() && !args.control.inverts() {
-            return Err(CommandError::bad_input("--bandwidth needs --control feedforward or --control pid+feedforward"));
+            return Err(CommandError::bad_input(
+                "--bandwidth needs --control feedforward or --control pid+feedforward",
+            ));
         }
         let mut options = options(&args.limits);
         // Not given, the limits are the model's, as far as the device goes along.
@@ -229,12 +231,14 @@ impl Job {
             )
         })?;
         let rows = split(&reference, reference.output().unwrap_or_default());
-        let range = rows.iter().flatten().fold((model.output.low, model.output.high), |(l, h), y| (l.min(*y), h.max(*y)));
+        let range =
+            rows.iter().flatten().fold((model.output.low, model.output.high), |(l, h), y| (l.min(*y), h.max(*y)));
         // From one end to the other in a second.
         play.slew_v_per_s = (range.1 - range.0).max(f64::MIN_POSITIVE);
         let held = |rows: &Vec<f64>| [&rows[..], &vec![rows.last().copied().unwrap_or_default(); late]].concat();
         let segments = rows.iter().map(held).collect();
-        let told = |rows: &Vec<f64>| std::iter::repeat_n(None, late).chain(rows.iter().copied().map(Some)).collect::<Vec<_>>();
+        let told =
+            |rows: &Vec<f64>| std::iter::repeat_n(None, late).chain(rows.iter().copied().map(Some)).collect::<Vec<_>>();
         let wanted = rows.iter().flat_map(told).collect();
         let followed = Followed {
             model,
