@@ -87,7 +87,7 @@ const REFERENCES: [Shape; 3] = [
 pub fn run(seed: u64) -> Study {
     let lab = Lab::new();
     lab.write("plant.toml", plant(seed));
-    lab.ok(&format!("excite identification --low 0 --high 120 --rate {RATE_HZ} --seconds 12 -o u.csv"));
+    lab.ok(&format!("excite identification --low 0 --high 120 --rate {RATE_HZ} --seconds 16 -o u.csv"));
     lab.ok("run --daq sim:plant.toml --drive u.csv --record train.csv");
     lab.ok("fit train.csv --model pi -o base.json");
     lab.ok("diagnose train.csv --model base.json -o extended.json --findings findings.json");
