@@ -80,7 +80,7 @@ fn recipe() -> Vec<u8> {
     };
     let mut room = [0; 4096];
     let block = write_block(&model, &mut room).expect("there is room");
-    [recipe_head(Some(&pid)).as_slice(), block].concat()
+    [recipe_head(Some(&pid), None).as_slice(), block].concat()
 }
 
 /// Sines of two frequencies that begin at rest \[µm\].

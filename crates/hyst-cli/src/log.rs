@@ -202,7 +202,8 @@ mod tests {
 
     fn sample(k: u32) -> LoggedSample {
         let time_s = f64::from(k) * 0.01;
-        let measured = hyst_hw::Sample { time_s, drive_v: 1.0, output: 2.5, temperature_degc: None, load_n: None };
+        let measured =
+            hyst_hw::Sample { time_s, drive_v: 1.0, output: 2.5, temperature_degc: None, load_n: None, force_n: None };
         LoggedSample::new(0, Phase::Record, &measured, Some(2.0))
     }
 

@@ -1,5 +1,7 @@
 //! What a serial device, a CAN device and the simulated plant have in common.
 
+use crate::remote::ClockFit;
+
 /// The voltages a device can put out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VoltageRange {
@@ -93,6 +95,8 @@ pub struct Sample {
     pub temperature_degc: Option<f64>,
     /// Measured load force (N), where the device has that channel.
     pub load_n: Option<f64>,
+    /// Force that the device has estimated (N), where it has a force observer.
+    pub force_n: Option<f64>,
 }
 
 /// A device that drives an actuator and measures it on one sample clock.
@@ -133,6 +137,11 @@ pub trait Daq {
     /// applied, nothing is clamped, and the device goes on as if the call had not been made. Other
     /// errors are the device's own; what `measured` holds by then is valid.
     fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, Self::Error>;
+
+    /// The device's clock against this computer's, in this run or the last one; `None` where there is no other clock, or nothing is known yet.
+    fn clock(&self) -> Option<ClockFit> {
+        None
+    }
 
     /// Brings the drive to the rest voltage and lets the device rest for `seconds`; the next
     /// sample begins a new segment.

@@ -49,8 +49,8 @@ pub use plant::error::{ConfigError, PlantError};
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
 #[cfg(feature = "std")]
 pub use remote::{
-    Bus, CanLine, FROM_DEVICE, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Slcan, TO_DEVICE,
-    Tcp, ports,
+    Bus, CanLine, ClockFit, FROM_DEVICE, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Slcan,
+    TO_DEVICE, Tcp, ports,
 };
 #[cfg(feature = "std")]
 pub use runner::{

@@ -1,6 +1,7 @@
 //! A device at the other end of a line, as a [`Daq`].
 
 mod can;
+mod clock;
 mod lines;
 mod slcan;
 
@@ -13,7 +14,10 @@ use crate::wire::{
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode,
 };
 
+use clock::Clock;
+
 pub use can::{Bus, CanLine, FROM_DEVICE, TO_DEVICE};
+pub use clock::ClockFit;
 pub use lines::{OpenError, Port, Serial, Tcp, ports};
 pub use slcan::Slcan;
 
@@ -167,6 +171,11 @@ pub struct Remote<L> {
     identity: Identity,
     capabilities: Capabilities,
     run: Option<Run>,
+    /// Of the run, or of the last one.
+    clock: Option<Clock>,
+    /// When the last request was sent, and its answer came.
+    asked: Instant,
+    answered: Instant,
     present_v: f64,
     broken: u32,
 }
@@ -215,6 +224,9 @@ impl<L: Line> Remote<L> {
             capabilities: capabilities(&nobody, "nobody"),
             identity: nobody,
             run: None,
+            clock: None,
+            asked: Instant::now(),
+            answered: Instant::now(),
             present_v: 0.0,
             broken: 0,
         };
@@ -338,7 +350,10 @@ impl<L: Line> Remote<L> {
                 let mut fresh = &bytes[..came];
                 while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
                     match reply {
-                        Ok(reply) if reply.number == self.number => return Ok(reply.tell),
+                        Ok(reply) if reply.number == self.number => {
+                            (self.asked, self.answered) = (sent, Instant::now());
+                            return Ok(reply.tell);
+                        }
                         // Of a request that was sent twice.
                         Ok(_) => {}
                         Err(FrameError::Message) if matches!(request.ask, Ask::Hello) => return Err(self.odd()),
@@ -363,6 +378,9 @@ impl<L: Line> Remote<L> {
         let exchange = Exchange { session: run.session, heard: run.heard, first: run.sent, drives };
         match self.ask(Ask::Exchange(exchange))? {
             Tell::Samples { status, first, samples } => {
+                if let Some(clock) = &mut self.clock {
+                    clock.tell(self.asked, self.answered, status.tick);
+                }
                 if let State::Fault(fault) = status.state {
                     self.hear(run, first, &samples, measured);
                     return Err(RemoteError::Fault { line: self.name.clone(), fault });
@@ -398,6 +416,7 @@ impl<L: Line> Remote<L> {
                 output: f64::from(sample.output),
                 temperature_degc: has(self.identity.temperature, sample.temperature_degc),
                 load_n: has(self.identity.load, sample.load_n),
+                force_n: sample.force_n.map(f64::from),
             });
         }
         true
@@ -478,6 +497,7 @@ impl<L: Line> Daq for Remote<L> {
         };
         let status = self.stated(Ask::Start(start))?;
         let rate_hz = f64::from(rate_hz as f32);
+        self.clock = Some(Clock::new(1.0 / rate_hz));
         self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room });
         // The next run of this program is another one.
         self.options.session = o.session.wrapping_add(1);
@@ -523,6 +543,10 @@ impl<L: Line> Daq for Remote<L> {
             self.trade_until_news(&[], &mut nobody)?;
         }
         Ok(())
+    }
+
+    fn clock(&self) -> Option<ClockFit> {
+        self.clock.as_ref()?.fit()
     }
 
     fn stop(&mut self) -> Result<(), RemoteError> {

@@ -191,7 +191,7 @@ impl Daq for Plant {
             let (temperature_degc, load_n) = self.surroundings.measure(time_s);
             let output =
                 self.sensor.read(disturbed, time_s).map_err(|value_um| PlantError::SensorRange { time_s, value_um })?;
-            measured.push(Sample { time_s, drive_v: volts, output, temperature_degc, load_n });
+            measured.push(Sample { time_s, drive_v: volts, output, temperature_degc, load_n, force_n: None });
         }
         Ok(drive_v.len())
     }

@@ -85,6 +85,7 @@ impl Daq for Queued {
                     output: 2.0 * volts,
                     temperature_degc: None,
                     load_n: Some(1.0),
+                    force_n: None,
                 });
             }
         }

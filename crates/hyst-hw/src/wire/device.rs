@@ -33,7 +33,11 @@ pub trait Control {
     fn load(&mut self, block: &[u8]) -> bool;
     /// Whether there is a model to follow with.
     fn ready(&self) -> bool;
-    /// Begins a run of this period \[s\], at the first reference, from what is shown and put out. Gives whether it can.
+    /// Begins to watch a run of this period \[s\] from what stands at `volts`: from now on [`force`](Self::force) is asked in each period.
+    fn watch(&mut self, period: f32, shown: &Shown, volts: f32);
+    /// Force on the output \[N\], from what was put out for this period and what is shown at its end; `None` without an observer.
+    fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32>;
+    /// Begins to follow with this period \[s\], at the first reference, from what is shown and put out. Gives whether it can.
     fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool;
     /// The drive that the reference asks for \[V\], which the limits may still change.
     fn step(&mut self, reference: f32, shown: &Shown) -> f32;
@@ -51,6 +55,10 @@ impl Control for Open {
     }
     fn ready(&self) -> bool {
         false
+    }
+    fn watch(&mut self, _: f32, _: &Shown, _: f32) {}
+    fn force(&mut self, _: f32, _: &Shown) -> Option<f32> {
+        None
     }
     fn begin(&mut self, _: f32, _: f32, _: &Shown, _: f32) -> bool {
         false
@@ -170,9 +178,11 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let shown = board.measure();
         self.shown = shown;
         self.tick = self.tick.wrapping_add(1);
+        let force_n = if self.state == State::Running { self.control.force(self.present_v, &shown) } else { None };
         if core::mem::take(&mut self.out) {
             let Shown { output, temperature_degc, load_n } = shown;
-            let sample = Measured { tick: self.tick, drive_v: self.present_v, output, temperature_degc, load_n };
+            let sample =
+                Measured { tick: self.tick, drive_v: self.present_v, output, temperature_degc, load_n, force_n };
             // There is room: a drive is only taken where there is.
             let _ = self.history.push_back(sample);
             self.measured = self.measured.wrapping_add(1);
@@ -333,6 +343,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.history.clear();
         (self.tick, self.received, self.measured, self.quiet, self.saturated, self.astray) = (0, 0, 0, 0, 0, 0);
         (self.out, self.reference) = (false, None);
+        self.control.watch(1.0 / start.rate_hz, &self.shown, self.present_v);
         Ok(())
     }
 

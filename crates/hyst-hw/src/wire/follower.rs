@@ -1,9 +1,9 @@
-//! A model's inverse in front and a PID behind it: how a device follows references.
+//! A model's inverse in front, a PID behind it and a force observer beside it: how a device follows references.
 
 use heapless::Deque;
 use hyst_core::{
-    Build, Chain, Compensator, CompensatorOptions, Env, OperatorParams, Pi, PidParams, Sampling, Stage, Tracking,
-    TrackingState,
+    Build, Chain, Compensator, CompensatorOptions, Env, ForceObserver, OperatorParams, Pi, PidParams, Sampling, Stage,
+    Tracking, TrackingState,
 };
 
 use super::device::{Control, Shown};
@@ -19,12 +19,20 @@ const LEAD: usize = 320;
 type Actuator = Chain<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS>;
 type Inverse = Compensator<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS, TAPS>;
 type Loop = Tracking<f32, Inverse, LEAD>;
+type Observer = ForceObserver<f32, Actuator>;
 
 /// Follows references with a model of plays and what surrounds them. All arithmetic is `f32`, in `hyst-core`: a host gets the same bits.
 #[derive(Debug, Default)]
 pub struct Follower {
     recipe: Option<Recipe>,
     running: Option<Running>,
+    watching: Option<Watching>,
+}
+
+#[derive(Debug)]
+struct Watching {
+    observer: Observer,
+    state: <Actuator as Stage<f32>>::State,
 }
 
 #[derive(Debug)]
@@ -40,15 +48,13 @@ struct Running {
 impl Follower {
     /// Without a model.
     pub const fn new() -> Self {
-        Self { recipe: None, running: None }
+        Self { recipe: None, running: None, watching: None }
     }
 
     /// The loop at a sample period \[s\]. `None` where this device has no room for it, or where there is no such loop.
     fn built(recipe: &Recipe, period: f32) -> Option<(Loop, usize)> {
-        let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
         let sampling = Sampling { period: f64::from(period) };
-        let pi: Pi<f32, MOST_PLAYS> = pi.build(&()).ok()?;
-        let chain: Actuator = recipe.model.around(pi, &sampling).ok()?;
+        let chain = actuator(recipe, &sampling)?;
         let inverse: Inverse = chain.compensator(&sampling, &CompensatorOptions::default()).ok()?;
         let lead = inverse.lead();
         let [low, high] = recipe.model.input;
@@ -68,6 +74,13 @@ impl Follower {
     }
 }
 
+/// The model at a sample period. `None` where this device has no room for it.
+fn actuator(recipe: &Recipe, sampling: &Sampling) -> Option<Actuator> {
+    let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
+    let pi: Pi<f32, MOST_PLAYS> = pi.build(&()).ok()?;
+    recipe.model.around(pi, sampling).ok()
+}
+
 /// Samples by which the output is later than the references: the inverse of what these bytes describe looks ahead. `None` where no device of this kind can
 /// follow with it at a sample period \[s\].
 pub fn lateness(bytes: &[u8], period: f32) -> Option<usize> {
@@ -79,15 +92,38 @@ fn env(shown: &Shown) -> Env<f32> {
     Env { time: 0.0, temperature: shown.temperature_degc, load: shown.load_n }
 }
 
+/// As [`env`], free: a measured load is what the observer is to find.
+fn free(shown: &Shown) -> Env<f32> {
+    Env { load: 0.0, ..env(shown) }
+}
+
 impl Control for Follower {
     fn load(&mut self, bytes: &[u8]) -> bool {
-        self.running = None;
+        (self.running, self.watching) = (None, None);
         self.recipe = recipe::read(bytes).ok().filter(|r| matches!(r.model.operator, OperatorParams::Pi(_)));
         self.recipe.is_some()
     }
 
     fn ready(&self) -> bool {
         self.recipe.is_some()
+    }
+
+    fn watch(&mut self, period: f32, shown: &Shown, volts: f32) {
+        let built = || {
+            let recipe = self.recipe.as_ref()?;
+            let chain = actuator(recipe, &Sampling { period: f64::from(period) })?;
+            let state = chain.state();
+            Some(Watching { observer: recipe.force?.observer(chain).ok()?, state })
+        };
+        self.watching = built();
+        if let Some(Watching { observer, state }) = &mut self.watching {
+            observer.reset(state, &free(shown), volts, shown.output);
+        }
+    }
+
+    fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32> {
+        let Watching { observer, state } = self.watching.as_mut()?;
+        Some(observer.step(state, &free(shown), volts, shown.output))
     }
 
     fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool {

@@ -14,7 +14,7 @@ pub const PROTOCOL: u16 = 1;
 /// Most drives in a request.
 pub const MOST_DRIVES: usize = 64;
 /// Most samples in an answer.
-pub const MOST_SAMPLES: usize = 20;
+pub const MOST_SAMPLES: usize = 17;
 /// Most bytes of a name.
 pub const MOST_NAME: usize = 32;
 /// Most bytes of a model in a request.
@@ -341,4 +341,6 @@ pub struct Measured {
     pub temperature_degc: f32,
     /// Load \[N\]; of no account where the device has none.
     pub load_n: f32,
+    /// Force that was estimated on the device \[N\], where it has a force observer.
+    pub force_n: Option<f32>,
 }

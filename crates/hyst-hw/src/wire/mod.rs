@@ -4,8 +4,9 @@
 //! - `iso_tp.rs`: messages over a CAN bus.
 //! - `message.rs`: what host and device say to each other.
 //! - `device.rs`: what a device does with it.
-//! - `recipe.rs`: a model and a PID as bytes.
+//! - `recipe.rs`: a model, a PID and a force observer as bytes.
 //! - `follower.rs`: how a device follows references with them.
+//! - `server.rs`: requests and answers over the drivers of a board.
 
 mod device;
 mod follower;
@@ -13,6 +14,7 @@ mod frame;
 mod iso_tp;
 mod message;
 mod recipe;
+mod server;
 
 pub use device::{Board, Control, Device, Open, Shown};
 pub use follower::{Follower, lateness};
@@ -25,3 +27,4 @@ pub use message::{
 pub use recipe::{
     MOST_ELEMENTS, MOST_HEAD, MOST_PLAYS, Model, RECIPE, Recipe, RecipeError, head as recipe_head, read as read_recipe,
 };
+pub use server::{CanServer, SerialServer};

@@ -4,23 +4,27 @@
 //! |---|---|
 //! | 4 | `HYCT` |
 //! | 1 | version of this format |
-//! | 1 | 1 with a PID, 0 without |
+//! | 1 | bit 0: with a PID; bit 1: with a force observer |
 //! | 0 or 72 | the nine numbers of [`PidParams`] in their order, `f64`, little endian |
+//! | 0 or 24 | the three numbers of [`ForceParams`] in their order, `f64`, little endian |
 //! | 4 | CRC-32 (ISO-HDLC) of everything before, little endian |
 //! | n | the model: a [block](hyst_core::read_block), which has a check sum of its own |
 
 use core::fmt;
 
-use hyst_core::{BlockError, ChainParams, List, PidParams, read_block};
+use hyst_core::{BlockError, ChainParams, ForceParams, List, PidParams, read_block};
 
 /// Version of these bytes.
 pub const RECIPE: u8 = 1;
 
 const MAGIC: [u8; 4] = *b"HYCT";
-const NUMBERS: usize = 9;
+const PID_NUMBERS: usize = 9;
+const FORCE_NUMBERS: usize = 3;
+const WITH_PID: u8 = 1;
+const WITH_FORCE: u8 = 2;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// Bytes in front of the model at most.
-pub const MOST_HEAD: usize = MAGIC.len() + 2 + 8 * NUMBERS + 4;
+pub const MOST_HEAD: usize = MAGIC.len() + 2 + 8 * (PID_NUMBERS + FORCE_NUMBERS) + 4;
 
 /// Plays and elements of a model that a device has room for.
 pub const MOST_PLAYS: usize = 64;
@@ -30,11 +34,13 @@ pub const MOST_ELEMENTS: usize = 16;
 /// A model with room for what a device can run.
 pub type Model = ChainParams<List<MOST_PLAYS>, List<MOST_ELEMENTS>>;
 
-/// A model whose inverse leads, and a PID that corrects it, if there is one.
+/// A model whose inverse leads, a PID that corrects it and a force observer beside it, if there are such.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
     /// The correction.
     pub pid: Option<PidParams>,
+    /// What the model of the free actuator does not explain, as a force.
+    pub force: Option<ForceParams>,
     /// The model.
     pub model: Model,
 }
@@ -70,7 +76,7 @@ impl fmt::Display for RecipeError {
 
 impl core::error::Error for RecipeError {}
 
-fn numbers(pid: &PidParams) -> [f64; NUMBERS] {
+fn of_pid(pid: &PidParams) -> [f64; PID_NUMBERS] {
     [
         pid.proportional,
         pid.integral,
@@ -85,12 +91,14 @@ fn numbers(pid: &PidParams) -> [f64; NUMBERS] {
 }
 
 /// What stands in front of the model's block.
-pub fn head(pid: Option<&PidParams>) -> heapless::Vec<u8, MOST_HEAD> {
+pub fn head(pid: Option<&PidParams>, force: Option<&ForceParams>) -> heapless::Vec<u8, MOST_HEAD> {
     let mut bytes = heapless::Vec::new();
+    let with = if pid.is_some() { WITH_PID } else { 0 } | if force.is_some() { WITH_FORCE } else { 0 };
     // All of it fits: that is what `MOST_HEAD` counts.
     let _ = bytes.extend_from_slice(&MAGIC);
-    let _ = bytes.extend_from_slice(&[RECIPE, u8::from(pid.is_some())]);
-    for number in pid.map(numbers).iter().flatten() {
+    let _ = bytes.extend_from_slice(&[RECIPE, with]);
+    let of_force = force.map(|f| [f.stiffness, f.kappa, f.chi]);
+    for number in pid.map(of_pid).iter().flatten().chain(of_force.iter().flatten()) {
         let _ = bytes.extend_from_slice(&number.to_le_bytes());
     }
     let sum = CRC.checksum(&bytes).to_le_bytes();
@@ -113,7 +121,9 @@ pub fn read(bytes: &[u8]) -> Result<Recipe, RecipeError> {
     if *version != RECIPE {
         return Err(RecipeError::Version(*version));
     }
-    let end = fixed + if *with == 0 { 0 } else { 8 * NUMBERS };
+    let (with_pid, with_force) = (with & WITH_PID != 0, with & WITH_FORCE != 0);
+    let numbers = if with_pid { PID_NUMBERS } else { 0 } + if with_force { FORCE_NUMBERS } else { 0 };
+    let end = fixed + 8 * numbers;
     let (Some(front), Some(stated), Some(block)) = (bytes.get(..end), bytes.get(end..end + 4), bytes.get(end + 4..))
     else {
         return Err(RecipeError::Truncated);
@@ -123,7 +133,7 @@ pub fn read(bytes: &[u8]) -> Result<Recipe, RecipeError> {
     }
     let mut read = front[fixed..].chunks_exact(8).filter_map(|b| b.try_into().ok()).map(f64::from_le_bytes);
     let mut next = || read.next().unwrap_or_default();
-    let pid = (*with != 0).then(|| PidParams {
+    let pid = with_pid.then(|| PidParams {
         proportional: next(),
         integral: next(),
         derivative: next(),
@@ -134,5 +144,6 @@ pub fn read(bytes: &[u8]) -> Result<Recipe, RecipeError> {
         low: next(),
         high: next(),
     });
-    Ok(Recipe { pid, model: read_block(block).map_err(RecipeError::Model)? })
+    let force = with_force.then(|| ForceParams { stiffness: next(), kappa: next(), chi: next() });
+    Ok(Recipe { pid, force, model: read_block(block).map_err(RecipeError::Model)? })
 }

@@ -13,7 +13,7 @@ use board::{Clock, Uart};
 use cortex_m::asm::wfi;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hprintln};
-use hyst_hw::wire::{Deframer, MAX_FRAME, Request, encode};
+use hyst_hw::wire::SerialServer;
 use hyst_onboard::{OnBoard, RATE_HZ, servo};
 
 #[entry]
@@ -21,24 +21,12 @@ fn main() -> ! {
     let mut line = Uart::open();
     let (mut servo, mut actuator) = (servo(), OnBoard::default());
     let Some(mut clock) = Clock::start(RATE_HZ) else { panic!("SysTick is taken") };
-    let mut deframer = Deframer::new();
-    let (mut frame, mut length, mut sent) = ([0; MAX_FRAME], 0, 0);
+    let mut server = SerialServer::new();
     loop {
         if clock.passed() {
             servo.tick(&mut actuator);
         }
-        // One answer at a time: while it goes out, requests wait in the line.
-        if sent < length {
-            sent += usize::from(line.send(frame[sent]));
-            continue;
-        }
-        let Some(byte) = line.receive() else { continue };
-        // What was changed on the way is asked again.
-        if let Some(Ok(request)) = deframer.next::<Request>(&mut &[byte][..]) {
-            let reply = servo.answer(&request);
-            length = encode(&reply, &mut frame).map_or(0, <[u8]>::len);
-            sent = 0;
-        }
+        let Ok(()) = server.poll(&mut servo, &mut line);
     }
 }
 
