@@ -9,14 +9,15 @@ use serde_json::Value;
 fn log(lab: &Lab, name: &str) -> Vec<Value> {
     let bytes = fs::read(lab.path(name)).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().expect("the log has a summary");
-    let channel = summary.channels.values().next().unwrap();
-    assert_eq!((channel.topic.as_str(), channel.message_encoding.as_str()), ("/actuator/sample", "json"));
+    let channel = summary.channels.values().find(|channel| channel.topic == "/actuator/sample").unwrap();
+    assert_eq!(channel.message_encoding, "json");
     assert_eq!(channel.metadata["unit.output"], "µm");
     let schema = channel.schema.as_ref().unwrap();
     assert_eq!(schema.encoding, "jsonschema");
     let schema: Value = serde_json::from_slice(&schema.data).unwrap();
     assert_eq!(schema["type"], "object");
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let messages = messages.filter(|message| message.channel.topic == channel.topic);
     let mut time = 0;
     messages
         .map(|message| {
@@ -213,12 +214,14 @@ fn the_limits_of_a_reference_are_kept() {
 }
 
 #[test]
-fn other_devices_are_not_there_yet() {
+fn devices_that_are_not_there_are_told() {
     let lab = Lab::with_model();
-    for device in ["serial:/dev/ttyACM0", "slcan:/dev/ttyACM0", "can:can0"] {
-        let message = lab.refuses(&format!("run --daq {device} --drive u.csv --record out.csv"), 2);
-        assert!(message.contains("sim:PLANT.toml"), "{message}");
+    for device in ["serial:/dev/tty-of-nobody", "slcan:/dev/tty-of-nobody"] {
+        let message = lab.refuses(&format!("run --daq {device} --drive u.csv --record out.csv"), 3);
+        assert!(message.contains("/dev/tty-of-nobody: there is no such port"), "{message}");
     }
+    let message = lab.refuses("run --daq usb:3 --drive u.csv --record out.csv", 2);
+    assert!(message.contains("sim:PLANT.toml"), "{message}");
     lab.refuses("run --daq plant.toml --drive u.csv --record out.csv", 2);
     let message = lab.refuses("run --daq sim:absent.toml --drive u.csv --record out.csv", 2);
     assert!(message.contains("absent.toml"), "{message}");

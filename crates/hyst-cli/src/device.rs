@@ -3,8 +3,8 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use hyst_hw::{
-    CanLine, Capabilities, Daq, FROM_DEVICE, Line, Plant, PlantError, Remote, RemoteError, RemoteOptions, Sample,
-    Serial, Slcan, TO_DEVICE, Tcp,
+    CanLine, Capabilities, ClockFit, Daq, FROM_DEVICE, Line, Plant, PlantError, Remote, RemoteError, RemoteOptions,
+    Sample, Serial, Slcan, TO_DEVICE, Tcp,
 };
 
 use crate::cli::Device;
@@ -31,9 +31,12 @@ impl Classified for DeviceError {
     fn exit(&self) -> Exit {
         match self {
             Self::Plant(error) => error.exit(),
-            Self::Remote(RemoteError::Refused { .. } | RemoteError::Value { .. } | RemoteError::Version { .. }) => {
-                Exit::BadInput
-            }
+            Self::Remote(
+                RemoteError::Standing { .. }
+                | RemoteError::Refused { .. }
+                | RemoteError::Value { .. }
+                | RemoteError::Version { .. },
+            ) => Exit::BadInput,
             Self::Remote(_) => Exit::DeviceLost,
         }
     }
@@ -48,6 +51,12 @@ pub(crate) struct Wishes {
     pub(crate) voltage: Option<(f64, f64)>,
     /// Steepest slope \[V/s\].
     pub(crate) slew_v_per_s: Option<f64>,
+    /// Whether a fault of an earlier run is cleared first.
+    pub(crate) clear: bool,
+    /// Highest temperature \[°C\].
+    pub(crate) hottest_degc: Option<f64>,
+    /// Greatest tracking error \[output unit\].
+    pub(crate) error: Option<f64>,
 }
 
 impl AnyDevice {
@@ -59,6 +68,8 @@ impl AnyDevice {
         let options = RemoteOptions {
             voltage: wishes.voltage,
             slew_v_per_s: wishes.slew_v_per_s,
+            hottest_degc: wishes.hottest_degc.unwrap_or(f64::INFINITY),
+            error: wishes.error.unwrap_or(f64::INFINITY),
             ..RemoteOptions::with_session(session)
         };
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
@@ -82,11 +93,24 @@ impl AnyDevice {
                 (Box::new(line), address)
             }
         };
-        Ok(Self::Remote(Box::new(Remote::open(line, name, options).map_err(lost)?)))
+        let mut remote = Remote::open(line, name, options).map_err(lost)?;
+        if wishes.clear {
+            remote.clear().map_err(lost)?;
+        }
+        Ok(Self::Remote(Box::new(remote)))
     }
 }
 
 impl AnyDevice {
+    /// Lets the device only measure: what it is given is not put out.
+    pub(crate) fn observe(&mut self) {
+        match self {
+            // It is given the voltage at which it rests.
+            Self::Plant(_) => {}
+            Self::Remote(remote) => remote.observe(),
+        }
+    }
+
     /// Lets the device follow references with this controller; drives are references from then on.
     pub(crate) fn follow(&mut self, recipe: &[u8], range: (f64, f64)) -> Result<(), CommandError> {
         match self {
@@ -121,6 +145,9 @@ impl Daq for AnyDevice {
     }
     fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, DeviceError> {
         each!(self, it => Ok(it.exchange(drive_v, measured)?))
+    }
+    fn clock(&self) -> Option<ClockFit> {
+        each!(self, it => it.clock())
     }
     fn rest(&mut self, seconds: f64) -> Result<(), DeviceError> {
         each!(self, it => Ok(it.rest(seconds)?))

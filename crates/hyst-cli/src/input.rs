@@ -1,6 +1,7 @@
 //! Reading what commands are given: records, models, plants.
 
 use std::fs;
+use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -18,15 +19,26 @@ use crate::text;
 /// The records of all files, joined to one.
 pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Record> {
     let map = ColumnMap::parse(map)?;
-    let read = |path: &PathBuf| Record::read(path, &map, Need::InputAndOutput);
-    let records: Vec<Record> = paths.iter().map(read).collect::<Result<_, _>>()?;
+    let read = |path: &PathBuf| read(path, &map, Need::InputAndOutput);
+    let records: Vec<Record> = paths.iter().map(read).collect::<CommandResult<_>>()?;
     records.iter().for_each(tell_oddities);
     Ok(Record::join(records)?)
 }
 
+/// A file, or what comes on stdin for `-`.
+fn read(path: &Path, map: &ColumnMap, need: Need) -> CommandResult<Record> {
+    if path != Path::new("-") {
+        return Ok(Record::read(path, map, need)?);
+    }
+    let mut bytes = Vec::new();
+    let came = io::stdin().lock().read_to_end(&mut bytes);
+    came.map_err(|error| CommandError::bad_input(format!("stdin: cannot be read: {error}")))?;
+    Ok(Record::parse("stdin", &bytes, map, need)?)
+}
+
 /// One record.
 pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<Record> {
-    let record = Record::read(path, &ColumnMap::parse(map)?, need)?;
+    let record = read(path, &ColumnMap::parse(map)?, need)?;
     tell_oddities(&record);
     if falls(&record) {
         let column = record.output_unit().map_or("", |unit| unit.column());

@@ -1,12 +1,14 @@
 //! The log of a run: an MCAP file that is written while the device runs.
 //!
-//! One channel, `/actuator/sample`, holds every sample as JSON; schema and channel metadata name the units. Chunks are
+//! One channel, `/actuator/sample`, holds every sample as JSON; schema and channel metadata name the units. Another one,
+//! `/actuator/event`, says what happened on the way. Chunks are
 //! closed once per second of data, so that what was measured can be read even if the program dies. A metadata record
 //! says what ran, and the model is attached as the file that it was.
 
 mod contents;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, IntoInnerError};
 use std::path::{Path, PathBuf};
@@ -16,11 +18,13 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use tempfile::TempPath;
 
-pub(crate) use contents::{LoggedModel, LoggedSample, RunInfo};
-use contents::{metadata, schema, units};
+pub(crate) use contents::{LoggedEvent, LoggedModel, LoggedSample, RunInfo};
+use contents::{event_schema, metadata, schema, units};
 
 /// Channel of the samples.
 pub(crate) const TOPIC: &str = "/actuator/sample";
+/// Channel of what happens on the way.
+const EVENTS: &str = "/actuator/event";
 
 /// The log cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +48,9 @@ pub(crate) struct RunLog {
     older: Option<PathBuf>,
     writer: Writer<BufWriter<File>>,
     channel_id: u16,
+    /// None while nothing has happened.
+    event_channel: Option<u16>,
+    events: u32,
     samples: u32,
     /// Lab time of the first sample that is not on the disk yet \[s\].
     unflushed_s: Option<f64>,
@@ -65,6 +72,8 @@ impl RunLog {
             older: None,
             writer,
             channel_id,
+            event_channel: None,
+            events: 0,
             samples: 0,
             unflushed_s: None,
         })
@@ -101,6 +110,41 @@ impl RunLog {
             self.unflushed_s = None;
         }
         Ok(())
+    }
+
+    /// Appends what has happened, and brings it to the disk.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn event(&mut self, event: &LoggedEvent) -> Result<(), LogError> {
+        self.append_event(event).map_err(|source| LogError { path: self.path.clone(), source })
+    }
+
+    fn append_event(&mut self, event: &LoggedEvent) -> Result<(), McapError> {
+        self.take_name()?;
+        let channel_id = match self.event_channel {
+            Some(id) => id,
+            None => {
+                let schema = serde_json::to_vec(&event_schema()).map_err(io::Error::other)?;
+                let schema_id = self.writer.add_schema("hyst.actuator.Event", "jsonschema", &schema)?;
+                *self.event_channel.insert(self.writer.add_channel(schema_id, EVENTS, "json", &BTreeMap::new())?)
+            }
+        };
+        let log_time = (event.time_s * 1e9).round() as u64;
+        let header = MessageHeader { channel_id, sequence: self.events, log_time, publish_time: log_time };
+        self.events = self.events.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, &serde_json::to_vec(event).map_err(io::Error::other)?)?;
+        self.unflushed_s = None;
+        self.writer.flush()
+    }
+
+    /// Adds what is known only at the end of a run.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn note(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<(), LogError> {
+        let metadata = Metadata { name: name.to_owned(), metadata: entries };
+        self.writer.write_metadata(&metadata).map_err(|source| LogError { path: self.path.clone(), source })
     }
 
     /// What it is called, or will be.

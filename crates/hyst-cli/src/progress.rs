@@ -39,6 +39,11 @@ impl Progress {
         self.0.set_message(message.to_owned());
     }
 
+    /// Prints a line above it.
+    pub(crate) fn tell(&self, line: &str) {
+        self.0.suspend(|| crate::output::say(line));
+    }
+
     /// Moves the bar.
     pub(crate) fn at(&self, done: usize) {
         self.0.set_position(done as u64);

@@ -3,8 +3,8 @@
 
 use std::net::TcpListener;
 
-use hyst_hw::wire::{Device, Open};
-use hyst_hw::{Plant, PlantBoard, PlantConfig, Tcp, serve};
+use hyst_hw::wire::{Device, Follower};
+use hyst_hw::{Plant, PlantBoard, PlantConfig, serve_at};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -14,14 +14,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rate_hz = arguments.next().map_or(Ok(1000.0), |rate| rate.parse())?;
     let config = PlantConfig::from_toml(&std::fs::read_to_string(file)?)?;
     let mut board = PlantBoard::new(Plant::new(config)?, rate_hz)?;
-    let mut device: Device<Open, 512, 0> = Device::new(board.identity(rate_hz), Open);
+    let mut device: Device<Follower, 512, 4096> = Device::new(board.identity(rate_hz, true), Follower::new());
     let listener = TcpListener::bind(address)?;
     println!("listening at {}", listener.local_addr()?);
-    loop {
-        let (stream, peer) = listener.accept()?;
-        eprintln!("{peer} is here");
-        // A host that goes leaves the device to its watchdog, which acts as soon as the next one comes; a real one does so by itself.
-        let gone = serve(&mut device, &mut board, &mut Tcp::over(stream)?, || false);
-        eprintln!("{peer} is gone: {gone:?}");
-    }
+    Ok(serve_at(&listener, &mut device, &mut board, || false)?)
 }

@@ -57,4 +57,4 @@ pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,
 };
 #[cfg(feature = "std")]
-pub use serve::{PlantBoard, serve};
+pub use serve::{PlantBoard, serve, serve_at};

@@ -21,6 +21,9 @@ pub use clock::ClockFit;
 pub use lines::{OpenError, Port, Serial, Tcp, ports};
 pub use slcan::Slcan;
 
+/// How long a device may take to come to rest.
+const LONGEST_REST: Duration = Duration::from_secs(60);
+
 /// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
 pub trait Line {
     /// Sends all of `bytes`.
@@ -89,6 +92,17 @@ pub enum RemoteError {
         line: String,
         /// Why.
         refusal: Refusal,
+    },
+    /// The device ended an earlier run by itself, and nobody has looked at it since.
+    #[error(
+        "{line}: the device stands with a fault ({}) of an earlier run: {fault}; when that is mended, clear it (hystctl run: --clear)",
+        fault.code()
+    )]
+    Standing {
+        /// What the line is called.
+        line: String,
+        /// Why.
+        fault: Fault,
     },
     /// The device ended the run by itself.
     #[error("{line}: the device ended the run (fault {}): {fault}", fault.code())]
@@ -272,6 +286,11 @@ impl<L: Line> Remote<L> {
         }
     }
 
+    /// Lets the device only measure in its next runs: what it is given is not put out.
+    pub fn observe(&mut self) {
+        self.options.mode = Mode::Nothing;
+    }
+
     /// Hands over what [`recipe_head`](crate::wire::recipe_head) and a model's block make, and from then on drives are references \[output unit\] between
     /// `low` and `high`, which the device follows: the ramps before and after a run begin and end where the output is now.
     ///
@@ -298,12 +317,20 @@ impl<L: Line> Remote<L> {
         self.stated(Ask::Emergency).map(|_| ())
     }
 
-    /// Clears a fault, once the device is at rest.
+    /// Clears a fault, if there is one, once the device is at rest; on its way there it is waited for.
     ///
     /// # Errors
-    /// When it is not at rest yet, or lost.
+    /// When it does not come to rest, or is lost.
     pub fn clear(&mut self) -> Result<(), RemoteError> {
-        self.stated(Ask::Clear).map(|_| ())
+        let began = Instant::now();
+        loop {
+            match self.stated(Ask::Clear) {
+                Err(RemoteError::Standing { .. }) if began.elapsed() < LONGEST_REST => {
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                told => return told.map(|_| ()),
+            }
+        }
     }
 
     fn odd(&self) -> RemoteError {
@@ -323,10 +350,13 @@ impl<L: Line> Remote<L> {
         match self.ask(ask)? {
             Tell::Status(status) => {
                 self.present_v = f64::from(match self.options.mode {
-                    Mode::Voltage => status.present_v,
+                    Mode::Voltage | Mode::Nothing => status.present_v,
                     Mode::Reference => status.output,
                 });
                 Ok(status)
+            }
+            Tell::Refused(Refusal::State, Status { state: State::Fault(fault), .. }) => {
+                Err(RemoteError::Standing { line: self.name.clone(), fault })
             }
             Tell::Refused(refusal, _) => Err(self.refused(refusal)),
             _ => Err(self.odd()),
@@ -508,7 +538,9 @@ impl<L: Line> Daq for Remote<L> {
         let range = self.capabilities.voltage;
         if let Some(bad) = drive_v.iter().find(|v| !range.contains(**v)) {
             let advice = match self.options.mode {
-                Mode::Voltage => "give voltages within the device's range; nothing of the block was applied",
+                Mode::Voltage | Mode::Nothing => {
+                    "give voltages within the device's range; nothing of the block was applied"
+                }
                 Mode::Reference => {
                     "give references within the range that was agreed on; nothing of the block was applied"
                 }
@@ -526,7 +558,9 @@ impl<L: Line> Daq for Remote<L> {
         // Its samples are nobody's: the device is only kept from missing its host.
         let VoltageRange { min_v, max_v, rest_v: rest } = self.capabilities.voltage;
         let slew = match self.options.mode {
-            Mode::Voltage => self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s)),
+            Mode::Voltage | Mode::Nothing => {
+                self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s))
+            }
             // From one end to the other in a second.
             Mode::Reference => (max_v - min_v).max(f64::MIN_POSITIVE),
         };
@@ -559,11 +593,11 @@ impl<L: Line> Daq for Remote<L> {
             match status.state {
                 State::Idle => return Ok(()),
                 State::Fault(_) if status.present_v == self.identity.rest_v => return Ok(()),
-                _ if began.elapsed() > Duration::from_secs(60) => {
+                _ if began.elapsed() > LONGEST_REST => {
                     let advice = "the device does not come to rest; switch its amplifier off";
                     return Err(RemoteError::Silent {
                         line: self.name.clone(),
-                        seconds: 60.0,
+                        seconds: LONGEST_REST.as_secs_f64(),
                         broken: self.broken,
                         advice,
                     });

@@ -1,12 +1,13 @@
 //! A device made of software, behind a line: for trying and testing what runs on hosts.
 
 use std::io;
+use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use crate::daq::{Daq, Sample};
 use crate::plant::Plant;
 use crate::plant::error::PlantError;
-use crate::remote::Line;
+use crate::remote::{Line, Tcp};
 use crate::wire::{Board, Control, Deframer, Device, Identity, MAX_FRAME, MOST_NAME, Request, Shown, Unit, encode};
 
 /// Periods that are made up for at once when the host's clock was late; more than that the device's clock loses.
@@ -53,6 +54,47 @@ pub fn serve<C: Control, const Q: usize, const M: usize>(
     Ok(())
 }
 
+/// Serves a device to whoever comes to `listener`, one after the other, until `stop` says so. Between two of them its clock goes on, and with it
+/// its watchdog.
+///
+/// # Errors
+/// When the listener cannot be asked without waiting.
+pub fn serve_at<C: Control, const Q: usize, const M: usize>(
+    listener: &TcpListener,
+    device: &mut Device<C, Q, M>,
+    board: &mut impl Board,
+    mut stop: impl FnMut() -> bool,
+) -> io::Result<()> {
+    listener.set_nonblocking(true)?;
+    while !stop() {
+        let mut host = None;
+        serve(device, board, &mut Nobody, || {
+            host = listener.accept().ok();
+            host.is_some() || stop()
+        })?;
+        if let Some((stream, _)) = host {
+            stream.set_nonblocking(false)?;
+            // A host that is gone is no end.
+            let _ = Tcp::over(stream).and_then(|mut line| serve(device, board, &mut line, &mut stop));
+        }
+    }
+    Ok(())
+}
+
+/// A line without a host.
+struct Nobody;
+
+impl Line for Nobody {
+    fn send(&mut self, _: &[u8]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn receive(&mut self, _: &mut [u8], patience: Duration) -> io::Result<usize> {
+        std::thread::sleep(patience);
+        Ok(0)
+    }
+}
+
 /// The simulated plant as amplifier and sensors.
 #[derive(Debug)]
 pub struct PlantBoard {
@@ -73,8 +115,8 @@ impl PlantBoard {
         Ok(Self { plant, volts, samples: Vec::new(), last: Shown::default() })
     }
 
-    /// What a device with this plant says of itself.
-    pub fn identity(&self, rate_hz: f64) -> Identity {
+    /// What a device with this plant says of itself; `follows`: that it has a controller.
+    pub fn identity(&self, rate_hz: f64, follows: bool) -> Identity {
         let can = self.plant.capabilities();
         let name = "simulated plant behind a line".bytes().take(MOST_NAME).collect();
         Identity {
@@ -88,7 +130,7 @@ impl PlantBoard {
             output: Unit::Micrometre,
             temperature: can.temperature,
             load: can.load,
-            follows: false,
+            follows,
             queue: 0,
             model: 0,
         }

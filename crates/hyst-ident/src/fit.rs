@@ -19,6 +19,7 @@ use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{start_up_rows, windows};
+use crate::simulate::{Zero, simulate};
 
 /// Cells along one edge of the Preisach triangle.
 pub(crate) const CELLS: usize = 24;
@@ -239,11 +240,14 @@ pub fn fit_with(
     }
     options.suits(kind)?;
     let convex = options.convex();
-    match kind {
-        Kind::Pi | Kind::Preisach if convex => convex::fit(record, kind, options),
-        Kind::Dpm if convex => Ok(crate::everett::fit_dpm(record, options)?.into()),
-        _ => searched::fit(record, kind, options, watch),
-    }
+    let mut fit: Fit = match kind {
+        Kind::Pi | Kind::Preisach if convex => convex::fit(record, kind, options)?,
+        Kind::Dpm if convex => crate::everett::fit_dpm(record, options)?.into(),
+        _ => searched::fit(record, kind, options, watch)?,
+    };
+    let zero = if options.zero_per_record { Zero::PerRecord } else { Zero::None };
+    fit.model.rmse = simulate(&fit.model, record, zero)?.errors.map(|errors| errors.rmse);
+    Ok(fit)
 }
 
 /// Models that rise and fall with their input: a record in which the output falls has a sensor with the wrong sign.
@@ -453,6 +457,7 @@ pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64
         effects: Effects::default(),
         std_errors: BTreeMap::new(),
         undetermined: BTreeSet::new(),
+        rmse: None,
         recorded_at_hz: 1.0 / samples.period,
         fitted_on: fitted_on(record, samples),
         seed,

@@ -50,6 +50,7 @@ pub(crate) enum Command {
     Loop(LoopArgs),
     Force(ForceArgs),
     Run(RunArgs),
+    Record(RecordArgs),
     Devices(DevicesArgs),
     Log(LogArgs),
     Export(ExportArgs),
@@ -295,10 +296,13 @@ pub(crate) struct RunArgs {
     /// Model file
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) model: Option<PathBuf>,
-    /// Record of the wanted output
+    /// Record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle or steps
     #[arg(long, requires = "model", required_unless_present = "drive", conflicts_with = "drive")]
     pub(crate) reference: Option<PathBuf>,
-    /// Record of the voltages to play, as excite or compensate writes it
+    /// Samples a second of a reference that is no file; those of the model's record if not given
+    #[arg(long, value_name = "HZ", value_parser = positive, requires = "reference")]
+    pub(crate) rate: Option<f64>,
+    /// Record of the voltages to play, as excite or compensate writes it; - for stdin
     #[arg(long)]
     pub(crate) drive: Option<PathBuf>,
     /// What makes the drive of the reference
@@ -317,6 +321,21 @@ pub(crate) struct RunArgs {
     pub(crate) record: Option<Target>,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
+    /// Clear the fault with which the device has ended an earlier run
+    #[arg(long)]
+    pub(crate) clear: bool,
+    /// End the run and come to rest above this temperature
+    #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
+    pub(crate) hottest: Option<f64>,
+    /// End the run and come to rest when the output is further than this from the reference for half a second [output unit]
+    #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
+    pub(crate) max_error: Option<f64>,
+    /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator [N per output unit]
+    #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
+    pub(crate) kout: Option<f64>,
+    /// Show a bar on a terminal instead of a picture of the last seconds
+    #[arg(long)]
+    pub(crate) plain: bool,
     /// Hold at the first value of a reference before it begins; 2 if not given. A model takes the actuator as settled there, and
     /// creep takes its time
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
@@ -329,6 +348,40 @@ pub(crate) struct RunArgs {
     pub(crate) rest: f64,
     #[command(flatten)]
     pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Record what the sensors show while nothing moves
+///
+/// The device stays at rest: noise, drift and what shakes the bench can be seen, and a thermometer can be read.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl record --daq serial:/dev/ttyACM0 --seconds 60 -o rest.csv")]
+pub(crate) struct RecordArgs {
+    /// Device, as for run
+    #[arg(long, value_name = "DEVICE")]
+    pub(crate) daq: Device,
+    /// How long
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) seconds: f64,
+    /// Samples a second; 1000 if not given, as far as the device goes along
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub(crate) rate: Option<f64>,
+    /// Record to write (CSV); - for stdout
+    #[arg(short, long, value_name = "CSV")]
+    pub(crate) output: Option<Target>,
+    /// Log to write while it lasts (MCAP)
+    #[arg(long, value_name = "MCAP")]
+    pub(crate) log: Option<PathBuf>,
+    /// End above this temperature
+    #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
+    pub(crate) hottest: Option<f64>,
+    /// Show a bar on a terminal instead of a picture of the last seconds
+    #[arg(long)]
+    pub(crate) plain: bool,
+    /// Seed of a simulated plant's noise; that of its file if not given
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    pub(crate) seed: Option<u64>,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }
@@ -524,7 +577,7 @@ mod tests {
 
     #[test]
     fn other_devices_and_models_are_refused_with_what_there_is() {
-        let message = parse("hystctl run --daq serial:/dev/ttyACM0 --drive u.csv").unwrap_err();
+        let message = parse("hystctl run --daq usb:3 --drive u.csv").unwrap_err();
         assert!(message.contains("sim:PLANT.toml"), "{message}");
         let message = parse("hystctl fit a.csv --model preisch -o m.json").unwrap_err();
         assert!(message.contains("pi, preisach"), "{message}");

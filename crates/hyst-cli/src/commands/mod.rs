@@ -12,6 +12,7 @@ mod force;
 mod gain;
 mod hysteresis_loop;
 mod log;
+mod record;
 mod response;
 mod run;
 mod simulate;
@@ -38,6 +39,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Gain(args) => gain::run(&args),
         Command::Loop(args) => hysteresis_loop::run(&args),
         Command::Run(args) => run::run(&args),
+        Command::Record(args) => record::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Log(args) => log::run(&args),
         Command::Export(args) => export::run(&args),

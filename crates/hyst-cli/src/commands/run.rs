@@ -1,14 +1,20 @@
 //! `run`: plays a drive, or a reference through a model, on a device.
 
+mod beside;
 mod control;
-mod job;
+mod guard;
+pub(super) mod job;
 mod live;
-mod play;
+mod lookout;
+pub(super) mod play;
+mod shape;
+mod view;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hyst_core::PidParams;
-use hyst_hw::Daq;
+use hyst_hw::{ClockFit, Daq};
 use hyst_ident::metrics::Errors;
 use hyst_ident::record::Extra;
 use serde::Serialize;
@@ -20,7 +26,9 @@ use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::{recording, text};
+use beside::Watched;
 use job::{Followed, HandedOver, Job, Told};
+use play::Played;
 
 /// What is said about a run.
 #[derive(Debug, Serialize)]
@@ -41,10 +49,16 @@ struct Summary {
     pid: Option<Gains>,
     /// Whether the device closed the loop.
     loop_on_device: bool,
+    /// Whether the model still explains the device; none where that was not watched.
+    watch: Option<WatchSummary>,
+    /// The device's clock against this computer's; none where it has no other.
+    clock: Option<ClockSummary>,
     /// Whether the drive was corrected by the measured temperature on the way.
     temperature_followed: bool,
     log: Option<String>,
     record: Option<String>,
+    #[serde(skip)]
+    model: Option<String>,
     #[serde(skip)]
     symbol: &'static str,
 }
@@ -58,6 +72,60 @@ struct Tracking {
     max_abs: f64,
     /// RMSE over the last half, in which the start tells less.
     rmse_last_half: f64,
+}
+
+/// Whether the model still explains the device.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct WatchSummary {
+    explains: bool,
+    /// When it stopped doing so for the first time, by the device's clock \[s\].
+    lost_at_s: Option<f64>,
+    /// Of the last block \[output unit\].
+    residual_rms: f64,
+    /// Of the model's own record \[output unit\].
+    fitted_rms: f64,
+}
+
+impl WatchSummary {
+    fn text(&self, unit: &str) -> Option<String> {
+        let (now, fitted) = (text::short(self.residual_rms), text::short(self.fitted_rms));
+        self.lost_at_s.map(|at| {
+            format!(
+                "from {} s on the model did not explain the device: {now} {unit} of residual at the end, {fitted} {unit} where it was fitted",
+                text::short(at)
+            )
+        })
+    }
+
+    fn new(Watched { lost_at, residual, trained_to }: Watched) -> Self {
+        Self { explains: lost_at.is_none(), lost_at_s: lost_at, residual_rms: residual, fitted_rms: trained_to }
+    }
+}
+
+/// The device's clock against this computer's.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct ClockSummary {
+    /// When period 0 of the run began \[s since 1970-01-01 UTC\], and to what that is known \[s\].
+    began_unix_s: f64,
+    uncertainty_s: f64,
+    /// By how much the device's clock is faster; none for a short run.
+    faster_ppm: Option<f64>,
+}
+
+impl ClockSummary {
+    fn new(ClockFit { began_unix_s, faster_ppm, uncertainty_s }: ClockFit) -> Self {
+        Self { began_unix_s, uncertainty_s, faster_ppm }
+    }
+
+    /// As a log has it.
+    fn entries(&self) -> BTreeMap<String, String> {
+        let mut entries = BTreeMap::from([
+            ("began_unix_s".to_owned(), self.began_unix_s.to_string()),
+            ("uncertainty_s".to_owned(), self.uncertainty_s.to_string()),
+        ]);
+        entries.extend(self.faster_ppm.map(|ppm| ("faster_ppm".to_owned(), ppm.to_string())));
+        entries
+    }
 }
 
 /// A PID that took part.
@@ -95,6 +163,9 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
         noise: args.seed,
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
+        clear: args.clear,
+        hottest_degc: args.hottest,
+        error: args.max_error,
     };
     on_device(&mut AnyDevice::open(&args.daq, &wishes)?, args, report)
 }
@@ -120,8 +191,11 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
         output::tell_set_aside(path, older);
     }
+    if let (Some(log), Some(clock)) = (log.as_mut().filter(|log| log.samples() > 0), daq.clock()) {
+        log.note("clock", ClockSummary::new(clock).entries())?;
+    }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-    let mut recording = played?;
+    let Played { mut recording, forces, watched } = played?;
     closed?;
     job.align(&mut recording);
 
@@ -129,7 +203,9 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         let column = format!("reference_{}", unit.suffix());
-        let extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
+        let mut extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
+        let forces = forces.get(forces.len().saturating_sub(record.rows())..).unwrap_or_default();
+        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers("estimated_force_n", forces)));
         target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
@@ -147,9 +223,12 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         control: job.followed.as_ref().map(|followed| followed.control),
         pid: job.pid().map(Gains::of),
         loop_on_device: job.handed_over.is_some(),
+        watch: watched.map(WatchSummary::new),
+        clock: daq.clock().map(ClockSummary::new),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.record.as_ref().map(ToString::to_string),
+        model: args.model.as_ref().map(|path| path.display().to_string()),
         symbol: unit.symbol(),
     };
     report.print(&summary.text(), &summary)
@@ -213,6 +292,12 @@ impl Summary {
         }
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
+        }
+        lines.extend(self.watch.and_then(|watch| watch.text(unit)));
+        if let (Some(WatchSummary { explains: false, .. }), Some(log), Some(model)) =
+            (self.watch, &self.log, &self.model)
+        {
+            lines.push(format!("next: hystctl diagnose {log} --model {model} -o extended.json"));
         }
         lines.extend(self.log.iter().map(|path| format!("log: {path}")));
         lines.extend(self.record.iter().map(|path| format!("record: {path}")));

@@ -51,12 +51,18 @@ pub(crate) struct LoggedSample {
     /// Output minus reference \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) error: Option<f64>,
+    /// What the model expects \[output unit\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) predicted: Option<f64>,
     /// Temperature \[°C\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) temperature_degc: Option<f64>,
     /// Load \[N\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) load_n: Option<f64>,
+    /// Estimated force \[N\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) estimated_force_n: Option<f64>,
 }
 
 fn phase_name<S: Serializer>(phase: &Phase, to: S) -> Result<S::Ok, S::Error> {
@@ -78,8 +84,10 @@ impl LoggedSample {
             output: sample.output,
             reference,
             error: reference.map(|wanted| sample.output - wanted),
+            predicted: None,
             temperature_degc: sample.temperature_degc,
             load_n: sample.load_n,
+            estimated_force_n: sample.force_n,
         }
     }
 }
@@ -126,8 +134,10 @@ pub(super) fn schema(unit: &str) -> serde_json::Value {
             "output": number(format!("Measured output [{unit}]")),
             "reference": number(format!("Wanted output [{unit}]; only in a record that follows a reference")),
             "error": number(format!("Output minus reference [{unit}]")),
+            "predicted": number(format!("Output that the model expects [{unit}]; only where one runs beside the device")),
             "temperature_degc": number("Temperature [degC], where it is measured".to_owned()),
-            "load_n": number("Load [N], where it is measured".to_owned())
+            "load_n": number("Load [N], where it is measured".to_owned()),
+            "estimated_force_n": number("Force on the output [N], where it is estimated".to_owned())
         },
         "required": ["time_s", "segment", "phase", "drive_v", "output"]
     })
@@ -141,8 +151,37 @@ pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
         ("output", unit),
         ("reference", unit),
         ("error", unit),
+        ("predicted", unit),
         ("temperature_degc", "degC"),
         ("load_n", "N"),
+        ("estimated_force_n", "N"),
     ];
     fields.into_iter().map(|(field, unit)| (format!("unit.{field}"), unit.to_owned())).collect()
+}
+
+/// Something that happened on the way.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct LoggedEvent {
+    /// Lab clock \[s\].
+    pub(crate) time_s: f64,
+    /// What, in one word for programs: `model-lost`, `model-found`, `fault`, `cancelled`.
+    pub(crate) kind: &'static str,
+    /// What, in a sentence.
+    pub(crate) text: String,
+}
+
+/// The JSON schema of [`LoggedEvent`].
+pub(super) fn event_schema() -> serde_json::Value {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "hyst.actuator.Event",
+        "description": "Something that happened during a run",
+        "type": "object",
+        "properties": {
+            "time_s": { "type": "number", "description": "Time of the lab's clock [s]" },
+            "kind": { "type": "string", "enum": ["model-lost", "model-found", "fault", "cancelled"] },
+            "text": { "type": "string" }
+        },
+        "required": ["time_s", "kind", "text"]
+    })
 }

@@ -73,7 +73,7 @@ impl<T: Real> Adaptation<T> {
     ) -> T {
         let predicted = operator.step(s, &Env::default(), input) + adapted.zero();
         let error = measured - predicted;
-        if !error.is_finite() || !(scale > T::ZERO) {
+        if !(error.is_finite() && scale.is_finite()) || scale <= T::ZERO {
             return T::ZERO;
         }
         let per_scale = T::ONE / scale;
@@ -127,7 +127,7 @@ impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
         let mut largest = T::ZERO;
         for (k, (row, gain)) in self.covariance.iter_mut().zip(&gains).enumerate() {
             for (p, other) in row.iter_mut().zip(&px) {
-                *p = *p - *gain * *other;
+                *p -= *gain * *other;
             }
             largest = largest.at_least(row.get(k).copied().unwrap_or_default());
         }

@@ -71,8 +71,8 @@ impl Control for Open {
     }
 }
 
-/// Periods for which the drive may stand at a limit, or the output be away from the reference, before that is a fault.
-const PATIENCE: u32 = 200;
+/// How long the drive may stand at a limit, or the output be away from the reference, before that is a fault \[s\].
+const PATIENCE_S: f32 = 0.5;
 /// Longest silence that a run may allow \[s\].
 const LONGEST_SILENCE_S: f32 = 60.0;
 
@@ -204,6 +204,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             return;
         }
         self.quiet = self.quiet.saturating_add(1);
+        let patience = PATIENCE_S * self.run.rate_hz;
         let has_number = shown.output.is_finite() && shown.temperature_degc.is_finite() && shown.load_n.is_finite();
         let fault = if !has_number {
             Some(Fault::Sensor)
@@ -215,7 +216,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             self.reference.and_then(|_| self.control.due()).and_then(|reference| {
                 let away = (reference - shown.output).abs() > self.run.error;
                 self.astray = if away { self.astray + 1 } else { 0 };
-                (self.astray > PATIENCE).then_some(Fault::TrackingError)
+                (self.astray as f32 > patience).then_some(Fault::TrackingError)
             })
         };
         if let Some(fault) = fault {
@@ -233,6 +234,10 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     fn play(&mut self, board: &mut impl Board, shown: &Shown) {
         let next = self.queue.pop_front();
         let wanted = match (self.run.mode, next, self.reference) {
+            (Mode::Nothing, next, _) => {
+                self.out = next.is_some();
+                return;
+            }
             (Mode::Voltage, Some(volts), _) => volts,
             (Mode::Voltage, None, _) | (Mode::Reference, None, None) => return,
             (Mode::Reference, Some(reference), None) => {
@@ -256,7 +261,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.present_v = inside.clamp(self.present_v - step, self.present_v + step);
         board.put_out(self.present_v);
         self.out = next.is_some();
-        if self.saturated > PATIENCE {
+        if self.saturated as f32 > PATIENCE_S * self.run.rate_hz {
             self.fail(Fault::Saturation);
         }
     }
@@ -388,7 +393,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let Some(fresh) = exchange.drives.get(known as usize..) else { return Ok(()) };
         let (low, high) = match self.run.mode {
             Mode::Voltage => (self.run.low_v, self.run.high_v),
-            Mode::Reference => (f32::MIN, f32::MAX),
+            Mode::Reference | Mode::Nothing => (f32::MIN, f32::MAX),
         };
         if let Some(k) = fresh.iter().position(|drive| !(low..=high).contains(drive)) {
             return Err(Refusal::Drive(self.received.wrapping_add(k as u32)));

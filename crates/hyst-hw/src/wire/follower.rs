@@ -35,6 +35,14 @@ struct Watching {
     state: <Actuator as Stage<f32>>::State,
 }
 
+impl Watching {
+    fn new(recipe: &Recipe, period: f32) -> Option<Self> {
+        let chain = actuator(recipe, &Sampling { period: f64::from(period) })?;
+        let state = chain.state();
+        Some(Self { observer: recipe.force?.observer(chain).ok()?, state })
+    }
+}
+
 #[derive(Debug)]
 struct Running {
     tracking: Loop,
@@ -109,13 +117,7 @@ impl Control for Follower {
     }
 
     fn watch(&mut self, period: f32, shown: &Shown, volts: f32) {
-        let built = || {
-            let recipe = self.recipe.as_ref()?;
-            let chain = actuator(recipe, &Sampling { period: f64::from(period) })?;
-            let state = chain.state();
-            Some(Watching { observer: recipe.force?.observer(chain).ok()?, state })
-        };
-        self.watching = built();
+        self.watching = self.recipe.as_ref().and_then(|recipe| Watching::new(recipe, period));
         if let Some(Watching { observer, state }) = &mut self.watching {
             observer.reset(state, &free(shown), volts, shown.output);
         }

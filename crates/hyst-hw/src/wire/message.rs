@@ -80,6 +80,8 @@ pub enum Mode {
     Voltage,
     /// A reference \[output unit\], which the device follows with its model and its loop.
     Reference,
+    /// Nothing: each asks for a sample, and the output stays where it is.
+    Nothing,
 }
 
 /// A piece of drive, and how much has been heard of the samples.
@@ -309,7 +311,7 @@ pub enum Field {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::State => "the device is not in the state for this: stop it, or clear its fault, first",
+            Self::State => "the device is busy with another run, or on its way to rest: stop that one, or wait",
             Self::Session => "the device is in another run, or was started anew: begin again",
             Self::Start(Field::Rate) => "the device cannot run at this rate",
             Self::Start(Field::Voltage) => "the voltage limits are not within the device's own",

@@ -191,6 +191,9 @@ pub fn diagnose(
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, hypothesis, after) = (model.clone(), start.clone(), before.clone());
     }
+    if extended != *model {
+        extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);
+    }
     let remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest).beside(only_loop, &useless);
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))

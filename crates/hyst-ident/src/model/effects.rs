@@ -193,7 +193,7 @@ impl Effects {
     }
 
     /// The same effects without `effect` (the last one, if there are two).
-    pub(crate) fn without(&self, effect: Effect) -> Self {
+    pub fn without(&self, effect: Effect) -> Self {
         let mut less = self.clone();
         match effect {
             Effect::Delay => less.delay = None,

@@ -56,6 +56,7 @@ impl Model {
             effects,
             std_errors: BTreeMap::new(),
             undetermined: BTreeSet::new(),
+            rmse: None,
             recorded_at_hz: ends.rate_hz,
             fitted_on: Vec::new(),
             seed: 0,

@@ -73,6 +73,8 @@ struct File<S> {
     zero: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     zero_std_error: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rmse: Option<f64>,
     /// Sample period of the record; the parameters do not depend on it.
     recorded_at_hz: f64,
     fitted_on: Vec<FittedOn>,
@@ -99,6 +101,8 @@ pub struct Model {
     pub std_errors: BTreeMap<String, f64>,
     /// Parameters, by `stage.parameter`, that the record does not determine, or only together with others.
     pub undetermined: BTreeSet<String>,
+    /// What the model leaves of the rows that it was fitted to, as root of the mean square \[output unit\].
+    pub rmse: Option<f64>,
     /// Sample rate of the record \[Hz\].
     pub recorded_at_hz: f64,
     /// The record's files.
@@ -239,6 +243,7 @@ impl Model {
             output: self.output.clone(),
             zero: self.zero,
             zero_std_error: self.std_errors.get(ZERO).copied(),
+            rmse: self.rmse,
             recorded_at_hz: self.recorded_at_hz,
             fitted_on: self.fitted_on.clone(),
             stages: self.stages(),
@@ -334,6 +339,7 @@ impl Model {
             effects,
             std_errors,
             undetermined,
+            rmse: file.rmse.filter(|rmse| rmse.is_finite()),
             recorded_at_hz: file.recorded_at_hz,
             fitted_on: file.fitted_on,
             seed: file.seed,

@@ -49,7 +49,7 @@ impl LogSample {
 /// A log as read.
 #[derive(Clone, Debug, Default)]
 pub struct RunLog {
-    /// What ran, by key: device, unit, version and more.
+    /// What ran, by key: device, unit, version and more; with its name and a point in front what other metadata records say.
     pub metadata: BTreeMap<String, String>,
     /// The text of the model's file, if one made the drive.
     pub model: Option<String>,
@@ -78,7 +78,11 @@ impl RunLog {
         // What is not whole at the end is what a cut takes.
         for entry in entries.map_while(Result::ok) {
             match entry {
-                Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata = metadata,
+                Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata.extend(metadata),
+                // What was known only at the end, as how the device's clock went.
+                Entry::Metadata(Metadata { name, metadata }) => {
+                    log.metadata.extend(metadata.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)));
+                }
                 Entry::Attachment { header, data, .. } if header.name == "model.json" => {
                     log.model = Some(String::from_utf8_lossy(&data).into_owned());
                 }

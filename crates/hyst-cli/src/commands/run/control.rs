@@ -19,6 +19,8 @@ pub(super) struct ClosedLoop {
     last_v: f64,
     /// Samples in which a limit held the drive.
     limited: usize,
+    /// The last so many of them in a row.
+    limited_for: usize,
     samples: usize,
 }
 
@@ -34,7 +36,7 @@ impl ClosedLoop {
         let pid: Pid<f64> = params.build(&Sampling { period }).map_err(CommandError::bad_input)?;
         let step_v = slew_v_per_s * period;
         let state = pid.state();
-        Ok(Self { pid, state, feedforward, wanted, step_v, last_v: 0.0, limited: 0, samples: 0 })
+        Ok(Self { pid, state, feedforward, wanted, step_v, last_v: 0.0, limited: 0, limited_for: 0, samples: 0 })
     }
 
     /// Replaces what was planned for the next rows by what the loop makes of the newest measurement.
@@ -53,10 +55,17 @@ impl ClosedLoop {
             let reference = wanted.get(of).copied().unwrap_or(measured);
             let asked = self.pid.step(&mut self.state, reference, measured, forward);
             *volts = asked.clamp(self.last_v - self.step_v, self.last_v + self.step_v);
-            self.limited += usize::from(self.state.limited() || *volts != asked);
+            let limited = self.state.limited() || *volts != asked;
+            self.limited += usize::from(limited);
+            self.limited_for = if limited { self.limited_for + 1 } else { 0 };
             self.samples += 1;
             self.last_v = *volts;
         }
+    }
+
+    /// Newest samples in a row in which a limit held the drive.
+    pub(super) fn limited_for(&self) -> usize {
+        self.limited_for
     }
 
     /// Share of the samples in which a limit held the drive \[%\].

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hyst_core::PidParams;
+use hyst_core::{ForceParams, PidParams};
 use hyst_hw::wire::{lateness, recipe_head};
 use hyst_hw::{Capabilities, RecordOptions, Recording};
 use hyst_ident::compensate::{Drive, compensate};
@@ -11,16 +11,18 @@ use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
 
+use super::beside::Beside;
 use super::control::ClosedLoop;
 use super::live::Live;
+use super::shape::Shape;
 use crate::cli::{Control, PidGains, RunArgs, VoltageLimits};
 use crate::commands::compensate::{Compensation, options};
 use crate::exit::{CommandError, CommandResult};
-use crate::{input, text};
+use crate::{input, recording, text};
 
 /// Everything that has to be known before a device moves.
 #[derive(Debug)]
-pub(super) struct Job {
+pub(in crate::commands) struct Job {
     /// Voltages of each segment \[V\].
     pub(super) segments: Vec<Vec<f64>>,
     /// How they are played.
@@ -31,6 +33,16 @@ pub(super) struct Job {
     pub(super) wanted: Vec<Option<f64>>,
     /// What the device is to follow references with: then the voltages above are references.
     pub(super) handed_over: Option<HandedOver>,
+    /// Symbol of the output's unit.
+    pub(super) symbol: &'static str,
+    /// Whether a bar is to be shown instead of a picture.
+    pub(super) plain: bool,
+    /// Highest temperature \[°C\] and greatest tracking error \[output unit\] of the run.
+    pub(super) hottest_degc: Option<f64>,
+    pub(super) greatest_error: Option<f64>,
+    /// Temperature where none is measured \[°C\], and stiffness with which a force is estimated \[N/output unit\].
+    degc: Option<f64>,
+    stiffness: Option<f64>,
 }
 
 /// A controller that runs on the device.
@@ -77,6 +89,20 @@ pub(super) struct Closed {
 }
 
 impl Job {
+    /// The model that runs beside the device, where there is one.
+    pub(super) fn beside(&self) -> CommandResult<Option<Beside>> {
+        let Some(followed) = &self.followed else { return Ok(None) };
+        let on_device = self.handed_over.is_some();
+        let beside =
+            Beside::new(&followed.model, self.options.rate_hz, self.degc, self.stiffness.filter(|_| !on_device))?;
+        if beside.is_none() && self.stiffness.is_some() && !on_device {
+            return Err(CommandError::bad_input(
+                "--kout needs a model that can be run as the drive comes; this one has to know all of it (band-limited): estimate the force afterwards, with hystctl force",
+            ));
+        }
+        Ok(beside)
+    }
+
     /// Takes the rows away in which the output had not come to a reference's beginning yet.
     pub(super) fn align(&self, recording: &mut Recording) {
         let Some(HandedOver { late, .. }) = self.handed_over else { return };
@@ -133,7 +159,7 @@ impl Job {
         let limits = limits(args, device)?;
         match (&args.model, &args.reference, &args.drive) {
             (Some(model), Some(reference), None) => Self::follow(args, device, model, reference, limits),
-            (None, None, Some(drive)) => Self::play(args, drive, limits),
+            (None, None, Some(drive)) => Self::play(args, device, drive, limits),
             _ => Err(CommandError::bad_input("give either --model and --reference, or --drive")),
         }
     }
@@ -156,7 +182,18 @@ impl Job {
                 format!("the model's output is {measured}, but the device measures {}", device.output.column());
             return Err(CommandError::bad_input(message));
         }
-        let reference = input::record(reference, &args.map.map, Need::Output)?;
+        let reference = match Shape::named(reference)? {
+            Some(shape) => {
+                let rate_hz = args.rate.unwrap_or(model.recorded_at_hz).clamp(device.min_rate_hz, device.max_rate_hz);
+                shape.record(reference, recording::unit(device.output), rate_hz)?
+            }
+            None if args.rate.is_some() => {
+                return Err(CommandError::bad_input(
+                    "--rate is for a reference as sine:LOW,HIGH,HZ,SECONDS; a record has its own rate",
+                ));
+            }
+            None => input::record(reference, &args.map.map, Need::Output)?,
+        };
         if args.pid.is_some() && !args.control.closes() {
             return Err(CommandError::bad_input("--pid needs --control pid or --control pid+feedforward"));
         }
@@ -182,7 +219,9 @@ impl Job {
         }
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
         if args.control.closes() && device.queued {
-            return Self::hand_over(args, model, json, reference, (low, high), play);
+            let degc = options.temperature;
+            let job = Self::hand_over(args, device, model, json, reference, (low, high), play)?;
+            return Ok(Self { degc, ..job });
         }
         let drive = args.control.inverts().then(|| compensate(&model, &reference, &options)).transpose()?;
         let planned = match &drive {
@@ -204,12 +243,13 @@ impl Job {
         let wanted = reference.output().unwrap_or_default().iter().copied().map(Some).collect();
         let followed =
             Followed { model, json, reference, control: args.control, drive, live, closed, held_s: play.settle_s };
-        Ok(Self { segments, followed: Some(followed), options: play, wanted, handed_over: None })
+        Ok(Self { degc: options.temperature, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
     /// For a device that closes the loop itself: what it measures comes too late for one that is closed here.
     fn hand_over(
         args: &RunArgs,
+        device: &Capabilities,
         model: Model,
         json: String,
         reference: Record,
@@ -224,7 +264,8 @@ impl Job {
         let period = 1.0 / play.rate_hz;
         let Chosen { gains, why, .. } = Chosen::new(args, &model, limits, period)?;
         let block = block(&model).map_err(CommandError::bad_input)?;
-        let recipe = [recipe_head(Some(&gains)).as_slice(), &block].concat();
+        let force = args.kout.map(|stiffness| ForceParams { stiffness, kappa: 1.0, chi: 0.0 });
+        let recipe = [recipe_head(Some(&gains), force.as_ref()).as_slice(), &block].concat();
         let late = lateness(&recipe, period as f32).ok_or_else(|| {
             CommandError::bad_input(
                 "the device has no inverse of this model at this rate: it takes models of kind pi with what an inverse needs room for; fit one with --model pi, or use --control feedforward",
@@ -251,10 +292,56 @@ impl Job {
             held_s: play.settle_s,
         };
         let handed_over = Some(HandedOver { recipe, range, late, gains, why });
-        Ok(Self { segments, followed: Some(followed), options: play, wanted, handed_over })
+        Ok(Self { handed_over, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
-    fn play(args: &RunArgs, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
+    fn new(
+        args: &RunArgs,
+        device: &Capabilities,
+        segments: Vec<Vec<f64>>,
+        options: RecordOptions,
+        wanted: Vec<Option<f64>>,
+        followed: Option<Followed>,
+    ) -> Self {
+        Self {
+            segments,
+            options,
+            followed,
+            wanted,
+            handed_over: None,
+            symbol: recording::unit(device.output).symbol(),
+            plain: args.plain,
+            hottest_degc: args.hottest,
+            greatest_error: args.max_error,
+            degc: None,
+            stiffness: args.kout,
+        }
+    }
+
+    /// At rest for so many samples, without a drive and without a model.
+    pub(in crate::commands) fn at_rest(
+        device: &Capabilities,
+        rows: usize,
+        rate_hz: f64,
+        hottest_degc: Option<f64>,
+        plain: bool,
+    ) -> Self {
+        Self {
+            segments: vec![vec![device.voltage.rest_v; rows]],
+            options: RecordOptions::at(rate_hz),
+            followed: None,
+            wanted: vec![None; rows],
+            handed_over: None,
+            symbol: recording::unit(device.output).symbol(),
+            plain,
+            hottest_degc,
+            greatest_error: None,
+            degc: None,
+            stiffness: None,
+        }
+    }
+
+    fn play(args: &RunArgs, device: &Capabilities, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
         if args.limits.bandwidth.is_some() {
             return Err(CommandError::bad_input(
                 "--bandwidth needs --model and --reference: a drive is played as it stands",
@@ -295,7 +382,7 @@ impl Job {
         }
         let wanted = vec![None; volts.len()];
         let options = play_options(args, &drive);
-        Ok(Self { segments: split(&drive, volts), options, followed: None, wanted, handed_over: None })
+        Ok(Self::new(args, device, split(&drive, volts), options, wanted, None))
     }
 }
 

@@ -4,17 +4,30 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use hyst_hw::{Cause, Daq, Failure, Phase, Recording, Revision, record_with};
+use hyst_hw::wire::Fault;
+use hyst_hw::{Cause, Daq, Failure, Recording, Revision, record_with};
 
+use super::beside::Watched;
+use super::guard::Guard;
 use super::job::Job;
+use super::lookout::Lookout;
+use super::view::View;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
-use crate::log::{LogError, LoggedSample, RunLog};
+use crate::log::{LogError, RunLog};
 use crate::output::say;
-use crate::progress::Progress;
 use crate::text;
 
+/// A run that came to its end.
+pub(in crate::commands) struct Played {
+    pub(in crate::commands) recording: Recording,
+    /// Estimated force at each row \[N\]; empty where none is estimated.
+    pub(super) forces: Vec<f64>,
+    /// None where no model was watched.
+    pub(super) watched: Option<Watched>,
+}
+
 /// Plays all segments; every sample goes to `log` as it comes in.
-pub(super) fn play<D: Daq>(daq: &mut D, job: &mut Job, mut log: Option<&mut RunLog>) -> CommandResult<Recording>
+pub(in crate::commands) fn play<D: Daq>(daq: &mut D, job: &mut Job, log: Option<&mut RunLog>) -> CommandResult<Played>
 where
     D::Error: Classified,
 {
@@ -23,37 +36,62 @@ where
     if let Err(error) = ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)) {
         say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
     }
-    let mut log_error = None;
-    let bar = Progress::bar("playing", job.segments.iter().map(Vec::len).sum());
-    let told = &job.wanted;
+    let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
+    let patience = guard.patience();
+    let mut lookout = Lookout {
+        log,
+        log_error: None,
+        beside: job.beside()?,
+        guard,
+        view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain),
+        wanted: &job.wanted,
+        unit: job.symbol,
+        fault: None,
+        forces: Vec::new(),
+        now_s: 0.0,
+    };
     let (mut live, mut closed) = match &mut job.followed {
         Some(followed) => (followed.live.as_mut(), followed.closed.as_mut()),
         None => (None, None),
     };
+    let saturated = AtomicBool::new(false);
     let revise = |revision: &mut Revision<'_>| {
         live.iter_mut().for_each(|live| live.revise(revision));
-        closed.iter_mut().for_each(|closed| closed.running.revise(revision));
+        if let Some(closed) = &mut closed {
+            closed.running.revise(revision);
+            saturated.fetch_or(closed.running.limited_for() > patience, Ordering::Relaxed);
+        }
     };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
-        bar.at(news.done);
-        let first = news.done - if news.phase == Phase::Record { news.samples.len() } else { 0 };
-        let asked_for = news.phase == Phase::Record;
-        if let (Some(log), None) = (&mut log, &log_error) {
-            let mut samples = news.samples.iter().enumerate().map(|(k, sample)| {
-                let wanted = told.get(first + k).copied().flatten().filter(|_| asked_for);
-                LoggedSample::new(news.segment, news.phase, sample, wanted)
-            });
-            log_error = samples.try_for_each(|sample| log.sample(&sample)).err();
+        let on = lookout.take(news);
+        if saturated.load(Ordering::Relaxed) {
+            lookout.end(Fault::Saturation);
         }
-        let on = log_error.is_none() && !stop.load(Ordering::Relaxed);
-        if on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        let ended = lookout.fault.is_some() || stop.load(Ordering::Relaxed);
+        if ended { ControlFlow::Break(()) } else { on }
     });
-    drop(bar);
-    played.map_err(|failure| failed(failure, log_error, log.map(|log| &*log)))
+    match &played {
+        Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
+            lookout.event("cancelled", "stopped on request; the device was brought to rest".to_owned());
+        }
+        Err(Failure { cause: Cause::Device(error), .. }) => lookout.event("fault", error.to_string()),
+        _ => {}
+    }
+    let watched = lookout.watched();
+    let Lookout { log, log_error, fault, forces, .. } = lookout;
+    match played {
+        Ok(recording) => Ok(Played { recording, forces, watched }),
+        Err(failure) => Err(failed(failure, log_error, fault, log.map(|log| &*log))),
+    }
 }
 
 /// What to say about a run that did not come to its end, and about what was measured until then.
-fn failed<E: Classified>(failure: Failure<E>, log_error: Option<LogError>, log: Option<&RunLog>) -> CommandError {
+fn failed<E: Classified>(
+    failure: Failure<E>,
+    log_error: Option<LogError>,
+    fault: Option<Fault>,
+    log: Option<&RunLog>,
+) -> CommandError {
     let measured: usize =
         failure.partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
     if measured > 0 {
@@ -64,8 +102,12 @@ fn failed<E: Classified>(failure: Failure<E>, log_error: Option<LogError>, log: 
         }
     }
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
-    match log_error {
-        Some(error) if cancelled => error.into(),
+    match (log_error, fault) {
+        (Some(error), _) if cancelled => error.into(),
+        (None, Some(fault)) if cancelled => CommandError::new(
+            Exit::DeviceLost,
+            anyhow::anyhow!("the run was ended and the device brought to rest (fault {}): {fault}", fault.code()),
+        ),
         _ => CommandError::new(exit(&failure), failure),
     }
 }

@@ -63,6 +63,7 @@ fn actuator(base: Base, effects: Effects) -> Model {
         std_errors: Default::default(),
         undetermined: Default::default(),
         recorded_at_hz: 1000.0,
+        rmse: None,
         fitted_on: Vec::new(),
         seed: 1,
         version: String::new(),

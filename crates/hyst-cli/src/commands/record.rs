@@ -1,0 +1,131 @@
+//! `record`: what the sensors of a device show while nothing is put out.
+
+use std::path::Path;
+
+use hyst_hw::Daq;
+use serde::Serialize;
+
+use super::run::job::Job;
+use super::run::play::{Played, play};
+use crate::cli::RecordArgs;
+use crate::device::{AnyDevice, Wishes};
+use crate::exit::{CommandError, CommandResult, Exit};
+use crate::log::{RunInfo, RunLog};
+use crate::output::{self, Report, Target};
+use crate::{recording, text};
+
+/// Sample rate if nothing is said, as far as the device goes along \[Hz\].
+const USUAL_HZ: f64 = 1000.0;
+/// Most samples.
+const MOST: f64 = 1e8;
+
+/// What is said about a record.
+#[derive(Debug, Serialize)]
+struct Summary {
+    device: String,
+    rate_hz: f64,
+    samples: usize,
+    unit: &'static str,
+    /// Voltage at which the device rested \[V\].
+    rest_v: f64,
+    mean: f64,
+    /// Standard deviation \[output unit\].
+    deviation: f64,
+    /// Highest less lowest output \[output unit\].
+    span: f64,
+    log: Option<String>,
+    record: Option<String>,
+    #[serde(skip)]
+    symbol: &'static str,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &RecordArgs) -> CommandResult {
+    let log = args.log.clone().map(Target::File);
+    let written: Vec<&Target> = log.iter().chain(&args.output).collect();
+    if written.is_empty() {
+        return Err(CommandError::bad_input("what is measured would be lost: give -o, --log or both"));
+    }
+    if args.log.as_deref() == Some(Path::new("-")) {
+        return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
+    }
+    let read: Vec<&Path> = args.daq.file().into_iter().collect();
+    output::check(&read, &written)?;
+    let report = Report::new(args.json.json, &written)?;
+    let wishes = Wishes { noise: args.seed, hottest_degc: args.hottest, ..Wishes::default() };
+    let mut daq = AnyDevice::open(&args.daq, &wishes)?;
+    daq.observe();
+    let can = daq.capabilities().clone();
+    let rate_hz = args.rate.unwrap_or(USUAL_HZ.clamp(can.min_rate_hz, can.max_rate_hz));
+    let rows = (args.seconds * rate_hz).round();
+    if !(1.0..=MOST).contains(&rows) {
+        let message =
+            format!("{} s at {rate_hz} Hz are {rows} samples; give another --seconds or --rate", args.seconds);
+        return Err(CommandError::bad_input(message));
+    }
+    if daq.present_v() != can.voltage.rest_v {
+        let message = format!(
+            "{} stands at {} V, and rests at {} V: it would move at the end; let it come to rest first",
+            can.device,
+            daq.present_v(),
+            can.voltage.rest_v
+        );
+        return Err(CommandError::bad_input(message));
+    }
+    let mut job = Job::at_rest(&can, rows as usize, rate_hz, args.hottest, args.plain);
+    let unit = recording::unit(can.output);
+    let info = RunInfo { device: &can.device, output: unit, sample_rate_hz: rate_hz, model: None };
+    let mut log = match &args.log {
+        Some(path) => Some(RunLog::beside_older(path, &info).map_err(|error| CommandError::new(Exit::Failed, error))?),
+        None => None,
+    };
+    let played = play(&mut daq, &mut job, log.as_mut());
+    if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
+        output::tell_set_aside(path, older);
+    }
+    let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
+    let Played { recording, .. } = played?;
+    closed?;
+    if let Some(target) = &args.output {
+        let record = recording::to_record(&recording, &target.to_string(), unit)?;
+        target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;
+    }
+    let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
+    let count = measured.len().max(1) as f64;
+    let mean = measured.iter().sum::<f64>() / count;
+    let deviation = (measured.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count).sqrt();
+    let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let summary = Summary {
+        device: can.device,
+        rate_hz: recording.rate_hz,
+        samples: measured.len(),
+        unit: unit.suffix(),
+        rest_v: can.voltage.rest_v,
+        mean,
+        deviation,
+        span: high - low,
+        log: args.log.as_ref().map(|path| path.display().to_string()),
+        record: args.output.as_ref().map(ToString::to_string),
+        symbol: unit.symbol(),
+    };
+    report.print(&summary.text(), &summary)
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let (short, unit) = (text::short, self.symbol);
+        let mut lines = vec![format!(
+            "{}: {} at {} Hz, nothing moved; output {} {unit} at {} V, deviation {} {unit}, span {} {unit}",
+            self.device,
+            text::count(self.samples, "sample"),
+            self.rate_hz,
+            short(self.mean),
+            short(self.rest_v),
+            short(self.deviation),
+            short(self.span)
+        )];
+        lines.extend(self.log.iter().map(|path| format!("log: {path}")));
+        lines.extend(self.record.iter().map(|path| format!("record: {path}")));
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,71 @@
+//! The limits of a run that are watched on this computer, beside those that a device watches itself.
+
+use hyst_hw::Sample;
+use hyst_hw::wire::Fault;
+
+/// How long the output may be too far away, or the drive at a limit \[s\]: as on a device.
+const PATIENCE_S: f64 = 0.5;
+
+/// What ends a run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guard {
+    hottest_degc: f64,
+    error: f64,
+    patience: usize,
+    astray: usize,
+}
+
+impl Guard {
+    /// Highest temperature \[°C\] and greatest tracking error \[output unit\], where there are such limits.
+    pub(super) fn new(hottest_degc: Option<f64>, error: Option<f64>, rate_hz: f64) -> Self {
+        Self {
+            hottest_degc: hottest_degc.unwrap_or(f64::INFINITY),
+            error: error.unwrap_or(f64::INFINITY),
+            patience: (PATIENCE_S * rate_hz).ceil() as usize,
+            astray: 0,
+        }
+    }
+
+    /// Samples that are waited for.
+    pub(super) fn patience(&self) -> usize {
+        self.patience
+    }
+
+    /// Why the run has to end, if it has to, by a sample and what was wanted then.
+    pub(super) fn look(&mut self, sample: &Sample, reference: Option<f64>) -> Option<Fault> {
+        let shown = [Some(sample.output), sample.temperature_degc, sample.load_n];
+        if shown.into_iter().flatten().any(|x| !x.is_finite()) {
+            return Some(Fault::Sensor);
+        }
+        if sample.temperature_degc.is_some_and(|degc| degc > self.hottest_degc) {
+            return Some(Fault::Temperature);
+        }
+        let away = reference.is_some_and(|wanted| (sample.output - wanted).abs() > self.error);
+        self.astray = if away { self.astray + 1 } else { 0 };
+        (self.astray > self.patience).then_some(Fault::TrackingError)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(output: f64, degc: f64) -> Sample {
+        Sample { time_s: 0.0, drive_v: 1.0, output, temperature_degc: Some(degc), load_n: None, force_n: None }
+    }
+
+    #[test]
+    fn heat_and_dead_sensors_end_a_run_at_once_and_an_error_after_a_while() {
+        let mut guard = Guard::new(Some(60.0), Some(0.5), 100.0);
+        assert_eq!(guard.look(&sample(1.0, 20.0), None), None);
+        assert_eq!(guard.look(&sample(1.0, 60.1), None), Some(Fault::Temperature));
+        assert_eq!(guard.look(&sample(f64::NAN, 20.0), None), Some(Fault::Sensor));
+        let mut away = |wanted| guard.look(&sample(1.0, 20.0), Some(wanted));
+        assert!((0..50).all(|_| away(1.6).is_none()));
+        assert_eq!(away(1.4), None);
+        assert!((0..50).all(|_| away(1.6).is_none()));
+        assert_eq!(away(1.6), Some(Fault::TrackingError));
+        let mut none = Guard::new(None, None, 100.0);
+        assert!((0..1000).all(|_| none.look(&sample(1e9, 1e9), Some(0.0)).is_none()));
+    }
+}

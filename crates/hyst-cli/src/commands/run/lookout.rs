@@ -1,0 +1,116 @@
+//! What is done with each sample of a run as it comes: log, limits, the model beside it, what a person sees.
+
+use std::ops::ControlFlow;
+
+use hyst_hw::wire::Fault;
+use hyst_hw::{Phase, Progress, Sample};
+
+use super::beside::{Beside, Watched};
+use super::guard::Guard;
+use super::view::{Seen, View};
+use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog};
+use crate::text;
+
+/// Everything that looks at a run.
+pub(super) struct Lookout<'a> {
+    pub(super) log: Option<&'a mut RunLog>,
+    /// Why the log could not be written; from then on nothing is.
+    pub(super) log_error: Option<LogError>,
+    pub(super) beside: Option<Beside>,
+    pub(super) guard: Guard,
+    pub(super) view: View,
+    /// What was wanted at each row of the record.
+    pub(super) wanted: &'a [Option<f64>],
+    /// Symbol of the output's unit.
+    pub(super) unit: &'a str,
+    /// Why the run is ended from here.
+    pub(super) fault: Option<Fault>,
+    /// Estimated force at each row of the record \[N\]; empty where none is estimated.
+    pub(super) forces: Vec<f64>,
+    /// Time of the newest sample \[s\].
+    pub(super) now_s: f64,
+}
+
+impl Lookout<'_> {
+    /// Takes samples as they come; whether the run goes on.
+    pub(super) fn take(&mut self, news: &Progress<'_>) -> ControlFlow<()> {
+        let recorded = news.phase == Phase::Record;
+        let first = news.done - if recorded { news.samples.len() } else { 0 };
+        for (k, sample) in news.samples.iter().enumerate() {
+            let wanted = self.wanted.get(first + k).copied().flatten().filter(|_| recorded);
+            self.one(news, sample, wanted);
+        }
+        self.view.show(news.done, news.total);
+        if self.fault.is_some() || self.log_error.is_some() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    fn one(&mut self, news: &Progress<'_>, sample: &Sample, wanted: Option<f64>) {
+        self.now_s = sample.time_s;
+        let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample));
+        let force = expected.and_then(|e| e.force).or(sample.force_n);
+        if news.phase == Phase::Record {
+            self.forces.extend(force);
+        }
+        if self.log_error.is_none()
+            && let Some(log) = &mut self.log
+        {
+            let mut logged = LoggedSample::new(news.segment, news.phase, sample, wanted);
+            logged.predicted = expected.map(|e| e.output);
+            logged.estimated_force_n = force;
+            self.log_error = log.sample(&logged).err();
+        }
+        self.view.add(Seen { sample: *sample, wanted, predicted: expected.map(|e| e.output), force });
+        if let Some(explains) = expected.and_then(|e| e.explains) {
+            let (kind, text) = self.told(explains);
+            self.event(kind, text);
+        }
+        if self.fault.is_none()
+            && let Some(fault) = self.guard.look(sample, wanted)
+        {
+            self.end(fault);
+        }
+    }
+
+    /// Ends the run.
+    pub(super) fn end(&mut self, fault: Fault) {
+        if self.fault.is_none() {
+            self.fault = Some(fault);
+            self.event("fault", format!("fault {}: {fault}", fault.code()));
+        }
+    }
+
+    /// How the watch stands, in words.
+    fn told(&self, explains: bool) -> (&'static str, String) {
+        let (now, unit) = (text::short(self.now_s), self.unit);
+        match self.watched() {
+            Some(Watched { residual, trained_to, .. }) if !explains => {
+                let (residual, usual) = (text::short(residual), text::short(trained_to));
+                let what = format!(
+                    "at {now} s the model has stopped explaining the device: {residual} {unit} of residual, {usual} {unit} where it was fitted"
+                );
+                ("model-lost", what)
+            }
+            _ => ("model-found", format!("at {now} s the model explains the device again")),
+        }
+    }
+
+    /// How the watch stands.
+    pub(super) fn watched(&self) -> Option<Watched> {
+        self.beside.as_ref().and_then(Beside::watched)
+    }
+
+    /// Tells and logs what has happened.
+    pub(super) fn event(&mut self, kind: &'static str, text: String) {
+        self.view.tell(&format!("{}: {text}", if kind == "model-found" { "note" } else { "warning" }));
+        if self.log_error.is_none()
+            // A run that is refused before anything moves leaves no log.
+            && let Some(log) = self.log.as_mut().filter(|log| log.samples() > 0)
+        {
+            self.log_error = log.event(&LoggedEvent { time_s: self.now_s, kind, text }).err();
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! A device of the simulated plant, in real time at a socket of this process.
+
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use hyst_hw::wire::{Board, Device, Follower, Shown, State};
+use hyst_hw::{Plant, PlantBoard, PlantConfig, serve_at};
+
+/// What has been put out, and how the device stands.
+#[derive(Debug, Default)]
+pub struct Told {
+    /// All voltages \[V\].
+    pub put_out: Vec<f32>,
+    /// How often something was measured.
+    pub measured: usize,
+}
+
+/// A served device; it ends with this.
+#[derive(Debug)]
+pub struct Served {
+    /// As `--daq` takes it.
+    pub daq: String,
+    /// What it has done.
+    pub told: Arc<Mutex<Told>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<State>>,
+}
+
+struct Watched {
+    board: PlantBoard,
+    told: Arc<Mutex<Told>>,
+}
+
+impl Board for Watched {
+    fn measure(&mut self) -> Shown {
+        self.told.lock().expect("nobody panicked with it").measured += 1;
+        self.board.measure()
+    }
+
+    fn put_out(&mut self, volts: f32) {
+        self.told.lock().expect("nobody panicked with it").put_out.push(volts);
+        self.board.put_out(volts);
+    }
+}
+
+impl Served {
+    /// A device that follows references, with the plant that `toml` describes, at `rate_hz`.
+    ///
+    /// # Panics
+    /// When there is no such plant, or no socket.
+    pub fn new(toml: &str, rate_hz: f64) -> Self {
+        let config = PlantConfig::from_toml(toml).expect("a plant");
+        let board = PlantBoard::new(Plant::new(config).expect("a plant"), rate_hz).expect("its rate");
+        let mut device: Device<Follower, 512, 4096> = Device::new(board.identity(rate_hz, true), Follower::new());
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a socket");
+        let daq = format!("tcp:{}", listener.local_addr().expect("its address"));
+        let (told, stop) = (Arc::<Mutex<Told>>::default(), Arc::<AtomicBool>::default());
+        let (mut board, ends) = (Watched { board, told: Arc::clone(&told) }, Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            serve_at(&listener, &mut device, &mut board, || ends.load(Ordering::Relaxed)).expect("a socket");
+            device.state()
+        });
+        Self { daq, told, stop, thread: Some(thread) }
+    }
+
+    /// All voltages that were put out so far \[V\].
+    ///
+    /// # Panics
+    /// When the device did.
+    pub fn put_out(&self) -> Vec<f32> {
+        self.told.lock().expect("the device has not panicked").put_out.clone()
+    }
+
+    /// Ends it, and gives how it stood.
+    ///
+    /// # Panics
+    /// When the device did.
+    pub fn end(mut self) -> State {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().expect("it runs").join().expect("the device has not panicked")
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

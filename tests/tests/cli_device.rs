@@ -1,0 +1,231 @@
+//! `run` and `record` on a device in real time at the other end of a line, and what watches over a run.
+
+use std::fs;
+use std::io::Write;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::Duration;
+
+use hyst_hw::wire::{Fault, State};
+use hyst_tests::served::Served;
+use hyst_tests::{Lab, PLANT, WARM, column};
+use serde_json::Value;
+
+const RATE_HZ: f64 = 500.0;
+
+/// With a model of kind `pi` that holds the plant's lag.
+fn lab() -> Lab {
+    let lab = Lab::with_model();
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    fs::rename(lab.path("extended.json"), lab.path("model.json")).unwrap();
+    lab
+}
+
+/// All events of a log, by kind.
+fn events(lab: &Lab, name: &str) -> Vec<(String, String)> {
+    let bytes = fs::read(lab.path(name)).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let events = messages.filter(|message| message.channel.topic == "/actuator/event");
+    events
+        .map(|message| {
+            let event: Value = serde_json::from_slice(&message.data).unwrap();
+            let text = |key: &str| event[key].as_str().unwrap().to_owned();
+            (text("kind"), text("text"))
+        })
+        .collect()
+}
+
+#[test]
+fn a_drive_over_a_socket_is_played_as_it_stands_and_looking_moves_nothing() {
+    let (lab, device) = (Lab::new(), Served::new(PLANT, RATE_HZ));
+    let daq = &device.daq;
+    let said = lab.ok(&format!("record --daq {daq} --seconds 0.5 -o rest.csv --log rest.mcap --json")).json();
+    assert_eq!(said["samples"], 250);
+    assert!(said["deviation"].as_f64().unwrap() > 0.0);
+    assert_eq!(lab.read("rest.csv").lines().count(), 251);
+    assert_eq!(device.put_out(), [0.0; 0], "nothing may be put out by a command that looks");
+
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 2 --cycles 2 -o u.csv"));
+    let said = lab.ok(&format!("run --daq {daq} --drive u.csv --record y.csv --log y.mcap --slew 5000 --json")).json();
+    let (sent, played) = (column(&lab.read("u.csv"), "voltage_v"), column(&lab.read("y.csv"), "voltage_v"));
+    assert_eq!(sent.len(), played.len());
+    assert!(sent.iter().zip(&played).all(|(a, b)| *a as f32 == *b as f32));
+    assert!(said["clock"]["uncertainty_s"].as_f64().unwrap() < 0.1, "{said}");
+    let steepest = device.put_out().windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
+    assert!(steepest <= 10.001, "{steepest} V in a period of 2 ms at 5000 V/s");
+    assert_eq!(device.put_out().last(), Some(&0.0));
+    let info = lab.ok("log info y.mcap").stdout;
+    assert!(info.contains("clock.began_unix_s"), "{info}");
+    assert_eq!(device.end(), State::Idle);
+}
+
+#[test]
+fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells_the_force() {
+    let lab = lab();
+    let loaded =
+        format!("{PLANT}[load]\nnewtons = 2\num_per_n = 0.8\nperiod_s = 1.7\nshape = \"sine\"\nrecorded = false\n");
+    let device = Served::new(&loaded, RATE_HZ);
+    let run = |control: &str, more: &str| {
+        lab.ok(&format!(
+            "run --daq {} --model model.json --reference sine:4,14,1,3 --control {control} --settle 0.5 --log run.mcap --json {more}",
+            device.daq
+        ))
+        .json()
+    };
+    let alone = run("feedforward", "");
+    let looped = run("pid+feedforward", "--kout 1.25 --record looped.csv");
+    let rmse = |said: &Value| said["tracking"]["rmse"].as_f64().unwrap();
+    assert!(rmse(&looped) < 0.2 * rmse(&alone), "{looped}\n{alone}");
+    assert_eq!((&looped["loop_on_device"], &alone["loop_on_device"]), (&true.into(), &false.into()));
+    // The force that acts goes from −2 to 2 N.
+    let force = column(&lab.read("looped.csv"), "estimated_force_n");
+    let (low, high) = force.iter().fold((0f64, 0f64), |(l, h), f| (l.min(*f), h.max(*f)));
+    assert!((-3.5..-1.0).contains(&low) && (1.0..3.5).contains(&high), "{low} {high}");
+
+    let refused = |control: &str| {
+        let line = format!("run --daq {} --model model.json --reference sine:4,14,1,3 --control {control}", device.daq);
+        lab.refuses(&line, 2)
+    };
+    assert!(refused("pid").contains("--control pid+feedforward"));
+    // An output that does not come to its reference ends the run on the device.
+    let line = format!(
+        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap",
+        device.daq
+    );
+    let ran = lab.run(&line);
+    assert_eq!(ran.code, 3, "{ran:?}");
+    assert!(ran.stderr.contains(&Fault::TrackingError.to_string()), "{ran:?}");
+    assert_eq!(device.put_out().last(), Some(&0.0));
+}
+
+#[test]
+fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_told() {
+    let (lab, device) = (Lab::new(), Served::new(PLANT, RATE_HZ));
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.2 --cycles 2 -o u.csv"));
+    let line = format!("run --daq {} --drive u.csv --log killed.mcap --slew 400", device.daq);
+    let mut host = lab.command(&line).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    while device.put_out().last().is_none_or(|v| *v < 40.0) {
+        sleep(Duration::from_millis(20));
+        assert!(host.try_wait().unwrap().is_none(), "the run has ended by itself");
+    }
+    host.kill().unwrap();
+    host.wait().unwrap();
+    while device.put_out().last() != Some(&0.0) {
+        sleep(Duration::from_millis(20));
+    }
+    let steepest = device.put_out().windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
+    assert!(steepest <= 0.8001, "{steepest} V in a period of 2 ms at 400 V/s");
+    let ran = lab.run(&line.replace("killed", "next"));
+    assert_eq!(ran.code, 2, "{ran:?}");
+    assert!(ran.stderr.contains("--clear"), "{ran:?}");
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 20 --frequency 5 --cycles 2 -o short.csv"));
+    lab.ok(&format!("{line} --clear").replace("killed", "next").replace("u.csv", "short.csv"));
+    assert_eq!(device.end(), State::Idle);
+}
+
+#[test]
+fn a_run_that_gets_too_hot_or_astray_is_ended_with_a_code_and_a_sentence() {
+    let lab = Lab::with_model();
+    lab.write("warm.toml", format!("{PLANT}{WARM}"));
+    let run = |more: &str| {
+        lab.run(&format!(
+            "run --daq sim:{more} --model model.json --reference sine:4,14,1,6 --control gain --log run.mcap"
+        ))
+    };
+    for (more, fault) in [
+        ("warm.toml --hottest 27 --temperature 22", Fault::Temperature),
+        ("plant.toml --max-error 0.001", Fault::TrackingError),
+    ] {
+        let ran = run(more);
+        assert_eq!(ran.code, 3, "{more}: {ran:?}");
+        let sentence = format!("(fault {}): {fault}", fault.code());
+        assert!(ran.stderr.contains(&sentence), "{sentence} is missing in {ran:?}");
+        let events = events(&lab, "run.mcap");
+        assert_eq!(events.len(), 1);
+        assert_eq!(events[0].0, "fault");
+        // The ramp to rest is in the log, too.
+        let all = lab.ok("log convert run.mcap --ramps").stdout;
+        assert_eq!(column(&all, "voltage_v").last(), Some(&0.0));
+    }
+    assert_eq!(run("warm.toml --hottest 60 --temperature 22").code, 0);
+    // A reference beyond what the drive can do holds the loop at its limit.
+    let ran = lab.run("run --daq sim:plant.toml --model model.json --reference steps:4,60,1,3 --control pid");
+    assert_eq!(ran.code, 3, "{ran:?}");
+    assert!(ran.stderr.contains(&Fault::Saturation.to_string()), "{ran:?}");
+}
+
+#[test]
+fn a_model_that_stops_explaining_its_device_is_told_logged_and_can_be_diagnosed() {
+    let lab = lab();
+    let run = |plant: &str| {
+        lab.ok(&format!(
+            "run --daq sim:{plant} --model model.json --reference triangle:4,14,0.7,20 --log run.mcap --record run.csv --json"
+        ))
+    };
+    let said = run("plant.toml").json();
+    assert_eq!((&said["watch"]["explains"], &said["watch"]["lost_at_s"]), (&true.into(), &Value::Null), "{said}");
+    assert_eq!(events(&lab, "run.mcap"), []);
+
+    // Half way its gain falls by a tenth, as when a joint comes loose.
+    lab.write("loose.toml", format!("{PLANT}[[disturbance]]\nkind = \"gain-step\"\nshare = -0.1\nat_s = 12.0\n"));
+    let ran = run("loose.toml");
+    assert!(ran.stderr.contains("has stopped explaining the device"), "{ran:?}");
+    let said = ran.json();
+    let at = said["watch"]["lost_at_s"].as_f64().unwrap();
+    assert!((12.0..16.0).contains(&at), "{said}");
+    assert_eq!(events(&lab, "run.mcap")[0].0, "model-lost");
+    let text =
+        lab.ok("run --daq sim:loose.toml --model model.json --reference triangle:4,14,0.7,20 --log again.mcap").stdout;
+    let next = text.lines().find_map(|line| line.strip_prefix("next: hystctl ")).unwrap_or_else(|| panic!("{text}"));
+    lab.ok(next);
+}
+
+#[test]
+fn a_force_is_estimated_while_a_plant_runs() {
+    let lab = lab();
+    lab.write("loaded.toml", format!("{PLANT}[load]\nnewtons = 3\num_per_n = 0.8\nperiod_s = 2\nshape = \"wander\"\n"));
+    let said = lab
+        .ok("run --daq sim:loaded.toml --model model.json --reference sine:4,14,0.5,6 --kout 1.25 --record run.csv --json")
+        .json();
+    assert!(said["watch"].is_null());
+    let text = lab.read("run.csv");
+    let (load, force) = (column(&text, "load_n"), column(&text, "estimated_force_n"));
+    let rms = |x: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = x.fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
+        f64::sqrt(sum / count)
+    };
+    let (error, signal) = (rms(&mut load.iter().zip(&force).map(|(a, b)| a - b)), rms(&mut load.iter().copied()));
+    assert!(error < 0.35 * signal, "{error} of {signal} N");
+}
+
+#[test]
+fn references_come_from_shapes_and_stdin() {
+    let lab = Lab::with_model();
+    lab.reference("r.csv", 2.0, 14.0);
+    let line = "run --daq sim:plant.toml --model model.json --json --reference";
+    let of_file = lab.ok(&format!("{line} r.csv")).json();
+    let mut piped = lab
+        .command(&format!("{line} -"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    piped.stdin.take().unwrap().write_all(lab.read("r.csv").as_bytes()).unwrap();
+    let output = piped.wait_with_output().unwrap();
+    let of_stdin: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(of_file["tracking"], of_stdin["tracking"]);
+    let shaped = lab.ok(&format!("{line} sine:6,14,1,2")).json();
+    assert_eq!(shaped["samples"], 1000);
+    let close = |key: &str| {
+        (shaped["tracking"][key].as_f64().unwrap() / of_file["tracking"][key].as_f64().unwrap() - 1.0).abs()
+    };
+    assert!(close("rmse") < 0.05, "{shaped} {of_file}");
+    assert_eq!(lab.ok(&format!("{line} steps:6,14,1,2 --rate 1000")).json()["samples"], 2000);
+    assert!(lab.refuses(&format!("{line} sine:6,14,1"), 2).contains("FORM:LOW,HIGH,HZ,SECONDS"));
+    assert!(lab.refuses(&format!("{line} r.csv --rate 1000"), 2).contains("--rate"));
+    let mut empty = lab.command(&format!("{line} -")).stdin(Stdio::null()).output().unwrap();
+    assert_eq!(empty.status.code(), Some(2));
+    empty.stderr.make_ascii_lowercase();
+    assert!(String::from_utf8_lossy(&empty.stderr).contains("stdin"));
+}
