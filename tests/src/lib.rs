@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod control_study;
 pub mod dpm_study;
 pub mod fod_study;
+pub mod force_ranking;
 pub mod force_study;
 pub mod served;
 

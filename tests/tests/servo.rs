@@ -8,9 +8,9 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hyst_core::{ChainParams, EffectParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
+use hyst_core::{ChainParams, EffectParams, ForceParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
 use hyst_hw::wire::{Ask, Chunk, Exchange, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, Tell, recipe_head};
-use hyst_hw::{Daq, Remote, RemoteError, RemoteOptions, Sample, Serial};
+use hyst_hw::{Daq, Line, Remote, RemoteError, RemoteOptions, Sample, Serial};
 use hyst_onboard::{OnBoard, RANGE_V, RATE_HZ, SLEW_V_PER_S, servo};
 
 /// The machine, which ends with it.
@@ -78,9 +78,10 @@ fn recipe() -> Vec<u8> {
         low: RANGE_V[0].into(),
         high: RANGE_V[1].into(),
     };
+    let force = ForceParams { stiffness: 1.5, kappa: 1.0, chi: 0.0 };
     let mut room = [0; 4096];
     let block = write_block(&model, &mut room).expect("there is room");
-    [recipe_head(Some(&pid), None).as_slice(), block].concat()
+    [recipe_head(Some(&pid), Some(&force)).as_slice(), block].concat()
 }
 
 /// Sines of two frequencies that begin at rest \[µm\].
@@ -89,8 +90,8 @@ fn references(rows: usize) -> Vec<f64> {
     (0..rows).map(|k| 6.0 * (1.0 - (0.8 * at(k)).cos()) + 1.5 * (1.0 - (5.0 * at(k)).cos())).collect()
 }
 
-/// The same source on the host: what the device measures, drive and output.
-fn on_host(references: &[f64]) -> Vec<(f32, f32)> {
+/// The same source on the host: what the device measures, drive, output and force.
+fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
     let (mut device, mut actuator) = (servo(), OnBoard::default());
     let ask = |device: &mut hyst_onboard::Servo, ask: Ask| -> Reply { device.answer(&Request { number: 0, ask }) };
     let bytes = recipe();
@@ -119,7 +120,7 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32)> {
             panic!("the device refuses");
         };
         sent = status.received as usize;
-        measured.extend(samples.iter().map(|s| (s.drive_v, s.output)));
+        measured.extend(samples.iter().map(|s| (s.drive_v, s.output, s.force_n)));
         device.tick(&mut actuator);
     }
     measured
@@ -147,9 +148,11 @@ fn the_firmware_tracks_with_the_hosts_bits() {
         assert!((pair[1].time_s - pair[0].time_s - 1.0 / rate).abs() < 1e-9, "a gap at {} s", pair[1].time_s);
     }
     let expected = on_host(&references);
-    for (k, (sample, (drive, output))) in measured.iter().zip(&expected).enumerate() {
+    for (k, (sample, (drive, output, force))) in measured.iter().zip(&expected).enumerate() {
         assert_eq!((sample.drive_v as f32).to_bits(), drive.to_bits(), "drive of sample {k}");
         assert_eq!((sample.output as f32).to_bits(), output.to_bits(), "output of sample {k}");
+        assert_eq!(sample.force_n.map(|f| (f as f32).to_bits()), force.map(f32::to_bits), "force of sample {k}");
+        assert!(force.is_some());
     }
     let rmse = |of: &dyn Fn(usize) -> f64| {
         let late = measured.len() / 4..measured.len();
@@ -160,6 +163,130 @@ fn the_firmware_tracks_with_the_hosts_bits() {
     let least = errors.fold(f64::INFINITY, f64::min);
     println!("10 s at {rate} Hz: RMSE {least:.3} µm");
     assert!(least < 0.5, "{least} µm");
+}
+
+/// `hystctl` in the middle of a run is killed: the firmware comes to rest by its watchdog, within its slew limit.
+#[test]
+fn a_host_that_is_killed_leaves_the_firmware_to_its_watchdog() {
+    let Some(machine) = machine() else { return };
+    let lab = hyst_tests::Lab::new();
+    // 20 s, of which the first few are played.
+    lab.ok("excite sine --rate 500 --high 80 --frequency 0.05 --cycles 1 -o u.csv");
+    let line = format!("run --daq serial:{} --drive u.csv --log run.mcap --slew 40", machine.port);
+    let mut host = lab.command(&line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("hystctl starts");
+    sleep(Duration::from_secs(6));
+    assert!(host.try_wait().expect("it can be asked").is_none(), "the run has ended by itself");
+    host.kill().expect("it can be killed");
+    host.wait().expect("and is gone");
+    // What the device puts out from now on, as often as it says so. To ask that is no sign of life for the run.
+    let mut remote = remote(&machine, 21, Mode::Voltage);
+    let mut ramp = Vec::new();
+    while ramp.last().is_none_or(|(volts, _)| *volts != 0.0) {
+        let status = remote.status().expect("it answers");
+        ramp.push((status.present_v, status.state));
+        assert!(ramp.len() < 100_000, "it does not come to rest");
+    }
+    assert!(ramp[0].0 > 20.0, "it was killed at {} V only", ramp[0].0);
+    let (_, last) = ramp[ramp.len() - 1];
+    assert_eq!(last, hyst_hw::wire::State::Fault(hyst_hw::wire::Fault::Silence));
+    let fallen = ramp.iter().position(|(volts, _)| *volts < ramp[0].0).expect("it falls");
+    assert!(ramp[fallen..].windows(2).all(|w| w[1].0 <= w[0].0), "on the way to rest it only falls");
+    let ran = lab.run(&line);
+    assert_eq!(ran.code, 2, "{ran:?}");
+    assert!(ran.stderr.contains("--clear"), "{ran:?}");
+    lab.ok("excite sine --rate 500 --high 4 --frequency 2 --cycles 1 -o u.csv");
+    lab.ok(&format!("{line} --clear"));
+    // What was logged until it was killed is there.
+    let said = lab.ok("log info run.mcap.~1~ --json").json();
+    assert_eq!(said["closed"], false);
+    assert!(said["samples"].as_u64().is_some_and(|n| n > 1500), "{said}");
+}
+
+/// Frames on their way that are lost, changed, doubled, cut or come late.
+struct Rough {
+    port: Serial,
+    chance: u64,
+    late: Vec<u8>,
+}
+
+/// The next of a row of numbers without order (Knuth's multiplier).
+fn stirred(chance: &mut u64) -> u64 {
+    *chance = chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *chance >> 33
+}
+
+impl Rough {
+    fn below(&mut self, n: u64) -> u64 {
+        stirred(&mut self.chance) % n
+    }
+
+    fn spoiled(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut bytes = bytes.to_vec();
+        if bytes.len() < 2 || self.below(6) > 0 {
+            return bytes;
+        }
+        let at = self.below(bytes.len() as u64) as usize;
+        match self.below(5) {
+            0 => bytes.clear(),
+            1 => bytes[at] ^= 1 << self.below(8),
+            2 => bytes.truncate(at),
+            3 => bytes.extend_from_within(..),
+            _ => std::mem::swap(&mut bytes, &mut self.late),
+        }
+        bytes
+    }
+}
+
+impl Line for Rough {
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        let bytes = self.spoiled(bytes);
+        self.port.send(&bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> std::io::Result<usize> {
+        let came = self.port.receive(bytes, patience)?;
+        let spoiled = self.spoiled(&bytes[..came]);
+        let kept = spoiled.len().min(bytes.len());
+        bytes[..kept].copy_from_slice(&spoiled[..kept]);
+        Ok(kept)
+    }
+}
+
+/// Over a line that spoils one frame in six both ways, the firmware plays what it is given and nothing else, and answers a sound line afterwards.
+#[test]
+fn a_rough_line_does_the_firmware_no_harm() {
+    let Some(machine) = machine() else { return };
+    for seed in [1, 2] {
+        let port = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
+        let rough = Rough { port, chance: seed, late: Vec::new() };
+        let options = RemoteOptions {
+            lost: Duration::from_secs(20),
+            silence_s: 20.0,
+            ..RemoteOptions::with_session(30 + seed as u32)
+        };
+        let mut remote = Remote::open(rough, "rough", options).expect("it is heard at last");
+        remote.start(RATE_HZ.into()).expect("the run starts");
+        let drive: Vec<f64> = (0..1000).map(|k| 30.0 - 30.0 * (0.0063 * f64::from(k)).cos()).collect();
+        let (mut sent, mut measured) = (0, Vec::<Sample>::new());
+        while measured.len() < drive.len() {
+            sent += remote.exchange(&drive[sent..], &mut measured).expect("the run goes on");
+        }
+        remote.stop().expect("the run stops");
+        assert_eq!(measured.len(), drive.len());
+        assert!(measured.iter().zip(&drive).all(|(s, v)| s.drive_v == f64::from(*v as f32)));
+    }
+    // Whatever comes, and be it no frame at all.
+    let mut port = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
+    let mut chance = 1u64;
+    for _ in 0..200 {
+        let bytes: Vec<u8> = (0..100).map(|_| stirred(&mut chance) as u8).collect();
+        port.send(&bytes).expect("it takes it");
+    }
+    drop(port);
+    let mut remote = remote(&machine, 40, Mode::Voltage);
+    assert_eq!(remote.status().expect("it answers").present_v, 0.0);
+    remote.start(RATE_HZ.into()).expect("and runs");
+    remote.stop().expect("and stops");
 }
 
 /// A host that goes leaves the device alone: it comes to rest by itself, within its slew limit, and says why.

@@ -1,7 +1,7 @@
 //! The comparisons of the examples, on actuators of other seeds.
 
 use hyst_ident::model::Kind;
-use hyst_tests::{activation_study, control_study, dpm_study, fod_study, force_study};
+use hyst_tests::{activation_study, control_study, dpm_study, fod_study, force_ranking, force_study};
 
 #[test]
 fn half_sine_curves_measure_a_valid_surface_in_a_structure_that_rings_and_triangles_do_not() {
@@ -85,4 +85,15 @@ fn a_force_is_seen_through_each_of_the_three_free_models() {
         s.models.iter().map(|m| (m.model.kind, m.affine, m.stiffness, m.force)).collect::<Vec<_>>()
     };
     assert_eq!(numbers(&study), numbers(&again));
+}
+
+#[test]
+fn a_force_is_seen_best_through_the_extended_chain() {
+    let ranking = force_ranking::run(5, 300);
+    assert_eq!(ranking.models.len(), 5);
+    let best = &ranking.models[0];
+    assert!(best.name.starts_with("pi + "), "{ranking:?}");
+    assert!(best.rmse < 0.25 * ranking.force, "{ranking:?}");
+    // The base that was extended, and what no model of hysteresis sees, are behind it.
+    assert!(ranking.models[1..].iter().all(|m| m.rmse > 1.5 * best.rmse), "{ranking:?}");
 }

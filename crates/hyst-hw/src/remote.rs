@@ -286,6 +286,14 @@ impl<L: Line> Remote<L> {
         }
     }
 
+    /// How the device stands. Nothing changes by that, and for the watchdog of a run it is no sign of life.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn status(&mut self) -> Result<Status, RemoteError> {
+        self.stated(Ask::Status)
+    }
+
     /// Lets the device only measure in its next runs: what it is given is not put out.
     pub fn observe(&mut self) {
         self.options.mode = Mode::Nothing;
@@ -392,10 +400,12 @@ impl<L: Line> Remote<L> {
                 }
             }
         }
-        let advice = if matches!(request.ask, Ask::Hello) {
-            "is this the right port, its speed the device's, and the device powered?"
-        } else {
-            "look at the cable; the device comes to rest by itself"
+        let advice = match request.ask {
+            Ask::Hello if self.broken > 0 => {
+                "something else speaks there: is this the right port, its speed the device's, its firmware one that speaks this protocol?"
+            }
+            Ask::Hello => "is this the right port, its speed the device's, and the device powered?",
+            _ => "look at the cable; the device comes to rest by itself",
         };
         let seconds = self.options.lost.as_secs_f64();
         Err(RemoteError::Silent { line: self.name.clone(), seconds, broken: self.broken, advice })

@@ -295,6 +295,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 Ok(())
             }),
             Ask::Clear => self.told(Self::clear),
+            Ask::Status => Tell::Status(self.status()),
             Ask::Model(chunk) => match self.take_model(chunk) {
                 Ok(bytes) => Tell::ModelBytes(bytes),
                 Err(refusal) => Tell::Refused(refusal, self.status()),

@@ -48,6 +48,8 @@ pub enum Ask {
     Clear,
     /// To take a part of a model.
     Model(Chunk),
+    /// How it stands.
+    Status,
 }
 
 /// How a run is to be done.
