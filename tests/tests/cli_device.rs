@@ -124,6 +124,20 @@ fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_t
 }
 
 #[test]
+fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
+    let (lab, device) = (Lab::with_model(), Served::new(PLANT, RATE_HZ));
+    let said = lab.ok(&format!("stop --daq {}", device.daq)).stdout;
+    assert!(said.contains("--clear"), "{said}");
+    let run = format!("run --daq {} --drive u.csv --record y.csv", device.daq);
+    let message = lab.refuses(&run, 2);
+    assert!(message.contains(&Fault::Emergency.to_string()), "{message}");
+    assert_eq!(device.put_out(), [0.0; 0]);
+    lab.refuses("stop --daq sim:plant.toml", 2);
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 20 --frequency 5 --cycles 2 -o u.csv"));
+    lab.ok(&format!("{run} --clear"));
+}
+
+#[test]
 fn a_run_that_gets_too_hot_or_astray_is_ended_with_a_code_and_a_sentence() {
     let lab = Lab::with_model();
     lab.write("warm.toml", format!("{PLANT}{WARM}"));

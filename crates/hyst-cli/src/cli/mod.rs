@@ -51,6 +51,7 @@ pub(crate) enum Command {
     Force(ForceArgs),
     Run(RunArgs),
     Record(RecordArgs),
+    Stop(StopArgs),
     Devices(DevicesArgs),
     Log(LogArgs),
     Export(ExportArgs),
@@ -348,6 +349,19 @@ pub(crate) struct RunArgs {
     pub(crate) rest: f64,
     #[command(flatten)]
     pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Emergency stop: whatever a device does, let it come to rest and stay there
+///
+/// The device ramps to rest at its slew limit, and starts again only once that is cleared (run --clear).
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl stop --daq can:can0")]
+pub(crate) struct StopArgs {
+    /// Device, as for run
+    #[arg(long, value_name = "DEVICE")]
+    pub(crate) daq: Device,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }

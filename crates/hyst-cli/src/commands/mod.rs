@@ -16,6 +16,7 @@ mod record;
 mod response;
 mod run;
 mod simulate;
+mod stop;
 
 use clap::CommandFactory;
 
@@ -40,6 +41,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Loop(args) => hysteresis_loop::run(&args),
         Command::Run(args) => run::run(&args),
         Command::Record(args) => record::run(&args),
+        Command::Stop(args) => stop::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Log(args) => log::run(&args),
         Command::Export(args) => export::run(&args),

@@ -33,7 +33,14 @@ where
 {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
-    if let Err(error) = ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)) {
+    let again = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            // Who asks twice does not want to wait for a device that does not answer.
+            say("error: left before the device was at rest; its watchdog brings it there, look whether it does");
+            std::process::exit(i32::from(Exit::DeviceLost as u8));
+        }
+    };
+    if let Err(error) = ctrlc::set_handler(again) {
         say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
     }
     let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
