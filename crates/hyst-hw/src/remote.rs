@@ -1,8 +1,11 @@
 //! A device at the other end of a line, as a [`Daq`].
 
 mod can;
+mod interfaces;
 mod lines;
 mod slcan;
+#[cfg(target_os = "linux")]
+mod socketcan;
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -14,8 +17,11 @@ use crate::wire::{
 };
 
 pub use can::{Bus, CanLine, FROM_DEVICE, TO_DEVICE};
+pub use interfaces::{Interface, interfaces};
 pub use lines::{OpenError, Port, Serial, Tcp, ports};
 pub use slcan::Slcan;
+#[cfg(target_os = "linux")]
+pub use socketcan::{SocketCan, SocketCanError};
 
 /// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
 pub trait Line {
