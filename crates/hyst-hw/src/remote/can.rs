@@ -17,7 +17,8 @@ pub const FROM_DEVICE: u32 = 0x6a1;
 pub(super) const SHORT: u32 = 0x7ff;
 pub(super) const LARGEST: u32 = 0x1fff_ffff;
 
-/// How long the other end may take to allow the next frames; the standard says a second, but who asked has asked again by then.
+/// How long the other end may take to allow the next frames, unless told otherwise. The standard says a second; who asked has asked again
+/// by then.
 const ALLOWS: Duration = Duration::from_millis(100);
 
 /// A bus that carries frames, classic ones and of CAN FD.
@@ -45,6 +46,7 @@ pub struct CanLine<B> {
     /// Identifier of frames to the device, and of those from it.
     to: u32,
     from: u32,
+    allows: Duration,
     came: VecDeque<u8>,
 }
 
@@ -52,7 +54,13 @@ impl<B: Bus> CanLine<B> {
     /// To the device that listens to the identifier `to` and speaks with `from`, over classic frames or those of CAN FD.
     /// A device is at the other end: it has the two the other way round.
     pub fn new(bus: B, to: u32, from: u32, fd: bool) -> Self {
-        Self { bus, tp: IsoTp::new(fd), to, from, came: VecDeque::new() }
+        Self { bus, tp: IsoTp::new(fd), to, from, allows: ALLOWS, came: VecDeque::new() }
+    }
+
+    /// The same, to another end that may take so long to allow the next frames of a message.
+    #[must_use]
+    pub fn patient(self, allows: Duration) -> Self {
+        Self { allows, ..self }
     }
 
     /// The bus.
@@ -96,7 +104,7 @@ impl<B: Bus> Line for CanLine<B> {
         self.speak()?;
         let mut last = Instant::now();
         while self.tp.busy() {
-            let Some(left) = ALLOWS.checked_sub(last.elapsed()) else {
+            let Some(left) = self.allows.checked_sub(last.elapsed()) else {
                 // Who asked will ask again.
                 self.tp.give_up();
                 break;
