@@ -525,7 +525,7 @@ mod tests {
 
     #[test]
     fn other_devices_and_models_are_refused_with_what_there_is() {
-        let message = parse("hystctl run --daq serial:/dev/ttyACM0 --drive u.csv").unwrap_err();
+        let message = parse("hystctl run --daq usb:3 --drive u.csv").unwrap_err();
         assert!(message.contains("sim:PLANT.toml"), "{message}");
         let message = parse("hystctl fit a.csv --model preisch -o m.json").unwrap_err();
         assert!(message.contains("pi, preisach"), "{message}");

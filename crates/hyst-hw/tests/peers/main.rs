@@ -61,7 +61,7 @@ fn id(k: u32) -> u32 {
         1 => 0x800,
         2 => 0x7ff,
         3 => 0x1fff_ffff,
-        _ if k % 2 == 0 => k * 37 % 0x800,
+        _ if k.is_multiple_of(2) => k * 37 % 0x800,
         _ => 0x800 + k * 1_234_567 % 0x1fff_f800,
     }
 }
