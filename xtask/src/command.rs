@@ -79,17 +79,29 @@ pub(crate) fn which(program: impl AsRef<OsStr>) -> Option<PathBuf> {
     env::split_paths(&path).map(|folder| folder.join(program.as_ref())).find(|file| file.is_file())
 }
 
+/// The folder of what is built.
+pub(crate) fn target() -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| root().join(folder))
+}
+
+/// Whether this may do anything.
+pub(crate) fn as_root() -> bool {
+    output(Command::new("id").arg("-u")).is_some_and(|id| id == "0")
+}
+
+/// Whether the command ends well; what it prints to standard output is nobody's.
+pub(crate) fn passes_quietly(command: &mut Command) -> bool {
+    command.stdin(Stdio::null()).stdout(Stdio::null()).status().is_ok_and(|status| status.success())
+}
+
 /// Installs Debian packages, where that needs nobody's leave.
 pub(crate) fn install(packages: &[&str]) -> bool {
-    let root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
-    if !root || which("apt-get").is_none() {
+    if !as_root() || which("apt-get").is_none() {
         return false;
     }
     let apt = |arguments: &[&str]| {
         let mut command = Command::new("apt-get");
-        command.args(["-qq"]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-        command.stdin(Stdio::null()).stdout(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
+        passes_quietly(command.args(["-qq"]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive"))
     };
     let ask = [&["install", "-y", "--no-install-recommends"], packages].concat();
     eprintln!("apt-get install {}", packages.join(" "));

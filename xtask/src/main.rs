@@ -3,6 +3,7 @@
 //! It runs all of them and ends with a table; a check that cannot run here says why and how to make it run.
 
 mod browser;
+mod can;
 mod command;
 mod firmware;
 mod python;
@@ -13,9 +14,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware, Python
+cargo xtask test                run every check: format, lints, tests, documentation, firmware, CAN, Python
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
+cargo xtask can                 run the CAN check alone: against python-can, and in QEMU against Linux's own ISO-TP and slcan
 cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
 
@@ -26,6 +28,7 @@ fn main() -> ExitCode {
         ["test"] => test(),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
+        ["can"] => table(&[("can", timed("can", can::check))]),
         ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
@@ -71,6 +74,7 @@ fn test() -> ExitCode {
     let checked = CHECKS.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
     results.extend(checked);
     results.push(("firmware", timed("firmware", || firmware::check(false))));
+    results.push(("can", timed("can", can::check)));
     results.push(("python", timed("python", python::check)));
     table(&results)
 }

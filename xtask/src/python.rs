@@ -13,15 +13,25 @@ const INTERPRETERS: &[&str] =
     &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];
 /// Succeeds where the package can be built and tested.
 const SUITABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
-const INSTALL: &str =
+pub(crate) const INSTALL: &str =
     "Python 3.10 or newer with its module venv is needed, and none was found; on Debian `apt install python3-venv`";
+
+/// An interpreter that is new enough and has what environments need.
+pub(crate) fn interpreter() -> Option<&'static str> {
+    let suitable = |python: &&str| {
+        Command::new(python).args(["-c", SUITABLE]).output().is_ok_and(|output| output.status.success())
+    };
+    INTERPRETERS.iter().copied().find(suitable)
+}
+
+/// The interpreter of an environment.
+pub(crate) fn program(environment: &Path) -> PathBuf {
+    environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" })
+}
 
 pub(crate) fn check() -> Outcome {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    let suitable = |python: &&&str| {
-        Command::new(python).args(["-c", SUITABLE]).output().is_ok_and(|output| output.status.success())
-    };
-    let Some(python) = INTERPRETERS.iter().find(suitable) else { return Outcome::Skipped(INSTALL.to_owned()) };
+    let Some(python) = interpreter() else { return Outcome::Skipped(INSTALL.to_owned()) };
     let own = root.join("target").join("python-tests");
     let run = |program: &Path, arguments: &[&str]| {
         let mut command = Command::new(program);
@@ -36,7 +46,7 @@ pub(crate) fn check() -> Outcome {
             }
         }
     };
-    let own_python = own.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    let own_python = program(&own);
     let package = PathBuf::from("crates").join("hyst-py").display().to_string();
     let package = format!(".{}{package}", std::path::MAIN_SEPARATOR);
     let install = [&["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package], NEEDED].concat();

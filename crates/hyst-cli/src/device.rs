@@ -86,6 +86,7 @@ impl AnyDevice {
                     .map_err(|error| gone(format!("{name}: the CAN adapter cannot be opened: {error}")))?;
                 (Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false)), name)
             }
+            Device::Can { interface, fd } => (can(interface, *fd)?, interface),
             Device::Tcp(address) => {
                 let line = Tcp::connect(address).map_err(|error| {
                     gone(format!("{address}: nobody answers: {error}; is the simulator or the bridge running?"))
@@ -99,6 +100,21 @@ impl AnyDevice {
         }
         Ok(Self::Remote(Box::new(remote)))
     }
+}
+
+/// The device on the bus behind an interface.
+#[cfg(target_os = "linux")]
+fn can(interface: &str, fd: bool) -> CommandResult<Box<dyn Line>> {
+    let bus = hyst_hw::SocketCan::open(interface, fd).map_err(|error| CommandError::new(Exit::DeviceLost, error))?;
+    bus.hear_only(FROM_DEVICE).map_err(|error| CommandError::new(Exit::DeviceLost, error))?;
+    Ok(Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, fd)))
+}
+
+/// Other systems have no interfaces for CAN.
+#[cfg(not(target_os = "linux"))]
+fn can(interface: &str, _fd: bool) -> CommandResult<Box<dyn Line>> {
+    let advice = "can: devices need Linux; an adapter at a serial port works here too (slcan:PORT)";
+    Err(CommandError::new(Exit::BadInput, anyhow::anyhow!("{interface}: {advice}")))
 }
 
 impl AnyDevice {

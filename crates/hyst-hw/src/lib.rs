@@ -49,9 +49,11 @@ pub use plant::error::{ConfigError, PlantError};
 pub use plant::{DISTURBANCES, EFFECTS, Plant};
 #[cfg(feature = "std")]
 pub use remote::{
-    Bus, CanLine, ClockFit, FROM_DEVICE, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial, Slcan,
-    TO_DEVICE, Tcp, ports,
+    Bus, CanLine, ClockFit, FROM_DEVICE, Interface, Line, OpenError, Port, Remote, RemoteError, RemoteOptions, Serial,
+    Slcan, TO_DEVICE, Tcp, interfaces, ports,
 };
+#[cfg(all(feature = "std", target_os = "linux"))]
+pub use remote::{SocketCan, SocketCanError};
 #[cfg(feature = "std")]
 pub use runner::{
     Cause, Failure, Phase, Progress, RecordOptions, Recording, Revision, SegmentRecord, record, record_with,

@@ -2,8 +2,11 @@
 
 mod can;
 mod clock;
+mod interfaces;
 mod lines;
 mod slcan;
+#[cfg(target_os = "linux")]
+mod socketcan;
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -18,8 +21,11 @@ use clock::Clock;
 
 pub use can::{Bus, CanLine, FROM_DEVICE, TO_DEVICE};
 pub use clock::ClockFit;
+pub use interfaces::{Interface, interfaces};
 pub use lines::{OpenError, Port, Serial, Tcp, ports};
 pub use slcan::Slcan;
+#[cfg(target_os = "linux")]
+pub use socketcan::{SocketCan, SocketCanError};
 
 /// How long a device may take to come to rest.
 const LONGEST_REST: Duration = Duration::from_secs(60);

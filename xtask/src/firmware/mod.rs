@@ -8,11 +8,11 @@ mod figures;
 mod link;
 mod toolchain;
 
-use crate::command::{Outcome, cargo, output, passes, root};
+use crate::command::{Outcome, cargo, output, passes, root, target};
 use figures::Figures;
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::Path;
 use std::process::Command;
-use std::{env, fs};
 use toolchain::{NotRun, TARGET, Toolchain};
 
 /// What the core may depend on: all of it is `no_std`. `libm` always, the others where a feature asks for them.
@@ -166,8 +166,4 @@ fn done(command: &mut Command) -> Result<(), Ended> {
         Outcome::Passed => Ok(()),
         _ => Err(Ended::Failed(String::new())),
     }
-}
-
-fn target() -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| Path::new(&root()).join(folder))
 }

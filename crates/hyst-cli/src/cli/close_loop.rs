@@ -17,7 +17,8 @@ use super::{Device, JsonArg};
 #[derive(Debug, Args)]
 #[command(after_help = CLOSE_LOOP)]
 pub(crate) struct CloseLoopArgs {
-    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD] or tcp:HOST:PORT
+    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD],
+    /// slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
     /// Base model to begin with: pi or preisach

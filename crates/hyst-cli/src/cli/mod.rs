@@ -291,7 +291,8 @@ pub(crate) struct CompensateArgs {
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
-    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD] or tcp:HOST:PORT
+    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD],
+    /// slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
     /// Model file
@@ -512,9 +513,9 @@ pub(crate) struct MapArg {
     pub(crate) map: Vec<String>,
 }
 
-/// List the serial ports at which a device may be
+/// List the serial ports and CAN interfaces at which a device may be
 ///
-/// Nothing is sent and nothing moves: the ports are only looked at.
+/// Nothing is sent and nothing moves: they are only looked at.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl devices")]
 pub(crate) struct DevicesArgs {

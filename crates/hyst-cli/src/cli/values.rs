@@ -47,6 +47,13 @@ pub(crate) enum Device {
         /// Bits a second of the bus.
         bits_per_s: u32,
     },
+    /// On a CAN bus, at an interface of the system.
+    Can {
+        /// What the system calls it.
+        interface: String,
+        /// Whether frames are those of CAN FD.
+        fd: bool,
+    },
     /// At a socket, as `host:port`.
     Tcp(String),
 }
@@ -61,7 +68,7 @@ impl Device {
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Simulated(path) => Some(path),
-            Self::Serial { .. } | Self::Slcan { .. } | Self::Tcp(_) => None,
+            Self::Serial { .. } | Self::Slcan { .. } | Self::Can { .. } | Self::Tcp(_) => None,
         }
     }
 }
@@ -80,14 +87,20 @@ impl FromStr for Device {
                 Ok(Self::Slcan { port, baud: USUAL_BAUD, bits_per_s })
             }
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
-            Some(("can", _)) => Err(format!("this version has no can: devices; give {FORMS}")),
+            Some(("can", interface)) if !interface.is_empty() => match interface.split_once(',') {
+                None => Ok(Self::Can { interface: interface.to_owned(), fd: false }),
+                Some((interface, "fd")) if !interface.is_empty() => {
+                    Ok(Self::Can { interface: interface.to_owned(), fd: true })
+                }
+                Some(_) => Err("give can:can0, or can:can0,fd for frames of CAN FD".to_owned()),
+            },
             _ => Err(format!("give {FORMS}")),
         }
     }
 }
 
 /// What a device can be given as.
-const FORMS: &str = "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S] or tcp:HOST:PORT";
+const FORMS: &str = "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
 
 /// A port and the bits a second behind its `@`, if there is one.
 fn at_rate(port: &str, usual: u32, example: &str) -> Result<(String, u32), String> {
@@ -181,7 +194,13 @@ mod tests {
         let slcan = Device::Slcan { port: "COM4".into(), baud: 115_200, bits_per_s: 250_000 };
         assert_eq!("slcan:COM4@250000".parse(), Ok(slcan));
         assert!("serial:COM3@fast".parse::<Device>().unwrap_err().contains("921600"));
-        for text in ["sim:", "sim", "plant.toml", "can:can0", "slcan:", "serial:", "tcp:here"] {
+        let can = |interface: &str, fd| Ok(Device::Can { interface: interface.into(), fd });
+        assert_eq!("can:can0".parse(), can("can0", false));
+        assert_eq!("can:vcan1,fd".parse(), can("vcan1", true));
+        for text in ["can:can0,", "can:can0,FD", "can:,fd", "can:can0,fd,fd"] {
+            assert!(text.parse::<Device>().unwrap_err().contains("can:can0,fd"), "{text}");
+        }
+        for text in ["sim:", "sim", "plant.toml", "can:", "can", "slcan:", "serial:", "tcp:here"] {
             assert!(text.parse::<Device>().unwrap_err().contains("sim:PLANT.toml"), "{text}");
         }
     }

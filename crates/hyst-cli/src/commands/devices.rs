@@ -1,6 +1,6 @@
 //! `hystctl devices`: what is connected. Nothing is sent, nothing moves.
 
-use hyst_hw::{Port, ports};
+use hyst_hw::{Interface, Port, interfaces, ports};
 use serde::Serialize;
 
 use crate::cli::DevicesArgs;
@@ -16,13 +16,20 @@ struct Found {
     what: String,
 }
 
+/// A CAN interface with all that it carries.
+fn can(interface: Interface) -> Found {
+    let Interface { name, up, fd } = interface;
+    let state = if up { "up" } else { "down" };
+    let (daq, kind) = if fd { (format!("can:{name},fd"), "CAN FD") } else { (format!("can:{name}"), "CAN") };
+    Found { daq, port: name, what: format!("{kind}, {state}") }
+}
+
 pub(super) fn run(args: &DevicesArgs) -> CommandResult {
-    let found: Vec<Found> = ports()
-        .into_iter()
-        .map(|Port { name, what }| Found { daq: format!("serial:{name}"), port: name, what })
-        .collect();
+    let serial =
+        ports().into_iter().map(|Port { name, what }| Found { daq: format!("serial:{name}"), port: name, what });
+    let found: Vec<Found> = serial.chain(interfaces().into_iter().map(can)).collect();
     let text = if found.is_empty() {
-        "no serial port is connected\na device without one: sim:PLANT.toml (the simulated plant), tcp:HOST:PORT (a simulator or a bridge)"
+        "no serial port and no CAN interface is connected\na device without one: sim:PLANT.toml (the simulated plant), tcp:HOST:PORT (a simulator or a bridge)"
             .to_owned()
     } else {
         let rows = found.iter().map(|f| vec![f.daq.clone(), f.what.clone()]);

@@ -2,6 +2,7 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
+use std::path::Path;
 use std::time::Duration;
 
 use serialport::{ErrorKind as ErrorKindOfPort, SerialPort, SerialPortType};
@@ -134,6 +135,8 @@ impl Serial {
         serialport::new(name, baud).timeout(SHORTEST).open().map(|port| Self { port }).map_err(|source| {
             let text = source.to_string().to_lowercase();
             match source.kind() {
+                // A port that is there but cannot be had is told as no device, too.
+                ErrorKindOfPort::NoDevice if Path::new(name).exists() => OpenError::Busy { port: port() },
                 _ if text.contains("busy") => OpenError::Busy { port: port() },
                 ErrorKindOfPort::Io(ErrorKind::PermissionDenied) => OpenError::Denied { port: port() },
                 ErrorKindOfPort::NoDevice | ErrorKindOfPort::Io(ErrorKind::NotFound) => {

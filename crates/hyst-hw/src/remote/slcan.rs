@@ -14,7 +14,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use super::Line;
-use super::can::Bus;
+use super::can::{Bus, LARGEST, SHORT};
 use crate::wire::CanData;
 
 /// Bits a second that the adapters know, in the order of their numbers.
@@ -23,9 +23,6 @@ const RATES: [u32; 9] = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 /// Most characters of a line; what is longer is noise.
 const LONGEST: usize = 160;
-/// Largest identifier of 11 bits.
-const SHORT: u32 = 0x7ff;
-
 /// An adapter at the end of a serial line.
 #[derive(Debug)]
 pub struct Slcan<L> {
@@ -58,7 +55,7 @@ impl<L: Line> Slcan<L> {
 
 /// A frame as text. Frames of more than 8 bytes are of CAN FD; their lengths are those that it knows.
 fn written(id: u32, data: &[u8]) -> Option<String> {
-    let code = LENGTHS.iter().position(|length| *length == data.len())?;
+    let code = LENGTHS.iter().position(|length| *length == data.len()).filter(|_| id <= LARGEST)?;
     let letter = match (code > 8, id > SHORT) {
         (false, false) => 't',
         (false, true) => 'T',
@@ -73,30 +70,37 @@ fn written(id: u32, data: &[u8]) -> Option<String> {
     Some(text)
 }
 
+/// What hexadecimal digits, and nothing but them, stand for.
+fn number(digits: &str) -> Option<u32> {
+    let all = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    u32::from_str_radix(digits, 16).ok().filter(|_| all)
+}
+
 /// The frame that a line of text holds, if it holds one.
 fn read(text: &[u8]) -> Option<(u32, CanData)> {
     // An answer to what was sent before may stand in front.
     let text = std::str::from_utf8(text).ok()?.trim_start_matches(['z', 'Z', '\u{7}']);
-    let (digits, fd) = match text.chars().next()? {
-        't' => (3, false),
-        'T' => (8, false),
-        'd' | 'b' => (3, true),
-        'D' | 'B' => (8, true),
+    let (digits, ids, fd) = match text.chars().next()? {
+        't' => (3, 0..=SHORT, false),
+        'T' => (8, SHORT + 1..=LARGEST, false),
+        'd' | 'b' => (3, 0..=SHORT, true),
+        'D' | 'B' => (8, SHORT + 1..=LARGEST, true),
         _ => return None,
     };
-    let id = u32::from_str_radix(text.get(1..=digits)?, 16).ok()?;
-    let code = u8::from_str_radix(text.get(digits + 1..digits + 2)?, 16).ok()?;
-    let length = *LENGTHS.get(usize::from(code)).filter(|_| fd || code <= 8)?;
+    let id = number(text.get(1..=digits)?).filter(|id| ids.contains(id))?;
+    let code = number(text.get(digits + 1..digits + 2)?)?;
+    let length = *LENGTHS.get(code as usize).filter(|_| fd || code <= 8)?;
     let hex = text.get(digits + 2..)?;
     // Some adapters add a time.
-    let byte = |i: usize| u8::from_str_radix(hex.get(2 * i..2 * i + 2)?, 16).ok();
+    let byte = |i: usize| Some(number(hex.get(2 * i..2 * i + 2)?)? as u8);
     Some((id, (0..length).map(byte).collect::<Option<CanData>>()?))
 }
 
 impl<L: Line> Bus for Slcan<L> {
     fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()> {
-        let text = written(id, data)
-            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "no CAN frame has that many bytes"))?;
+        let text = written(id, data).ok_or_else(|| {
+            io::Error::new(io::ErrorKind::InvalidInput, "no CAN frame is of that identifier and length")
+        })?;
         self.line.send(text.as_bytes())
     }
 
@@ -104,7 +108,7 @@ impl<L: Line> Bus for Slcan<L> {
         let began = Instant::now();
         let mut bytes = [0; 1024];
         while self.came.is_empty() {
-            let Some(left) = patience.checked_sub(began.elapsed()).filter(|left| !left.is_zero()) else { break };
+            let left = patience.saturating_sub(began.elapsed());
             let count = self.line.receive(&mut bytes, left)?;
             for byte in &bytes[..count] {
                 match byte {
@@ -115,6 +119,9 @@ impl<L: Line> Bus for Slcan<L> {
                     _ if self.text.len() < LONGEST => self.text.push(*byte),
                     _ => {}
                 }
+            }
+            if left.is_zero() {
+                break;
             }
         }
         Ok(self.came.pop_front())
@@ -133,11 +140,15 @@ mod tests {
         let fd = written(0x7ff, &[0xCC; 12]).unwrap();
         assert_eq!(fd, format!("d7FF9{}\r", "CC".repeat(12)));
         assert_eq!(written(1, &[0; 9]), None);
+        assert_eq!(written(0x2000_0000, &[]), None);
     }
 
     #[test]
     fn what_is_no_frame_is_passed_over() {
-        for text in [&b""[..], b"z", b"\x07", b"t", b"t12", b"t1239", b"t1232A", b"txyz0", b"V1013", b"N\xff"] {
+        let foreign = [&b"T000001230"[..], b"t8000", b"T200000000", b"r1230"];
+        let odd =
+            [&b""[..], b"z", b"\x07", b"t", b"t12", b"t1239", b"t1232A", b"txyz0", b"t1231+1", b"V1013", b"N\xff"];
+        for text in odd.into_iter().chain(foreign) {
             assert_eq!(read(text), None, "{text:?}");
         }
         assert_eq!(read(b"zt12301"), Some((0x123, CanData::new())), "an answer, a frame and a time");

@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
 use super::*;
-use crate::wire::{Board, Device, Open, Shown};
+use crate::wire::{Board, CanData, Device, Open, Shown};
 use crate::{Cause, RecordOptions, record};
 use proptest::prelude::*;
 
@@ -350,6 +351,37 @@ fn a_run_over_a_socket() {
 fn a_run_over_a_pseudo_terminal() {
     let (host, device) = serialport::TTYPort::pair().unwrap();
     over(Serial::over(Box::new(host)), Serial::over(Box::new(device)));
+}
+
+/// One end of a bus of two, whose frames must not be longer than its kind has.
+struct Wire {
+    out: Sender<(u32, CanData)>,
+    into: Receiver<(u32, CanData)>,
+    longest: usize,
+}
+
+impl Bus for Wire {
+    fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()> {
+        assert!(data.len() <= self.longest);
+        self.out.send((id, data.iter().copied().collect())).map_err(|_| io::ErrorKind::BrokenPipe.into())
+    }
+    fn receive(&mut self, patience: Duration) -> io::Result<Option<(u32, CanData)>> {
+        match self.into.recv_timeout(patience) {
+            Ok(frame) => Ok(Some(frame)),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(io::ErrorKind::BrokenPipe.into()),
+        }
+    }
+}
+
+#[test]
+fn a_run_over_a_bus() {
+    for (fd, longest) in [(false, 8), (true, 64)] {
+        let ((there, from_host), (back, from_device)) = (channel(), channel());
+        let host = Wire { out: there, into: from_device, longest };
+        let device = Wire { out: back, into: from_host, longest };
+        over(CanLine::new(host, TO_DEVICE, FROM_DEVICE, fd), CanLine::new(device, FROM_DEVICE, TO_DEVICE, fd));
+    }
 }
 
 #[test]

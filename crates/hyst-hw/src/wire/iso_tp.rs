@@ -1,7 +1,9 @@
 //! Messages over a CAN bus: ISO 15765-2 (ISO-TP), classic frames of 8 bytes and FD frames of up to 64.
 //!
-//! No bus and no clock: [`IsoTp::frame`] gives the frames that are to be sent, [`IsoTp::take`] takes those that came. A message that
-//! lost a frame is given up; who wants it asks again.
+//! No bus and no clock: [`IsoTp::frame`] gives the frames that are to be sent, [`IsoTp::take`] takes those that came, and who has a clock
+//! waits for [`IsoTp::pause`] between them. A message that lost a frame is given up; who wants it asks again.
+
+use core::time::Duration;
 
 use heapless::Vec;
 
@@ -9,6 +11,10 @@ use heapless::Vec;
 pub const MOST_CAN: usize = 64;
 /// Most bytes of a message whose length fits in a first frame of the usual form.
 const MOST_LENGTH: usize = 0xfff;
+/// What one end tells the other about its message: go on, wait, there is no room for it.
+const GO_ON: u8 = 0x30;
+const WAIT: u8 = 0x31;
+const NO_ROOM: u8 = 0x32;
 
 /// Data of one CAN frame.
 pub type CanData = Vec<u8, MOST_CAN>;
@@ -49,8 +55,10 @@ pub struct IsoTp<const N: usize> {
     number: u8,
     /// Frames that may go before the other end has to be heard again; none if it does not matter.
     block: Option<u8>,
-    /// A frame that says that the other end may go on.
-    permission: bool,
+    /// What it wants between two frames.
+    pause: Duration,
+    /// What the other end is to be told about its message.
+    answer: Option<u8>,
     into: Vec<u8, N>,
     /// Bytes of the message that comes; zero if none does.
     expected: usize,
@@ -67,7 +75,8 @@ impl<const N: usize> IsoTp<N> {
             sent: 0,
             number: 0,
             block: None,
-            permission: false,
+            pause: Duration::ZERO,
+            answer: None,
             into: Vec::new(),
             expected: 0,
             next: 0,
@@ -82,6 +91,11 @@ impl<const N: usize> IsoTp<N> {
     /// Whether the other end has to allow what is still to be sent.
     pub fn waits(&self) -> bool {
         self.sending == Sending::Waiting
+    }
+
+    /// How long the other end wants to have between two frames of a message.
+    pub fn pause(&self) -> Duration {
+        self.pause
     }
 
     /// Gives up what is on its way out: the other end does not answer.
@@ -112,8 +126,9 @@ impl<const N: usize> IsoTp<N> {
 
     /// The next frame to send; none if there is nothing to send, or the other end has to be heard first.
     pub fn frame(&mut self) -> Option<CanData> {
-        if core::mem::take(&mut self.permission) {
-            return Some(filled(&[0x30, 0, 0], &[]));
+        if let Some(answer) = self.answer.take() {
+            // All of it in one go, without pauses.
+            return Some(filled(&[answer, 0, 0], &[]));
         }
         let length = self.out.len();
         match self.sending {
@@ -156,10 +171,11 @@ impl<const N: usize> IsoTp<N> {
             0 => {
                 // A length of its own byte comes with CAN FD.
                 let (length, bytes) = match head & 0xf {
-                    0 => {
+                    0 if data.len() > 8 => {
                         let (&length, bytes) = rest.split_first()?;
                         (usize::from(length), bytes)
                     }
+                    0 => return None,
                     length => (usize::from(length), rest),
                 };
                 self.expected = 0;
@@ -172,12 +188,17 @@ impl<const N: usize> IsoTp<N> {
                 let length = usize::from(head & 0xf) << 8 | usize::from(low);
                 self.expected = 0;
                 self.into.clear();
+                // Zero announces a length of four bytes.
+                if length > N || length == 0 {
+                    self.answer = Some(NO_ROOM);
+                    return None;
+                }
                 // One that fits in a single frame does not come in several.
-                if length > N || length <= bytes.len() {
+                if length <= bytes.len() {
                     return None;
                 }
                 self.into.extend_from_slice(bytes).ok()?;
-                (self.expected, self.next, self.permission) = (length, 1, true);
+                (self.expected, self.next, self.answer) = (length, 1, Some(GO_ON));
                 None
             }
             2 if self.expected > 0 => {
@@ -195,19 +216,29 @@ impl<const N: usize> IsoTp<N> {
                 Some(&self.into)
             }
             3 if self.sending == Sending::Waiting => {
-                match head & 0xf {
-                    0 => {
+                match head {
+                    GO_ON => {
                         self.sending = Sending::Going;
                         self.block = rest.first().copied().filter(|frames| *frames > 0);
+                        self.pause = rest.get(1).copied().map_or(Duration::ZERO, pause);
                     }
-                    // It asks to wait.
-                    1 => {}
+                    WAIT => {}
                     _ => self.sending = Sending::Nothing,
                 }
                 None
             }
             _ => None,
         }
+    }
+}
+
+/// The time that a byte stands for: milliseconds, or tenths of them.
+const fn pause(byte: u8) -> Duration {
+    match byte {
+        0..=0x7f => Duration::from_millis(byte as u64),
+        0xf1..=0xf9 => Duration::from_micros(100 * (byte - 0xf0) as u64),
+        // The standard has nothing for these; it takes them for the longest.
+        _ => Duration::from_millis(0x7f),
     }
 }
 
@@ -281,6 +312,36 @@ mod tests {
         let frame = end.frame().unwrap();
         assert_eq!((frame.len(), &frame[..4]), (24, &[0, 20, 0, 1][..]));
         assert_eq!(end.send(&[0; 1025]), Err(IsoTpError::TooLong));
+    }
+
+    #[test]
+    fn the_other_end_says_how_fast() {
+        let mut end = End::new(false);
+        for (byte, micros) in [(0, 0), (20, 20_000), (0x7f, 127_000), (0xf1, 100), (0xf9, 900), (0x80, 127_000)] {
+            end.give_up();
+            end.send(&[0; 100]).unwrap();
+            end.frame().unwrap();
+            end.take(&[GO_ON, 0, byte]);
+            assert_eq!(end.pause(), Duration::from_micros(micros), "{byte:#x}");
+        }
+    }
+
+    #[test]
+    fn a_message_without_room_is_refused() {
+        let mut end = End::new(false);
+        // 1025 bytes, and a length in four more bytes.
+        for first in [[0x14, 1, 0, 1, 2, 3, 4, 5], [0x10, 0, 0, 0, 0x20, 0, 1, 2]] {
+            assert_eq!(end.take(&first), None);
+            assert_eq!(end.frame().unwrap()[..3], [NO_ROOM, 0, 0]);
+            assert_eq!(end.take(&[0x21, 6, 7, 8, 9, 10, 11, 12]), None);
+        }
+        // Who is told so gives up.
+        end.send(&[0; 100]).unwrap();
+        end.frame().unwrap();
+        end.take(&[NO_ROOM, 0, 0]);
+        assert!(!end.busy() && end.frame().is_none());
+        // A length of its own byte is of long frames.
+        assert_eq!(end.take(&[0, 2, 1, 2, 0, 0, 0, 0]), None);
     }
 
     proptest! {

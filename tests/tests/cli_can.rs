@@ -1,0 +1,88 @@
+//! `hystctl` with a device on a CAN bus, through the sockets of Linux.
+//!
+//! The tests make interfaces, so they run where `HYST_CAN` is set, as root: `cargo xtask can` starts a machine in which all of that is
+//! there. Elsewhere each of them says that it skips.
+#![cfg(target_os = "linux")]
+
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use hyst_hw::wire::{Device, Open};
+use hyst_hw::{CanLine, FROM_DEVICE, Plant, PlantBoard, PlantConfig, SocketCan, TO_DEVICE, serve};
+use hyst_tests::{Lab, PLANT, column};
+
+const RATE_HZ: f64 = 500.0;
+
+/// A bus with an actuator on it; both end with it.
+struct Bus {
+    name: &'static str,
+    stop: Arc<AtomicBool>,
+    device: Option<JoinHandle<()>>,
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        let ended = self.device.take().map(JoinHandle::join);
+        let _ = Command::new("ip").args(["link", "del", self.name]).status();
+        assert!(ended.is_none_or(|ended| ended.is_ok()) || thread::panicking(), "the device failed");
+    }
+}
+
+/// The actuator of [`PLANT`] on a virtual bus, where there can be one.
+fn bus(name: &'static str, fd: bool) -> Option<Bus> {
+    if std::env::var_os("HYST_CAN").is_none() {
+        println!("skipped: HYST_CAN is not set; cargo xtask can runs this in a machine with CAN");
+        return None;
+    }
+    for line in ["add NAME type vcan", if fd { "set NAME mtu 72" } else { "set NAME mtu 16" }, "set NAME up"] {
+        let line = line.replace("NAME", name);
+        assert!(Command::new("ip").arg("link").args(line.split(' ')).status().unwrap().success(), "ip link {line}");
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let line = SocketCan::open(name, fd).unwrap();
+    let device = thread::spawn(move || {
+        let plant = Plant::new(PlantConfig::from_toml(PLANT).unwrap()).unwrap();
+        let mut board = PlantBoard::new(plant, RATE_HZ).unwrap();
+        let mut device = Device::<Open, 256, 0>::new(board.identity(RATE_HZ), Open);
+        let mut line = CanLine::new(line, FROM_DEVICE, TO_DEVICE, fd);
+        serve(&mut device, &mut board, &mut line, || stopped.load(Ordering::Relaxed)).unwrap();
+    });
+    Some(Bus { name, stop, device: Some(device) })
+}
+
+#[test]
+fn a_run_on_a_bus() {
+    for (name, fd) in [("cli", false), ("cli-fd", true)] {
+        let Some(_bus) = bus(name, fd) else { return };
+        let lab = Lab::new();
+        let volts: Vec<f64> = (0..1200).map(|k| 40.0 - 40.0 * (f64::from(k) * 0.02).cos()).collect();
+        let rows = volts.iter().enumerate().map(|(k, v)| format!("{:.3},{v:.3}\n", k as f64 / RATE_HZ));
+        lab.write("u.csv", format!("time_s,voltage_v\n{}", rows.collect::<String>()));
+        let daq = if fd { format!("can:{name},fd") } else { format!("can:{name}") };
+        let ran = lab.ok(&format!("run --daq {daq} --drive u.csv --record out.csv"));
+        println!("{}", ran.stdout.trim());
+        let (asked, record) = (column(&lab.read("u.csv"), "voltage_v"), lab.read("out.csv"));
+        let (driven, shown) = (column(&record, "voltage_v"), column(&record, "displacement_um"));
+        assert_eq!(driven.len(), asked.len());
+        assert!(driven.iter().zip(&asked).all(|(driven, asked)| *driven == f64::from(*asked as f32)));
+        // About 20 µm at 100 V: it moved.
+        let top = shown.iter().copied().fold(f64::MIN, f64::max);
+        assert!((10.0..20.0).contains(&top), "{top} µm");
+    }
+}
+
+#[test]
+fn interfaces_are_listed_and_refused_with_advice() {
+    let Some(_bus) = bus("cli-list", true) else { return };
+    let lab = Lab::new();
+    let found = lab.ok("devices --json").json();
+    let found = found.as_array().expect("a list");
+    assert!(found.iter().any(|port| port["daq"] == "can:cli-list,fd" && port["what"] == "CAN FD, up"), "{found:?}");
+    lab.write("u.csv", "time_s,voltage_v\n0,0\n0.002,1\n0.004,0\n");
+    let message = lab.refuses("run --daq can:cli-none --drive u.csv --record out.csv", 3);
+    assert!(message.contains("there are cli-list"), "{message}");
+}

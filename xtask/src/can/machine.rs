@@ -1,0 +1,143 @@
+//! A machine with CAN: QEMU starts it with the tests `can` of `hyst-hw` and `cli_can`, which make virtual interfaces and have the kernel
+//! itself as their peer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::packages::Packages;
+use super::{SKIPPED, image};
+use crate::command::{Outcome, cargo, install, output, passes, target, wait, which};
+
+const EMULATOR: &str = "qemu-system-x86_64";
+const EMULATOR_PACKAGE: &str = "qemu-system-x86";
+/// The machine is emulated, and has one processor.
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// Tests that run in it, with their packages.
+pub(super) const TESTS: &[(&str, &str)] = &[("hyst-hw", "can"), ("hyst-tests", "cli_can")];
+/// What `tests` prints of one that came to its end.
+pub(super) const PASSED: &str = "hyst-can: passed ";
+
+/// Runs the tests in it.
+pub(crate) fn check() -> Outcome {
+    if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+        return skipped("it needs Linux on x86-64");
+    }
+    if which(EMULATOR).is_none() && !install(&[EMULATOR_PACKAGE]) {
+        return skipped(&format!("{EMULATOR} is missing (Debian: `apt-get install {EMULATOR_PACKAGE}`)"));
+    }
+    let folder = target().join("can");
+    let packages = match Packages::get(&folder) {
+        Ok(packages) => packages,
+        Err(why) => return skipped(&why),
+    };
+    match run(&packages, &folder) {
+        Ok(()) => Outcome::Passed,
+        Err(why) => {
+            eprintln!("error: {why}");
+            Outcome::Failed
+        }
+    }
+}
+
+fn skipped(why: &str) -> Outcome {
+    Outcome::Skipped(format!("SocketCAN was not tested: {why}"))
+}
+
+fn run(packages: &Packages, folder: &Path) -> Result<(), String> {
+    let mut programs = Vec::new();
+    for (package, test) in TESTS {
+        programs.push((*test, built(package, test)?));
+    }
+    let hystctl = hystctl()?;
+    let image = image::build(packages, &programs, &hystctl, folder)?;
+    let printed = folder.join("printed.txt");
+    let log = fs::File::create(&printed).map_err(|error| format!("{}: {error}", printed.display()))?;
+    let mut machine = Command::new(EMULATOR);
+    machine
+        .args(["-accel", "tcg", "-machine", "q35", "-cpu", "max", "-m", "1024", "-nodefaults", "-no-reboot"])
+        .args(["-display", "none", "-serial", "stdio", "-append", "console=ttyS0 quiet panic=-1", "-kernel"])
+        .arg(&packages.kernel)
+        .arg("-initrd")
+        .arg(&image)
+        .stdin(Stdio::null())
+        .stdout(log);
+    let child = machine.spawn().map_err(|error| format!("{EMULATOR} could not be started: {error}"))?;
+    let ended = wait(child, LIMIT);
+    // The machine's exit code says nothing; what it printed does.
+    let bytes = fs::read(&printed).map_err(|error| format!("{}: {error}", printed.display()))?;
+    let text = String::from_utf8_lossy(&bytes).replace('\r', "");
+    eprintln!("{}", text.trim());
+    if ended.is_none() {
+        return Err(format!("the machine did not end within {} s", LIMIT.as_secs()));
+    }
+    judge(&text)
+}
+
+/// Whether all tests ran and passed, by what the machine printed.
+fn judge(text: &str) -> Result<(), String> {
+    if let Some(line) = text.lines().find(|line| line.contains(SKIPPED)) {
+        return Err(format!("a test did not run in the machine: {line}"));
+    }
+    for (_, test) in TESTS {
+        let ran = |line: &str| line.starts_with("test result: ok.") && !line.contains(" 0 passed");
+        let mut lines = text.lines().skip_while(|line| *line != format!("hyst-can: starts {test}"));
+        let ok = lines.any(ran) && lines.any(|line| line.strip_prefix(PASSED) == Some(test));
+        if !ok {
+            return Err(format!("the tests {test} did not pass in the machine"));
+        }
+    }
+    Ok(())
+}
+
+/// The program of a package's integration test.
+fn built(package: &str, test: &str) -> Result<PathBuf, String> {
+    let arguments = ["test", "--no-run", "--message-format=json-render-diagnostics", "--package", package];
+    let text = output(cargo().args(arguments).args(["--test", test]).stderr(Stdio::inherit()));
+    let text = text.ok_or_else(|| format!("the tests {test} of {package} do not build"))?;
+    let named = format!(r#""name":"{test}""#);
+    let line = text.lines().filter(|line| line.contains(&named)).find_map(|line| line.split_once(r#""executable":""#));
+    let program = line.and_then(|(_, rest)| rest.split_once('"')).map(|(program, _)| PathBuf::from(program));
+    program.ok_or_else(|| format!("cargo did not say where the tests {test} of {package} are"))
+}
+
+/// The command line's program.
+fn hystctl() -> Result<PathBuf, String> {
+    match passes(cargo().args(["build", "--package", "hyst-cli"])) {
+        Outcome::Passed => Ok(target().join("debug/hystctl")),
+        _ => Err("hystctl does not build".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "\
+hyst-can: starts can
+test result: ok. 14 passed; 0 failed
+hyst-can: passed can
+hyst-can: starts cli_can
+test result: ok. 2 passed; 0 failed
+hyst-can: passed cli_can
+";
+
+    #[test]
+    fn only_what_ran_and_passed_is_good() {
+        assert_eq!(judge(GOOD), Ok(()));
+        for (from, to) in [
+            ("14 passed", "0 passed"),
+            ("ok. 2", "FAILED. 2"),
+            ("hyst-can: passed can\n", ""),
+            ("hyst-can: passed cli_can\n", ""),
+            ("test result: ok. 14 passed; 0 failed\n", ""),
+            ("test result: ok. 14", "skipped: no CAN\ntest result: ok. 14"),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            judge(&GOOD.replace(from, to)).unwrap_err();
+        }
+        judge("").unwrap_err();
+    }
+}
