@@ -17,8 +17,9 @@ pub struct Ranked {
     pub free_rmse: f64,
     /// Gain and zero \[µm\] by which the free displacement is corrected.
     pub affine: (f64, f64),
-    /// Root mean square and largest error of the force \[N\].
+    /// Root mean square of the force's error \[N\].
     pub rmse: f64,
+    /// The largest one \[N\].
     pub max: f64,
 }
 

@@ -47,7 +47,7 @@ fn bus(name: &'static str, fd: bool) -> Option<Bus> {
     let device = thread::spawn(move || {
         let plant = Plant::new(PlantConfig::from_toml(PLANT).unwrap()).unwrap();
         let mut board = PlantBoard::new(plant, RATE_HZ).unwrap();
-        let mut device = Device::<Open, 256, 0>::new(board.identity(RATE_HZ), Open);
+        let mut device = Device::<Open, 256, 0>::new(board.identity(RATE_HZ, false), Open);
         let mut line = CanLine::new(line, FROM_DEVICE, TO_DEVICE, fd);
         serve(&mut device, &mut board, &mut line, || stopped.load(Ordering::Relaxed)).unwrap();
     });

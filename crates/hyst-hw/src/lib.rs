@@ -1,12 +1,13 @@
 //! Data acquisition: one trait for everything that drives an actuator and measures it, a runner
-//! that is generic over the trait, and a simulated actuator that implements it.
+//! that is generic over the trait, a simulated actuator and devices at lines that implement it.
 //!
 //! - [`Daq`]: start a sample clock, exchange drive for measurements, let the device rest, stop.
 //! - [`record`]: plays drive segments on any [`Daq`] and returns what was measured.
 //! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file), with any of eleven [`EFFECTS`] and with
 //!   [`Disturbance`]s that are none of them.
-//!
-//! - [`wire`]: frames on a stream of bytes, `no_std` and without heap, for a device and its firmware.
+//! - [`Remote`]: a device at the other end of a [`Line`]: a serial port, a CAN bus, a socket.
+//! - [`serve`]: a device made of software behind a line, with the plant as its actuator.
+//! - [`wire`]: what host and device say to each other, and the device's side of it, `no_std` and without heap, for firmware.
 //!
 //! ```
 //! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};

@@ -3,7 +3,7 @@
 mod picture;
 mod seconds;
 
-use std::io::{IsTerminal, Stderr, stderr};
+use std::io::{IsTerminal, Stderr, stderr, stdin, stdout};
 use std::time::{Duration, Instant};
 
 use hyst_hw::Sample;
@@ -52,7 +52,9 @@ impl View {
     /// Of a run of so many samples; `plain` asks for a bar.
     pub(super) fn new(total: usize, unit: &'static str, plain: bool) -> Self {
         let options = TerminalOptions { viewport: Viewport::Inline(LINES) };
-        let terminal = (stderr().is_terminal() && !plain)
+        // Where the cursor is, is asked on stdout and answered on stdin: neither may be anything else.
+        let asked = stdout().is_terminal() && stdin().is_terminal();
+        let terminal = (stderr().is_terminal() && asked && !plain)
             // A terminal that does not say where its cursor is has no picture.
             .then(|| Terminal::with_options(CrosstermBackend::new(stderr()), options).ok())
             .flatten();
@@ -110,7 +112,10 @@ impl Picture {
 
 impl Drop for Picture {
     fn drop(&mut self) {
+        let place = self.terminal.get_frame().area().as_position();
         let _ = self.terminal.clear();
+        // What is said next begins where the picture was.
+        let _ = self.terminal.set_cursor_position(place);
         let _ = self.terminal.show_cursor();
     }
 }
