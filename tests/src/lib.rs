@@ -6,6 +6,8 @@ pub mod control_study;
 pub mod dpm_study;
 pub mod fod_study;
 pub mod force_study;
+pub mod logs;
+pub mod served;
 
 use std::env;
 use std::ffi::OsStr;

@@ -1,52 +1,75 @@
 //! The log of a run: an MCAP file that is written while the device runs.
 //!
 //! One channel, `/actuator/sample`, holds every sample as JSON; schema and channel metadata name the units. Chunks are
-//! closed once per second of data, so that what was measured can be read even if the program dies. A metadata record
+//! closed twice a second, so that what was measured can be read even if the program dies. A metadata record
 //! says what ran, and the model is attached as the file that it was.
 
 mod contents;
+mod recover;
+mod sink;
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufWriter, IntoInnerError};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use hyst_ident::atomic_file::set_aside;
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapError, WriteOptions, Writer};
+use mcap::records::Metadata;
+use mcap::{Attachment, McapError, WriteOptions};
 use tempfile::TempPath;
 
-pub(crate) use contents::{LoggedModel, LoggedSample, RunInfo};
+pub use contents::{LoggedModel, LoggedSample, RunInfo};
 use contents::{metadata, schema, units};
+pub use recover::recovered;
+use sink::{Open, Sink, said};
 
 /// Channel of the samples.
-pub(crate) const TOPIC: &str = "/actuator/sample";
+pub const TOPIC: &str = "/actuator/sample";
 
 /// The log cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: the log cannot be written", path.display())]
-pub(crate) struct LogError {
+#[error("{}: {}: {source}; {}", path.display(), self.what(), self.advice())]
+pub struct LogError {
     path: PathBuf,
-    source: McapError,
+    /// Samples that can be read all the same, at least; none before there was one.
+    saved: Option<u32>,
+    source: io::Error,
+}
+
+impl LogError {
+    fn what(&self) -> &'static str {
+        if self.saved.is_some() { "the log cannot be written any further" } else { "the log cannot be written" }
+    }
+
+    fn advice(&self) -> String {
+        let path = self.path.display();
+        let make_room = "free space there, or log to a file on another disk";
+        match self.saved {
+            None => "give a file in a folder that can be written and has space".to_owned(),
+            Some(0) => format!("{make_room}, and run again"),
+            Some(saved) => format!(
+                "{make_room}, and run again; at least the first {saved} samples are safe in it: `hystctl log recover {path} -o whole.mcap` makes a closed log of them"
+            ),
+        }
+    }
 }
 
 /// A log while it is written.
 ///
 /// It takes its name with the first sample: a run that is refused before anything moves leaves an older log as it was.
 /// Dropped without [`finish`](Self::finish), it is still closed as well as it can be.
-pub(crate) struct RunLog {
+pub struct RunLog {
     path: PathBuf,
-    /// The temporary name, until the first sample.
-    unnamed: Option<TempPath>,
+    sink: Sink,
+    channel_id: u16,
+    /// A sample as text.
+    text: Vec<u8>,
     /// Whether an older file of this name is set aside.
     keeps_older: bool,
     /// The name that it has got.
     older: Option<PathBuf>,
-    writer: Writer<BufWriter<File>>,
-    channel_id: u16,
-    samples: u32,
-    /// Lab time of the first sample that is not on the disk yet \[s\].
-    unflushed_s: Option<f64>,
+    /// The temporary name, until the first sample.
+    unnamed: Option<TempPath>,
 }
 
 impl RunLog {
@@ -54,19 +77,18 @@ impl RunLog {
     ///
     /// # Errors
     /// When the folder cannot be written.
-    pub(crate) fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
-        let failed = |source| LogError { path: path.to_owned(), source };
-        let (file, unnamed) = temporary(path).map_err(|error| failed(error.into()))?.into_parts();
-        let (writer, channel_id) = begin(file, info).map_err(failed)?;
+    pub fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+        let failed = |source| LogError { path: path.to_owned(), saved: None, source };
+        let (file, unnamed) = temporary(path).map_err(failed)?.into_parts();
+        let (writer, channel_id) = begin(file, info).map_err(said).map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
-            unnamed: Some(unnamed),
+            sink: Sink::new(writer).map_err(failed)?,
+            channel_id,
+            text: Vec::new(),
             keeps_older: false,
             older: None,
-            writer,
-            channel_id,
-            samples: 0,
-            unflushed_s: None,
+            unnamed: Some(unnamed),
         })
     }
 
@@ -74,64 +96,52 @@ impl RunLog {
     ///
     /// # Errors
     /// When the folder cannot be written.
-    pub(crate) fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+    pub fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
-    /// Appends one sample.
+    /// Appends one sample. It reaches the disk within half a second, also if none follows.
     ///
     /// # Errors
-    /// When the disk refuses.
-    pub(crate) fn sample(&mut self, sample: &LoggedSample) -> Result<(), LogError> {
-        self.append(sample).map_err(|source| LogError { path: self.path.clone(), source })
+    /// When the disk refuses, or has refused one before.
+    pub fn sample(&mut self, sample: &LoggedSample) -> Result<(), LogError> {
+        self.append(sample).map_err(|source| self.failed(source))
     }
 
-    fn append(&mut self, sample: &LoggedSample) -> Result<(), McapError> {
+    fn append(&mut self, sample: &LoggedSample) -> io::Result<()> {
         self.take_name()?;
-        let data = serde_json::to_vec(sample).map_err(io::Error::other)?;
-        // A time before zero, which no clock here has, would become zero.
-        let log_time = (sample.time_s * 1e9).round() as u64;
-        let header =
-            MessageHeader { channel_id: self.channel_id, sequence: self.samples, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &data)?;
-        self.samples = self.samples.wrapping_add(1);
-        let since = *self.unflushed_s.get_or_insert(sample.time_s);
-        if sample.time_s - since >= 1.0 {
-            self.writer.flush()?;
-            self.unflushed_s = None;
-        }
-        Ok(())
+        self.text.clear();
+        serde_json::to_writer(&mut self.text, sample)?;
+        self.sink.append(self.channel_id, sample.time_s, &self.text)
+    }
+
+    fn failed(&self, source: io::Error) -> LogError {
+        LogError { path: self.path.clone(), saved: Some(self.sink.saved()), source }
     }
 
     /// What it is called, or will be.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// The name that an older file has got.
-    pub(crate) fn older(&self) -> Option<&Path> {
+    pub fn older(&self) -> Option<&Path> {
         self.older.as_deref()
     }
 
     /// Samples so far.
-    pub(crate) fn samples(&self) -> u32 {
-        self.samples
+    pub fn samples(&self) -> u32 {
+        self.sink.written()
     }
 
     /// Writes summary and footer, and waits for the disk.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub(crate) fn finish(self) -> Result<(), LogError> {
-        let path = self.path.clone();
-        self.close().map_err(|source| LogError { path, source })
-    }
-
-    fn close(mut self) -> Result<(), McapError> {
-        self.take_name()?;
-        self.writer.finish()?;
-        let file = self.writer.into_inner().into_inner().map_err(IntoInnerError::into_error)?;
-        Ok(file.sync_all()?)
+    pub fn finish(mut self) -> Result<(), LogError> {
+        self.take_name().map_err(|source| self.failed(source))?;
+        let (path, saved) = (self.path, Some(self.sink.saved()));
+        self.sink.close().map_err(|source| LogError { path, saved, source })
     }
 
     fn take_name(&mut self) -> io::Result<()> {
@@ -166,13 +176,9 @@ fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// Header, metadata, attachment, schema and channel.
-fn begin(file: File, info: &RunInfo<'_>) -> Result<(Writer<BufWriter<File>>, u16), McapError> {
-    let mut writer = WriteOptions::new()
-        .library(concat!("hystctl ", env!("CARGO_PKG_VERSION")))
-        // Chunks of one second are small: threads would only cost.
-        .compression_threads(0)
-        .create(BufWriter::new(file))?;
+/// Header, metadata, attachment, schema and channel, all of them on the disk: a log that is cut off later says what ran.
+fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
+    let mut writer = options().create(BufWriter::new(file))?;
     writer.write_metadata(&Metadata { name: "run".to_owned(), metadata: metadata(info) })?;
     if let Some(LoggedModel { json, .. }) = info.model {
         writer.attach(&Attachment {
@@ -187,7 +193,17 @@ fn begin(file: File, info: &RunInfo<'_>) -> Result<(Writer<BufWriter<File>>, u16
     let schema = serde_json::to_vec(&schema(unit)).map_err(io::Error::other)?;
     let schema_id = writer.add_schema("hyst.actuator.Sample", "jsonschema", &schema)?;
     let channel_id = writer.add_channel(schema_id, TOPIC, "json", &units(unit))?;
+    writer.flush()?;
     Ok((writer, channel_id))
+}
+
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .library(concat!("hystctl ", env!("CARGO_PKG_VERSION")))
+        // Chunks of half a second are small: threads would only cost.
+        .compression_threads(0)
+        // A chunk goes out in one piece, so that what stands before it is whole whenever the program dies.
+        .disable_seeking(true)
 }
 
 #[cfg(test)]
@@ -240,6 +256,36 @@ mod tests {
         (0..250).for_each(|k| log.sample(&sample(k)).unwrap());
         assert!(read(&path).len() >= 202);
         drop(log);
+    }
+
+    #[test]
+    fn a_sample_that_none_follows_reaches_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = RunLog::create(&path, &info()).unwrap();
+        for (k, all) in [(0, 1), (1, 2), (2, 3)] {
+            log.sample(&sample(k)).unwrap();
+            // It takes half a second; a busy machine is given a minute.
+            let began = std::time::Instant::now();
+            while read(&path).len() < all && began.elapsed().as_secs() < 60 {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            assert_eq!(read(&path).len(), all);
+            assert_eq!(log.sink.saved(), all as u32);
+        }
+        log.finish().unwrap();
+        assert_eq!(read(&path).len(), 3);
+    }
+
+    #[test]
+    fn a_log_that_has_no_sample_on_the_disk_says_what_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = RunLog::create(&path, &info()).unwrap();
+        log.sample(&sample(0)).unwrap();
+        let begun = hyst_ident::record::RunLog::parse("run.mcap", &std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!((begun.samples.len(), begun.closed), (0, false));
+        assert_eq!(begun.metadata["device"], "test");
     }
 
     #[test]

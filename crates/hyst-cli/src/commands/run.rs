@@ -122,7 +122,6 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let mut recording = played?;
-    closed?;
     job.align(&mut recording);
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
@@ -132,6 +131,8 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         let extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
         target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
+    // The record may lie on another disk than a log that could not be closed.
+    closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
     let summary = Summary {

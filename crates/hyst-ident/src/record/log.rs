@@ -95,6 +95,9 @@ impl RunLog {
         }
         match channel {
             Some(_) => Ok(log),
+            None if !log.closed => {
+                Err(foreign(format!("it was cut off before the channel {TOPIC}: nothing of a run is in it")))
+            }
             None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
         }
     }
