@@ -5,6 +5,7 @@
 mod browser;
 mod command;
 mod firmware;
+mod logs;
 mod python;
 
 use command::{Check, Outcome};
@@ -13,9 +14,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware, Python
+cargo xtask test                run every check: format, lints, tests, documentation, firmware, logs, Python
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
+cargo xtask logs                run the log checks alone: logs of every kind of run, read with Foxglove's Go programs
 cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
 
@@ -26,6 +28,7 @@ fn main() -> ExitCode {
         ["test"] => test(),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
+        ["logs"] => table(&logs()),
         ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
@@ -71,8 +74,14 @@ fn test() -> ExitCode {
     let checked = CHECKS.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
     results.extend(checked);
     results.push(("firmware", timed("firmware", || firmware::check(false))));
+    results.extend(logs());
     results.push(("python", timed("python", python::check)));
     table(&results)
+}
+
+fn logs() -> [(&'static str, (Outcome, f64)); 2] {
+    let checks: [(&str, fn() -> Outcome); 2] = [("logs, Go library", logs::library), ("logs, mcap doctor", logs::tool)];
+    checks.map(|(name, check)| (name, timed(name, check)))
 }
 
 fn table(results: &[(&str, (Outcome, f64))]) -> ExitCode {

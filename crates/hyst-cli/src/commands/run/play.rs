@@ -59,14 +59,14 @@ fn failed<E: Classified>(failure: Failure<E>, log_error: Option<LogError>, log: 
     let many = text::count(measured, "sample");
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
     match (log, log_error) {
-        _ if measured == 0 => {}
         (Some(_), Some(error)) if cancelled => {
             say(&format!("note: the device was brought to rest; {many} had been measured"));
             return error.into();
         }
         (Some(_), Some(error)) => say(&format!("note: {error}")),
+        _ if measured == 0 => {}
         (Some(log), None) => {
-            say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()))
+            say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()));
         }
         (None, _) => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
     }
