@@ -6,6 +6,7 @@ pub mod control_study;
 pub mod dpm_study;
 pub mod fod_study;
 pub mod force_study;
+pub mod fuzz;
 pub mod logs;
 pub mod served;
 

@@ -30,6 +30,16 @@ pub trait Line {
     /// # Errors
     /// When the line is gone.
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize>;
+
+    /// What time it is at this line. A line that is simulated may have a clock of its own.
+    fn now(&mut self) -> Instant {
+        Instant::now()
+    }
+
+    /// Lets some time pass.
+    fn pause(&mut self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 impl<L: Line + ?Sized> Line for Box<L> {
@@ -39,6 +49,14 @@ impl<L: Line + ?Sized> Line for Box<L> {
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
         (**self).receive(bytes, patience)
+    }
+
+    fn now(&mut self) -> Instant {
+        (**self).now()
+    }
+
+    fn pause(&mut self, time: Duration) {
+        (**self).pause(time);
     }
 }
 
@@ -294,6 +312,11 @@ impl<L: Line> Remote<L> {
         self.stated(Ask::Clear).map(|_| ())
     }
 
+    /// Time since `then`, on the line's clock.
+    fn since(&mut self, then: Instant) -> Duration {
+        self.line.now().saturating_duration_since(then)
+    }
+
     fn odd(&self) -> RemoteError {
         RemoteError::Answer { line: self.name.clone() }
     }
@@ -327,13 +350,13 @@ impl<L: Line> Remote<L> {
         let request = Request { number: self.number, ask };
         let mut buffer = [0; MAX_FRAME];
         let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
-        let began = Instant::now();
+        let began = self.line.now();
         let mut bytes = [0; 4096];
-        while began.elapsed() < self.options.lost {
+        while self.since(began) < self.options.lost {
             // A zero ends what a line may have left of an earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
-            let sent = Instant::now();
-            while let Some(patience) = self.options.repeat.checked_sub(sent.elapsed()).filter(|d| !d.is_zero()) {
+            let sent = self.line.now();
+            while let Some(patience) = self.options.repeat.checked_sub(self.since(sent)).filter(|d| !d.is_zero()) {
                 let came = self.line.receive(&mut bytes, patience).map_err(|source| self.gone(source))?;
                 let mut fresh = &bytes[..came];
                 while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
@@ -406,7 +429,7 @@ impl<L: Line> Remote<L> {
     /// Waits until the device has done something more.
     fn trade_until_news(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
         let mut run = self.run.ok_or(RemoteError::Order)?;
-        let (before, began) = (measured.len(), Instant::now());
+        let (before, began) = (measured.len(), self.line.now());
         loop {
             let outcome = self.trade(&mut run, drive_v, measured);
             self.run = Some(run);
@@ -415,11 +438,11 @@ impl<L: Line> Remote<L> {
             if taken > 0 || measured.len() > before || !outstanding && drive_v.is_empty() {
                 return Ok(taken);
             }
-            if began.elapsed() > self.options.lost {
+            if self.since(began) > self.options.lost {
                 // The runner calls that a stalled device.
                 return Ok(0);
             }
-            std::thread::sleep(Duration::from_micros(200));
+            self.line.pause(Duration::from_micros(200));
         }
     }
 }
@@ -529,13 +552,13 @@ impl<L: Line> Daq for Remote<L> {
         if self.run.take().is_none() {
             return Ok(());
         }
-        let began = Instant::now();
+        let began = self.line.now();
         loop {
             let status = self.stated(Ask::Stop)?;
             match status.state {
                 State::Idle => return Ok(()),
                 State::Fault(_) if status.present_v == self.identity.rest_v => return Ok(()),
-                _ if began.elapsed() > Duration::from_secs(60) => {
+                _ if self.since(began) > Duration::from_secs(60) => {
                     let advice = "the device does not come to rest; switch its amplifier off";
                     return Err(RemoteError::Silent {
                         line: self.name.clone(),
@@ -544,7 +567,7 @@ impl<L: Line> Daq for Remote<L> {
                         advice,
                     });
                 }
-                _ => std::thread::sleep(Duration::from_millis(2)),
+                _ => self.line.pause(Duration::from_millis(2)),
             }
         }
     }
