@@ -17,6 +17,7 @@ const USAGE: &str = "\
 cargo xtask test                run every check: format, lints, tests, documentation, firmware, logs, Python
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
+cargo xtask fuzz [CASES]        frames and bytes by chance against whatever takes them, 1,000,000 cases of each kind; half an hour
 cargo xtask logs                run the log checks alone: logs of every kind of run, read with Foxglove's Go programs
 cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         ["test"] => test(),
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
+        ["fuzz", ref more @ ..] => table(&[("fuzz", timed("fuzz", || fuzz(more)))]),
         ["logs"] => table(&logs()),
         ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
@@ -77,6 +79,12 @@ fn test() -> ExitCode {
     results.extend(logs());
     results.push(("python", timed("python", python::check)));
     table(&results)
+}
+
+/// Says by itself what to do with a number of cases that is none.
+fn fuzz(arguments: &[&str]) -> Outcome {
+    let program = ["run", "--release", "--quiet", "--package", "hyst-tests", "--example", "fuzz", "--"];
+    command::passes(command::cargo().args(program).args(arguments))
 }
 
 fn logs() -> Vec<(&'static str, (Outcome, f64))> {

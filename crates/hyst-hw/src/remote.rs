@@ -112,6 +112,12 @@ pub enum RemoteError {
         /// Why.
         fault: Fault,
     },
+    /// The run is over, and nobody here has ended it.
+    #[error("{line}: the device was told to stop, and not by this program; does another one talk to it?")]
+    Stopped {
+        /// What the line is called.
+        line: String,
+    },
     /// A value that cannot be asked for.
     #[error("{what} = {value}: {advice}")]
     Value {
@@ -389,6 +395,10 @@ impl<L: Line> Remote<L> {
                 if let State::Fault(fault) = status.state {
                     self.hear(run, first, &samples, measured);
                     return Err(RemoteError::Fault { line: self.name.clone(), fault });
+                }
+                if status.state != State::Running {
+                    self.hear(run, first, &samples, measured);
+                    return Err(RemoteError::Stopped { line: self.name.clone() });
                 }
                 let taken = status.received.wrapping_sub(run.sent) as usize;
                 if taken > drive_v.len() || !self.hear(run, first, &samples, measured) {

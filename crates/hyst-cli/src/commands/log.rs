@@ -35,6 +35,8 @@ struct Summary {
     log: String,
     /// Whether it was closed; else it was cut off.
     closed: bool,
+    /// Chunks of samples and other records that are left out because they are damaged.
+    damaged: usize,
     samples: usize,
     /// Of the samples, those that are part of what was asked for.
     record_samples: usize,
@@ -60,6 +62,7 @@ impl Summary {
         Self {
             log: path.display().to_string(),
             closed: log.closed,
+            damaged: log.damaged,
             samples: log.samples.len(),
             record_samples: record().count(),
             segments: segments.len(),
@@ -81,6 +84,7 @@ impl Summary {
             text::count(self.segments, "segment"),
             if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
         )];
+        lines.extend(damage(self.damaged));
         lines.extend(
             self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
@@ -88,6 +92,12 @@ impl Summary {
         lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
         lines.join("\n")
     }
+}
+
+/// What to say about pieces that are damaged, if there are any.
+fn damage(pieces: usize) -> Option<String> {
+    let many = text::count(pieces, "damaged piece");
+    (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
 }
 
 fn info(args: &LogInfoArgs) -> CommandResult {
@@ -111,6 +121,8 @@ struct Recovered {
     samples: usize,
     /// Whether there was anything to recover.
     was_closed: bool,
+    /// Chunks of samples and other records that were left out because they are damaged.
+    damaged: usize,
 }
 
 fn recover(args: &LogRecoverArgs) -> CommandResult {
@@ -124,8 +136,10 @@ fn recover(args: &LogRecoverArgs) -> CommandResult {
         output: args.output.to_string(),
         samples: log.samples.len(),
         was_closed: log.closed,
+        damaged: log.damaged,
     };
     let how = if log.closed { "was closed already" } else { "had been cut off" };
     let said = format!("{} {how}; {}: {}", done.log, done.output, text::count(done.samples, "sample"));
-    report.print(&said, &done)
+    let said: Vec<String> = std::iter::once(said).chain(damage(done.damaged)).collect();
+    report.print(&said.join("\n"), &done)
 }

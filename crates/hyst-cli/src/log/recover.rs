@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Cursor};
 
-use mcap::read::{ChunkFlattener, Options};
+use hyst_ident::record::LogRecords;
 use mcap::records::{Metadata, Record};
 use mcap::{Attachment, McapError};
 
@@ -22,8 +22,7 @@ pub fn recovered(bytes: &[u8]) -> io::Result<Vec<u8>> {
 fn rewritten(bytes: &[u8]) -> Result<Vec<u8>, McapError> {
     let mut writer = options().create(Cursor::new(Vec::new()))?;
     let (mut schemas, mut channels) = (BTreeMap::from([(0, 0)]), BTreeMap::new());
-    let records = ChunkFlattener::new_with_options(bytes, Options::IgnoreEndMagic.into())?;
-    for record in records.map_while(Result::ok) {
+    for record in LogRecords::new(bytes).ok_or(McapError::BadMagic)? {
         match record {
             Record::Schema { header, data } => {
                 schemas.insert(header.id, writer.add_schema(&header.name, &header.encoding, &data)?);
@@ -115,5 +114,26 @@ mod tests {
             assert_eq!(summary.stats.unwrap().message_count, left.len() as u64);
         }
         assert_eq!(messages(&recovered(&whole).unwrap()), all);
+    }
+
+    #[test]
+    fn a_damaged_chunk_takes_no_other_with_it() {
+        let whole = log();
+        let all = messages(&whole);
+        let summary = mcap::Summary::read(&whole).unwrap().unwrap();
+        for chunk in &summary.chunk_indexes {
+            let inside = summary.stream_chunk(&whole, chunk).unwrap().count();
+            // Behind its kind and its length.
+            let (from, to) =
+                (chunk.chunk_start_offset as usize + 9, (chunk.chunk_start_offset + chunk.chunk_length) as usize);
+            for at in from..to {
+                // The channel stands in the first chunk.
+                let mut damaged = whole.clone();
+                damaged[at] ^= 1 << (at % 8);
+                let left = messages(&recovered(&damaged).unwrap());
+                assert!(left.len() + inside >= all.len() || inside == 0, "{} left, byte {at}", left.len());
+                assert!(left.iter().all(|message| all.contains(message)), "another sample, byte {at}");
+            }
+        }
     }
 }
