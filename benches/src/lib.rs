@@ -1,4 +1,5 @@
 //! What the benches share: tasks with a known answer, and clocks.
 
 pub mod clock;
+pub mod echo;
 pub mod task;

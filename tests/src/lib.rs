@@ -7,6 +7,8 @@ pub mod dpm_study;
 pub mod fod_study;
 pub mod force_ranking;
 pub mod force_study;
+pub mod fuzz;
+pub mod logs;
 pub mod served;
 
 use std::env;

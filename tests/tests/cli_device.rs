@@ -37,8 +37,8 @@ fn events(lab: &Lab, name: &str) -> Vec<(String, String)> {
 
 #[test]
 fn a_drive_over_a_socket_is_played_as_it_stands_and_looking_moves_nothing() {
-    let (lab, device) = (Lab::new(), Served::new(PLANT, RATE_HZ));
-    let daq = &device.daq;
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
+    let daq = device.daq();
     let said = lab.ok(&format!("record --daq {daq} --seconds 0.5 -o rest.csv --log rest.mcap --json")).json();
     assert_eq!(said["samples"], 250);
     assert!(said["deviation"].as_f64().unwrap() > 0.0);
@@ -56,7 +56,7 @@ fn a_drive_over_a_socket_is_played_as_it_stands_and_looking_moves_nothing() {
     assert_eq!(device.put_out().last(), Some(&0.0));
     let info = lab.ok("log info y.mcap").stdout;
     assert!(info.contains("clock.began_unix_s"), "{info}");
-    assert_eq!(device.end(), State::Idle);
+    assert_eq!(device.end().state, State::Idle);
 }
 
 #[test]
@@ -64,11 +64,11 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     let lab = lab();
     let loaded =
         format!("{PLANT}[load]\nnewtons = 2\num_per_n = 0.8\nperiod_s = 1.7\nshape = \"sine\"\nrecorded = false\n");
-    let device = Served::new(&loaded, RATE_HZ);
+    let device = Served::plant(&loaded, RATE_HZ);
     let run = |control: &str, more: &str| {
         lab.ok(&format!(
             "run --daq {} --model model.json --reference sine:4,14,1,3 --control {control} --settle 0.5 --log run.mcap --json {more}",
-            device.daq
+            device.daq()
         ))
         .json()
     };
@@ -83,14 +83,15 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     assert!((-3.5..-1.0).contains(&low) && (1.0..3.5).contains(&high), "{low} {high}");
 
     let refused = |control: &str| {
-        let line = format!("run --daq {} --model model.json --reference sine:4,14,1,3 --control {control}", device.daq);
+        let line =
+            format!("run --daq {} --model model.json --reference sine:4,14,1,3 --control {control}", device.daq());
         lab.refuses(&line, 2)
     };
     assert!(refused("pid").contains("--control pid+feedforward"));
     // An output that does not come to its reference ends the run on the device.
     let line = format!(
         "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap",
-        device.daq
+        device.daq()
     );
     let ran = lab.run(&line);
     assert_eq!(ran.code, 3, "{ran:?}");
@@ -100,9 +101,9 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
 
 #[test]
 fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_told() {
-    let (lab, device) = (Lab::new(), Served::new(PLANT, RATE_HZ));
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.2 --cycles 2 -o u.csv"));
-    let line = format!("run --daq {} --drive u.csv --log killed.mcap --slew 400", device.daq);
+    let line = format!("run --daq {} --drive u.csv --log killed.mcap --slew 400", device.daq());
     let mut host = lab.command(&line).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
     while device.put_out().last().is_none_or(|v| *v < 40.0) {
         sleep(Duration::from_millis(20));
@@ -120,15 +121,15 @@ fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_t
     assert!(ran.stderr.contains("--clear"), "{ran:?}");
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 20 --frequency 5 --cycles 2 -o short.csv"));
     lab.ok(&format!("{line} --clear").replace("killed", "next").replace("u.csv", "short.csv"));
-    assert_eq!(device.end(), State::Idle);
+    assert_eq!(device.end().state, State::Idle);
 }
 
 #[test]
 fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
-    let (lab, device) = (Lab::with_model(), Served::new(PLANT, RATE_HZ));
-    let said = lab.ok(&format!("stop --daq {}", device.daq)).stdout;
+    let (lab, device) = (Lab::with_model(), Served::plant(PLANT, RATE_HZ));
+    let said = lab.ok(&format!("stop --daq {}", device.daq())).stdout;
     assert!(said.contains("--clear"), "{said}");
-    let run = format!("run --daq {} --drive u.csv --record y.csv", device.daq);
+    let run = format!("run --daq {} --drive u.csv --record y.csv", device.daq());
     let message = lab.refuses(&run, 2);
     assert!(message.contains(&Fault::Emergency.to_string()), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);

@@ -6,6 +6,7 @@ mod browser;
 mod can;
 mod command;
 mod firmware;
+mod logs;
 mod python;
 
 use command::{Check, Outcome};
@@ -14,10 +15,12 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware, CAN, Python
+cargo xtask test                run every check: format, lints, tests, documentation, firmware, CAN, logs, Python
 cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
 cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
 cargo xtask can                 run the CAN check alone: against python-can, and in QEMU against Linux's own ISO-TP and slcan
+cargo xtask fuzz [CASES]        frames and bytes by chance against whatever takes them, 1,000,000 cases of each kind; half an hour
+cargo xtask logs                run the log checks alone: logs of every kind of run, read with Foxglove's Go programs
 cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
 
@@ -29,6 +32,8 @@ fn main() -> ExitCode {
         ["firmware"] => table(&[("firmware", timed("firmware", || firmware::check(false)))]),
         ["firmware", "--table"] => table(&[("firmware", timed("firmware", || firmware::check(true)))]),
         ["can"] => table(&[("can", timed("can", can::check))]),
+        ["fuzz", ref more @ ..] => table(&[("fuzz", timed("fuzz", || fuzz(more)))]),
+        ["logs"] => table(&logs()),
         ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
@@ -75,8 +80,20 @@ fn test() -> ExitCode {
     results.extend(checked);
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
+    results.extend(logs());
     results.push(("python", timed("python", python::check)));
     table(&results)
+}
+
+/// Says by itself what to do with a number of cases that is none.
+fn fuzz(arguments: &[&str]) -> Outcome {
+    let program = ["run", "--release", "--quiet", "--package", "hyst-tests", "--example", "fuzz", "--"];
+    command::passes(command::cargo().args(program).args(arguments))
+}
+
+fn logs() -> Vec<(&'static str, (Outcome, f64))> {
+    let (library, tool) = ("logs, Go library", "logs, mcap doctor");
+    vec![(library, timed(library, logs::library)), (tool, timed(tool, logs::tool))]
 }
 
 fn table(results: &[(&str, (Outcome, f64))]) -> ExitCode {

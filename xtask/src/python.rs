@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::command::Outcome;
 
 /// What the tests need besides the package.
-const NEEDED: &[&str] = &["numpy", "scipy", "pytest", "hypothesis"];
+const NEEDED: &[&str] = &["numpy", "scipy", "pytest", "hypothesis", "mcap", "jsonschema"];
 /// Interpreters to try, in this order.
 const INTERPRETERS: &[&str] =
     &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];
@@ -32,10 +32,11 @@ pub(crate) fn program(environment: &Path) -> PathBuf {
 pub(crate) fn check() -> Outcome {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let Some(python) = interpreter() else { return Outcome::Skipped(INSTALL.to_owned()) };
+    let Some(logs) = crate::logs::made() else { return Outcome::Failed };
     let own = root.join("target").join("python-tests");
     let run = |program: &Path, arguments: &[&str]| {
         let mut command = Command::new(program);
-        command.current_dir(root).args(arguments);
+        command.current_dir(root).args(arguments).env("HYST_LOGS", &logs);
         // An environment of the caller's must not lend its packages.
         command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
         match command.status() {

@@ -2,58 +2,81 @@
 //!
 //! One channel, `/actuator/sample`, holds every sample as JSON; schema and channel metadata name the units. Another one,
 //! `/actuator/event`, says what happened on the way. Chunks are
-//! closed once per second of data, so that what was measured can be read even if the program dies. A metadata record
+//! closed twice a second, so that what was measured can be read even if the program dies. A metadata record
 //! says what ran, and the model is attached as the file that it was.
 
 mod contents;
+mod recover;
+mod sink;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, IntoInnerError};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use hyst_ident::atomic_file::set_aside;
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapError, WriteOptions, Writer};
+use mcap::{Attachment, McapError, WriteOptions};
 use tempfile::TempPath;
 
-pub(crate) use contents::{LoggedEvent, LoggedModel, LoggedSample, RunInfo};
+pub use contents::{LoggedEvent, LoggedModel, LoggedSample, RunInfo};
 use contents::{event_schema, metadata, schema, units};
+pub use recover::recovered;
+use sink::{Open, Sink, said};
 
 /// Channel of the samples.
-pub(crate) const TOPIC: &str = "/actuator/sample";
+pub const TOPIC: &str = "/actuator/sample";
 /// Channel of what happens on the way.
 const EVENTS: &str = "/actuator/event";
 
 /// The log cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: the log cannot be written", path.display())]
-pub(crate) struct LogError {
+#[error("{}: {}: {source}; {}", path.display(), self.what(), self.advice())]
+pub struct LogError {
     path: PathBuf,
-    source: McapError,
+    /// Samples that can be read all the same, at least; none before there was one.
+    saved: Option<u32>,
+    source: io::Error,
+}
+
+impl LogError {
+    fn what(&self) -> &'static str {
+        if self.saved.is_some() { "the log cannot be written any further" } else { "the log cannot be written" }
+    }
+
+    fn advice(&self) -> String {
+        let path = self.path.display();
+        let make_room = "free space there, or log to a file on another disk";
+        match self.saved {
+            None => "give a file in a folder that can be written and has space".to_owned(),
+            Some(0) => format!("{make_room}, and run again"),
+            Some(saved) => format!(
+                "{make_room}, and run again; at least the first {saved} samples are safe in it: `hystctl log recover {path} -o whole.mcap` makes a closed log of them"
+            ),
+        }
+    }
 }
 
 /// A log while it is written.
 ///
 /// It takes its name with the first sample: a run that is refused before anything moves leaves an older log as it was.
 /// Dropped without [`finish`](Self::finish), it is still closed as well as it can be.
-pub(crate) struct RunLog {
+pub struct RunLog {
     path: PathBuf,
-    /// The temporary name, until the first sample.
-    unnamed: Option<TempPath>,
+    sink: Sink,
+    channel_id: u16,
+    /// A sample as text.
+    text: Vec<u8>,
     /// Whether an older file of this name is set aside.
     keeps_older: bool,
     /// The name that it has got.
     older: Option<PathBuf>,
-    writer: Writer<BufWriter<File>>,
-    channel_id: u16,
     /// None while nothing has happened.
     event_channel: Option<u16>,
     events: u32,
-    samples: u32,
-    /// Lab time of the first sample that is not on the disk yet \[s\].
-    unflushed_s: Option<f64>,
+    /// The temporary name, until the first sample.
+    unnamed: Option<TempPath>,
 }
 
 impl RunLog {
@@ -61,21 +84,20 @@ impl RunLog {
     ///
     /// # Errors
     /// When the folder cannot be written.
-    pub(crate) fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
-        let failed = |source| LogError { path: path.to_owned(), source };
-        let (file, unnamed) = temporary(path).map_err(|error| failed(error.into()))?.into_parts();
-        let (writer, channel_id) = begin(file, info).map_err(failed)?;
+    pub fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+        let failed = |source| LogError { path: path.to_owned(), saved: None, source };
+        let (file, unnamed) = temporary(path).map_err(failed)?.into_parts();
+        let (writer, channel_id) = begin(file, info).map_err(said).map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
-            unnamed: Some(unnamed),
+            sink: Sink::new(writer).map_err(failed)?,
+            channel_id,
+            text: Vec::new(),
             keeps_older: false,
             older: None,
-            writer,
-            channel_id,
             event_channel: None,
             events: 0,
-            samples: 0,
-            unflushed_s: None,
+            unnamed: Some(unnamed),
         })
     }
 
@@ -83,99 +105,92 @@ impl RunLog {
     ///
     /// # Errors
     /// When the folder cannot be written.
-    pub(crate) fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+    pub fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
-    /// Appends one sample.
+    /// Appends one sample. It reaches the disk within half a second, also if none follows.
     ///
     /// # Errors
-    /// When the disk refuses.
-    pub(crate) fn sample(&mut self, sample: &LoggedSample) -> Result<(), LogError> {
-        self.append(sample).map_err(|source| LogError { path: self.path.clone(), source })
+    /// When the disk refuses, or has refused one before.
+    pub fn sample(&mut self, sample: &LoggedSample) -> Result<(), LogError> {
+        self.append(sample).map_err(|source| self.failed(source))
     }
 
-    fn append(&mut self, sample: &LoggedSample) -> Result<(), McapError> {
+    fn append(&mut self, sample: &LoggedSample) -> io::Result<()> {
         self.take_name()?;
-        let data = serde_json::to_vec(sample).map_err(io::Error::other)?;
-        // A time before zero, which no clock here has, would become zero.
-        let log_time = (sample.time_s * 1e9).round() as u64;
-        let header =
-            MessageHeader { channel_id: self.channel_id, sequence: self.samples, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &data)?;
-        self.samples = self.samples.wrapping_add(1);
-        let since = *self.unflushed_s.get_or_insert(sample.time_s);
-        if sample.time_s - since >= 1.0 {
-            self.writer.flush()?;
-            self.unflushed_s = None;
-        }
-        Ok(())
+        self.text.clear();
+        serde_json::to_writer(&mut self.text, sample)?;
+        self.sink.append(self.channel_id, sample.time_s, &self.text)
+    }
+
+    fn failed(&self, source: io::Error) -> LogError {
+        LogError { path: self.path.clone(), saved: Some(self.sink.saved()), source }
     }
 
     /// Appends what has happened, and brings it to the disk.
     ///
     /// # Errors
-    /// When the disk refuses.
-    pub(crate) fn event(&mut self, event: &LoggedEvent) -> Result<(), LogError> {
-        self.append_event(event).map_err(|source| LogError { path: self.path.clone(), source })
+    /// As [`sample`](Self::sample).
+    pub fn event(&mut self, event: &LoggedEvent) -> Result<(), LogError> {
+        self.append_event(event).map_err(|source| self.failed(source))
     }
 
-    fn append_event(&mut self, event: &LoggedEvent) -> Result<(), McapError> {
+    fn append_event(&mut self, event: &LoggedEvent) -> io::Result<()> {
         self.take_name()?;
-        let channel_id = match self.event_channel {
-            Some(id) => id,
-            None => {
-                let schema = serde_json::to_vec(&event_schema()).map_err(io::Error::other)?;
-                let schema_id = self.writer.add_schema("hyst.actuator.Event", "jsonschema", &schema)?;
-                *self.event_channel.insert(self.writer.add_channel(schema_id, EVENTS, "json", &BTreeMap::new())?)
-            }
-        };
+        let data = serde_json::to_vec(event)?;
         let log_time = (event.time_s * 1e9).round() as u64;
-        let header = MessageHeader { channel_id, sequence: self.events, log_time, publish_time: log_time };
+        let (known, sequence) = (self.event_channel, self.events);
+        let channel_id = self.sink.aside(|writer| {
+            let channel_id = match known {
+                Some(id) => id,
+                None => {
+                    let schema = serde_json::to_vec(&event_schema()).map_err(io::Error::other)?;
+                    let schema_id = writer.add_schema("hyst.actuator.Event", "jsonschema", &schema)?;
+                    let units = BTreeMap::from([("unit.time_s".to_owned(), "s".to_owned())]);
+                    writer.add_channel(schema_id, EVENTS, "json", &units)?
+                }
+            };
+            let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+            writer.write_to_known_channel(&header, &data).map(|()| channel_id)
+        })?;
+        self.event_channel = Some(channel_id);
         self.events = self.events.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, &serde_json::to_vec(event).map_err(io::Error::other)?)?;
-        self.unflushed_s = None;
-        self.writer.flush()
+        Ok(())
     }
 
-    /// Adds what is known only at the end of a run.
+    /// Adds what is known only at the end of a run, as a metadata record.
     ///
     /// # Errors
-    /// When the disk refuses.
-    pub(crate) fn note(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<(), LogError> {
+    /// As [`sample`](Self::sample).
+    pub fn note(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<(), LogError> {
         let metadata = Metadata { name: name.to_owned(), metadata: entries };
-        self.writer.write_metadata(&metadata).map_err(|source| LogError { path: self.path.clone(), source })
+        self.sink.aside(|writer| writer.write_metadata(&metadata)).map_err(|source| self.failed(source))
     }
 
     /// What it is called, or will be.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// The name that an older file has got.
-    pub(crate) fn older(&self) -> Option<&Path> {
+    pub fn older(&self) -> Option<&Path> {
         self.older.as_deref()
     }
 
     /// Samples so far.
-    pub(crate) fn samples(&self) -> u32 {
-        self.samples
+    pub fn samples(&self) -> u32 {
+        self.sink.written()
     }
 
     /// Writes summary and footer, and waits for the disk.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub(crate) fn finish(self) -> Result<(), LogError> {
-        let path = self.path.clone();
-        self.close().map_err(|source| LogError { path, source })
-    }
-
-    fn close(mut self) -> Result<(), McapError> {
-        self.take_name()?;
-        self.writer.finish()?;
-        let file = self.writer.into_inner().into_inner().map_err(IntoInnerError::into_error)?;
-        Ok(file.sync_all()?)
+    pub fn finish(mut self) -> Result<(), LogError> {
+        self.take_name().map_err(|source| self.failed(source))?;
+        let (path, saved) = (self.path, Some(self.sink.saved()));
+        self.sink.close().map_err(|source| LogError { path, saved, source })
     }
 
     fn take_name(&mut self) -> io::Result<()> {
@@ -210,13 +225,9 @@ fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// Header, metadata, attachment, schema and channel.
-fn begin(file: File, info: &RunInfo<'_>) -> Result<(Writer<BufWriter<File>>, u16), McapError> {
-    let mut writer = WriteOptions::new()
-        .library(concat!("hystctl ", env!("CARGO_PKG_VERSION")))
-        // Chunks of one second are small: threads would only cost.
-        .compression_threads(0)
-        .create(BufWriter::new(file))?;
+/// Header, metadata, attachment, schema and channel, all of them on the disk: a log that is cut off later says what ran.
+fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
+    let mut writer = options().create(BufWriter::new(file))?;
     writer.write_metadata(&Metadata { name: "run".to_owned(), metadata: metadata(info) })?;
     if let Some(LoggedModel { json, .. }) = info.model {
         writer.attach(&Attachment {
@@ -231,7 +242,17 @@ fn begin(file: File, info: &RunInfo<'_>) -> Result<(Writer<BufWriter<File>>, u16
     let schema = serde_json::to_vec(&schema(unit)).map_err(io::Error::other)?;
     let schema_id = writer.add_schema("hyst.actuator.Sample", "jsonschema", &schema)?;
     let channel_id = writer.add_channel(schema_id, TOPIC, "json", &units(unit))?;
+    writer.flush()?;
     Ok((writer, channel_id))
+}
+
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .library(concat!("hystctl ", env!("CARGO_PKG_VERSION")))
+        // Chunks of half a second are small: threads would only cost.
+        .compression_threads(0)
+        // A chunk goes out in one piece, so that what stands before it is whole whenever the program dies.
+        .disable_seeking(true)
 }
 
 #[cfg(test)]
@@ -285,6 +306,36 @@ mod tests {
         (0..250).for_each(|k| log.sample(&sample(k)).unwrap());
         assert!(read(&path).len() >= 202);
         drop(log);
+    }
+
+    #[test]
+    fn a_sample_that_none_follows_reaches_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = RunLog::create(&path, &info()).unwrap();
+        for (k, all) in [(0, 1), (1, 2), (2, 3)] {
+            log.sample(&sample(k)).unwrap();
+            // It takes half a second; a busy machine is given a minute.
+            let began = std::time::Instant::now();
+            while read(&path).len() < all && began.elapsed().as_secs() < 60 {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            assert_eq!(read(&path).len(), all);
+            assert_eq!(log.sink.saved(), all as u32);
+        }
+        log.finish().unwrap();
+        assert_eq!(read(&path).len(), 3);
+    }
+
+    #[test]
+    fn a_log_that_has_no_sample_on_the_disk_says_what_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = RunLog::create(&path, &info()).unwrap();
+        log.sample(&sample(0)).unwrap();
+        let begun = hyst_ident::record::RunLog::parse("run.mcap", &std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!((begun.samples.len(), begun.closed), (0, false));
+        assert_eq!(begun.metadata["device"], "test");
     }
 
     #[test]

@@ -10,7 +10,6 @@ mod demo;
 mod device;
 mod exit;
 mod input;
-mod log;
 mod output;
 mod progress;
 mod recording;
@@ -23,6 +22,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use exit::Exit;
+use hyst_cli::log;
 
 fn main() -> ExitCode {
     // Bad arguments end here: clap prints what is wrong and exits with 2.

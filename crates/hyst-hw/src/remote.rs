@@ -43,6 +43,16 @@ pub trait Line {
     /// # Errors
     /// When the line is gone.
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize>;
+
+    /// What time it is at this line. A line that is simulated may have a clock of its own.
+    fn now(&mut self) -> Instant {
+        Instant::now()
+    }
+
+    /// Lets some time pass.
+    fn pause(&mut self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 impl<L: Line + ?Sized> Line for Box<L> {
@@ -52,6 +62,14 @@ impl<L: Line + ?Sized> Line for Box<L> {
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
         (**self).receive(bytes, patience)
+    }
+
+    fn now(&mut self) -> Instant {
+        (**self).now()
+    }
+
+    fn pause(&mut self, time: Duration) {
+        (**self).pause(time);
     }
 }
 
@@ -117,6 +135,12 @@ pub enum RemoteError {
         line: String,
         /// Why.
         fault: Fault,
+    },
+    /// The run is over, and nobody here has ended it.
+    #[error("{line}: the device was told to stop, and not by this program; does another one talk to it?")]
+    Stopped {
+        /// What the line is called.
+        line: String,
     },
     /// A value that cannot be asked for.
     #[error("{what} = {value}: {advice}")]
@@ -336,15 +360,20 @@ impl<L: Line> Remote<L> {
     /// # Errors
     /// When it does not come to rest, or is lost.
     pub fn clear(&mut self) -> Result<(), RemoteError> {
-        let began = Instant::now();
+        let began = self.line.now();
         loop {
             match self.stated(Ask::Clear) {
-                Err(RemoteError::Standing { .. }) if began.elapsed() < LONGEST_REST => {
-                    std::thread::sleep(Duration::from_millis(20));
+                Err(RemoteError::Standing { .. }) if self.since(began) < LONGEST_REST => {
+                    self.line.pause(Duration::from_millis(20));
                 }
                 told => return told.map(|_| ()),
             }
         }
+    }
+
+    /// Time since `then`, on the line's clock.
+    fn since(&mut self, then: Instant) -> Duration {
+        self.line.now().saturating_duration_since(then)
     }
 
     fn odd(&self) -> RemoteError {
@@ -383,19 +412,19 @@ impl<L: Line> Remote<L> {
         let request = Request { number: self.number, ask };
         let mut buffer = [0; MAX_FRAME];
         let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
-        let began = Instant::now();
+        let began = self.line.now();
         let mut bytes = [0; 4096];
-        while began.elapsed() < self.options.lost {
+        while self.since(began) < self.options.lost {
             // A zero ends what a line may have left of an earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
-            let sent = Instant::now();
-            while let Some(patience) = self.options.repeat.checked_sub(sent.elapsed()).filter(|d| !d.is_zero()) {
+            let sent = self.line.now();
+            while let Some(patience) = self.options.repeat.checked_sub(self.since(sent)).filter(|d| !d.is_zero()) {
                 let came = self.line.receive(&mut bytes, patience).map_err(|source| self.gone(source))?;
                 let mut fresh = &bytes[..came];
                 while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
                     match reply {
                         Ok(reply) if reply.number == self.number => {
-                            (self.asked, self.answered) = (sent, Instant::now());
+                            (self.asked, self.answered) = (sent, self.line.now());
                             return Ok(reply.tell);
                         }
                         // Of a request that was sent twice.
@@ -430,6 +459,10 @@ impl<L: Line> Remote<L> {
                 if let State::Fault(fault) = status.state {
                     self.hear(run, first, &samples, measured);
                     return Err(RemoteError::Fault { line: self.name.clone(), fault });
+                }
+                if status.state != State::Running {
+                    self.hear(run, first, &samples, measured);
+                    return Err(RemoteError::Stopped { line: self.name.clone() });
                 }
                 let taken = status.received.wrapping_sub(run.sent) as usize;
                 if taken > drive_v.len() || !self.hear(run, first, &samples, measured) {
@@ -471,7 +504,7 @@ impl<L: Line> Remote<L> {
     /// Waits until the device has done something more.
     fn trade_until_news(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
         let mut run = self.run.ok_or(RemoteError::Order)?;
-        let (before, began) = (measured.len(), Instant::now());
+        let (before, began) = (measured.len(), self.line.now());
         loop {
             let outcome = self.trade(&mut run, drive_v, measured);
             self.run = Some(run);
@@ -480,11 +513,11 @@ impl<L: Line> Remote<L> {
             if taken > 0 || measured.len() > before || !outstanding && drive_v.is_empty() {
                 return Ok(taken);
             }
-            if began.elapsed() > self.options.lost {
+            if self.since(began) > self.options.lost {
                 // The runner calls that a stalled device.
                 return Ok(0);
             }
-            std::thread::sleep(Duration::from_micros(200));
+            self.line.pause(Duration::from_micros(200));
         }
     }
 }
@@ -543,7 +576,7 @@ impl<L: Line> Daq for Remote<L> {
         };
         let status = self.stated(Ask::Start(start))?;
         let rate_hz = f64::from(rate_hz as f32);
-        self.clock = Some(Clock::new(1.0 / rate_hz));
+        self.clock = Some(Clock::new(1.0 / rate_hz, self.line.now()));
         self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room });
         // The next run of this program is another one.
         self.options.session = o.session.wrapping_add(1);
@@ -603,13 +636,13 @@ impl<L: Line> Daq for Remote<L> {
         if self.run.take().is_none() {
             return Ok(());
         }
-        let began = Instant::now();
+        let began = self.line.now();
         loop {
             let status = self.stated(Ask::Stop)?;
             match status.state {
                 State::Idle => return Ok(()),
                 State::Fault(_) if status.present_v == self.identity.rest_v => return Ok(()),
-                _ if began.elapsed() > LONGEST_REST => {
+                _ if self.since(began) > LONGEST_REST => {
                     let advice = "the device does not come to rest; switch its amplifier off";
                     return Err(RemoteError::Silent {
                         line: self.name.clone(),
@@ -618,7 +651,7 @@ impl<L: Line> Daq for Remote<L> {
                         advice,
                     });
                 }
-                _ => std::thread::sleep(Duration::from_millis(2)),
+                _ => self.line.pause(Duration::from_millis(2)),
             }
         }
     }

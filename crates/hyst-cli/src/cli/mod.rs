@@ -30,7 +30,7 @@ use values::{celsius, positive, seconds};
 
 /// Identify, diagnose and compensate piezo actuators and others with hysteresis.
 #[derive(Debug, Parser)]
-#[command(name = "hystctl", version, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "hystctl", version = env!("HYST_VERSION"), after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

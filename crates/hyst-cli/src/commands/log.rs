@@ -1,19 +1,15 @@
 //! `log`: what stands in the log of a run, as a record, and what is left of one that was cut off.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Cursor;
 use std::path::Path;
 
 use hyst_ident::record::{LogSample, RunLog};
-use mcap::read::{ChunkFlattener, Options};
-use mcap::records::{Metadata, Record as Entry};
-use mcap::{Attachment, McapError, WriteOptions, Writer};
 use serde::Serialize;
 
 use crate::cli::{LogArgs, LogCommand, LogConvertArgs, LogInfoArgs, LogRecoverArgs};
 use crate::exit::{CommandError, CommandResult};
+use crate::log::recovered;
 use crate::output::{self, Report};
 use crate::text;
 
@@ -39,6 +35,8 @@ struct Summary {
     log: String,
     /// Whether it was closed; else it was cut off.
     closed: bool,
+    /// Chunks of samples and other records that are left out because they are damaged.
+    damaged: usize,
     samples: usize,
     /// Of the samples, those that are part of what was asked for.
     record_samples: usize,
@@ -64,6 +62,7 @@ impl Summary {
         Self {
             log: path.display().to_string(),
             closed: log.closed,
+            damaged: log.damaged,
             samples: log.samples.len(),
             record_samples: record().count(),
             segments: segments.len(),
@@ -85,6 +84,7 @@ impl Summary {
             text::count(self.segments, "segment"),
             if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
         )];
+        lines.extend(damage(self.damaged));
         lines.extend(
             self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
@@ -92,6 +92,12 @@ impl Summary {
         lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
         lines.join("\n")
     }
+}
+
+/// What to say about pieces that are damaged, if there are any.
+fn damage(pieces: usize) -> Option<String> {
+    let many = text::count(pieces, "damaged piece");
+    (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
 }
 
 fn info(args: &LogInfoArgs) -> CommandResult {
@@ -115,64 +121,25 @@ struct Recovered {
     samples: usize,
     /// Whether there was anything to recover.
     was_closed: bool,
+    /// Chunks of samples and other records that were left out because they are damaged.
+    damaged: usize,
 }
 
 fn recover(args: &LogRecoverArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (bytes, log) = read(&args.log)?;
-    let whole = rewritten(&bytes).map_err(CommandError::failed)?;
+    let whole = recovered(&bytes).map_err(CommandError::failed)?;
     args.output.write(|out| out.write_all(&whole))?;
-    let recovered = Recovered {
+    let done = Recovered {
         log: args.log.display().to_string(),
         output: args.output.to_string(),
         samples: log.samples.len(),
         was_closed: log.closed,
+        damaged: log.damaged,
     };
     let how = if log.closed { "was closed already" } else { "had been cut off" };
-    let said = format!("{} {how}; {}: {}", recovered.log, recovered.output, text::count(recovered.samples, "sample"));
-    report.print(&said, &recovered)
-}
-
-/// Everything that is whole in an MCAP file, as a closed one.
-fn rewritten(bytes: &[u8]) -> Result<Vec<u8>, McapError> {
-    let options = WriteOptions::new().library(concat!("hystctl ", env!("CARGO_PKG_VERSION"))).compression_threads(0);
-    let mut writer = options.create(Cursor::new(Vec::new()))?;
-    let (mut schemas, mut channels) = (BTreeMap::from([(0, 0)]), BTreeMap::new());
-    let entries = ChunkFlattener::new_with_options(bytes, Options::IgnoreEndMagic.into())?;
-    for entry in entries.map_while(Result::ok) {
-        match entry {
-            Entry::Schema { header, data } => {
-                schemas.insert(header.id, writer.add_schema(&header.name, &header.encoding, &data)?);
-            }
-            Entry::Channel(channel) => {
-                if let Some(schema) = schemas.get(&channel.schema_id) {
-                    let id =
-                        writer.add_channel(*schema, &channel.topic, &channel.message_encoding, &channel.metadata)?;
-                    channels.insert(channel.id, id);
-                }
-            }
-            Entry::Message { mut header, data } => {
-                if let Some(id) = channels.get(&header.channel_id) {
-                    header.channel_id = *id;
-                    writer.write_to_known_channel(&header, &data)?;
-                }
-            }
-            Entry::Metadata(Metadata { name, metadata }) => writer.write_metadata(&Metadata { name, metadata })?,
-            Entry::Attachment { header, data, .. } => writer.attach(&Attachment {
-                log_time: header.log_time,
-                create_time: header.create_time,
-                name: header.name,
-                media_type: header.media_type,
-                data: Cow::Borrowed(&data),
-            })?,
-            _ => {}
-        }
-    }
-    finished(writer)
-}
-
-fn finished(mut writer: Writer<Cursor<Vec<u8>>>) -> Result<Vec<u8>, McapError> {
-    writer.finish()?;
-    Ok(writer.into_inner().into_inner())
+    let said = format!("{} {how}; {}: {}", done.log, done.output, text::count(done.samples, "sample"));
+    let said: Vec<String> = std::iter::once(said).chain(damage(done.damaged)).collect();
+    report.print(&said.join("\n"), &done)
 }

@@ -191,12 +191,12 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
         output::tell_set_aside(path, older);
     }
-    if let (Some(log), Some(clock)) = (log.as_mut().filter(|log| log.samples() > 0), daq.clock()) {
-        log.note("clock", ClockSummary::new(clock).entries())?;
-    }
-    let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
+    let noted = match (log.as_mut().filter(|log| log.samples() > 0), daq.clock()) {
+        (Some(log), Some(clock)) => log.note("clock", ClockSummary::new(clock).entries()),
+        _ => Ok(()),
+    };
+    let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
     let Played { mut recording, forces, watched } = played?;
-    closed?;
     job.align(&mut recording);
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
@@ -208,6 +208,8 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         extra.extend((forces.len() == record.rows()).then(|| Extra::numbers("estimated_force_n", forces)));
         target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
+    // The record may lie on another disk than a log that could not be closed.
+    closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
     let summary = Summary {

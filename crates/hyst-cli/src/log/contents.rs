@@ -11,58 +11,58 @@ use sha2::{Digest, Sha256};
 
 /// What a log says about the whole run.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RunInfo<'a> {
+pub struct RunInfo<'a> {
     /// What the device calls itself.
-    pub(crate) device: &'a str,
+    pub device: &'a str,
     /// Unit of output, reference and error.
-    pub(crate) output: OutputUnit,
+    pub output: OutputUnit,
     /// Samples per second \[Hz\].
-    pub(crate) sample_rate_hz: f64,
+    pub sample_rate_hz: f64,
     /// The model that computed the drive, if one did.
-    pub(crate) model: Option<LoggedModel<'a>>,
+    pub model: Option<LoggedModel<'a>>,
 }
 
 /// A model and the text of its file.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LoggedModel<'a> {
+pub struct LoggedModel<'a> {
     /// The model.
-    pub(crate) model: &'a Model,
+    pub model: &'a Model,
     /// Its file's text.
-    pub(crate) json: &'a str,
+    pub json: &'a str,
 }
 
 /// One sample of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct LoggedSample {
+pub struct LoggedSample {
     /// Lab clock \[s\].
-    pub(crate) time_s: f64,
+    pub time_s: f64,
     /// Segment, from 0.
-    pub(crate) segment: usize,
+    pub segment: usize,
     /// What the sample is part of.
     #[serde(serialize_with = "phase_name")]
-    pub(crate) phase: Phase,
+    pub phase: Phase,
     /// Voltage that was applied \[V\].
-    pub(crate) drive_v: f64,
+    pub drive_v: f64,
     /// Measured output \[output unit\].
-    pub(crate) output: f64,
+    pub output: f64,
     /// Wanted output \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) reference: Option<f64>,
+    pub reference: Option<f64>,
     /// Output minus reference \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) error: Option<f64>,
+    pub error: Option<f64>,
     /// What the model expects \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) predicted: Option<f64>,
+    pub predicted: Option<f64>,
     /// Temperature \[°C\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) temperature_degc: Option<f64>,
+    pub temperature_degc: Option<f64>,
     /// Load \[N\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) load_n: Option<f64>,
+    pub load_n: Option<f64>,
     /// Estimated force \[N\].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) estimated_force_n: Option<f64>,
+    pub estimated_force_n: Option<f64>,
 }
 
 fn phase_name<S: Serializer>(phase: &Phase, to: S) -> Result<S::Ok, S::Error> {
@@ -75,7 +75,7 @@ fn phase_name<S: Serializer>(phase: &Phase, to: S) -> Result<S::Ok, S::Error> {
 
 impl LoggedSample {
     /// A sample as measured; `reference` is what was wanted then, if anything was.
-    pub(crate) fn new(segment: usize, phase: Phase, sample: &hyst_hw::Sample, reference: Option<f64>) -> Self {
+    pub fn new(segment: usize, phase: Phase, sample: &hyst_hw::Sample, reference: Option<f64>) -> Self {
         Self {
             time_s: sample.time_s,
             segment,
@@ -98,12 +98,15 @@ pub(super) fn metadata(info: &RunInfo<'_>) -> BTreeMap<String, String> {
         [
             ("program", "hystctl"),
             ("version", env!("CARGO_PKG_VERSION")),
+            ("git", env!("HYST_GIT")),
             ("device", info.device),
             ("output_column", info.output.column()),
             ("unit", info.output.symbol()),
         ]
         .map(|(key, value)| (key.to_owned(), value.to_owned())),
     );
+    // A program that was built without a repository does not know its state.
+    entries.retain(|_, value| !value.is_empty());
     entries.insert("sample_rate_hz".to_owned(), info.sample_rate_hz.to_string());
     if let Some(LoggedModel { model, json }) = info.model {
         entries.insert("model_kind".to_owned(), model.base.kind().to_string());
@@ -161,13 +164,13 @@ pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
 
 /// Something that happened on the way.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct LoggedEvent {
+pub struct LoggedEvent {
     /// Lab clock \[s\].
-    pub(crate) time_s: f64,
+    pub time_s: f64,
     /// What, in one word for programs: `model-lost`, `model-found`, `fault`, `cancelled`.
-    pub(crate) kind: &'static str,
+    pub kind: &'static str,
     /// What, in a sentence.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 /// The JSON schema of [`LoggedEvent`].

@@ -41,10 +41,10 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Of a run that begins now, with this sample period \[s\].
-    pub(super) fn new(period_s: f64) -> Self {
+    /// Of a run that begins now, as the line has it, with this sample period \[s\].
+    pub(super) fn new(period_s: f64, began: Instant) -> Self {
         Self {
-            began: Instant::now(),
+            began,
             wall: SystemTime::now(),
             period_s,
             stretch_s: SHORTEST_S,
@@ -106,7 +106,7 @@ mod tests {
 
     /// A device whose clock of 1 kHz began after 20 ms and is 150 ppm fast, asked 200 times a second over a line with a tail.
     fn told(seconds: f64) -> Clock {
-        let mut clock = Clock::new(1e-3);
+        let mut clock = Clock::new(1e-3, Instant::now());
         let mut luck = 1u32;
         for k in 0..(200.0 * seconds) as u32 {
             luck = luck.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -137,6 +137,6 @@ mod tests {
     fn a_short_run_tells_no_rate_and_an_empty_one_nothing() {
         let fit = told(0.1).fit().unwrap();
         assert_eq!(fit.faster_ppm, None);
-        assert_eq!(Clock::new(1e-3).fit(), None);
+        assert_eq!(Clock::new(1e-3, Instant::now()).fit(), None);
     }
 }

@@ -274,6 +274,24 @@ fn what_a_device_refuses_is_said() {
 }
 
 #[test]
+fn a_stop_by_somebody_else_is_told() {
+    let mut bench = Bench::new(0, 1);
+    let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
+    remote.start(1000.0).unwrap();
+    remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap();
+    remote.line_mut().device.answer(&Request { number: 1, ask: Ask::Stop });
+    let error = loop {
+        // What had been measured by then comes first.
+        if let Err(error) = remote.exchange(&[30.0; 20], &mut Vec::new()) {
+            break error;
+        }
+    };
+    assert!(matches!(error, RemoteError::Stopped { .. }) && error.to_string().contains("told to stop"), "{error}");
+    remote.stop().unwrap();
+    assert_eq!((bench.device.state(), bench.board.volts), (State::Idle, 0.0));
+}
+
+#[test]
 fn a_line_that_is_cut_is_told_and_the_device_comes_to_rest() {
     let mut bench = Bench::new(0, 1);
     let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { silence_s: 0.05, ..options() }).unwrap();
@@ -310,7 +328,7 @@ fn served(mut line: impl Line + Send + 'static) -> std::thread::JoinHandle<(Devi
         let (mut device, mut board) = (Device::new(identity(), Open), Echo::default());
         // The end of the line is no error here.
         let _ = crate::serve(&mut device, &mut board, &mut line, || false);
-        (0..4000).for_each(|_| device.tick(&mut board));
+        (0..24_000).for_each(|_| device.tick(&mut board));
         (device, board)
     })
 }
@@ -319,7 +337,8 @@ fn served(mut line: impl Line + Send + 'static) -> std::thread::JoinHandle<(Devi
 fn over(host: impl Line, device: impl Line + Send + 'static) {
     let device = served(device);
     let options = RemoteOptions {
-        silence_s: 0.5,
+        // A busy machine may keep a thread waiting.
+        silence_s: 10.0,
         repeat: Duration::from_millis(200),
         lost: Duration::from_secs(20),
         ..options()

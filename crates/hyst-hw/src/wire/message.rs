@@ -2,7 +2,8 @@
 //!
 //! The host asks, the device answers; each request has a number, which its answer repeats. Everything that moves is numbered
 //! from the start of a run: drive `k` of the run, sample `k` that was measured with it. A request that is lost, comes twice or
-//! comes late therefore does no harm: the host asks again, and what the device has had already it passes over.
+//! comes late therefore does no harm: the host asks again, and what the device has had already it passes over. To stop needs no number
+//! of a run, so that anybody may: a late request for it ends at rest what it was not meant for.
 
 use core::fmt;
 

@@ -1,22 +1,22 @@
 //! Logs of runs: MCAP files of samples, read as records.
 //!
 //! A log says every sample as JSON on the channel [`TOPIC`]; a metadata record `run` says what ran, and the model is attached as `model.json`. Of a log
-//! that was cut off, as by a loss of power, everything up to the cut is read.
+//! that was cut off, as by a loss of power, everything up to the cut is read; of one that was damaged, every chunk that was not.
+
+mod records;
 
 use std::collections::BTreeMap;
 
-use mcap::read::{ChunkFlattener, Options};
 use mcap::records::{Metadata, Record as Entry};
 use serde::Deserialize;
 
 use super::error::RecordError;
 use super::{OutputUnit, Record};
+pub use records::LogRecords;
+use records::MAGIC;
 
 /// Channel of the samples.
 pub const TOPIC: &str = "/actuator/sample";
-
-/// What an MCAP file begins with.
-const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// One sample of a log, as it stands there.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -57,6 +57,8 @@ pub struct RunLog {
     pub samples: Vec<LogSample>,
     /// Whether the log was closed; else its writer was cut off.
     pub closed: bool,
+    /// Chunks and other records that are left out because they are damaged.
+    pub damaged: usize,
 }
 
 /// Whether these are the bytes of an MCAP file.
@@ -71,12 +73,11 @@ impl RunLog {
     /// If the bytes are no MCAP file, or one without samples of a run.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, RecordError> {
         let foreign = |what: String| RecordError::Log { file: name.to_owned(), what };
-        let entries = ChunkFlattener::new_with_options(bytes, Options::IgnoreEndMagic.into())
-            .map_err(|error| foreign(error.to_string()))?;
+        let mut entries = LogRecords::new(bytes).ok_or_else(|| foreign("it is no MCAP file".to_owned()))?;
         let mut log = Self::default();
         let mut channel = None;
         // What is not whole at the end is what a cut takes.
-        for entry in entries.map_while(Result::ok) {
+        for entry in &mut entries {
             match entry {
                 Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata.extend(metadata),
                 // What was known only at the end, as how the device's clock went.
@@ -97,8 +98,12 @@ impl RunLog {
                 _ => {}
             }
         }
+        log.damaged = entries.damaged();
         match channel {
             Some(_) => Ok(log),
+            None if !log.closed && log.damaged == 0 => {
+                Err(foreign(format!("it was cut off before the channel {TOPIC}: nothing of a run is in it")))
+            }
             None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
         }
     }

@@ -101,17 +101,22 @@ fn failed<E: Classified>(
 ) -> CommandError {
     let measured: usize =
         failure.partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
-    if measured > 0 {
-        let many = text::count(measured, "sample");
-        match log.filter(|_| log_error.is_none()) {
-            Some(log) => say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display())),
-            None => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
-        }
-    }
+    let many = text::count(measured, "sample");
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
-    match (log_error, fault) {
-        (Some(error), _) if cancelled => error.into(),
-        (None, Some(fault)) if cancelled => CommandError::new(
+    match (log, log_error) {
+        (Some(_), Some(error)) if cancelled => {
+            say(&format!("note: the device was brought to rest; {many} had been measured"));
+            return error.into();
+        }
+        (Some(_), Some(error)) => say(&format!("note: {error}")),
+        _ if measured == 0 => {}
+        (Some(log), None) => {
+            say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()));
+        }
+        (None, _) => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
+    }
+    match fault {
+        Some(fault) if cancelled => CommandError::new(
             Exit::DeviceLost,
             anyhow::anyhow!("the run was ended and the device brought to rest (fault {}): {fault}", fault.code()),
         ),

@@ -1,0 +1,102 @@
+"""Logs of runs, read with the `mcap` package as others would read them.
+
+`cargo xtask test` makes the logs and names their folder in HYST_LOGS.
+"""
+
+import csv
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+FOLDER = os.environ.get("HYST_LOGS")
+if not FOLDER:
+    pytest.skip(
+        "HYST_LOGS names no folder of logs; `cargo run -p hyst-tests --example every_log -- FOLDER` makes them",
+        allow_module_level=True,
+    )
+
+from jsonschema import Draft202012Validator  # noqa: E402
+from mcap.reader import NonSeekingReader, SeekingReader  # noqa: E402
+
+FOLDER = Path(FOLDER)
+LOGS = json.loads((FOLDER / "logs.json").read_text())
+# What a column of a record is called in a log.
+FIELDS = {"voltage_v": "drive_v", "displacement_um": "output", "reference_um": "reference"}
+KINDS = ("drive", "plain", "gain", "feedforward", "pid", "pid+feedforward", "line", "on-device", "failed", "interrupted")
+
+
+def test_there_are_logs_of_every_kind():
+    names = [log["log"].removesuffix(".mcap") for log in LOGS]
+    assert set(KINDS) <= set(names)
+    assert {"again", "again.~1~"} <= set(names), "one was set aside"
+    assert sum(name.startswith("recovered-") for name in names) == 40
+
+
+def rows(log):
+    """What hystctl finds in the log."""
+    with open(FOLDER / log["samples"], newline="") as file:
+        return [{FIELDS.get(name, name): float(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log["log"])
+def test_a_log_is_read(log):
+    with open(FOLDER / log["log"], "rb") as file:
+        reader = SeekingReader(file, validate_crcs=True)
+        messages = list(reader.iter_messages())
+        # As a stream, without the indexes at its end.
+        file.seek(0)
+        stream = list(NonSeekingReader(file, validate_crcs=True).iter_messages())
+        assert [m.data for _, _, m in stream] == [m.data for _, _, m in messages]
+
+        summary = reader.get_summary()
+        assert summary.statistics.message_count == len(messages)
+        assert {c.topic for c in summary.channels.values()} == {"/actuator/sample"}
+        metadata = list(reader.iter_metadata())
+        assert [m.name for m in metadata] == ["run"] and metadata[0].metadata == log["metadata"]
+        assert {"program", "version", "device", "output_column", "unit", "sample_rate_hz"} <= set(log["metadata"])
+        attached = [(a.name, a.media_type, a.data) for a in reader.iter_attachments()]
+        model = ("model.json", "application/json", (FOLDER / "model.json").read_bytes())
+        assert attached == ([model] if log["model"] else [])
+
+    wanted = rows(log)
+    assert len(messages) == len(wanted)
+    for number, ((schema, channel, message), row) in enumerate(zip(messages, wanted)):
+        assert schema.encoding == "jsonschema" and channel.message_encoding == "json"
+        assert message.sequence == number
+        sample = json.loads(message.data)
+        assert message.log_time == pytest.approx(1e9 * sample["time_s"], abs=1)
+        assert {name: sample[name] for name in row} == row
+    times = [m.log_time for _, _, m in messages]
+    assert all(a < b for a, b in zip(times, times[1:]))
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log["log"])
+def test_samples_keep_to_the_schema(log):
+    with open(FOLDER / log["log"], "rb") as file:
+        reader = SeekingReader(file)
+        schema = json.loads(next(iter(reader.get_summary().schemas.values())).data)
+        channel = next(iter(reader.get_summary().channels.values()))
+        Draft202012Validator.check_schema(schema)
+        validator = Draft202012Validator(schema)
+        known = set(schema["properties"])
+        numbers = {name for name, field in schema["properties"].items() if field["type"] == "number"}
+        assert {name.removeprefix("unit.") for name in channel.metadata} == numbers, "every number has its unit"
+        for _, _, message in reader.iter_messages():
+            sample = json.loads(message.data)
+            validator.validate(sample)
+            assert set(sample) <= known
+    if log["log"].startswith("drive"):
+        assert {"temperature_degc", "load_n"} <= set(sample)
+
+
+def test_the_schema_refuses_what_is_no_sample():
+    with open(FOLDER / LOGS[0]["log"], "rb") as file:
+        schema = json.loads(next(iter(SeekingReader(file).get_summary().schemas.values())).data)
+    validator = Draft202012Validator(schema)
+    sample = {"time_s": 0.1, "segment": 0, "phase": "record", "drive_v": 1.0, "output": 2.0}
+    assert validator.is_valid(sample)
+    for wrong in ({"phase": "rest"}, {"time_s": "0.1"}, {"segment": 0.5}, {"output": None}):
+        assert not validator.is_valid(sample | wrong), wrong
+    assert not validator.is_valid({name: sample[name] for name in list(sample)[:-1]})

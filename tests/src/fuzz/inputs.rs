@@ -1,0 +1,369 @@
+//! Whatever reads bytes of others: frames, CAN, controllers, models, records, logs, plants.
+
+use std::io;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use hyst_cli::log::{LoggedModel, LoggedSample, RunInfo, RunLog, recovered};
+use hyst_core::{
+    ChainParams, EffectParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block, write_block,
+};
+use hyst_hw::wire::{
+    Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, Measured, Reply, Request, Shown, State,
+    Status, Tell, encode, lateness, read_recipe, recipe_head,
+};
+use hyst_hw::{Bus, Line, Phase, Plant, PlantConfig, Sample, Slcan};
+use hyst_ident::export::block;
+use hyst_ident::model::Model;
+use hyst_ident::record::{self, ColumnMap, Need, Record};
+
+use super::luck::Luck;
+use crate::{PLANT, WARM, root};
+
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// Bytes of a controller for the model of [`recipe`].
+fn sealed(pid: &[u8], block: &[u8]) -> Vec<u8> {
+    [pid, &CRC.checksum(pid).to_le_bytes(), block].concat()
+}
+
+/// A controller that a device can run: plays, a lag and a PID.
+pub(super) fn recipe() -> &'static [u8] {
+    static RECIPE: OnceLock<Vec<u8>> = OnceLock::new();
+    RECIPE.get_or_init(|| {
+        let operator = OperatorParams::Pi(PiParams {
+            gain: 0.1,
+            thresholds: (0..8).map(|i| 1.5 + 4.0 * f64::from(i)).collect(),
+            weights: (0..8).map(|i| 0.022 * (-0.25 * f64::from(i)).exp()).collect(),
+        });
+        let effects = EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
+        let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, zero: 0.0, input: [0.0, 100.0] };
+        let pid = PidParams {
+            proportional: 0.5,
+            integral: 60.0,
+            derivative: 0.0,
+            derivative_hz: 50.0,
+            proportional_weight: 1.0,
+            derivative_weight: 0.0,
+            anti_windup_seconds: 0.05,
+            low: 0.0,
+            high: 100.0,
+        };
+        let mut room = [0; 4096];
+        let block = write_block(&model, &mut room).expect("there is room");
+        [recipe_head(Some(&pid)).as_slice(), block].concat()
+    })
+}
+
+/// Where the block begins in a controller with a PID: `HYCT`, version, flag, nine numbers, check sum.
+const BLOCK: usize = 4 + 2 + 72 + 4;
+/// Where the numbers begin.
+const NUMBERS: usize = 4 + 2;
+
+/// Changes what stands in a controller, and makes its check sums right again.
+pub(super) fn reseal_recipe(luck: &mut Luck, recipe: &mut Vec<u8>) {
+    let (mut pid, mut block) = (recipe[..BLOCK - 4].to_vec(), recipe[BLOCK..].to_vec());
+    if luck.once_in(2) {
+        odd_number(luck, &mut pid[NUMBERS..]);
+    }
+    if !luck.once_in(3) {
+        reseal_block(luck, &mut block);
+    }
+    *recipe = sealed(&pid, &block);
+}
+
+/// Puts a number that nobody would write in one of the places of eight bytes.
+fn odd_number(luck: &mut Luck, bytes: &mut [u8]) {
+    let odd = [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e308, -1e308, 1e-320, 1e9, 65.0, -0.0];
+    let places = bytes.len() / 8;
+    if places > 0 {
+        let at = 8 * luck.below(places);
+        bytes[at..at + 8].copy_from_slice(&luck.of(&odd).to_le_bytes());
+    }
+}
+
+/// Damages a block's parameters, and makes length and check sum right again.
+fn reseal_block(luck: &mut Luck, bytes: &mut Vec<u8>) {
+    let mut payload = bytes[9..bytes.len() - 4].to_vec();
+    if luck.once_in(2) && payload.len() > 16 {
+        // The numbers do not lie on places of eight.
+        let from = luck.below(8);
+        odd_number(luck, &mut payload[from..]);
+    } else {
+        luck.damage(&mut payload);
+    }
+    bytes.truncate(5);
+    bytes.extend((payload.len() as u32).to_le_bytes());
+    bytes.extend(payload);
+    let sum = CRC.checksum(bytes).to_le_bytes();
+    bytes.extend(sum);
+}
+
+/// The models of the documentation, one of each kind.
+fn models() -> &'static [String] {
+    static MODELS: OnceLock<Vec<String>> = OnceLock::new();
+    MODELS.get_or_init(|| {
+        let folder = root().join("docs").join("models");
+        let files = std::fs::read_dir(&folder).expect("the models of the documentation");
+        let mut paths: Vec<_> = files.filter_map(|file| Some(file.ok()?.path())).collect();
+        paths.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
+        paths.sort();
+        let read = |path| std::fs::read_to_string(path).expect("a model");
+        paths.into_iter().map(read).filter(|text| text.len() < 20_000).collect()
+    })
+}
+
+fn status() -> Status {
+    Status {
+        state: State::Running,
+        session: 1,
+        tick: 9,
+        present_v: 2.0,
+        output: 0.4,
+        received: 7,
+        room: 50,
+        measured: 6,
+    }
+}
+
+/// Frames of requests and answers, damaged.
+pub(super) fn frames(luck: &mut Luck) {
+    let mut stream = Vec::new();
+    for number in 0..luck.below(4) as u32 {
+        let drives = (0..luck.below(30)).map(|k| k as f32).collect();
+        let ask = match luck.below(3) {
+            0 => Ask::Describe,
+            1 => Ask::Exchange(Exchange { session: 1, heard: 2, first: 3, drives }),
+            _ => Ask::Model(Chunk { offset: 0, total: 900, bytes: luck.bytes(200).into_iter().collect() }),
+        };
+        stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
+        let sample = Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
+        let samples = std::iter::repeat_n(sample, luck.below(20)).collect();
+        let tell = Tell::Samples { status: status(), first: 0, samples };
+        stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
+    }
+    if luck.once_in(2) {
+        // A payload by chance with the right check sum.
+        let payload = luck.bytes(60);
+        let sum = CRC.checksum(&payload).to_le_bytes();
+        let mut stuffed = vec![0; 100];
+        let length = cobs::encode(&[payload, sum.to_vec()].concat(), &mut stuffed);
+        stream.extend_from_slice(&stuffed[..=length]);
+    }
+    luck.damage(&mut stream);
+    stream.extend(luck.bytes(20));
+    let good = encode(&Request { number: 77, ask: Ask::Hello }, &mut [0; MAX_FRAME]).expect("a frame").to_vec();
+    stream.push(0);
+    stream.extend(good);
+    let (mut requests, mut replies) = (Deframer::new(), Deframer::new());
+    let mut last = None;
+    for piece in stream.chunks(1 + luck.below(200)) {
+        let mut fresh = piece;
+        while let Some(request) = requests.next::<Request>(&mut fresh) {
+            last = Some(request);
+        }
+        let mut fresh = piece;
+        while replies.next::<Reply>(&mut fresh).is_some() {}
+    }
+    assert_eq!(last, Some(Ok(Request { number: 77, ask: Ask::Hello })), "a sound frame is not heard");
+}
+
+/// Frames of a CAN bus.
+pub(super) fn can(luck: &mut Luck) {
+    let fd = luck.once_in(2);
+    let (mut from, mut to) = (IsoTp::<MAX_FRAME>::new(fd), IsoTp::<MAX_FRAME>::new(fd));
+    for _ in 0..luck.below(4) {
+        from.give_up();
+        let _ = from.send(&luck.bytes(MAX_FRAME + 20));
+        for _ in 0..80 {
+            let mut frame = match from.frame() {
+                Some(frame) => frame.to_vec(),
+                None if luck.once_in(2) => break,
+                None => luck.bytes(64),
+            };
+            if luck.once_in(6) {
+                luck.damage(&mut frame);
+            }
+            if let Some(message) = to.take(&frame) {
+                assert!(message.len() <= MAX_FRAME);
+            }
+            while let Some(answer) = to.frame() {
+                assert!(answer.len() <= 64);
+                let mut answer = answer.to_vec();
+                if luck.once_in(6) {
+                    luck.damage(&mut answer);
+                }
+                let _ = from.take(&answer);
+            }
+        }
+    }
+    // Whatever was there, a whole message comes through.
+    (from.give_up(), from.send(&[7; 100]).expect("nothing is on its way"));
+    let mut arrived = false;
+    for _ in 0..40 {
+        let Some(frame) = from.frame() else { break };
+        arrived |= to.take(&frame) == Some(&[7; 100]);
+        while let Some(answer) = to.frame() {
+            let _ = from.take(&answer);
+        }
+    }
+    assert!(arrived, "a whole message does not arrive");
+}
+
+/// A serial line that has these bytes.
+struct Said(Vec<u8>);
+
+impl Line for Said {
+    fn send(&mut self, _: &[u8]) -> io::Result<()> {
+        Ok(())
+    }
+    fn receive(&mut self, bytes: &mut [u8], _: Duration) -> io::Result<usize> {
+        if self.0.is_empty() {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        let count = bytes.len().min(self.0.len());
+        self.0.drain(..count).zip(bytes).for_each(|(from, to)| *to = from);
+        Ok(count)
+    }
+}
+
+/// Text of a CAN adapter.
+pub(super) fn slcan(luck: &mut Luck) {
+    let frames = [
+        "t6a03010203\r",
+        "T000006a1211ab\r",
+        "z\r",
+        "\x07",
+        "d6a19000102030405060708090a0b\r",
+        "b6a0F",
+        "V1013\r",
+        "t12380011223344556677\r",
+    ];
+    let mut text: Vec<u8> = (0..luck.below(8)).flat_map(|_| luck.of(&frames).bytes().collect::<Vec<_>>()).collect();
+    luck.damage(&mut text);
+    text.extend(luck.bytes(30));
+    // Something is left of a line that was never ended.
+    text.extend_from_slice(b"\rt6a1207a5\r");
+    let mut bus = Slcan::open(Said(text), 500_000).expect("it opens");
+    let mut last = None;
+    while let Ok(Some((id, data))) = bus.receive(Duration::from_secs(3600)) {
+        assert!(data.len() <= 64);
+        last = Some((id, data.to_vec()));
+    }
+    assert_eq!(last, Some((0x6a1, vec![0x07, 0xa5])), "a sound frame is not heard");
+}
+
+/// Controllers, and a run with what could be read.
+pub(super) fn controllers(luck: &mut Luck) {
+    let mut bytes = recipe().to_vec();
+    match luck.below(4) {
+        0 => luck.damage(&mut bytes),
+        1 => bytes = luck.bytes(200),
+        _ => reseal_recipe(luck, &mut bytes),
+    }
+    let period = *luck.of(&[0.001f32, 0.002, 0.1, f32::NAN, 0.0, 1e-30, 1e30]);
+    let _ = (read_recipe(&bytes), lateness(&bytes, period));
+    let mut follower = Follower::new();
+    if follower.load(&bytes) {
+        let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
+        if follower.begin(period, 3.0, &shown, 20.0) {
+            for k in 0..20 {
+                let _ = follower.step(3.0 + 0.1 * k as f32, &shown);
+            }
+            let _ = (follower.step(f32::NAN, &shown), follower.step(1e30, &shown), follower.due());
+        }
+    }
+}
+
+/// Blocks of parameters of every kind of model.
+pub(super) fn blocks(luck: &mut Luck) {
+    static BLOCKS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    let blocks = BLOCKS.get_or_init(|| {
+        models().iter().filter_map(|text| block(&Model::parse("model.json", text).expect("a model")).ok()).collect()
+    });
+    let mut bytes = luck.of(blocks).clone();
+    if luck.once_in(3) {
+        luck.damage(&mut bytes);
+    } else {
+        reseal_block(luck, &mut bytes);
+    }
+    let _ = read_block::<List<64>, List<16>>(&bytes);
+    let _ = read_block::<Vec<f64>, Vec<f64>>(&bytes);
+}
+
+/// Model files; what is read can be written and exported.
+pub(super) fn model_files(luck: &mut Luck) {
+    let mut text = luck.of(models()).clone().into_bytes();
+    luck.damage(&mut text);
+    let Ok(text) = String::from_utf8(text) else { return };
+    if let Ok(model) = Model::parse("model.json", &text) {
+        let _ = block(&model);
+        Model::parse("again.json", &model.to_json()).expect("what was written can be read");
+    }
+}
+
+/// Records as CSV.
+pub(super) fn records(luck: &mut Luck) {
+    let mut text = String::from("segment,time_s,voltage_v,displacement_um,temperature_degc\n");
+    for k in 0..luck.below(40) {
+        text += &format!(
+            "{},{},{:.3},{:e},22.5\n",
+            k / 20,
+            k as f64 * 0.002,
+            luck.between(0.0, 100.0),
+            luck.between(-5.0, 20.0)
+        );
+    }
+    let mut bytes = text.into_bytes();
+    luck.damage(&mut bytes);
+    if luck.once_in(8) {
+        bytes.splice(0..0, *b"\xef\xbb\xbf");
+    }
+    let need = *luck.of(&[Need::InputAndOutput, Need::Input, Need::Output]);
+    if let Ok(record) = Record::parse("a.csv", &bytes, &ColumnMap::default(), need) {
+        assert!(record.time().iter().all(|t| t.is_finite()));
+    }
+}
+
+/// Logs: read, converted, recovered.
+pub(super) fn logs(luck: &mut Luck) {
+    static LOG: OnceLock<Vec<u8>> = OnceLock::new();
+    let log = LOG.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.mcap");
+        let json = &models()[0];
+        let model = Model::parse("model.json", json).expect("a model");
+        let output = record::OutputUnit::Micrometre;
+        let model = Some(LoggedModel { model: &model, json });
+        let info = RunInfo { device: "fuzz", output, sample_rate_hz: 4.0, model };
+        let mut log = RunLog::create(&path, &info).expect("a log");
+        for k in 0..12 {
+            let time_s = 0.25 * f64::from(k);
+            let sample = Sample { time_s, drive_v: 1.5, output: 0.3, temperature_degc: Some(20.0), load_n: None };
+            log.sample(&LoggedSample::new(0, Phase::Record, &sample, Some(0.25))).expect("it is written");
+        }
+        log.finish().expect("it is written");
+        std::fs::read(path).expect("a log")
+    });
+    let mut bytes = log.clone();
+    luck.damage(&mut bytes);
+    if let Ok(log) = record::RunLog::parse("run.mcap", &bytes) {
+        let _ = log.csv("run.mcap", true);
+    }
+    if let Ok(again) = recovered(&bytes) {
+        // A log without its channel is one of no run.
+        let _ = record::RunLog::parse("again.mcap", &again).map(|log| assert!(log.closed));
+    }
+}
+
+/// Descriptions of simulated plants.
+pub(super) fn plants(luck: &mut Luck) {
+    let mut text = format!("{PLANT}{WARM}[creep]\nshare = 0.05\n").into_bytes();
+    luck.damage(&mut text);
+    let Ok(text) = String::from_utf8(text) else { return };
+    if let Ok(config) = PlantConfig::from_toml(&text)
+        && config.actuator.relays <= 2000
+    {
+        let _ = Plant::new(config);
+    }
+}

@@ -1,0 +1,67 @@
+//! Numbers by chance that a seed repeats, and what chance does to bytes.
+
+/// Numbers by chance (SplitMix64, Steele, Lea and Flood 2014).
+#[derive(Clone, Debug)]
+pub(super) struct Luck(u64);
+
+impl Luck {
+    pub(super) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub(super) fn number(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `n`, which is not zero.
+    pub(super) fn below(&mut self, n: usize) -> usize {
+        (self.number() % n as u64) as usize
+    }
+
+    /// Whether something happens that does once in `n` times; never if `n` is zero.
+    pub(super) fn once_in(&mut self, n: usize) -> bool {
+        n > 0 && self.below(n) == 0
+    }
+
+    /// From `low` to `high`.
+    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.number() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(super) fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
+        &list[self.below(list.len())]
+    }
+
+    pub(super) fn bytes(&mut self, most: usize) -> Vec<u8> {
+        (0..self.below(most + 1)).map(|_| self.number() as u8).collect()
+    }
+
+    /// Changes, loses, doubles or moves a few of the bytes.
+    pub(super) fn damage(&mut self, bytes: &mut Vec<u8>) {
+        for _ in 0..=self.below(3) {
+            if bytes.is_empty() {
+                return;
+            }
+            let (at, other) = (self.below(bytes.len()), self.below(bytes.len()));
+            let (low, high) = (at.min(other), at.max(other));
+            match self.below(9) {
+                0 => bytes[at] ^= 1 << self.below(8),
+                1 => bytes[at] = *self.of(&[0, 1, 0x7f, 0x80, 0xff, b'0', b'-', b'9', b'"', b'{', b'\n', b',', b'e']),
+                2 => bytes.truncate(at),
+                3 => drop(bytes.remove(at)),
+                4 => bytes.insert(at, self.number() as u8),
+                5 => bytes.swap(at, other),
+                6 => drop(bytes.drain(low..high)),
+                7 => {
+                    let again = bytes[low..high.min(low + 64)].to_vec();
+                    bytes.splice(low..low, again);
+                }
+                // A length or a count, as large as can be.
+                _ => bytes[low..high.min(low + 8)].fill(*self.of(&[0, 0xff])),
+            }
+        }
+    }
+}
