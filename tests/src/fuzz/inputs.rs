@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use hyst_cli::log::{LoggedModel, LoggedSample, RunInfo, RunLog, recovered};
 use hyst_core::{
-    ChainParams, EffectParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block, write_block,
+    ChainParams, EffectParams, ForceParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block, write_block,
 };
 use hyst_hw::wire::{
     Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, Measured, Reply, Request, Shown, State,
@@ -49,9 +49,10 @@ pub(super) fn recipe() -> &'static [u8] {
             low: 0.0,
             high: 100.0,
         };
+        let force = ForceParams { stiffness: 1.5, kappa: 1.0, chi: 0.0 };
         let mut room = [0; 4096];
         let block = write_block(&model, &mut room).expect("there is room");
-        [recipe_head(Some(&pid)).as_slice(), block].concat()
+        [recipe_head(Some(&pid), Some(&force)).as_slice(), block].concat()
     })
 }
 
@@ -137,7 +138,7 @@ pub(super) fn frames(luck: &mut Luck) {
             _ => Ask::Model(Chunk { offset: 0, total: 900, bytes: luck.bytes(200).into_iter().collect() }),
         };
         stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
-        let sample = Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
+        let sample = Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
         let samples = std::iter::repeat_n(sample, luck.below(20)).collect();
         let tell = Tell::Samples { status: status(), first: 0, samples };
         stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
@@ -265,7 +266,7 @@ pub(super) fn controllers(luck: &mut Luck) {
     let _ = (read_recipe(&bytes), lateness(&bytes, period));
     let mut follower = Follower::new();
     if follower.load(&bytes) {
-        let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
+        let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
         if follower.begin(period, 3.0, &shown, 20.0) {
             for k in 0..20 {
                 let _ = follower.step(3.0 + 0.1 * k as f32, &shown);
@@ -339,7 +340,7 @@ pub(super) fn logs(luck: &mut Luck) {
         let mut log = RunLog::create(&path, &info).expect("a log");
         for k in 0..12 {
             let time_s = 0.25 * f64::from(k);
-            let sample = Sample { time_s, drive_v: 1.5, output: 0.3, temperature_degc: Some(20.0), load_n: None };
+            let sample = Sample { time_s, drive_v: 1.5, output: 0.3, temperature_degc: Some(20.0), load_n: None, force_n: None };
             log.sample(&LoggedSample::new(0, Phase::Record, &sample, Some(0.25))).expect("it is written");
         }
         log.finish().expect("it is written");
