@@ -1,5 +1,5 @@
-//! Bytes and frames by chance on all cores: `cargo run --release -p hyst-tests --example fuzz -- [CASES [FIRST_SEED]]`, or one case that
-//! has found something: `… -- KIND SEED`.
+//! Bytes and frames by chance on all cores: `cargo run --release -p hyst-tests --example fuzz -- [CASES [FIRST_SEED]]`; one case that
+//! has found something: `… -- KIND SEED`; cases of one kind: `… -- KIND FIRST_SEED CASES`.
 
 use std::error::Error;
 use std::io::Write;
@@ -20,6 +20,9 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let Some(kind) = arguments.first().and_then(|name| Kind::named(name)) {
         let seed = arguments.get(1).ok_or("give the seed of the case")?.parse()?;
+        if let Some(cases) = arguments.get(2) {
+            return Ok(if of_kind(kind, seed, cases.parse()?) == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+        }
         kind.run(seed);
         println!("{} {seed}: nothing found", kind.name);
         return Ok(ExitCode::SUCCESS);
