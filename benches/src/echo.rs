@@ -55,6 +55,7 @@ impl Daq for Echo {
                 output,
                 temperature_degc: Some(22.0 + 0.01 * output),
                 load_n: Some(0.1 * output),
+                force_n: None,
             });
         }
         self.drive_v = drive_v.last().copied().unwrap_or(self.drive_v);

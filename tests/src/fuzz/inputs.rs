@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use hyst_cli::log::{LoggedModel, LoggedSample, RunInfo, RunLog, recovered};
 use hyst_core::{
-    ChainParams, EffectParams, ForceParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block, write_block,
+    ChainParams, EffectParams, ForceParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block,
+    write_block,
 };
 use hyst_hw::wire::{
     Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, Measured, Reply, Request, Shown, State,
@@ -138,7 +139,8 @@ pub(super) fn frames(luck: &mut Luck) {
             _ => Ask::Model(Chunk { offset: 0, total: 900, bytes: luck.bytes(200).into_iter().collect() }),
         };
         stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
-        let sample = Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
+        let sample =
+            Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
         let samples = std::iter::repeat_n(sample, luck.below(20)).collect();
         let tell = Tell::Samples { status: status(), first: 0, samples };
         stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
@@ -341,7 +343,8 @@ pub(super) fn logs(luck: &mut Luck) {
         let mut log = RunLog::create(&path, &info).expect("a log");
         for k in 0..12 {
             let time_s = 0.25 * f64::from(k);
-            let sample = Sample { time_s, drive_v: 1.5, output: 0.3, temperature_degc: Some(20.0), load_n: None, force_n: None };
+            let sample =
+                Sample { time_s, drive_v: 1.5, output: 0.3, temperature_degc: Some(20.0), load_n: None, force_n: None };
             log.sample(&LoggedSample::new(0, Phase::Record, &sample, Some(0.25))).expect("it is written");
         }
         log.finish().expect("it is written");
