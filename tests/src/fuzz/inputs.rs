@@ -269,7 +269,7 @@ pub(super) fn controllers(luck: &mut Luck) {
     let _ = (read_recipe(&bytes), lateness(&bytes, period));
     let mut follower = Follower::new();
     if follower.load(&bytes) {
-        let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
+        let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
         if follower.begin(period, 3.0, &shown, 20.0) {
             for k in 0..20 {
                 let _ = follower.step(3.0 + 0.1 * k as f32, &shown);
