@@ -75,6 +75,7 @@ mod tests {
                 output: (f64::from(k) * 0.9).cos(),
                 temperature_degc: Some(20.0 + f64::from(k)),
                 load_n: None,
+                force_n: None,
             };
             log.sample(&LoggedSample::new(0, Phase::Record, &sample, Some(0.5))).unwrap();
         }
