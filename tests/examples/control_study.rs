@@ -32,9 +32,11 @@ fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
     let colours =
         [RGBColor(150, 150, 150), RGBColor(230, 140, 30), RGBColor(40, 110, 190), RGBColor(190, 50, 60), BLACK];
     for (area, row) in root.split_evenly((study.rows.len(), 1)).iter().zip(&study.rows) {
+        // The names stand beside the curves, not on them.
+        let (curves, names) = area.split_horizontally(950);
         let most = row.errors.iter().skip(1).fold(0.0f64, |m, e| m.max(e.max));
         let end = row.time.last().copied().unwrap_or(1.0);
-        let mut chart = ChartBuilder::on(area)
+        let mut chart = ChartBuilder::on(&curves)
             .caption(row.name, ("sans-serif", 18))
             .margin(8)
             .x_label_area_size(32)
@@ -50,13 +52,11 @@ fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
             let points = row.time.iter().zip(measured).zip(&row.wanted);
             let line = points.map(|((t, y), r)| (*t, (y - r).clamp(-most, most))).step_by(4);
             let name = format!("{}: {:.3} µm", CONTROLS[k], row.errors[k].rmse);
-            let colour = colours[k];
-            chart
-                .draw_series(LineSeries::new(line, &colour))?
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
+            let (colour, y) = (colours[k], 60 + 26 * k as i32);
+            chart.draw_series(LineSeries::new(line, &colour))?;
+            names.draw(&PathElement::new([(0, y), (16, y)], colour.stroke_width(3)))?;
+            names.draw(&Text::new(name, (22, y - 7), ("sans-serif", 14)))?;
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
     }
     root.present()?;
     Ok(())
