@@ -9,7 +9,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hyst_core::{ChainParams, EffectParams, ForceParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
-use hyst_hw::wire::{Ask, Chunk, Exchange, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, Tell, recipe_head};
+use hyst_hw::wire::{
+    Ask, Chunk, Exchange, Fault, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, State, Tell, model_sum,
+    recipe_head,
+};
 use hyst_hw::{Daq, Line, Remote, RemoteError, RemoteOptions, Sample, Serial};
 use hyst_onboard::{OnBoard, RANGE_V, RATE_HZ, SLEW_V_PER_S, servo};
 
@@ -53,7 +56,7 @@ fn machine() -> Option<Machine> {
 
 fn remote(machine: &Machine, session: u32, mode: Mode) -> Remote<Serial> {
     let line = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
-    let options = RemoteOptions { mode, ..RemoteOptions::with_session(session) };
+    let options = RemoteOptions { mode, force: mode == Mode::Reference, ..RemoteOptions::with_session(session) };
     Remote::open(line, &machine.port, options).expect("the firmware answers")
 }
 
@@ -96,8 +99,12 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
     let ask = |device: &mut hyst_onboard::Servo, ask: Ask| -> Reply { device.answer(&Request { number: 0, ask }) };
     let bytes = recipe();
     for (i, part) in bytes.chunks(MOST_CHUNK).enumerate() {
-        let chunk =
-            Chunk { offset: (i * MOST_CHUNK) as u32, total: bytes.len() as u32, bytes: part.iter().copied().collect() };
+        let chunk = Chunk {
+            offset: (i * MOST_CHUNK) as u32,
+            total: bytes.len() as u32,
+            sum: model_sum(&bytes),
+            bytes: part.iter().copied().collect(),
+        };
         assert!(matches!(ask(&mut device, Ask::Model(chunk)).tell, Tell::ModelBytes(_)));
     }
     let start = Start {
@@ -110,6 +117,7 @@ fn on_host(references: &[f64]) -> Vec<(f32, f32, Option<f32>)> {
         hottest_degc: f32::INFINITY,
         error: f32::INFINITY,
         silence_s: 0.5,
+        force: true,
     };
     assert!(matches!(ask(&mut device, Ask::Start(start)).tell, Tell::Status(_)));
     let (mut sent, mut measured) = (0, Vec::new());
@@ -188,7 +196,7 @@ fn a_host_that_is_killed_leaves_the_firmware_to_its_watchdog() {
     }
     assert!(ramp[0].0 > 20.0, "it was killed at {} V only", ramp[0].0);
     let (_, last) = ramp[ramp.len() - 1];
-    assert_eq!(last, hyst_hw::wire::State::Fault(hyst_hw::wire::Fault::Silence));
+    assert_eq!(last, State::Fault(Fault::Silence));
     let fallen = ramp.iter().position(|(volts, _)| *volts < ramp[0].0).expect("it falls");
     assert!(ramp[fallen..].windows(2).all(|w| w[1].0 <= w[0].0), "on the way to rest it only falls");
     let ran = lab.run(&line);
@@ -306,7 +314,7 @@ fn without_a_host_the_firmware_comes_to_rest() {
     sleep(Duration::from_millis(1500));
     let mut remote = remote(&machine, 12, Mode::Voltage);
     let refused = remote.start(RATE_HZ.into());
-    assert!(matches!(refused, Err(RemoteError::Refused { .. })), "{refused:?}");
+    assert!(matches!(refused, Err(RemoteError::Standing { fault: Fault::Silence, .. })), "{refused:?}");
     remote.clear().expect("at rest the fault can be cleared");
     assert_eq!(remote.present_v(), 0.0);
     remote.start(RATE_HZ.into()).expect("and the next run starts");

@@ -51,6 +51,10 @@ pub(crate) struct Wishes {
     pub(crate) voltage: Option<(f64, f64)>,
     /// Steepest slope \[V/s\].
     pub(crate) slew_v_per_s: Option<f64>,
+    /// Whether the device estimates the external force.
+    pub(crate) force: bool,
+    /// Silence of this computer after which the device comes to rest \[s\].
+    pub(crate) silence_s: Option<f64>,
     /// Whether a fault of an earlier run is cleared first.
     pub(crate) clear: bool,
     /// Highest temperature \[°C\].
@@ -62,44 +66,68 @@ pub(crate) struct Wishes {
 impl AnyDevice {
     /// Opens it. Nothing moves by that.
     pub(crate) fn open(device: &Device, wishes: &Wishes) -> CommandResult<Self> {
-        // No two runs have the same number, so that a late request of one does nothing to another.
-        let clock = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-        let session = (clock ^ (clock >> 32)) as u32 ^ std::process::id().rotate_left(16);
-        let options = RemoteOptions {
-            voltage: wishes.voltage,
-            slew_v_per_s: wishes.slew_v_per_s,
-            hottest_degc: wishes.hottest_degc.unwrap_or(f64::INFINITY),
-            error: wishes.error.unwrap_or(f64::INFINITY),
-            ..RemoteOptions::with_session(session)
-        };
+        if let Device::Simulated(described) = device {
+            return Ok(Self::Plant(Box::new(input::plant(described, wishes.noise)?)));
+        }
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
-        let port =
-            |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
-        let gone = |message: String| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"));
-        let (line, name): (Box<dyn Line>, &str) = match device {
-            Device::Simulated(described) => {
-                return Ok(Self::Plant(Box::new(input::plant(described, wishes.noise)?)));
-            }
-            Device::Serial { port: name, baud } => (Box::new(port(name, *baud)?), name),
-            Device::Slcan { port: name, baud, bits_per_s } => {
-                let bus = Slcan::open(port(name, *baud)?, *bits_per_s)
-                    .map_err(|error| gone(format!("{name}: the CAN adapter cannot be opened: {error}")))?;
-                (Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false)), name)
-            }
-            Device::Can { interface, fd } => (can(interface, *fd)?, interface),
-            Device::Tcp(address) => {
-                let line = Tcp::connect(address).map_err(|error| {
-                    gone(format!("{address}: nobody answers: {error}; is the simulator or the bridge running?"))
-                })?;
-                (Box::new(line), address)
-            }
-        };
-        let mut remote = Remote::open(line, name, options).map_err(lost)?;
+        let (line, name) = line(device)?;
+        let mut remote = Remote::open(line, name, options(wishes)).map_err(lost)?;
         if wishes.clear {
             remote.clear().map_err(lost)?;
         }
         Ok(Self::Remote(Box::new(remote)))
     }
+
+    /// Lets it come to rest and stay there, without a word before; gives its name and what it put out then \[V\].
+    pub(crate) fn emergency_stop(device: &Device) -> CommandResult<(String, f64)> {
+        let (line, name) = line(device)?;
+        let status = Remote::stop_at(line, name.clone(), options(&Wishes::default()));
+        Ok((name, f64::from(status.map_err(DeviceError::from)?.present_v)))
+    }
+}
+
+/// How a device is talked to.
+fn options(wishes: &Wishes) -> RemoteOptions {
+    // No two runs have the same number, so that a late request of one does nothing to another.
+    let clock = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    let session = (clock ^ (clock >> 32)) as u32 ^ std::process::id().rotate_left(16);
+    let usual = RemoteOptions::with_session(session);
+    RemoteOptions {
+        voltage: wishes.voltage,
+        slew_v_per_s: wishes.slew_v_per_s,
+        silence_s: wishes.silence_s.unwrap_or(usual.silence_s),
+        hottest_degc: wishes.hottest_degc.unwrap_or(f64::INFINITY),
+        error: wishes.error.unwrap_or(f64::INFINITY),
+        force: wishes.force,
+        ..usual
+    }
+}
+
+/// The line to a device, and what it is called.
+fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
+    let port = |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
+    let gone = |message: String| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"));
+    let (line, name): (Box<dyn Line>, &String) = match device {
+        Device::Simulated(_) => {
+            return Err(CommandError::bad_input(
+                "a simulated plant runs in the command that plays it; press Ctrl-C there",
+            ));
+        }
+        Device::Serial { port: name, baud } => (Box::new(port(name, *baud)?), name),
+        Device::Slcan { port: name, baud, bits_per_s } => {
+            let bus = Slcan::open(port(name, *baud)?, *bits_per_s)
+                .map_err(|error| gone(format!("{name}: the CAN adapter cannot be opened: {error}")))?;
+            (Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false)), name)
+        }
+        Device::Can { interface, fd } => (can(interface, *fd)?, interface),
+        Device::Tcp(address) => {
+            let line = Tcp::connect(address).map_err(|error| {
+                gone(format!("{address}: nobody answers: {error}; is the simulator or the bridge running?"))
+            })?;
+            (Box::new(line), address)
+        }
+    };
+    Ok((line, name.clone()))
 }
 
 /// The device on the bus behind an interface.

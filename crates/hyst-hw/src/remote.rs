@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use crate::daq::{Capabilities, Daq, OutputUnit, Sample, VoltageRange};
 use crate::wire::{
     Ask, Chunk, Deframer, Exchange, Fault, FrameError, Identity, MAX_FRAME, MOST_CHUNK, MOST_DRIVES, Measured, Mode,
-    PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode,
+    PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, encode, model_sum,
 };
 
 use clock::Clock;
@@ -27,8 +27,14 @@ pub use slcan::Slcan;
 #[cfg(target_os = "linux")]
 pub use socketcan::{SocketCan, SocketCanError};
 
-/// How long a device may take to come to rest.
-const LONGEST_REST: Duration = Duration::from_secs(60);
+/// How long a device may take to come to rest, its ramp not counted.
+const LONGEST_REST: Duration = Duration::from_secs(20);
+/// How far drives are sent ahead \[s\]: long enough for a host that is kept busy for a moment, short enough for a stop.
+const LOOKAHEAD_S: f64 = 0.25;
+/// By how many times the first wait for an answer the last ones may be longer.
+const MOST_REPEATS: u32 = 8;
+/// Room for noise at the ends of a range of references, as a share of it.
+const MARGIN: f64 = 0.05;
 
 /// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
 pub trait Line {
@@ -142,6 +148,22 @@ pub enum RemoteError {
         /// What the line is called.
         line: String,
     },
+    /// The device does not know the run any more.
+    #[error("{line}: the device has left the run: {refusal}; was it switched off and on?")]
+    Left {
+        /// What the line is called.
+        line: String,
+        /// What it said.
+        refusal: Refusal,
+    },
+    /// The device does not come to rest.
+    #[error("{line}: the device does not come to rest within {seconds} s; switch its amplifier off")]
+    Restless {
+        /// What the line is called.
+        line: String,
+        /// How long was waited \[s\].
+        seconds: f64,
+    },
     /// A value that cannot be asked for.
     #[error("{what} = {value}: {advice}")]
     Value {
@@ -182,6 +204,8 @@ pub struct RemoteOptions {
     pub mode: Mode,
     /// Greatest tracking error \[output unit\].
     pub error: f64,
+    /// Whether the device estimates the external force, with the observer that was handed over.
+    pub force: bool,
     /// Number of the run: another one for each. Drawn by the caller, so that two programs do not meet in one.
     pub session: u32,
 }
@@ -199,6 +223,7 @@ impl RemoteOptions {
             hottest_degc: f64::INFINITY,
             mode: Mode::Voltage,
             error: f64::INFINITY,
+            force: false,
             session,
         }
     }
@@ -217,9 +242,8 @@ pub struct Remote<L> {
     run: Option<Run>,
     /// Of the run, or of the last one.
     clock: Option<Clock>,
-    /// When the last request was sent, and its answer came.
-    asked: Instant,
-    answered: Instant,
+    /// When the last request was sent and its answer came, if that is known.
+    round_trip: Option<(Instant, Instant)>,
     present_v: f64,
     broken: u32,
 }
@@ -235,6 +259,10 @@ struct Run {
     heard: u32,
     /// Number of the first drive that it has no room for.
     room: u32,
+    /// Most drives that wait on the device: what is decided here acts no later than that.
+    lookahead: u32,
+    /// Periods since the run began, as many as there are: the device's count begins anew after 2³².
+    ticks: u64,
 }
 
 impl<L: Line> Remote<L> {
@@ -243,6 +271,22 @@ impl<L: Line> Remote<L> {
     /// # Errors
     /// When nobody answers, or in another version.
     pub fn open(line: L, name: impl Into<String>, options: RemoteOptions) -> Result<Self, RemoteError> {
+        let mut remote = Self::unknown(line, name.into(), options);
+        match remote.ask(Ask::Hello)? {
+            Tell::Version(PROTOCOL) => {}
+            Tell::Version(device) => return Err(RemoteError::Version { line: remote.name, device }),
+            _ => return Err(remote.odd()),
+        }
+        let Tell::Identity(identity) = remote.ask(Ask::Describe)? else { return Err(remote.odd()) };
+        remote.capabilities = capabilities(&identity, &remote.name);
+        remote.identity = identity;
+        // Where it stands, which need not be where it rests.
+        remote.status()?;
+        Ok(remote)
+    }
+
+    /// Before anything was said.
+    fn unknown(line: L, name: String, options: RemoteOptions) -> Self {
         let nobody = Identity {
             name: heapless::Vec::new(),
             min_v: 0.0,
@@ -258,9 +302,9 @@ impl<L: Line> Remote<L> {
             queue: 0,
             model: 0,
         };
-        let mut remote = Self {
+        let remote = Self {
             line,
-            name: name.into(),
+            name,
             options,
             deframer: Deframer::new(),
             // An answer to an earlier program's request is told from one to this one's.
@@ -269,21 +313,11 @@ impl<L: Line> Remote<L> {
             identity: nobody,
             run: None,
             clock: None,
-            asked: Instant::now(),
-            answered: Instant::now(),
+            round_trip: None,
             present_v: 0.0,
             broken: 0,
         };
-        match remote.ask(Ask::Hello)? {
-            Tell::Version(PROTOCOL) => {}
-            Tell::Version(device) => return Err(RemoteError::Version { line: remote.name, device }),
-            _ => return Err(remote.odd()),
-        }
-        let Tell::Identity(identity) = remote.ask(Ask::Describe)? else { return Err(remote.odd()) };
-        remote.capabilities = capabilities(&identity, &remote.name);
-        remote.present_v = f64::from(identity.rest_v);
-        remote.identity = identity;
-        Ok(remote)
+        remote
     }
 
     /// What the device is.
@@ -301,12 +335,13 @@ impl<L: Line> Remote<L> {
     /// # Errors
     /// When the device has no room for it or cannot run it, or is lost.
     pub fn upload(&mut self, block: &[u8]) -> Result<(), RemoteError> {
-        let total = block.len() as u32;
+        let (total, sum) = (block.len() as u32, model_sum(block));
         let mut offset = 0;
-        loop {
+        // Each part brings it on; parts that do not are those of a device that is none.
+        for _ in 0..=2 * block.len().div_ceil(MOST_CHUNK) {
             let end = block.len().min(offset as usize + MOST_CHUNK);
             let bytes = block[offset as usize..end].iter().copied().collect();
-            match self.ask(Ask::Model(Chunk { offset, total, bytes }))? {
+            match self.ask(Ask::Model(Chunk { offset, total, sum, bytes }))? {
                 Tell::ModelBytes(have) if have >= total => return Ok(()),
                 Tell::ModelBytes(have) => offset = have,
                 Tell::Refused(Refusal::ModelGap, _) => offset = 0,
@@ -314,6 +349,7 @@ impl<L: Line> Remote<L> {
                 _ => return Err(self.odd()),
             }
         }
+        Err(self.odd())
     }
 
     /// How the device stands. Nothing changes by that, and for the watchdog of a run it is no sign of life.
@@ -346,6 +382,14 @@ impl<L: Line> Remote<L> {
         Ok(())
     }
 
+    /// An emergency stop of the device at the other end of `line`, whatever it does and whichever version it speaks: nothing is asked before.
+    ///
+    /// # Errors
+    /// When nobody answers.
+    pub fn stop_at(line: L, name: impl Into<String>, options: RemoteOptions) -> Result<Status, RemoteError> {
+        Self::unknown(line, name.into(), options).stated(Ask::Emergency)
+    }
+
     /// Ends whatever the device does and keeps it from starting again before [`clear`](Self::clear).
     ///
     /// # Errors
@@ -363,12 +407,25 @@ impl<L: Line> Remote<L> {
         let began = self.line.now();
         loop {
             match self.stated(Ask::Clear) {
-                Err(RemoteError::Standing { .. }) if self.since(began) < LONGEST_REST => {
+                Err(RemoteError::Standing { .. }) if self.since(began) < self.longest_rest() => {
                     self.line.pause(Duration::from_millis(20));
                 }
                 told => return told.map(|_| ()),
             }
         }
+    }
+
+    /// How long to go without an answer: a slow clock gives no news for a while.
+    fn lost(&self) -> Duration {
+        let periods = self.run.map_or(0.0, |run| 4.0 / run.rate_hz);
+        self.options.lost.max(Duration::from_secs_f64(periods.min(1e4)))
+    }
+
+    /// How long the device may take to come to rest at its slew.
+    fn longest_rest(&self) -> Duration {
+        let slew = self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s));
+        let ramp = f64::from(self.identity.max_v - self.identity.min_v) / slew.max(f64::MIN_POSITIVE);
+        LONGEST_REST + Duration::from_secs_f64(ramp.clamp(0.0, 1e6))
     }
 
     /// Time since `then`, on the line's clock.
@@ -414,17 +471,20 @@ impl<L: Line> Remote<L> {
         let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
         let began = self.line.now();
         let mut bytes = [0; 4096];
-        while self.since(began) < self.options.lost {
+        let (mut repeat, mut asked) = (self.options.repeat, 0);
+        while self.since(began) < self.lost() {
             // A zero ends what a line may have left of an earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
             let sent = self.line.now();
-            while let Some(patience) = self.options.repeat.checked_sub(self.since(sent)).filter(|d| !d.is_zero()) {
+            asked += 1;
+            while let Some(patience) = repeat.checked_sub(self.since(sent)).filter(|d| !d.is_zero()) {
                 let came = self.line.receive(&mut bytes, patience).map_err(|source| self.gone(source))?;
                 let mut fresh = &bytes[..came];
                 while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
                     match reply {
                         Ok(reply) if reply.number == self.number => {
-                            (self.asked, self.answered) = (sent, self.line.now());
+                            // Asked twice, it is not known which one was answered.
+                            self.round_trip = (asked == 1).then(|| (sent, self.line.now()));
                             return Ok(reply.tell);
                         }
                         // Of a request that was sent twice.
@@ -434,6 +494,8 @@ impl<L: Line> Remote<L> {
                     }
                 }
             }
+            // A line that is slow, and not deaf, would only be filled.
+            repeat = (2 * repeat).min(MOST_REPEATS * self.options.repeat);
         }
         let advice = match request.ask {
             Ask::Hello if self.broken > 0 => {
@@ -442,27 +504,34 @@ impl<L: Line> Remote<L> {
             Ask::Hello => "is this the right port, its speed the device's, and the device powered?",
             _ => "look at the cable; the device comes to rest by itself",
         };
-        let seconds = self.options.lost.as_secs_f64();
+        let seconds = self.lost().as_secs_f64();
         Err(RemoteError::Silent { line: self.name.clone(), seconds, broken: self.broken, advice })
     }
 
     /// One request of a run: gives how many drives were taken.
     fn trade(&mut self, run: &mut Run, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
-        let free = run.room.saturating_sub(run.sent) as usize;
+        let ahead = run.lookahead.saturating_sub(run.sent.wrapping_sub(run.heard));
+        let free = run.room.saturating_sub(run.sent).min(ahead) as usize;
         let drives = drive_v.iter().take(free.min(MOST_DRIVES)).map(|v| *v as f32).collect();
         let exchange = Exchange { session: run.session, heard: run.heard, first: run.sent, drives };
         match self.ask(Ask::Exchange(exchange))? {
             Tell::Samples { status, first, samples } => {
-                if let Some(clock) = &mut self.clock {
-                    clock.tell(self.asked, self.answered, status.tick);
-                }
-                if let State::Fault(fault) = status.state {
-                    self.hear(run, first, &samples, measured);
-                    return Err(RemoteError::Fault { line: self.name.clone(), fault });
+                if let (Some(clock), Some((asked, answered))) = (&mut self.clock, self.round_trip) {
+                    // The device's count, from the periods that are known of.
+                    let periods = run.ticks + u64::from(status.tick.wrapping_sub(run.ticks as u32));
+                    clock.tell(asked, answered, periods);
                 }
                 if status.state != State::Running {
-                    self.hear(run, first, &samples, measured);
-                    return Err(RemoteError::Stopped { line: self.name.clone() });
+                    // What led to it is what one wants to see.
+                    let mut whole = self.hear(run, first, &samples, measured);
+                    for _ in 0..status.measured.wrapping_sub(run.heard) {
+                        whole = whole && run.heard != status.measured && self.hear_more(run, measured);
+                    }
+                    let line = self.name.clone();
+                    return Err(match status.state {
+                        State::Fault(fault) => RemoteError::Fault { line, fault },
+                        _ => RemoteError::Stopped { line },
+                    });
                 }
                 let taken = status.received.wrapping_sub(run.sent) as usize;
                 if taken > drive_v.len() || !self.hear(run, first, &samples, measured) {
@@ -475,11 +544,24 @@ impl<L: Line> Remote<L> {
                 };
                 Ok(taken)
             }
-            Tell::Refused(refusal, status) => match status.state {
-                State::Fault(fault) => Err(RemoteError::Fault { line: self.name.clone(), fault }),
-                _ => Err(self.refused(refusal)),
+            Tell::Refused(refusal, status) => match (status.state, refusal) {
+                (State::Fault(fault), _) => Err(RemoteError::Fault { line: self.name.clone(), fault }),
+                (_, Refusal::Drive(_)) => Err(self.refused(refusal)),
+                _ => Err(RemoteError::Left { line: self.name.clone(), refusal }),
             },
             _ => Err(self.odd()),
+        }
+    }
+
+    /// Asks for samples of a run that is over; whether some came.
+    fn hear_more(&mut self, run: &mut Run, measured: &mut Vec<Sample>) -> bool {
+        let drives = heapless::Vec::new();
+        let exchange = Exchange { session: run.session, heard: run.heard, first: run.sent, drives };
+        match self.ask(Ask::Exchange(exchange)) {
+            Ok(Tell::Samples { first, samples, .. }) => {
+                !samples.is_empty() && self.hear(run, first, &samples, measured)
+            }
+            _ => false,
         }
     }
 
@@ -487,10 +569,11 @@ impl<L: Line> Remote<L> {
     fn hear(&self, run: &mut Run, first: u32, samples: &[Measured], measured: &mut Vec<Sample>) -> bool {
         let Some(known) = run.heard.checked_sub(first) else { return samples.is_empty() };
         for sample in samples.iter().skip(known as usize) {
-            run.heard += 1;
+            run.heard = run.heard.wrapping_add(1);
+            run.ticks += u64::from(sample.tick.wrapping_sub(run.ticks as u32));
             let has = |there: bool, value: f32| there.then_some(f64::from(value));
             measured.push(Sample {
-                time_s: f64::from(sample.tick) / run.rate_hz,
+                time_s: run.ticks as f64 / run.rate_hz,
                 drive_v: f64::from(sample.drive_v),
                 output: f64::from(sample.output),
                 temperature_degc: has(self.identity.temperature, sample.temperature_degc),
@@ -513,7 +596,7 @@ impl<L: Line> Remote<L> {
             if taken > 0 || measured.len() > before || !outstanding && drive_v.is_empty() {
                 return Ok(taken);
             }
-            if self.since(began) > self.options.lost {
+            if self.since(began) > self.lost() {
                 // The runner calls that a stalled device.
                 return Ok(0);
             }
@@ -573,11 +656,28 @@ impl<L: Line> Daq for Remote<L> {
             hottest_degc: o.hottest_degc as f32,
             error: o.error as f32,
             silence_s: o.silence_s as f32,
+            force: o.force,
         };
-        let status = self.stated(Ask::Start(start))?;
+        let status = match self.stated(Ask::Start(start)) {
+            Err(error @ (RemoteError::Silent { .. } | RemoteError::Answer { .. })) => {
+                // It may have begun all the same.
+                let _ = self.ask(Ask::Stop);
+                return Err(error);
+            }
+            other => other?,
+        };
         let rate_hz = f64::from(rate_hz as f32);
         self.clock = Some(Clock::new(1.0 / rate_hz, self.line.now()));
-        self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room });
+        let lookahead = (LOOKAHEAD_S * rate_hz).ceil().clamp(8.0, 1e6) as u32;
+        self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room, lookahead, ticks: 0 });
+        if o.mode == Mode::Reference {
+            // Ramps begin and end where the output is now, wherever its sensor's noise puts it.
+            let (range, output) = (&mut self.capabilities.voltage, f64::from(status.output));
+            let margin = MARGIN * (range.max_v - range.min_v);
+            range.min_v = range.min_v.min(output - margin);
+            range.max_v = range.max_v.max(output + margin);
+            range.rest_v = output;
+        }
         // The next run of this program is another one.
         self.options.session = o.session.wrapping_add(1);
         Ok(rate_hz)
@@ -619,6 +719,7 @@ impl<L: Line> Daq for Remote<L> {
         let volts = |k: usize| if k + 1 >= ramp { rest } else { from + (rest - from) * (k + 1) as f64 / ramp as f64 };
         let (mut sent, mut nobody) = (0, Vec::new());
         while sent < total {
+            nobody.clear();
             let block: Vec<f64> = (sent..total.min(sent + MOST_DRIVES)).map(volts).collect();
             sent += self.trade_until_news(&block, &mut nobody)?;
         }
@@ -633,26 +734,21 @@ impl<L: Line> Daq for Remote<L> {
     }
 
     fn stop(&mut self) -> Result<(), RemoteError> {
-        if self.run.take().is_none() {
+        if self.run.is_none() {
             return Ok(());
         }
-        let began = self.line.now();
+        let (began, longest) = (self.line.now(), self.longest_rest());
         loop {
             let status = self.stated(Ask::Stop)?;
-            match status.state {
-                State::Idle => return Ok(()),
-                State::Fault(_) if status.present_v == self.identity.rest_v => return Ok(()),
-                _ if self.since(began) > LONGEST_REST => {
-                    let advice = "the device does not come to rest; switch its amplifier off";
-                    return Err(RemoteError::Silent {
-                        line: self.name.clone(),
-                        seconds: LONGEST_REST.as_secs_f64(),
-                        broken: self.broken,
-                        advice,
-                    });
-                }
-                _ => self.line.pause(Duration::from_millis(2)),
+            let at_rest = matches!(status.state, State::Fault(_)) && status.present_v == self.identity.rest_v;
+            if status.state == State::Idle || at_rest {
+                self.run = None;
+                return Ok(());
             }
+            if self.since(began) > longest {
+                return Err(RemoteError::Restless { line: self.name.clone(), seconds: longest.as_secs_f64() });
+            }
+            self.line.pause(Duration::from_millis(2));
         }
     }
 }

@@ -10,8 +10,10 @@ use crate::plant::error::PlantError;
 use crate::remote::{Line, Tcp};
 use crate::wire::{Board, Control, Deframer, Device, Identity, MAX_FRAME, MOST_NAME, Request, Shown, Unit, encode};
 
-/// Periods that are made up for at once when the host's clock was late; more than that the device's clock loses.
+/// Periods that are made up for when this computer was late; more than that the device's clock loses.
 const MOST_LATE: u32 = 1000;
+/// Of them, those that are made up for before the line is heard again: a host would seem silent that was not.
+const AT_ONCE: u32 = 20;
 
 /// Serves a device at `line` on the host's clock, until `stop` says so or the line is gone.
 ///
@@ -28,13 +30,13 @@ pub fn serve<C: Control, const Q: usize, const M: usize>(
     while !stop() {
         let period = Duration::from_secs_f64(1.0 / f64::from(device.rate_hz().max(1.0)));
         let mut late = 0;
-        while due <= Instant::now() {
+        while late < AT_ONCE && due <= Instant::now() {
             device.tick(board);
             due += period;
             late += 1;
-            if late >= MOST_LATE {
-                due = Instant::now() + period;
-            }
+        }
+        if Instant::now().saturating_duration_since(due) > period * MOST_LATE {
+            due = Instant::now();
         }
         let patience = due.saturating_duration_since(Instant::now());
         let came = line.receive(&mut bytes, patience)?;

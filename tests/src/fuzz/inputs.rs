@@ -136,7 +136,12 @@ pub(super) fn frames(luck: &mut Luck) {
         let ask = match luck.below(3) {
             0 => Ask::Describe,
             1 => Ask::Exchange(Exchange { session: 1, heard: 2, first: 3, drives }),
-            _ => Ask::Model(Chunk { offset: 0, total: 900, bytes: luck.bytes(200).into_iter().collect() }),
+            _ => Ask::Model(Chunk {
+                offset: 0,
+                total: 900,
+                sum: luck.number() as u32,
+                bytes: luck.bytes(200).into_iter().collect(),
+            }),
         };
         stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
         let sample =

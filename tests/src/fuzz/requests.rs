@@ -36,6 +36,7 @@ fn start(luck: &mut Luck) -> Start {
         hottest_degc: *luck.of(&[10.0, 50.0, f32::INFINITY]),
         error: *luck.of(&[0.1, 100.0, f32::INFINITY]),
         silence_s: *luck.of(&SILENCES_S),
+        force: false,
     };
     match luck.below(8) {
         0 => Start { rate_hz: *luck.of(&[f32::NAN, 0.0, -5.0, 1e9]), ..sound },
@@ -53,7 +54,7 @@ fn chunk(luck: &mut Luck, recipe: &[u8]) -> Chunk {
     let offset =
         if luck.once_in(8) { luck.below(6000) } else { luck.below(recipe.len() / MOST_CHUNK + 1) * MOST_CHUNK };
     let bytes = recipe.iter().skip(offset).take(MOST_CHUNK).copied().collect();
-    Chunk { offset: if luck.once_in(16) { luck.number() as u32 } else { offset as u32 }, total, bytes }
+    Chunk { offset: if luck.once_in(16) { luck.number() as u32 } else { offset as u32 }, total, sum, bytes }
 }
 
 fn ask(luck: &mut Luck, device: &Servo, recipe: &[u8]) -> Ask {
@@ -97,7 +98,8 @@ pub(super) fn case(luck: &mut Luck) {
         // So that references are followed more often than by luck.
         for (k, part) in recipe.chunks(MOST_CHUNK).enumerate() {
             let (offset, total) = ((k * MOST_CHUNK) as u32, recipe.len() as u32);
-            let ask = Ask::Model(Chunk { offset, total, bytes: part.iter().copied().collect() });
+            let ask =
+                Ask::Model(Chunk { offset, total, sum: model_sum(recipe()), bytes: part.iter().copied().collect() });
             device.answer(&Request { number: 0, ask });
         }
     }
@@ -144,6 +146,7 @@ fn sound_again(device: &mut Servo, board: &mut Watched) {
         hottest_degc: f32::INFINITY,
         error: f32::INFINITY,
         silence_s: 1.0,
+        force: false,
     };
     assert!(matches!(told(device, Ask::Start(start)), Tell::Status(status) if status.state == State::Running));
     let drives = [10.0, 20.0, 30.0];

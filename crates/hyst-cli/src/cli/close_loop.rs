@@ -17,8 +17,7 @@ use super::{Device, JsonArg};
 #[derive(Debug, Args)]
 #[command(after_help = CLOSE_LOOP)]
 pub(crate) struct CloseLoopArgs {
-    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD],
-    /// slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT
+    /// Device: sim:PLANT.toml, the simulated actuator that the file describes
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
     /// Base model to begin with: pi or preisach

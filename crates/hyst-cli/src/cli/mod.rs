@@ -323,6 +323,9 @@ pub(crate) struct RunArgs {
     pub(crate) record: Option<Target>,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
+    /// Silence of this computer after which a device comes to rest by itself; 0.5 if not given
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) silence: Option<f64>,
     /// Clear the fault with which the device has ended an earlier run
     #[arg(long)]
     pub(crate) clear: bool,
@@ -356,7 +359,8 @@ pub(crate) struct RunArgs {
 
 /// Emergency stop: whatever a device does, let it come to rest and stay there
 ///
-/// The device ramps to rest at its slew limit, and starts again only once that is cleared (run --clear).
+/// The device ramps to rest at the slew limit of its run, and starts again only once that is cleared (run --clear). A serial port that another
+/// program holds, and a simulator that serves one host at a time, cannot be reached so: press Ctrl-C there. On a CAN bus there is room for both.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl stop --daq can:can0")]
 pub(crate) struct StopArgs {

@@ -64,6 +64,11 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
         let message = format!("{}: the folder is not empty; give another one with --out", out.display());
         return Err(CommandError::bad_input(message));
     }
+    if args.daq.file().is_none() {
+        return Err(CommandError::bad_input(
+            "close-loop runs simulated plants alone (sim:PLANT.toml): an actuator that moves for minutes wants somebody beside it; go the same way with excite, run, fit, diagnose and run again, with --limit and --slew",
+        ));
+    }
     let mut device = AnyDevice::open(&args.daq, &Wishes::default())?;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;

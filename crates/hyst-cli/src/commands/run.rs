@@ -164,6 +164,8 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
         clear: args.clear,
+        force: args.kout.is_some(),
+        silence_s: args.silence,
         hottest_degc: args.hottest,
         error: args.max_error,
     };
@@ -196,16 +198,16 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         _ => Ok(()),
     };
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
-    let Played { mut recording, forces, watched } = played?;
-    job.align(&mut recording);
+    let Played { mut recording, mut forces, watched } = played?;
+    job.align(&mut recording, &mut forces);
+    let forces = forces.concat();
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         let column = format!("reference_{}", unit.suffix());
         let mut extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
-        let forces = forces.get(forces.len().saturating_sub(record.rows())..).unwrap_or_default();
-        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers("estimated_force_n", forces)));
+        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers("estimated_force_n", &forces)));
         target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
     // The record may lie on another disk than a log that could not be closed.

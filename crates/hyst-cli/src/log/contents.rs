@@ -134,9 +134,12 @@ pub(super) fn schema(unit: &str) -> serde_json::Value {
                 "description": "approach: ramp to the first value; record: the drive; retreat: ramp to rest"
             },
             "drive_v": number("Voltage that was applied [V]".to_owned()),
-            "output": number(format!("Measured output [{unit}]")),
+            "output": {
+                "type": ["number", "null"],
+                "description": format!("Measured output [{unit}]; null where the sensor showed no number")
+            },
             "reference": number(format!("Wanted output [{unit}]; only in a record that follows a reference")),
-            "error": number(format!("Output minus reference [{unit}]")),
+            "error": { "type": ["number", "null"], "description": format!("Output minus reference [{unit}]") },
             "predicted": number(format!("Output that the model expects [{unit}]; only where one runs beside the device")),
             "temperature_degc": number("Temperature [degC], where it is measured".to_owned()),
             "load_n": number("Load [N], where it is measured".to_owned()),

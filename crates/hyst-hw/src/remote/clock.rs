@@ -53,11 +53,11 @@ impl Clock {
     }
 
     /// A device has said how many periods had passed.
-    pub(super) fn tell(&mut self, asked: Instant, answered: Instant, periods: u32) {
+    pub(super) fn tell(&mut self, asked: Instant, answered: Instant, periods: u64) {
         let since = |then: Instant| then.saturating_duration_since(self.began).as_secs_f64();
         let (asked, answered) = (since(asked), since(answered));
         // The period that runs is half over, on the average.
-        let device_s = (f64::from(periods) + 0.5) * self.period_s;
+        let device_s = (periods as f64 + 0.5) * self.period_s;
         self.take(Told { host_s: 0.5 * (asked + answered), round_trip_s: answered - asked, device_s });
     }
 
@@ -118,7 +118,7 @@ mod tests {
                 continue;
             }
             let at = |s: f64| clock.began + Duration::from_secs_f64(s);
-            clock.tell(at(asked), at(asked + there + back), (device / 1e-3) as u32);
+            clock.tell(at(asked), at(asked + there + back), (device / 1e-3) as u64);
         }
         clock
     }

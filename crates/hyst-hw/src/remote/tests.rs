@@ -423,7 +423,7 @@ proptest! {
             let mut value = || odd[luck.below(odd.len() as u64) as usize];
             let start = Start {
                 session: 1, mode: Mode::Voltage, rate_hz: 1000.0, low_v: value().min(0.0), high_v: value().max(1.0),
-                slew_v_per_s: value(), hottest_degc: value(), error: value(), silence_s: 1.0,
+                slew_v_per_s: value(), hottest_degc: value(), error: value(), silence_s: 1.0, force: false,
             };
             let drives: heapless::Vec<f32, MOST_DRIVES> = (0..5).map(|_| value()).collect();
             let sound = Start { low_v: 0.0, high_v: 99.0, slew_v_per_s: 5000.0, hottest_degc: 50.0, error: 1.0, ..start };

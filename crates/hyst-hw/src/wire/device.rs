@@ -5,7 +5,7 @@ use heapless::{Deque, Vec};
 
 use super::message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_SAMPLES, Measured, Mode, PROTOCOL, Refusal, Reply, Request,
-    Start, State, Status, Tell,
+    Start, State, Status, Tell, model_sum,
 };
 
 /// What the sensors show.
@@ -33,14 +33,17 @@ pub trait Control {
     fn load(&mut self, block: &[u8]) -> bool;
     /// Whether there is a model to follow with.
     fn ready(&self) -> bool;
-    /// Begins to watch a run of this period \[s\] from what stands at `volts`: from now on [`force`](Self::force) is asked in each period.
-    fn watch(&mut self, period: f32, shown: &Shown, volts: f32);
+    /// Prepares a run of this period \[s\] that begins at rest: all that takes time is done here. With `force` the external force is
+    /// estimated in each period, from none now at `volts` on. Gives whether references can be followed.
+    fn prepare(&mut self, period: f32, shown: &Shown, volts: f32, force: bool) -> bool;
     /// Force on the output \[N\], from what was put out for this period and what is shown at its end; `None` without an observer.
     fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32>;
-    /// Begins to follow with this period \[s\], at the first reference, from what is shown and put out. Gives whether it can.
-    fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool;
+    /// Begins to follow, at the first reference, from what is shown and put out.
+    fn begin(&mut self, reference: f32, shown: &Shown, volts: f32);
     /// The drive that the reference asks for \[V\], which the limits may still change.
     fn step(&mut self, reference: f32, shown: &Shown) -> f32;
+    /// Whether a limit keeps the output away from its reference.
+    fn limited(&self) -> bool;
     /// The reference at which the output should be now: what looks ahead is given references before they are due.
     fn due(&self) -> Option<f32>;
 }
@@ -56,15 +59,18 @@ impl Control for Open {
     fn ready(&self) -> bool {
         false
     }
-    fn watch(&mut self, _: f32, _: &Shown, _: f32) {}
+    fn prepare(&mut self, _: f32, _: &Shown, _: f32, _: bool) -> bool {
+        false
+    }
     fn force(&mut self, _: f32, _: &Shown) -> Option<f32> {
         None
     }
-    fn begin(&mut self, _: f32, _: f32, _: &Shown, _: f32) -> bool {
-        false
-    }
+    fn begin(&mut self, _: f32, _: &Shown, _: f32) {}
     fn step(&mut self, reference: f32, _: &Shown) -> f32 {
         reference
+    }
+    fn limited(&self) -> bool {
+        false
     }
     fn due(&self) -> Option<f32> {
         None
@@ -82,6 +88,9 @@ pub struct Device<C, const Q: usize, const M: usize> {
     identity: Identity,
     control: C,
     model: Vec<u8, M>,
+    /// Check sum and length of the model whose parts come.
+    sum: u32,
+    total: u32,
     /// Whether all bytes of the model have come and are one that runs.
     loaded: bool,
     state: State,
@@ -117,6 +126,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             identity,
             control,
             model: Vec::new(),
+            sum: 0,
+            total: 0,
             loaded: false,
             state: State::Idle,
             run: Start {
@@ -129,6 +140,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 hottest_degc: f32::INFINITY,
                 error: f32::INFINITY,
                 silence_s: 1.0,
+                force: false,
             },
             started: false,
             tick: 0,
@@ -210,7 +222,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             Some(Fault::Sensor)
         } else if self.identity.temperature && shown.temperature_degc > self.run.hottest_degc {
             Some(Fault::Temperature)
-        } else if self.quiet as f32 > self.run.silence_s * self.run.rate_hz {
+        } else if self.quiet as f32 > (self.run.silence_s * self.run.rate_hz).max(2.0) {
             Some(Fault::Silence)
         } else {
             self.reference.and_then(|_| self.control.due()).and_then(|reference| {
@@ -242,10 +254,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             (Mode::Voltage, None, _) | (Mode::Reference, None, None) => return,
             (Mode::Reference, Some(reference), None) => {
                 self.reference = Some(reference);
-                if !self.control.begin(1.0 / self.run.rate_hz, reference, shown, self.present_v) {
-                    self.fail(Fault::Sensor);
-                    return;
-                }
+                self.control.begin(reference, shown, self.present_v);
                 self.control.step(reference, shown)
             }
             (Mode::Reference, Some(reference), Some(_)) | (Mode::Reference, None, Some(reference)) => {
@@ -256,7 +265,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let (low, high, step) = (self.run.low_v, self.run.high_v, self.step_v());
         let wanted = if wanted.is_finite() { wanted } else { self.present_v };
         let inside = wanted.clamp(low, high);
-        let beyond = self.run.mode == Mode::Reference && inside != wanted;
+        let beyond = self.run.mode == Mode::Reference && self.control.limited();
         self.saturated = if beyond { self.saturated + 1 } else { 0 };
         self.present_v = inside.clamp(self.present_v - step, self.present_v + step);
         board.put_out(self.present_v);
@@ -314,7 +323,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         if self.started && start.session == self.run.session {
             // Asked twice. A run that is over does not begin again.
-            return if self.state == State::Running { Ok(()) } else { Err(Refusal::Session) };
+            let same = self.state == State::Running && self.run == *start;
+            return if same { Ok(()) } else { Err(Refusal::Session) };
         }
         if self.state != State::Idle {
             return Err(Refusal::State);
@@ -339,8 +349,12 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 return Err(Refusal::Start(field));
             }
         }
+        let follows = self.control.prepare(1.0 / start.rate_hz, &self.shown, self.present_v, start.force);
         if start.mode == Mode::Reference && !(self.loaded && self.control.ready()) {
             return Err(Refusal::NoModel);
+        }
+        if start.mode == Mode::Reference && !follows {
+            return Err(Refusal::Model);
         }
         self.run = *start;
         self.started = true;
@@ -349,7 +363,6 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.history.clear();
         (self.tick, self.received, self.measured, self.quiet, self.saturated, self.astray) = (0, 0, 0, 0, 0, 0);
         (self.out, self.reference) = (false, None);
-        self.control.watch(1.0 / start.rate_hz, &self.shown, self.present_v);
         Ok(())
     }
 
@@ -380,8 +393,9 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             self.history.pop_front();
         }
         if self.state == State::Running {
-            self.quiet = 0;
             self.take_drives(exchange)?;
+            // Who asks for nothing but what is refused is no host that looks after its run.
+            self.quiet = 0;
         }
         let first = self.measured.wrapping_sub(self.history.len() as u32);
         let samples = self.history.iter().take(MOST_SAMPLES).copied().collect();
@@ -416,9 +430,10 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         if chunk.total as usize > M || !self.identity.follows {
             return Err(Refusal::ModelSize);
         }
-        if chunk.offset == 0 && (self.loaded || self.model.len() > chunk.bytes.len()) {
+        // A part of another model than the last one begins it anew; of the same one what comes twice is passed over.
+        if chunk.sum != self.sum || chunk.total != self.total {
             self.model.clear();
-            self.loaded = false;
+            (self.loaded, self.sum, self.total) = (false, chunk.sum, chunk.total);
         }
         let have = self.model.len() as u32;
         let Some(known) = have.checked_sub(chunk.offset) else { return Err(Refusal::ModelGap) };
@@ -429,7 +444,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 return Err(Refusal::ModelSize);
             }
             if self.model.len() == chunk.total as usize {
-                self.loaded = self.control.load(&self.model);
+                self.loaded = model_sum(&self.model) == self.sum && self.control.load(&self.model);
                 if !self.loaded {
                     self.model.clear();
                     return Err(Refusal::Model);

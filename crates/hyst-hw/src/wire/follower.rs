@@ -33,13 +33,15 @@ pub struct Follower {
 struct Watching {
     observer: Observer,
     state: <Actuator as Stage<f32>>::State,
+    /// What the observer says before anything acts: the sensor's zero of today \[N\].
+    at_rest: f32,
 }
 
 impl Watching {
     fn new(recipe: &Recipe, period: f32) -> Option<Self> {
         let chain = actuator(recipe, &Sampling { period: f64::from(period) })?;
         let state = chain.state();
-        Some(Self { observer: recipe.force?.observer(chain).ok()?, state })
+        Some(Self { observer: recipe.force?.observer(chain).ok()?, state, at_rest: 0.0 })
     }
 }
 
@@ -51,6 +53,25 @@ struct Running {
     /// References that are not due yet.
     early: Deque<f32, LEAD>,
     due: f32,
+    /// A limit that leaves less than this is of no account: references may touch the ends of the range \[output unit\].
+    tolerance: f32,
+    limited: bool,
+}
+
+/// The tolerance, as a share of the model's travel.
+const TOLERANCE: f64 = 0.02;
+
+impl Running {
+    /// The loop at a sample period \[s\], before its first reference.
+    fn new(recipe: &Recipe, period: f32) -> Option<Self> {
+        let (tracking, lead) = Follower::built(recipe, period)?;
+        let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
+        let [low, high] = recipe.model.input;
+        let slope = pi.gain + pi.weights.iter().sum::<f64>();
+        let tolerance = (TOLERANCE * (slope * (high - low)).abs()) as f32;
+        let state = tracking.state();
+        Some(Self { tracking, state, lead, early: Deque::new(), due: 0.0, tolerance, limited: false })
+    }
 }
 
 impl Follower {
@@ -116,31 +137,30 @@ impl Control for Follower {
         self.recipe.is_some()
     }
 
-    fn watch(&mut self, period: f32, shown: &Shown, volts: f32) {
-        self.watching = self.recipe.as_ref().and_then(|recipe| Watching::new(recipe, period));
-        if let Some(Watching { observer, state }) = &mut self.watching {
-            observer.reset(state, &free(shown), volts, shown.output);
+    fn prepare(&mut self, period: f32, shown: &Shown, volts: f32, force: bool) -> bool {
+        self.watching = self.recipe.as_ref().filter(|_| force).and_then(|recipe| Watching::new(recipe, period));
+        if let Some(Watching { observer, state, at_rest }) = &mut self.watching {
+            *at_rest = observer.reset(state, &free(shown), volts, shown.output);
         }
+        self.running = self.recipe.as_ref().and_then(|recipe| Running::new(recipe, period));
+        self.running.is_some()
     }
 
     fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32> {
-        let Watching { observer, state } = self.watching.as_mut()?;
-        Some(observer.step(state, &free(shown), volts, shown.output))
+        let Watching { observer, state, at_rest } = self.watching.as_mut()?;
+        Some(observer.step(state, &free(shown), volts, shown.output) - *at_rest)
     }
 
-    fn begin(&mut self, period: f32, reference: f32, shown: &Shown, volts: f32) -> bool {
-        let built = self.recipe.as_ref().and_then(|recipe| Self::built(recipe, period));
-        self.running = built.map(|(tracking, lead)| {
-            let mut state = tracking.state();
-            if self.recipe.as_ref().is_some_and(|r| r.pid.is_some()) {
-                tracking.reset(&mut state, &env(shown), reference, shown.output, volts);
-            } else {
-                // Without a PID nothing would ever take a first difference back: the drive goes where the model has it, at the slew limit.
-                tracking.reset_to_feedforward(&mut state, &env(shown), reference);
-            }
-            Running { tracking, state, lead, early: Deque::new(), due: reference }
-        });
-        self.running.is_some()
+    fn begin(&mut self, reference: f32, shown: &Shown, volts: f32) {
+        let corrects = self.recipe.as_ref().is_some_and(|r| r.pid.is_some());
+        let Some(Running { tracking, state, due, .. }) = &mut self.running else { return };
+        if corrects {
+            tracking.reset(state, &env(shown), reference, shown.output, volts);
+        } else {
+            // Without a PID nothing would ever take a first difference back: the drive goes where the model has it, at the slew limit.
+            tracking.reset_to_feedforward(state, &env(shown), reference);
+        }
+        *due = reference;
     }
 
     fn step(&mut self, reference: f32, shown: &Shown) -> f32 {
@@ -150,7 +170,14 @@ impl Control for Follower {
         if run.early.len() > run.lead {
             run.due = run.early.pop_front().unwrap_or(run.due);
         }
-        run.tracking.step(&mut run.state, &env(shown), reference, shown.output)
+        let drive = run.tracking.step(&mut run.state, &env(shown), reference, shown.output);
+        let away = (run.due - shown.output).abs() > run.tolerance;
+        run.limited = away && run.state.pid().limited();
+        drive
+    }
+
+    fn limited(&self) -> bool {
+        self.running.as_ref().is_some_and(|run| run.limited)
     }
 
     fn due(&self) -> Option<f32> {

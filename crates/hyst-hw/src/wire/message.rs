@@ -74,6 +74,8 @@ pub struct Start {
     pub error: f32,
     /// Silence of the host after which the device comes to rest \[s\].
     pub silence_s: f32,
+    /// Whether the external force is estimated, by the observer of the model that was handed over.
+    pub force: bool,
 }
 
 /// What a drive is.
@@ -107,8 +109,15 @@ pub struct Chunk {
     pub offset: u32,
     /// Bytes of the whole model.
     pub total: u32,
+    /// Their [check sum](model_sum): parts of two models are not put together.
+    pub sum: u32,
     /// Its bytes.
     pub bytes: Vec<u8, MOST_CHUNK>,
+}
+
+/// CRC-32 (ISO-HDLC) of a model.
+pub fn model_sum(bytes: &[u8]) -> u32 {
+    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
 }
 
 /// An answer.

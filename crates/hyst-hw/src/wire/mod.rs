@@ -22,7 +22,7 @@ pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
 pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
-    PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit,
+    PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, model_sum,
 };
 pub use recipe::{
     MOST_ELEMENTS, MOST_HEAD, MOST_PLAYS, Model, RECIPE, Recipe, RecipeError, head as recipe_head, read as read_recipe,

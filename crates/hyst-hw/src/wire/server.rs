@@ -81,6 +81,8 @@ pub struct CanServer {
     /// Identifier of the frames that this device hears, and of those that it sends.
     hears: u32,
     speaks: Option<Id>,
+    /// Number of the request that is being answered.
+    answers: u32,
     /// A frame for which the bus had no room.
     held: Option<CanData>,
 }
@@ -88,7 +90,7 @@ pub struct CanServer {
 impl CanServer {
     /// A device that hears frames with one identifier and sends them with another one.
     pub fn new(hears: u32, speaks: u32) -> Self {
-        Self { tp: IsoTp::new(false), deframer: Deframer::new(), hears, speaks: id(speaks), held: None }
+        Self { tp: IsoTp::new(false), deframer: Deframer::new(), hears, speaks: id(speaks), answers: 0, held: None }
     }
 
     /// As [`SerialServer::poll`].
@@ -117,6 +119,11 @@ impl CanServer {
             }
             let Some(mut message) = self.tp.take(frame.data()) else { continue };
             if let Some(Ok(request)) = self.deframer.next::<Request>(&mut message) {
+                // Asked again while its answer is on the way: on a slow bus that is no reason to begin anew.
+                if self.tp.busy() && !self.tp.waits() && request.number == self.answers {
+                    continue;
+                }
+                self.answers = request.number;
                 let reply = device.answer(&request);
                 let mut bytes = [0; MAX_FRAME];
                 if let Ok(answer) = encode(&reply, &mut bytes) {

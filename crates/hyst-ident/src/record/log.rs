@@ -8,7 +8,7 @@ mod records;
 use std::collections::BTreeMap;
 
 use mcap::records::{Metadata, Record as Entry};
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use super::error::RecordError;
 use super::{OutputUnit, Record};
@@ -29,7 +29,8 @@ pub struct LogSample {
     pub phase: String,
     /// Voltage that was applied \[V\].
     pub drive_v: f64,
-    /// Measured output \[output unit\].
+    /// Measured output \[output unit\]; no number where the sensor showed none.
+    #[serde(deserialize_with = "or_none")]
     pub output: f64,
     /// Wanted output \[output unit\].
     pub reference: Option<f64>,
@@ -37,6 +38,11 @@ pub struct LogSample {
     pub temperature_degc: Option<f64>,
     /// Load \[N\].
     pub load_n: Option<f64>,
+}
+
+/// JSON has no other word for what is no number than null.
+fn or_none<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 impl LogSample {
@@ -123,7 +129,8 @@ impl RunLog {
             what: "its metadata do not say the unit of the output".into(),
         };
         let unit = self.unit().ok_or_else(no_unit)?;
-        let chosen = || self.samples.iter().filter(|s| with_ramps || s.is_record());
+        // A sample without a number is the one that has ended its run.
+        let chosen = || self.samples.iter().filter(|s| (with_ramps || s.is_record()) && s.output.is_finite());
         let reference = format!("reference_{}", unit.suffix());
         type Of = fn(&LogSample) -> Option<f64>;
         let optional: [(&str, Of); 3] =

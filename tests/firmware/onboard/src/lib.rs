@@ -10,6 +10,8 @@ use hyst_hw::wire::{Board, Device, Follower, Identity, Shown, Unit};
 pub const RATE_HZ: f32 = 500.0;
 /// Range of the amplifier \[V\].
 pub const RANGE_V: [f32; 2] = [0.0, 120.0];
+/// Voltage at rest \[V\].
+pub const REST_V: f32 = 0.0;
 /// Steepest slope of the amplifier \[V/s\].
 pub const SLEW_V_PER_S: f32 = 20_000.0;
 
@@ -36,7 +38,7 @@ pub fn servo() -> Servo {
         name,
         min_v: RANGE_V[0],
         max_v: RANGE_V[1],
-        rest_v: 0.0,
+        rest_v: REST_V,
         max_slew_v_per_s: SLEW_V_PER_S,
         min_rate_hz: RATE_HZ,
         max_rate_hz: RATE_HZ,

@@ -37,10 +37,11 @@ impl Clock {
         Some(Self { seen: 0 })
     }
 
-    /// Whether another period has passed. None is lost, however late it is asked.
+    /// Whether another period has passed. Those for which it comes too late are lost: made up for at once, they would be a jump of the output.
     pub fn passed(&mut self) -> bool {
-        let passed = PERIODS.load(Ordering::Relaxed) != self.seen;
-        self.seen = self.seen.wrapping_add(u32::from(passed));
+        let now = PERIODS.load(Ordering::Relaxed);
+        let passed = now != self.seen;
+        self.seen = now;
         passed
     }
 }

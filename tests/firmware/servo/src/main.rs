@@ -13,13 +13,15 @@ use board::{Clock, Uart};
 use cortex_m::asm::wfi;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hprintln};
-use hyst_hw::wire::SerialServer;
-use hyst_onboard::{OnBoard, RATE_HZ, servo};
+use hyst_hw::wire::{Board, SerialServer};
+use hyst_onboard::{OnBoard, RATE_HZ, REST_V, servo};
 
 #[entry]
 fn main() -> ! {
     let mut line = Uart::open();
     let (mut servo, mut actuator) = (servo(), OnBoard::default());
+    // Whatever stood there before a reset: the device takes it for granted that it begins at rest.
+    actuator.put_out(REST_V);
     let Some(mut clock) = Clock::start(RATE_HZ) else { panic!("SysTick is taken") };
     let mut server = SerialServer::new();
     loop {
@@ -30,7 +32,8 @@ fn main() -> ! {
     }
 }
 
-/// Ends the emulation.
+/// Ends the emulation. A board puts its output to rest first, by the shortest way that does not need what has just failed, and has a hardware watchdog
+/// that does it where even this is not reached.
 fn end(status: debug::ExitStatus) -> ! {
     debug::exit(status);
     loop {

@@ -57,6 +57,15 @@ pub(super) struct Watched {
     pub(super) trained_to: f64,
 }
 
+/// Where an external force is estimated.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Force {
+    /// Here, with the output's stiffness \[N/output unit\].
+    Here(f64),
+    /// By the device.
+    OnDevice,
+}
+
 /// A mean under way.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
@@ -76,19 +85,22 @@ impl Mean {
 }
 
 impl Beside {
-    /// Beside a device that runs at `rate_hz`, with the output's stiffness where a force is to be estimated \[N/output unit\]. `None` for a model that has
-    /// to know the whole drive.
+    /// Beside a device that runs at `rate_hz`. `None` for a model that has to know the whole drive.
     pub(super) fn new(
         model: &Model,
         rate_hz: f64,
         degc: Option<f64>,
-        stiffness: Option<f64>,
+        force: Option<Force>,
     ) -> CommandResult<Option<Self>> {
         if model.between_samples != BetweenSamples::Linear {
             return Ok(None);
         }
         // What a compliance explains is what an observer is to find.
-        let free = match stiffness {
+        let stiffness = match force {
+            Some(Force::Here(stiffness)) => Some(stiffness),
+            _ => None,
+        };
+        let free = match force {
             Some(_) => Model { effects: model.effects.without(Effect::Load), ..model.clone() },
             None => model.clone(),
         };
@@ -96,7 +108,7 @@ impl Beside {
         let observer = |stiffness| ForceParams { stiffness, kappa: 1.0, chi: 0.0 }.build(&());
         let block = (BLOCK_S * rate_hz).max(FEWEST).round() as u32;
         // Under a force that is looked for, a residual is no news.
-        let sigma = model.rmse.filter(|rmse| *rmse > 0.0 && stiffness.is_none());
+        let sigma = model.rmse.filter(|rmse| *rmse > 0.0 && force.is_none());
         Ok(Some(Self {
             state: Box::new(chain.state()),
             chain,

@@ -19,24 +19,38 @@ pub(super) struct ClosedLoop {
     last_v: f64,
     /// Samples in which a limit held the drive.
     limited: usize,
-    /// The last so many of them in a row.
+    /// The last so many samples in which that kept the output away.
     limited_for: usize,
+    /// A limit that leaves less than this is of no account \[output unit\].
+    tolerance: f64,
     samples: usize,
 }
 
 impl ClosedLoop {
-    /// Around what is planned for `wanted`, at a sample period \[s\].
+    /// Around what is planned for `wanted`, at a sample period \[s\]; errors up to `tolerance` \[output unit\] are no sign of a drive that is held.
     pub(super) fn new(
         params: &PidParams,
         feedforward: bool,
         wanted: Vec<Vec<f64>>,
         period: f64,
         slew_v_per_s: f64,
+        tolerance: f64,
     ) -> CommandResult<Self> {
         let pid: Pid<f64> = params.build(&Sampling { period }).map_err(CommandError::bad_input)?;
         let step_v = slew_v_per_s * period;
         let state = pid.state();
-        Ok(Self { pid, state, feedforward, wanted, step_v, last_v: 0.0, limited: 0, limited_for: 0, samples: 0 })
+        Ok(Self {
+            pid,
+            state,
+            feedforward,
+            wanted,
+            step_v,
+            last_v: 0.0,
+            limited: 0,
+            limited_for: 0,
+            tolerance,
+            samples: 0,
+        })
     }
 
     /// Replaces what was planned for the next rows by what the loop makes of the newest measurement.
@@ -57,13 +71,14 @@ impl ClosedLoop {
             *volts = asked.clamp(self.last_v - self.step_v, self.last_v + self.step_v);
             let limited = self.state.limited() || *volts != asked;
             self.limited += usize::from(limited);
-            self.limited_for = if limited { self.limited_for + 1 } else { 0 };
+            let away = self.state.limited() && (reference - measured).abs() > self.tolerance;
+            self.limited_for = if away { self.limited_for + 1 } else { 0 };
             self.samples += 1;
             self.last_v = *volts;
         }
     }
 
-    /// Newest samples in a row in which a limit held the drive.
+    /// Newest samples in a row in which a limit held the drive and the output away from its reference.
     pub(super) fn limited_for(&self) -> usize {
         self.limited_for
     }

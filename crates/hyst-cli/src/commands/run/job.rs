@@ -11,7 +11,7 @@ use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
 
-use super::beside::Beside;
+use super::beside::{Beside, Force};
 use super::control::ClosedLoop;
 use super::live::Live;
 use super::shape::Shape;
@@ -93,8 +93,8 @@ impl Job {
     pub(super) fn beside(&self) -> CommandResult<Option<Beside>> {
         let Some(followed) = &self.followed else { return Ok(None) };
         let on_device = self.handed_over.is_some();
-        let beside =
-            Beside::new(&followed.model, self.options.rate_hz, self.degc, self.stiffness.filter(|_| !on_device))?;
+        let force = self.stiffness.map(|stiffness| if on_device { Force::OnDevice } else { Force::Here(stiffness) });
+        let beside = Beside::new(&followed.model, self.options.rate_hz, self.degc, force)?;
         if beside.is_none() && self.stiffness.is_some() && !on_device {
             return Err(CommandError::bad_input(
                 "--kout needs a model that can be run as the drive comes; this one has to know all of it (band-limited): estimate the force afterwards, with hystctl force",
@@ -103,11 +103,14 @@ impl Job {
         Ok(beside)
     }
 
-    /// Takes the rows away in which the output had not come to a reference's beginning yet.
-    pub(super) fn align(&self, recording: &mut Recording) {
+    /// Takes the rows away in which the output had not come to a reference's beginning yet, and the forces of these rows.
+    pub(super) fn align(&self, recording: &mut Recording, forces: &mut [Vec<f64>]) {
         let Some(HandedOver { late, .. }) = self.handed_over else { return };
         for segment in &mut recording.segments {
             segment.samples.drain(..late.min(segment.samples.len()));
+        }
+        for forces in forces {
+            forces.drain(..late.min(forces.len()));
         }
     }
 
@@ -150,6 +153,8 @@ impl Followed {
 
 /// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
 const USUAL_SETTLE_S: f64 = 2.0;
+/// An error that a limit leaves is of no account up to this share of the model's output, as on a device.
+const TOLERANCE: f64 = 0.02;
 /// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
@@ -425,7 +430,8 @@ impl Closed {
     ) -> CommandResult<Self> {
         let Chosen { gains, crossover_hz, why } = Chosen::new(args, model, limits, period)?;
         let slew = args.limits.slew.unwrap_or(f64::INFINITY);
-        let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew)?;
+        let tolerance = TOLERANCE * (model.output.high - model.output.low);
+        let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew, tolerance)?;
         Ok(Self { running, gains, crossover_hz, why })
     }
 }

@@ -25,8 +25,8 @@ pub(super) struct Lookout<'a> {
     pub(super) unit: &'a str,
     /// Why the run is ended from here.
     pub(super) fault: Option<Fault>,
-    /// Estimated force at each row of the record \[N\]; empty where none is estimated.
-    pub(super) forces: Vec<f64>,
+    /// Estimated force at each row of each segment \[N\]; empty where none is estimated.
+    pub(super) forces: Vec<Vec<f64>>,
     /// Time of the newest sample \[s\].
     pub(super) now_s: f64,
 }
@@ -53,7 +53,8 @@ impl Lookout<'_> {
         let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample));
         let force = expected.and_then(|e| e.force).or(sample.force_n);
         if news.phase == Phase::Record {
-            self.forces.extend(force);
+            self.forces.resize_with(self.forces.len().max(news.segment + 1), Vec::new);
+            self.forces[news.segment].extend(force);
         }
         if self.log_error.is_none()
             && let Some(log) = &mut self.log

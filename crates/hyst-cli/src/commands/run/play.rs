@@ -20,8 +20,8 @@ use crate::text;
 /// A run that came to its end.
 pub(in crate::commands) struct Played {
     pub(in crate::commands) recording: Recording,
-    /// Estimated force at each row \[N\]; empty where none is estimated.
-    pub(super) forces: Vec<f64>,
+    /// Estimated force at each row of each segment \[N\]; empty where none is estimated.
+    pub(super) forces: Vec<Vec<f64>>,
     /// None where no model was watched.
     pub(super) watched: Option<Watched>,
 }
