@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 
 use hyst_tests::fuzz::{KINDS, Kind};
 
-/// A case that takes longer than this hangs.
-const LONGEST: Duration = Duration::from_secs(20);
+/// How often it is looked whether a case has ended, and how often in vain before it counts as one that never does.
+const LOOK: Duration = Duration::from_millis(20);
+const IN_VAIN: u32 = 1000;
 /// Findings of one kind after which the next kind is tried.
 const MOST: usize = 5;
 
@@ -44,13 +45,12 @@ fn of_kind(kind: Kind, first: u64, cases: u64) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let (next, over) = (AtomicU64::new(0), AtomicBool::new(false));
     let found = Mutex::new(Vec::new());
-    // What each thread does, and since when [ms].
+    // What each thread does, and how many it has done.
     let busy: Vec<(AtomicU64, AtomicU64)> = (0..cores).map(|_| Default::default()).collect();
-    let now = || began.elapsed().as_millis() as u64;
     std::thread::scope(|scope| {
         let threads: Vec<_> = busy
             .iter()
-            .map(|(which, since)| {
+            .map(|(which, done)| {
                 scope.spawn(|| {
                     loop {
                         let k = next.fetch_add(1, Ordering::Relaxed);
@@ -59,7 +59,7 @@ fn of_kind(kind: Kind, first: u64, cases: u64) -> usize {
                         }
                         let seed = first.wrapping_add(k);
                         which.store(seed, Ordering::Relaxed);
-                        since.store(now(), Ordering::Relaxed);
+                        done.fetch_add(1, Ordering::Relaxed);
                         if catch_unwind(|| kind.run(seed)).is_err() {
                             let mut found = found.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
                             found.push(seed);
@@ -69,12 +69,15 @@ fn of_kind(kind: Kind, first: u64, cases: u64) -> usize {
                 })
             })
             .collect();
+        // Looks are counted, not seconds: who stops this program for a while stops them too.
+        let mut looks = vec![(0, 0); cores];
         while !threads.iter().all(|thread| thread.is_finished()) {
-            std::thread::sleep(Duration::from_millis(20));
-            for ((seed, since), thread) in busy.iter().zip(&threads) {
-                if !thread.is_finished()
-                    && now().saturating_sub(since.load(Ordering::Relaxed)) > LONGEST.as_millis() as u64
-                {
+            std::thread::sleep(LOOK);
+            for (((seed, done), thread), (before, in_vain)) in busy.iter().zip(&threads).zip(&mut looks) {
+                let done = done.load(Ordering::Relaxed);
+                *in_vain = if done == *before && !thread.is_finished() { *in_vain + 1 } else { 0 };
+                *before = done;
+                if *in_vain > IN_VAIN {
                     // There is no way to end it.
                     eprintln!("{} {}: does not end", kind.name, seed.load(Ordering::Relaxed));
                     std::process::exit(1);
