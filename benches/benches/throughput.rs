@@ -124,6 +124,7 @@ fn requests(mut line: impl Line) -> Outcome<Vec<f64>> {
         hottest_degc: f32::INFINITY,
         error: f32::INFINITY,
         silence_s: 1.0,
+        force: false,
     };
     answered(&mut line, &mut deframer, &Request { number: u32::MAX, ask: Ask::Start(start) })?;
     let began = Instant::now();

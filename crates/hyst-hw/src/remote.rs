@@ -302,7 +302,7 @@ impl<L: Line> Remote<L> {
             queue: 0,
             model: 0,
         };
-        let remote = Self {
+        Self {
             line,
             name,
             options,
@@ -316,8 +316,7 @@ impl<L: Line> Remote<L> {
             round_trip: None,
             present_v: 0.0,
             broken: 0,
-        };
-        remote
+        }
     }
 
     /// What the device is.

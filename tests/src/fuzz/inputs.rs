@@ -275,7 +275,8 @@ pub(super) fn controllers(luck: &mut Luck) {
     let mut follower = Follower::new();
     if follower.load(&bytes) {
         let shown = Shown { output: 3.0, temperature_degc: 20.0, load_n: 0.0 };
-        if follower.begin(period, 3.0, &shown, 20.0) {
+        if follower.prepare(period, &shown, 20.0, true) {
+            follower.begin(3.0, &shown, 20.0);
             for k in 0..20 {
                 let _ = follower.step(3.0 + 0.1 * k as f32, &shown);
             }

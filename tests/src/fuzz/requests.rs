@@ -2,6 +2,7 @@
 
 use hyst_hw::wire::{
     Ask, Chunk, Deframer, Device, Exchange, Follower, MAX_FRAME, MOST_CHUNK, Mode, Request, Start, State, Tell, encode,
+    model_sum,
 };
 
 use super::inputs;
@@ -53,6 +54,7 @@ fn chunk(luck: &mut Luck, recipe: &[u8]) -> Chunk {
     let total = if luck.once_in(8) { luck.number() as u32 } else { recipe.len() as u32 };
     let offset =
         if luck.once_in(8) { luck.below(6000) } else { luck.below(recipe.len() / MOST_CHUNK + 1) * MOST_CHUNK };
+    let sum = if luck.once_in(8) { luck.number() as u32 } else { model_sum(recipe) };
     let bytes = recipe.iter().skip(offset).take(MOST_CHUNK).copied().collect();
     Chunk { offset: if luck.once_in(16) { luck.number() as u32 } else { offset as u32 }, total, sum, bytes }
 }
@@ -99,7 +101,7 @@ pub(super) fn case(luck: &mut Luck) {
         for (k, part) in recipe.chunks(MOST_CHUNK).enumerate() {
             let (offset, total) = ((k * MOST_CHUNK) as u32, recipe.len() as u32);
             let ask =
-                Ask::Model(Chunk { offset, total, sum: model_sum(recipe()), bytes: part.iter().copied().collect() });
+                Ask::Model(Chunk { offset, total, sum: model_sum(&recipe), bytes: part.iter().copied().collect() });
             device.answer(&Request { number: 0, ask });
         }
     }
