@@ -19,6 +19,7 @@ impl Default for Echo {
         let capabilities = Capabilities {
             device: "echo".to_owned(),
             voltage: VoltageRange { min_v: 0.0, max_v: 100.0, rest_v: 0.0 },
+            max_slew_v_per_s: f64::INFINITY,
             min_rate_hz: 1.0,
             max_rate_hz: 1e6,
             max_block: 256,

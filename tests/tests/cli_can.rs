@@ -81,7 +81,13 @@ fn interfaces_are_listed_and_refused_with_advice() {
     let lab = Lab::new();
     let found = lab.ok("devices --json").json();
     let found = found.as_array().expect("a list");
-    assert!(found.iter().any(|port| port["daq"] == "can:cli-list,fd" && port["what"] == "CAN FD, up"), "{found:?}");
+    assert!(
+        found
+            .iter()
+            .any(|port| port["daq"] == "can:cli-list"
+                && port["what"] == "CAN; with can:cli-list,fd in frames of CAN FD; up"),
+        "{found:?}"
+    );
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.002,1\n0.004,0\n");
     let message = lab.refuses("run --daq can:cli-none --drive u.csv --record out.csv", 3);
     assert!(message.contains("there are cli-list"), "{message}");

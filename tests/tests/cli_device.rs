@@ -1,10 +1,11 @@
 //! `run` and `record` on a device in real time at the other end of a line, and what watches over a run.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::Stdio;
-use std::thread::sleep;
-use std::time::Duration;
+use std::thread::{self, sleep};
+use std::time::{Duration, Instant};
 
 use hyst_hw::wire::{Fault, State};
 use hyst_tests::served::Served;
@@ -12,6 +13,8 @@ use hyst_tests::{Lab, PLANT, WARM, column};
 use serde_json::Value;
 
 const RATE_HZ: f64 = 500.0;
+/// A machine on which other tests run may leave a device alone for a while.
+const PATIENT: &str = "--silence 30";
 
 /// With a model of kind `pi` that holds the plant's lag.
 fn lab() -> Lab {
@@ -46,7 +49,9 @@ fn a_drive_over_a_socket_is_played_as_it_stands_and_looking_moves_nothing() {
     assert_eq!(device.put_out(), [0.0; 0], "nothing may be put out by a command that looks");
 
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 2 --cycles 2 -o u.csv"));
-    let said = lab.ok(&format!("run --daq {daq} --drive u.csv --record y.csv --log y.mcap --slew 5000 --json")).json();
+    let said = lab
+        .ok(&format!("run --daq {daq} --drive u.csv --record y.csv --log y.mcap --slew 5000 {PATIENT} --json"))
+        .json();
     let (sent, played) = (column(&lab.read("u.csv"), "voltage_v"), column(&lab.read("y.csv"), "voltage_v"));
     assert_eq!(sent.len(), played.len());
     assert!(sent.iter().zip(&played).all(|(a, b)| *a as f32 == *b as f32));
@@ -67,7 +72,7 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     let device = Served::plant(&loaded, RATE_HZ);
     let run = |control: &str, more: &str| {
         lab.ok(&format!(
-            "run --daq {} --model model.json --reference sine:4,14,1,3 --control {control} --settle 0.5 --log run.mcap --json {more}",
+            "run --daq {} --model model.json --reference sine:4,14,1,3 --control {control} --settle 0.5 --log run.mcap --json {PATIENT} {more}",
             device.daq()
         ))
         .json()
@@ -90,13 +95,82 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     assert!(refused("pid").contains("--control pid+feedforward"));
     // An output that does not come to its reference ends the run on the device.
     let line = format!(
-        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap",
+        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap {PATIENT}",
         device.daq()
     );
     let ran = lab.run(&line);
     assert_eq!(ran.code, 3, "{ran:?}");
     assert!(ran.stderr.contains(&Fault::TrackingError.to_string()), "{ran:?}");
+    // Nor does one for which the drive may not go far enough.
+    let line = format!(
+        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
+        device.daq()
+    );
+    let ran = lab.run(&line);
+    assert_eq!(ran.code, 3, "{ran:?}");
+    assert!(ran.stderr.contains(&Fault::Saturation.to_string()), "{ran:?}");
+    assert!(device.put_out().iter().rev().take_while(|v| **v <= 40.0).count() > 500, "{:?}", device.put_out());
     assert_eq!(device.put_out().last(), Some(&0.0));
+}
+
+#[test]
+fn a_drive_steeper_than_the_amplifier_is_refused() {
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
+    // 120,000 V/s; the device's amplifier can do 100,000.
+    lab.write("u.csv", "time_s,voltage_v\n0,0\n0.0005,60\n0.001,0\n");
+    let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
+    assert!(message.contains("steeper than 100000 V/s"), "{message}");
+    assert_eq!(device.put_out(), [0.0; 0]);
+}
+
+#[test]
+fn a_line_that_is_too_slow_is_told_and_a_fault_is_as_gentle_as_the_run() {
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.5 --cycles 1 -o u.csv"));
+    let line = slowed(&device.daq(), Duration::from_millis(600));
+    let said = lab.ok(&format!("run --daq {line} --drive u.csv --record y.csv --log y.mcap {PATIENT} --json"));
+    assert!(said.stderr.contains("the line is too slow for this rate"), "{said:?}");
+    assert!(said.json()["gaps"]["periods"].as_u64().unwrap() > 50, "{said:?}");
+    assert_eq!(events(&lab, "y.mcap")[0].0, "gap");
+    // Each drive was played all the same, in its order.
+    let (sent, played) = (column(&lab.read("u.csv"), "voltage_v"), column(&lab.read("y.csv"), "voltage_v"));
+    assert!(sent.iter().zip(&played).all(|(a, b)| *a as f32 == *b as f32) && sent.len() == played.len());
+
+    // 80 V come within a second, at 126 V/s: so steep, half as much added, may the way to rest be.
+    let before = device.put_out().len();
+    let line = slowed(&device.daq(), Duration::from_secs(4));
+    let ran = lab.run(&format!("run --daq {line} --drive u.csv --record z.csv"));
+    assert_eq!(ran.code, 3, "{ran:?}");
+    let put_out = device.put_out().split_off(before);
+    let steepest = put_out.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
+    assert!(steepest < 1.51 * 126.0 / RATE_HZ as f32, "{steepest} V in 2 ms");
+    assert_eq!(put_out.last(), Some(&0.0));
+}
+
+/// A way to `daq` that keeps everything back for so long, once, a second after the first word.
+fn slowed(daq: &str, pause: Duration) -> String {
+    let device = TcpStream::connect(daq.trim_start_matches("tcp:")).unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        let (host, _) = listener.accept().unwrap();
+        let (mut back_from, mut back_to) = (device.try_clone().unwrap(), host.try_clone().unwrap());
+        let back = thread::spawn(move || io::copy(&mut back_from, &mut back_to));
+        let (mut from, mut to, mut bytes) = (host, device, [0; 4096]);
+        let (mut began, mut paused) = (None, false);
+        while let Ok(count @ 1..) = from.read(&mut bytes) {
+            if began.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) && !paused {
+                sleep(pause);
+                paused = true;
+            }
+            if to.write_all(&bytes[..count]).is_err() {
+                break;
+            }
+        }
+        let _ = to.shutdown(Shutdown::Both);
+        let _ = back.join();
+    });
+    format!("tcp:{address}")
 }
 
 #[test]
@@ -129,7 +203,7 @@ fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
     let (lab, device) = (Lab::with_model(), Served::plant(PLANT, RATE_HZ));
     let said = lab.ok(&format!("stop --daq {}", device.daq())).stdout;
     assert!(said.contains("--clear"), "{said}");
-    let run = format!("run --daq {} --drive u.csv --record y.csv", device.daq());
+    let run = format!("run --daq {} --drive u.csv --record y.csv {PATIENT}", device.daq());
     let message = lab.refuses(&run, 2);
     assert!(message.contains(&Fault::Emergency.to_string()), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);

@@ -155,6 +155,15 @@ impl AnyDevice {
         }
     }
 
+    /// Lets the device come to rest no steeper than this \[V/s\], where no slew was wished for.
+    pub(crate) fn gentle(&mut self, slew_v_per_s: f64) {
+        match self {
+            // It is gone with the command that plays it.
+            Self::Plant(_) => {}
+            Self::Remote(remote) => remote.gentle(slew_v_per_s),
+        }
+    }
+
     /// Lets the device follow references with this controller; drives are references from then on.
     pub(crate) fn follow(&mut self, recipe: &[u8], range: (f64, f64)) -> Result<(), CommandError> {
         match self {

@@ -65,6 +65,8 @@ pub struct Capabilities {
     pub device: String,
     /// Voltages it can put out.
     pub voltage: VoltageRange,
+    /// Steepest slope of its voltage (V/s); infinite where nothing is said of it.
+    pub max_slew_v_per_s: f64,
     /// Slowest sample clock (Hz).
     pub min_rate_hz: f64,
     /// Fastest sample clock (Hz).

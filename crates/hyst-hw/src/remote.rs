@@ -364,6 +364,13 @@ impl<L: Line> Remote<L> {
         self.options.mode = Mode::Nothing;
     }
 
+    /// Drives and ramps of the next run are no steeper than this \[V/s\], unless the options say something else: a fault then ramps to rest as gently
+    /// as the run itself went.
+    pub fn gentle(&mut self, slew_v_per_s: f64) {
+        let most = self.capabilities.max_slew_v_per_s;
+        self.options.slew_v_per_s = self.options.slew_v_per_s.or(Some(slew_v_per_s.min(most)));
+    }
+
     /// Hands over what [`recipe_head`](crate::wire::recipe_head) and a model's block make, and from then on drives are references \[output unit\] between
     /// `low` and `high`, which the device follows: the ramps before and after a run begin and end where the output is now.
     ///
@@ -612,6 +619,7 @@ fn capabilities(identity: &Identity, line: &str) -> Capabilities {
             max_v: f64::from(identity.max_v),
             rest_v: f64::from(identity.rest_v),
         },
+        max_slew_v_per_s: f64::from(identity.max_slew_v_per_s),
         min_rate_hz: f64::from(identity.min_rate_hz),
         max_rate_hz: f64::from(identity.max_rate_hz),
         max_block: MOST_DRIVES,

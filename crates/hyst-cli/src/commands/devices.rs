@@ -20,8 +20,9 @@ struct Found {
 fn can(interface: Interface) -> Found {
     let Interface { name, up, fd } = interface;
     let state = if up { "up" } else { "down" };
-    let (daq, kind) = if fd { (format!("can:{name},fd"), "CAN FD") } else { (format!("can:{name}"), "CAN") };
-    Found { daq, port: name, what: format!("{kind}, {state}") }
+    // That the interface can do FD does not say that the others on the bus can.
+    let kind = if fd { format!("CAN; with can:{name},fd in frames of CAN FD") } else { "CAN".to_owned() };
+    Found { daq: format!("can:{name}"), what: format!("{kind}; {state}"), port: name }
 }
 
 pub(super) fn run(args: &DevicesArgs) -> CommandResult {

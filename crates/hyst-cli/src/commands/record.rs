@@ -5,6 +5,7 @@ use std::path::Path;
 use hyst_hw::Daq;
 use serde::Serialize;
 
+use super::run::gaps::Gaps;
 use super::run::job::Job;
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
@@ -33,6 +34,8 @@ struct Summary {
     deviation: f64,
     /// Highest less lowest output \[output unit\].
     span: f64,
+    /// Periods that are missing.
+    gaps: Gaps,
     log: Option<String>,
     record: Option<String>,
     #[serde(skip)]
@@ -84,7 +87,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         output::tell_set_aside(path, older);
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-    let Played { recording, .. } = played?;
+    let Played { recording, gaps, .. } = played?;
     closed?;
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
@@ -104,6 +107,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         mean,
         deviation,
         span: high - low,
+        gaps,
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.output.as_ref().map(ToString::to_string),
         symbol: unit.symbol(),
@@ -124,6 +128,7 @@ impl Summary {
             short(self.deviation),
             short(self.span)
         )];
+        lines.extend(self.gaps.text());
         lines.extend(self.log.iter().map(|path| format!("log: {path}")));
         lines.extend(self.record.iter().map(|path| format!("record: {path}")));
         lines.join("\n")

@@ -2,6 +2,7 @@
 
 mod beside;
 mod control;
+pub(super) mod gaps;
 mod guard;
 pub(super) mod job;
 mod live;
@@ -27,6 +28,7 @@ use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::{recording, text};
 use beside::Watched;
+use gaps::Gaps;
 use job::{Followed, HandedOver, Job, Told};
 use play::Played;
 
@@ -51,6 +53,8 @@ struct Summary {
     loop_on_device: bool,
     /// Whether the model still explains the device; none where that was not watched.
     watch: Option<WatchSummary>,
+    /// Periods for which the device had nothing to put out.
+    gaps: Gaps,
     /// The device's clock against this computer's; none where it has no other.
     clock: Option<ClockSummary>,
     /// Whether the drive was corrected by the measured temperature on the way.
@@ -188,6 +192,9 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some(HandedOver { recipe, range, .. }) = &job.handed_over {
         daq.follow(recipe, *range)?;
     }
+    if let Some(slew_v_per_s) = job.steepest() {
+        daq.gentle(slew_v_per_s);
+    }
     let played = play::play(daq, &mut job, log.as_mut());
     // What was measured is kept in any case; the first error is the one to tell.
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
@@ -198,7 +205,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         _ => Ok(()),
     };
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
-    let Played { mut recording, mut forces, watched } = played?;
+    let Played { mut recording, mut forces, watched, gaps } = played?;
     job.align(&mut recording, &mut forces);
     let forces = forces.concat();
 
@@ -228,6 +235,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         pid: job.pid().map(Gains::of),
         loop_on_device: job.handed_over.is_some(),
         watch: watched.map(WatchSummary::new),
+        gaps,
         clock: daq.clock().map(ClockSummary::new),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
         log: args.log.as_ref().map(|path| path.display().to_string()),
@@ -297,6 +305,7 @@ impl Summary {
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
         }
+        lines.extend(self.gaps.text());
         lines.extend(self.watch.and_then(|watch| watch.text(unit)));
         if let (Some(WatchSummary { explains: false, .. }), Some(log), Some(model)) =
             (self.watch, &self.log, &self.model)

@@ -170,7 +170,7 @@ pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
 pub struct LoggedEvent {
     /// Lab clock \[s\].
     pub time_s: f64,
-    /// What, in one word for programs: `model-lost`, `model-found`, `fault`, `cancelled`.
+    /// What, in one word for programs: `model-lost`, `model-found`, `fault`, `cancelled`, `gap`.
     pub kind: &'static str,
     /// What, in a sentence.
     pub text: String,
@@ -185,7 +185,7 @@ pub(super) fn event_schema() -> serde_json::Value {
         "type": "object",
         "properties": {
             "time_s": { "type": "number", "description": "Time of the lab's clock [s]" },
-            "kind": { "type": "string", "enum": ["model-lost", "model-found", "fault", "cancelled"] },
+            "kind": { "type": "string", "enum": ["model-lost", "model-found", "fault", "cancelled", "gap"] },
             "text": { "type": "string" }
         },
         "required": ["time_s", "kind", "text"]

@@ -107,6 +107,7 @@ impl Plant {
                 Some(noise) => format!("simulated plant, seed {}, noise of seed {noise}", config.seed),
             },
             voltage: VoltageRange { min_v: actuator.min_v, max_v: actuator.max_v, rest_v: actuator.rest_v },
+            max_slew_v_per_s: f64::INFINITY,
             min_rate_hz: 1.0,
             max_rate_hz: config.sensor.max_rate_hz,
             max_block: 4096,

@@ -29,6 +29,7 @@ impl Queued {
         let capabilities = Capabilities {
             device: "queued".to_owned(),
             voltage: VoltageRange { min_v: -10.0, max_v: 10.0, rest_v: 0.0 },
+            max_slew_v_per_s: f64::INFINITY,
             min_rate_hz: 1.0,
             max_rate_hz: 1000.0,
             max_block: 8,

@@ -103,6 +103,16 @@ impl Job {
         Ok(beside)
     }
 
+    /// How steep the device has to go \[V/s\]; none where it makes the drive itself.
+    pub(super) fn steepest(&self) -> Option<f64> {
+        if self.handed_over.is_some() {
+            return None;
+        }
+        let steps = self.segments.iter().flat_map(|volts| volts.windows(2)).map(|pair| (pair[1] - pair[0]).abs());
+        let steepest = steps.fold(0.0, f64::max) * self.options.rate_hz;
+        Some(STEEPER * steepest.max(self.options.slew_v_per_s))
+    }
+
     /// Takes the rows away in which the output had not come to a reference's beginning yet, and the forces of these rows.
     pub(super) fn align(&self, recording: &mut Recording, forces: &mut [Vec<f64>]) {
         let Some(HandedOver { late, .. }) = self.handed_over else { return };
@@ -155,6 +165,8 @@ impl Followed {
 const USUAL_SETTLE_S: f64 = 2.0;
 /// An error that a limit leaves is of no account up to this share of the model's output, as on a device.
 const TOLERANCE: f64 = 0.02;
+/// By how much steeper than the planned drive, which may be corrected on the way, the device may go.
+const STEEPER: f64 = 1.5;
 /// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
@@ -213,8 +225,9 @@ impl Job {
             Some(limit) => (limit.low, limit.high),
             None => (limits.low.max(model.input.low), limits.high.min(model.input.high)),
         });
+        options.slew = options.slew.min(device.max_slew_v_per_s);
         options.temperature = input::temperature(args.temperature, &model, &reference);
-        let mut play = play_options(args, &reference);
+        let mut play = play_options(args, device, &reference);
         play.settle_s = args.settle.unwrap_or(USUAL_SETTLE_S);
         // A temperature that is measured is followed; the plan starts from the given one, or the one that the gain is stated for.
         let measured = model.effects.temperature.filter(|_| device.temperature && args.control.inverts());
@@ -241,7 +254,7 @@ impl Job {
         let closed = if args.control.closes() {
             play.block = 1;
             let wanted = split(&reference, reference.output().unwrap_or_default());
-            Some(Closed::new(args, &model, (low, high), wanted, 1.0 / play.rate_hz)?)
+            Some(Closed::new(args, &model, (low, high), wanted, (1.0 / play.rate_hz, options.slew))?)
         } else {
             None
         };
@@ -376,7 +389,7 @@ impl Job {
             let message = format!("{file}: at {t} s the drive is {u} V, outside {low} to {high} V; nothing was played");
             return Err(CommandError::bad_input(message));
         }
-        let slew = args.limits.slew.unwrap_or(f64::INFINITY);
+        let slew = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
         // A drive that was limited to this slew has been printed and read since.
         let step = slew * drive.sample_period() * (1.0 + 1e-6);
         let steep = |row: &usize| (volts[row + 1] - volts[*row]).abs() > step;
@@ -386,7 +399,7 @@ impl Job {
             return Err(CommandError::bad_input(message));
         }
         let wanted = vec![None; volts.len()];
-        let options = play_options(args, &drive);
+        let options = play_options(args, device, &drive);
         Ok(Self::new(args, device, split(&drive, volts), options, wanted, None))
     }
 }
@@ -426,10 +439,9 @@ impl Closed {
         model: &Model,
         limits: (f64, f64),
         wanted: Vec<Vec<f64>>,
-        period: f64,
+        (period, slew): (f64, f64),
     ) -> CommandResult<Self> {
         let Chosen { gains, crossover_hz, why } = Chosen::new(args, model, limits, period)?;
-        let slew = args.limits.slew.unwrap_or(f64::INFINITY);
         let tolerance = TOLERANCE * (model.output.high - model.output.low);
         let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew, tolerance)?;
         Ok(Self { running, gains, crossover_hz, why })
@@ -464,14 +476,14 @@ fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits>
     }
 }
 
-fn play_options(args: &RunArgs, record: &Record) -> RecordOptions {
+fn play_options(args: &RunArgs, device: &Capabilities, record: &Record) -> RecordOptions {
     let rate_hz = 1.0 / record.sample_period();
     let whole = rate_hz.round();
     // 1 / 0.00001 is not 100000 to the last bit.
     let rate_hz = if (rate_hz - whole).abs() < 1e-9 * rate_hz { whole } else { rate_hz };
     let mut options = RecordOptions::at(rate_hz);
     options.rest_s = args.rest;
-    options.slew_v_per_s = options.slew_v_per_s.min(args.limits.slew.unwrap_or(f64::INFINITY));
+    options.slew_v_per_s = options.slew_v_per_s.min(args.limits.slew.unwrap_or(device.max_slew_v_per_s));
     options
 }
 

@@ -6,6 +6,7 @@ use hyst_hw::wire::Fault;
 use hyst_hw::{Phase, Progress, Sample};
 
 use super::beside::{Beside, Watched};
+use super::gaps::GapFinder;
 use super::guard::Guard;
 use super::view::{Seen, View};
 use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog};
@@ -18,6 +19,7 @@ pub(super) struct Lookout<'a> {
     pub(super) log_error: Option<LogError>,
     pub(super) beside: Option<Beside>,
     pub(super) guard: Guard,
+    pub(super) gaps: GapFinder,
     pub(super) view: View,
     /// What was wanted at each row of the record.
     pub(super) wanted: &'a [Option<f64>],
@@ -50,6 +52,10 @@ impl Lookout<'_> {
 
     fn one(&mut self, news: &Progress<'_>, sample: &Sample, wanted: Option<f64>) {
         self.now_s = sample.time_s;
+        if let Some(missing) = self.gaps.take(news.segment, sample.time_s) {
+            let now = text::short(sample.time_s);
+            self.event("gap", format!("before {now} s the device held its last value for {missing} periods: the line is too slow for this rate"));
+        }
         let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample));
         let force = expected.and_then(|e| e.force).or(sample.force_n);
         if news.phase == Phase::Record {

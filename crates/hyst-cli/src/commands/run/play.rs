@@ -8,6 +8,7 @@ use hyst_hw::wire::Fault;
 use hyst_hw::{Cause, Daq, Failure, Recording, Revision, record_with};
 
 use super::beside::Watched;
+use super::gaps::{GapFinder, Gaps};
 use super::guard::Guard;
 use super::job::Job;
 use super::lookout::Lookout;
@@ -24,6 +25,7 @@ pub(in crate::commands) struct Played {
     pub(super) forces: Vec<Vec<f64>>,
     /// None where no model was watched.
     pub(super) watched: Option<Watched>,
+    pub(in crate::commands) gaps: Gaps,
 }
 
 /// Plays all segments; every sample goes to `log` as it comes in.
@@ -50,6 +52,7 @@ where
         log_error: None,
         beside: job.beside()?,
         guard,
+        gaps: GapFinder::new(job.options.rate_hz),
         view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain),
         wanted: &job.wanted,
         unit: job.symbol,
@@ -85,9 +88,10 @@ where
         _ => {}
     }
     let watched = lookout.watched();
+    let gaps = lookout.gaps.gaps();
     let Lookout { log, log_error, fault, forces, .. } = lookout;
     match played {
-        Ok(recording) => Ok(Played { recording, forces, watched }),
+        Ok(recording) => Ok(Played { recording, forces, watched, gaps }),
         Err(failure) => Err(failed(failure, log_error, fault, log.map(|log| &*log))),
     }
 }
