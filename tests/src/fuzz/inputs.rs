@@ -10,8 +10,8 @@ use hyst_core::{
     write_block,
 };
 use hyst_hw::wire::{
-    Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, Measured, Reply, Request, Shown, State,
-    Status, Tell, encode, lateness, read_recipe, recipe_head,
+    Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, MOST_SAMPLES, Measured, Reply, Request, Shown,
+    State, Status, Tell, encode, lateness, read_recipe, recipe_head,
 };
 use hyst_hw::{Bus, Line, Phase, Plant, PlantConfig, Sample, Slcan};
 use hyst_ident::export::block;
@@ -146,7 +146,7 @@ pub(super) fn frames(luck: &mut Luck) {
         stream.extend_from_slice(encode(&Request { number, ask }, &mut [0; MAX_FRAME]).expect("a frame"));
         let sample =
             Measured { tick: 1, drive_v: 2.0, output: 3.0, temperature_degc: 20.0, load_n: 0.0, force_n: Some(0.5) };
-        let samples = std::iter::repeat_n(sample, luck.below(20)).collect();
+        let samples = std::iter::repeat_n(sample, luck.below(MOST_SAMPLES + 1)).collect();
         let tell = Tell::Samples { status: status(), first: 0, samples };
         stream.extend_from_slice(encode(&Reply { number, tell }, &mut [0; MAX_FRAME]).expect("a frame"));
     }

@@ -335,7 +335,7 @@ pub(crate) struct RunArgs {
     /// End the run and come to rest when the output is further than this from the reference for half a second [output unit]
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
-    /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator [N per output unit]
+    /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,
     /// Show a bar on a terminal instead of a picture of the last seconds
