@@ -4,8 +4,9 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::Stdio;
+use std::sync::Arc;
 use std::thread::{self, sleep};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hyst_hw::wire::{Fault, State};
 use hyst_tests::served::Served;
@@ -103,7 +104,7 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     assert!(ran.stderr.contains(&Fault::TrackingError.to_string()), "{ran:?}");
     // Nor does one for which the drive may not go far enough.
     let line = format!(
-        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
+        "run --daq {} --model model.json --reference steps:4,14,0.3,5 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
         device.daq()
     );
     let ran = lab.run(&line);
@@ -120,6 +121,10 @@ fn a_drive_steeper_than_the_amplifier_is_refused() {
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.0005,60\n0.001,0\n");
     let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
     assert!(message.contains("steeper than 100000 V/s"), "{message}");
+    lab.ok("excite sine --rate 700 --high 80 --frequency 2 --cycles 2 -o u.csv");
+    let message = lab.refuses(&format!("run --daq {} --drive u.csv --record y.csv", device.daq()), 2);
+    assert!(message.contains("700 Hz; the device runs at 500 to 500 Hz"), "{message}");
+    assert!(!message.contains("warning"), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
 }
 
@@ -127,18 +132,20 @@ fn a_drive_steeper_than_the_amplifier_is_refused() {
 fn a_line_that_is_too_slow_is_told_and_a_fault_is_as_gentle_as_the_run() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.5 --cycles 1 -o u.csv"));
-    let line = slowed(&device.daq(), Duration::from_millis(600));
+    let line = slowed(&device, Duration::from_millis(600));
     let said = lab.ok(&format!("run --daq {line} --drive u.csv --record y.csv --log y.mcap {PATIENT} --json"));
     assert!(said.stderr.contains("the line is too slow for this rate"), "{said:?}");
-    assert!(said.json()["gaps"]["periods"].as_u64().unwrap() > 50, "{said:?}");
+    assert!(said.json()["gaps"]["periods"].as_u64().unwrap() > 0, "{said:?}");
     assert_eq!(events(&lab, "y.mcap")[0].0, "gap");
+    let kept = lab.ok("log convert y.mcap").stdout;
+    assert_eq!(column(&kept, "segment"), column(&lab.read("y.csv"), "segment"));
     // Each drive was played all the same, in its order.
     let (sent, played) = (column(&lab.read("u.csv"), "voltage_v"), column(&lab.read("y.csv"), "voltage_v"));
     assert!(sent.iter().zip(&played).all(|(a, b)| *a as f32 == *b as f32) && sent.len() == played.len());
 
     // 80 V come within a second, at 126 V/s: so steep, half as much added, may the way to rest be.
     let before = device.put_out().len();
-    let line = slowed(&device.daq(), Duration::from_secs(4));
+    let line = slowed(&device, Duration::from_secs(4));
     let ran = lab.run(&format!("run --daq {line} --drive u.csv --record z.csv"));
     assert_eq!(ran.code, 3, "{ran:?}");
     let put_out = device.put_out().split_off(before);
@@ -147,9 +154,10 @@ fn a_line_that_is_too_slow_is_told_and_a_fault_is_as_gentle_as_the_run() {
     assert_eq!(put_out.last(), Some(&0.0));
 }
 
-/// A way to `daq` that keeps everything back for so long, once, a second after the first word.
-fn slowed(daq: &str, pause: Duration) -> String {
-    let device = TcpStream::connect(daq.trim_start_matches("tcp:")).unwrap();
+/// A way to `device` that keeps everything back for so long, once, when it has put out 400 drives more.
+fn slowed(device: &Served, pause: Duration) -> String {
+    let (told, before) = (Arc::clone(&device.told), device.put_out().len());
+    let device = TcpStream::connect(device.daq().trim_start_matches("tcp:")).unwrap();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     thread::spawn(move || {
@@ -157,9 +165,9 @@ fn slowed(daq: &str, pause: Duration) -> String {
         let (mut back_from, mut back_to) = (device.try_clone().unwrap(), host.try_clone().unwrap());
         let back = thread::spawn(move || io::copy(&mut back_from, &mut back_to));
         let (mut from, mut to, mut bytes) = (host, device, [0; 4096]);
-        let (mut began, mut paused) = (None, false);
+        let mut paused = false;
         while let Ok(count @ 1..) = from.read(&mut bytes) {
-            if began.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) && !paused {
+            if !paused && told.lock().unwrap().put_out.len() > before + 400 {
                 sleep(pause);
                 paused = true;
             }

@@ -35,6 +35,7 @@ impl Classified for DeviceError {
                 RemoteError::Standing { .. }
                 | RemoteError::Refused { .. }
                 | RemoteError::Value { .. }
+                | RemoteError::Rate { .. }
                 | RemoteError::Version { .. },
             ) => Exit::BadInput,
             Self::Remote(_) => Exit::DeviceLost,

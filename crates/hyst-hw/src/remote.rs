@@ -164,6 +164,20 @@ pub enum RemoteError {
         /// How long was waited \[s\].
         seconds: f64,
     },
+    /// A rate that the device does not run at.
+    #[error(
+        "{line}: {asked_hz} Hz; the device runs at {low_hz} to {high_hz} Hz: give a record of another rate, or --rate"
+    )]
+    Rate {
+        /// What the line is called.
+        line: String,
+        /// What was asked for \[Hz\].
+        asked_hz: f64,
+        /// Slowest \[Hz\].
+        low_hz: f64,
+        /// Fastest \[Hz\].
+        high_hz: f64,
+    },
     /// A value that cannot be asked for.
     #[error("{what} = {value}: {advice}")]
     Value {
@@ -652,6 +666,10 @@ impl<L: Line> Daq for Remote<L> {
         }
         let o = self.options;
         let i = &self.identity;
+        let &Capabilities { min_rate_hz: low_hz, max_rate_hz: high_hz, .. } = &self.capabilities;
+        if !(low_hz..=high_hz).contains(&f64::from(rate_hz as f32)) {
+            return Err(RemoteError::Rate { line: self.name.clone(), asked_hz: rate_hz, low_hz, high_hz });
+        }
         let (low, high) = o.voltage.map_or((i.min_v, i.max_v), |(low, high)| (low as f32, high as f32));
         let start = Start {
             session: o.session,

@@ -5,7 +5,7 @@ use std::path::Path;
 use hyst_hw::Daq;
 use serde::Serialize;
 
-use super::run::gaps::Gaps;
+use super::run::gaps::{self, Gaps};
 use super::run::job::Job;
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
@@ -88,6 +88,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let Played { recording, gaps, .. } = played?;
+    let recording = gaps::split(recording);
     closed?;
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;

@@ -207,6 +207,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
     let Played { mut recording, mut forces, watched, gaps } = played?;
     job.align(&mut recording, &mut forces);
+    let recording = gaps::split(recording);
     let forces = forces.concat();
 
     let wanted = job.followed.as_ref().map(Followed::wanted);

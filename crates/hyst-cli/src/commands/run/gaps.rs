@@ -1,14 +1,21 @@
 //! Periods in which a device had nothing to put out: it holds its last value then, and nothing is measured.
 
+use hyst_hw::{Recording, Sample, SegmentRecord};
 use serde::Serialize;
 
 /// Where the line or this computer was too slow for the rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(in crate::commands) struct Gaps {
     /// How often.
-    times: usize,
+    pub(super) times: usize,
     /// Periods altogether.
     periods: usize,
+}
+
+/// Periods that are missing before `next`.
+fn missing(before: &Sample, next: &Sample, rate_hz: f64) -> usize {
+    let periods = ((next.time_s - before.time_s) * rate_hz).round() as usize;
+    periods.saturating_sub(1)
 }
 
 /// Looks for gaps between samples.
@@ -16,8 +23,8 @@ pub(in crate::commands) struct Gaps {
 pub(super) struct GapFinder {
     rate_hz: f64,
     gaps: Gaps,
-    /// Segment and time of the last sample \[s\].
-    last: Option<(usize, f64)>,
+    /// Segment and sample before.
+    last: Option<(usize, Sample)>,
 }
 
 impl GapFinder {
@@ -25,19 +32,33 @@ impl GapFinder {
         Self { rate_hz, gaps: Gaps::default(), last: None }
     }
 
-    /// Takes the next sample's segment and time \[s\]; gives the periods that are missing before the first sample for which some are.
-    pub(super) fn take(&mut self, segment: usize, time_s: f64) -> Option<usize> {
-        let before = self.last.replace((segment, time_s)).filter(|(s, _)| *s == segment);
-        let periods = ((time_s - before?.1) * self.rate_hz).round() as usize;
-        let missing = periods.saturating_sub(1);
-        self.gaps.periods += missing;
-        self.gaps.times += usize::from(missing > 0);
-        (missing > 0 && self.gaps.times == 1).then_some(missing)
+    /// Takes the next sample; gives the periods that are missing before it, if some are.
+    pub(super) fn take(&mut self, segment: usize, sample: &Sample) -> Option<usize> {
+        let (_, before) = self.last.replace((segment, *sample)).filter(|(last, _)| *last == segment)?;
+        let periods = missing(&before, sample, self.rate_hz);
+        self.gaps.periods += periods;
+        self.gaps.times += usize::from(periods > 0);
+        (periods > 0).then_some(periods)
     }
 
     pub(super) fn gaps(&self) -> Gaps {
         self.gaps
     }
+}
+
+/// Begins another segment after each gap: a record's rows are evenly spaced in time.
+pub(in crate::commands) fn split(recording: Recording) -> Recording {
+    let rate_hz = recording.rate_hz;
+    let mut segments = Vec::with_capacity(recording.segments.len());
+    for SegmentRecord { approach, samples, retreat } in recording.segments {
+        let mut parts = samples.chunk_by(|a, b| missing(a, b, rate_hz) == 0).map(<[Sample]>::to_vec);
+        segments.push(SegmentRecord { approach, samples: parts.next().unwrap_or_default(), retreat: Vec::new() });
+        segments.extend(parts.map(|samples| SegmentRecord { samples, ..SegmentRecord::default() }));
+        if let Some(last) = segments.last_mut() {
+            last.retreat = retreat;
+        }
+    }
+    Recording { segments, ..recording }
 }
 
 impl Gaps {
@@ -46,7 +67,7 @@ impl Gaps {
         let Self { times, periods } = *self;
         (times > 0).then(|| {
             format!(
-                "the line was too slow for this rate: {times} times the device had nothing to put out and held its last value, for {periods} periods altogether; take a lower rate or a quicker line"
+                "the line was too slow for this rate: {times} times the device had nothing to put out and held its last value, for {periods} periods altogether, and after each the record begins another segment; take a lower rate or a quicker line"
             )
         })
     }
@@ -56,16 +77,33 @@ impl Gaps {
 mod tests {
     use super::*;
 
+    fn at(period: u32) -> Sample {
+        let time_s = f64::from(period) / 100.0;
+        Sample { time_s, drive_v: 0.0, output: 0.0, temperature_degc: None, load_n: None, force_n: None }
+    }
+
     #[test]
     fn only_what_is_missing_within_a_segment_counts() {
         let mut finder = GapFinder::new(100.0);
         let mut told = Vec::new();
         for (segment, period) in [(0, 1), (0, 2), (0, 5), (0, 6), (0, 8), (1, 20), (1, 21)] {
-            told.extend(finder.take(segment, f64::from(period) / 100.0));
+            told.extend(finder.take(segment, &at(period)));
         }
-        assert_eq!(told, [2]);
+        assert_eq!(told, [2, 1]);
         assert_eq!(finder.gaps(), Gaps { times: 2, periods: 3 });
         assert!(finder.gaps().text().unwrap().contains("for 3 periods"));
         assert_eq!(Gaps::default().text(), None);
+    }
+
+    #[test]
+    fn a_recording_is_split_where_something_is_missing() {
+        let of = |approach: &[u32], samples: &[u32], retreat: &[u32]| {
+            let [approach, samples, retreat] =
+                [approach, samples, retreat].map(|periods| periods.iter().map(|p| at(*p)).collect());
+            SegmentRecord { approach, samples, retreat }
+        };
+        let whole = Recording { rate_hz: 100.0, segments: vec![of(&[1], &[2, 3, 6, 7], &[8]), of(&[20], &[], &[21])] };
+        let parts = split(whole).segments;
+        assert_eq!(parts, [of(&[1], &[2, 3], &[]), of(&[], &[6, 7], &[8]), of(&[20], &[], &[21])]);
     }
 }

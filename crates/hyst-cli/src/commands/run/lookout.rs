@@ -52,7 +52,9 @@ impl Lookout<'_> {
 
     fn one(&mut self, news: &Progress<'_>, sample: &Sample, wanted: Option<f64>) {
         self.now_s = sample.time_s;
-        if let Some(missing) = self.gaps.take(news.segment, sample.time_s) {
+        if let Some(missing) = self.gaps.take(news.segment, sample)
+            && self.gaps.gaps().times == 1
+        {
             let now = text::short(sample.time_s);
             self.event("gap", format!("before {now} s the device held its last value for {missing} periods: the line is too slow for this rate"));
         }
@@ -65,7 +67,7 @@ impl Lookout<'_> {
         if self.log_error.is_none()
             && let Some(log) = &mut self.log
         {
-            let mut logged = LoggedSample::new(news.segment, news.phase, sample, wanted);
+            let mut logged = LoggedSample::new(news.segment + self.gaps.gaps().times, news.phase, sample, wanted);
             logged.predicted = expected.map(|e| e.output);
             logged.estimated_force_n = force;
             self.log_error = log.sample(&logged).err();
@@ -113,6 +115,11 @@ impl Lookout<'_> {
     /// Tells and logs what has happened.
     pub(super) fn event(&mut self, kind: &'static str, text: String) {
         self.view.tell(&format!("{}: {text}", if kind == "model-found" { "note" } else { "warning" }));
+        self.note(kind, text);
+    }
+
+    /// Logs what has happened.
+    pub(super) fn note(&mut self, kind: &'static str, text: String) {
         if self.log_error.is_none()
             // A run that is refused before anything moves leaves no log.
             && let Some(log) = self.log.as_mut().filter(|log| log.samples() > 0)

@@ -84,7 +84,7 @@ where
         Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
             lookout.event("cancelled", "stopped on request; the device was brought to rest".to_owned());
         }
-        Err(Failure { cause: Cause::Device(error), .. }) => lookout.event("fault", error.to_string()),
+        Err(Failure { cause: Cause::Device(error), .. }) => lookout.note("fault", error.to_string()),
         _ => {}
     }
     let watched = lookout.watched();
