@@ -104,7 +104,7 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     assert!(ran.stderr.contains(&Fault::TrackingError.to_string()), "{ran:?}");
     // Nor does one for which the drive may not go far enough.
     let line = format!(
-        "run --daq {} --model model.json --reference steps:4,14,0.3,5 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
+        "run --daq {} --model model.json --reference triangle:4,18,0.1,10 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
         device.daq()
     );
     let ran = lab.run(&line);

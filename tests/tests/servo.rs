@@ -199,6 +199,8 @@ fn a_host_that_is_killed_leaves_the_firmware_to_its_watchdog() {
     assert_eq!(last, State::Fault(Fault::Silence));
     let fallen = ramp.iter().position(|(volts, _)| *volts < ramp[0].0).expect("it falls");
     assert!(ramp[fallen..].windows(2).all(|w| w[1].0 <= w[0].0), "on the way to rest it only falls");
+    // One program at a time.
+    drop(remote);
     let ran = lab.run(&line);
     assert_eq!(ran.code, 2, "{ran:?}");
     assert!(ran.stderr.contains("--clear"), "{ran:?}");

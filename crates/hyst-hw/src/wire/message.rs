@@ -115,9 +115,10 @@ pub struct Chunk {
     pub bytes: Vec<u8, MOST_CHUNK>,
 }
 
-/// CRC-32 (ISO-HDLC) of a model.
+/// CRC-32C (Castagnoli) of a model. Another polynomial than that of the sums at its parts' ends: over bytes that end with their own sum a CRC is the same
+/// whatever the bytes are.
 pub fn model_sum(bytes: &[u8]) -> u32 {
-    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
+    crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes)
 }
 
 /// An answer.
