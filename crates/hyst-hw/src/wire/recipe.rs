@@ -147,3 +147,24 @@ pub fn read(bytes: &[u8]) -> Result<Recipe, RecipeError> {
     let force = with_force.then(|| ForceParams { stiffness: next(), kappa: next(), chi: next() });
     Ok(Recipe { pid, force, model: read_block(block).map_err(RecipeError::Model)? })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::model_sum;
+
+    /// Head and block end with their own sums; the sum that tells a controller from another has to see what is before these.
+    #[test]
+    fn controllers_that_differ_in_gains_alone_have_different_sums() {
+        let forces = [1.0, 2.0].map(|stiffness| {
+            let mut bytes: Vec<u8> =
+                head(None, Some(&ForceParams { stiffness, kappa: 1.0, chi: 0.0 })).iter().copied().collect();
+            let block = b"any model";
+            bytes.extend_from_slice(block);
+            bytes.extend_from_slice(&CRC.checksum(block).to_le_bytes());
+            bytes
+        });
+        assert_ne!(model_sum(&forces[0]), model_sum(&forces[1]));
+        assert_eq!(CRC.checksum(&forces[0]), CRC.checksum(&forces[1]), "what has to be told apart");
+    }
+}
