@@ -230,9 +230,10 @@ impl Rough {
         stirred(&mut self.chance) % n
     }
 
-    fn spoiled(&mut self, bytes: &[u8]) -> Vec<u8> {
+    /// One in so many.
+    fn spoiled(&mut self, bytes: &[u8], of: u64) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
-        if bytes.len() < 2 || self.below(6) > 0 {
+        if bytes.len() < 2 || self.below(of) > 0 {
             return bytes;
         }
         let at = self.below(bytes.len() as u64) as usize;
@@ -249,20 +250,21 @@ impl Rough {
 
 impl Line for Rough {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        let bytes = self.spoiled(bytes);
+        let bytes = self.spoiled(bytes, 6);
         self.port.send(&bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> std::io::Result<usize> {
         let came = self.port.receive(bytes, patience)?;
-        let spoiled = self.spoiled(&bytes[..came]);
+        // An answer comes in some pieces, of which each may be spoiled.
+        let spoiled = self.spoiled(&bytes[..came], 30);
         let kept = spoiled.len().min(bytes.len());
         bytes[..kept].copy_from_slice(&spoiled[..kept]);
         Ok(kept)
     }
 }
 
-/// Over a line that spoils one frame in six both ways, the firmware plays what it is given and nothing else, and answers a sound line afterwards.
+/// Over a line that spoils one frame in six, or so, both ways, the firmware plays what it is given and nothing else, and answers a sound line afterwards.
 #[test]
 fn a_rough_line_does_the_firmware_no_harm() {
     let Some(machine) = machine() else { return };

@@ -11,6 +11,8 @@ use super::Line;
 
 /// Shortest wait that the systems know.
 const SHORTEST: Duration = Duration::from_millis(1);
+/// How long a frame may take to be taken: one of 600 bytes at 9600 baud takes 0.6 s.
+const LONGEST_WRITE: Duration = Duration::from_secs(2);
 /// How long to try to reach a host.
 const REACH: Duration = Duration::from_secs(5);
 
@@ -150,6 +152,10 @@ impl Serial {
 
 impl Line for Serial {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        // The port's one wait holds for both directions: a full buffer that empties at the line's speed is no end of the line.
+        if self.port.timeout() != LONGEST_WRITE {
+            self.port.set_timeout(LONGEST_WRITE)?;
+        }
         self.port.write_all(bytes)
     }
 
