@@ -109,7 +109,7 @@ impl RunLog {
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
-    /// Appends one sample. It reaches the disk within half a second, also if none follows.
+    /// Appends one sample. It reaches its file within half a second, also if none follows.
     ///
     /// # Errors
     /// When the disk refuses, or has refused one before.
@@ -128,7 +128,7 @@ impl RunLog {
         LogError { path: self.path.clone(), saved: Some(self.sink.saved()), source }
     }
 
-    /// Appends what has happened, and brings it to the disk.
+    /// Appends what has happened, and brings it to the file.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
