@@ -22,6 +22,8 @@ from mcap.reader import NonSeekingReader, SeekingReader  # noqa: E402
 
 FOLDER = Path(FOLDER)
 LOGS = json.loads((FOLDER / "logs.json").read_text())
+# The topic of what happened on the way.
+EVENTS = "/actuator/event"
 # What a column of a record is called in a log.
 FIELDS = {"voltage_v": "drive_v", "displacement_um": "output", "reference_um": "reference"}
 KINDS = ("drive", "plain", "gain", "feedforward", "pid", "pid+feedforward", "line", "on-device", "failed", "interrupted")
@@ -52,14 +54,20 @@ def test_a_log_is_read(log):
 
         summary = reader.get_summary()
         assert summary.statistics.message_count == len(messages)
-        assert {c.topic for c in summary.channels.values()} == {"/actuator/sample"}
-        metadata = list(reader.iter_metadata())
-        assert [m.name for m in metadata] == ["run"] and metadata[0].metadata == log["metadata"]
+        assert {c.topic for c in summary.channels.values()} - {EVENTS} == {"/actuator/sample"}
+        metadata = {m.name: m.metadata for m in reader.iter_metadata()}
+        others = {f"{name}.{key}": text for name in metadata if name != "run" for key, text in metadata[name].items()}
+        assert metadata["run"] | others == log["metadata"]
         assert {"program", "version", "device", "output_column", "unit", "sample_rate_hz"} <= set(log["metadata"])
         attached = [(a.name, a.media_type, a.data) for a in reader.iter_attachments()]
         model = ("model.json", "application/json", (FOLDER / "model.json").read_bytes())
         assert attached == ([model] if log["model"] else [])
 
+    times = [m.log_time for _, _, m in messages]
+    assert all(a <= b for a, b in zip(times, times[1:]))
+    events = [json.loads(m.data) for _, c, m in messages if c.topic == EVENTS]
+    assert [event["kind"] for event in events] == {"failed": ["fault"], "interrupted": ["cancelled"]}.get(log["log"].removesuffix(".mcap"), [])
+    messages = [message for message in messages if message[1].topic != EVENTS]
     wanted = rows(log)
     assert len(messages) == len(wanted)
     for number, ((schema, channel, message), row) in enumerate(zip(messages, wanted)):
@@ -76,27 +84,31 @@ def test_a_log_is_read(log):
 def test_samples_keep_to_the_schema(log):
     with open(FOLDER / log["log"], "rb") as file:
         reader = SeekingReader(file)
-        schema = json.loads(next(iter(reader.get_summary().schemas.values())).data)
-        channel = next(iter(reader.get_summary().channels.values()))
-        Draft202012Validator.check_schema(schema)
-        validator = Draft202012Validator(schema)
-        known = set(schema["properties"])
-        numbers = {name for name, field in schema["properties"].items() if field["type"] == "number"}
-        assert {name.removeprefix("unit.") for name in channel.metadata} == numbers, "every number has its unit"
-        for _, _, message in reader.iter_messages():
-            sample = json.loads(message.data)
-            validator.validate(sample)
-            assert set(sample) <= known
+        summary = reader.get_summary()
+        known = {}
+        for channel in summary.channels.values():
+            schema = json.loads(summary.schemas[channel.schema_id].data)
+            Draft202012Validator.check_schema(schema)
+            numbers = {name for name, field in schema["properties"].items() if "number" in field["type"]}
+            assert {name.removeprefix("unit.") for name in channel.metadata} == numbers, "every number has its unit"
+            known[channel.topic] = (Draft202012Validator(schema), set(schema["properties"]))
+        for _, channel, message in reader.iter_messages():
+            validator, fields = known[channel.topic]
+            said = json.loads(message.data)
+            validator.validate(said)
+            assert set(said) <= fields
+            sample = said if channel.topic != EVENTS else sample
     if log["log"].startswith("drive"):
         assert {"temperature_degc", "load_n"} <= set(sample)
 
 
 def test_the_schema_refuses_what_is_no_sample():
     with open(FOLDER / LOGS[0]["log"], "rb") as file:
-        schema = json.loads(next(iter(SeekingReader(file).get_summary().schemas.values())).data)
+        schemas = SeekingReader(file).get_summary().schemas.values()
+        schema = next(json.loads(schema.data) for schema in schemas if schema.name == "hyst.actuator.Sample")
     validator = Draft202012Validator(schema)
     sample = {"time_s": 0.1, "segment": 0, "phase": "record", "drive_v": 1.0, "output": 2.0}
     assert validator.is_valid(sample)
-    for wrong in ({"phase": "rest"}, {"time_s": "0.1"}, {"segment": 0.5}, {"output": None}):
+    for wrong in ({"phase": "rest"}, {"time_s": "0.1"}, {"segment": 0.5}, {"output": "2.0"}):
         assert not validator.is_valid(sample | wrong), wrong
     assert not validator.is_valid({name: sample[name] for name in list(sample)[:-1]})

@@ -8,6 +8,7 @@
 mod contents;
 mod recover;
 mod sink;
+mod stream;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -21,14 +22,17 @@ use mcap::{Attachment, McapError, WriteOptions};
 use tempfile::TempPath;
 
 pub use contents::{LoggedEvent, LoggedModel, LoggedSample, RunInfo};
-use contents::{event_schema, metadata, schema, units};
+use contents::{event_schema, event_units, metadata, schema, units};
 pub use recover::recovered;
 use sink::{Open, Sink, said};
+pub use stream::{RunStream, StreamError};
 
 /// Channel of the samples.
 pub const TOPIC: &str = "/actuator/sample";
 /// Channel of what happens on the way.
 const EVENTS: &str = "/actuator/event";
+const SAMPLE_SCHEMA: &str = "hyst.actuator.Sample";
+const EVENT_SCHEMA: &str = "hyst.actuator.Event";
 
 /// The log cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -146,9 +150,8 @@ impl RunLog {
                 Some(id) => id,
                 None => {
                     let schema = serde_json::to_vec(&event_schema()).map_err(io::Error::other)?;
-                    let schema_id = writer.add_schema("hyst.actuator.Event", "jsonschema", &schema)?;
-                    let units = BTreeMap::from([("unit.time_s".to_owned(), "s".to_owned())]);
-                    writer.add_channel(schema_id, EVENTS, "json", &units)?
+                    let schema_id = writer.add_schema(EVENT_SCHEMA, "jsonschema", &schema)?;
+                    writer.add_channel(schema_id, EVENTS, "json", &event_units())?
                 }
             };
             let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
@@ -240,7 +243,7 @@ fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
     }
     let unit = info.output.symbol();
     let schema = serde_json::to_vec(&schema(unit)).map_err(io::Error::other)?;
-    let schema_id = writer.add_schema("hyst.actuator.Sample", "jsonschema", &schema)?;
+    let schema_id = writer.add_schema(SAMPLE_SCHEMA, "jsonschema", &schema)?;
     let channel_id = writer.add_channel(schema_id, TOPIC, "json", &units(unit))?;
     writer.flush()?;
     Ok((writer, channel_id))

@@ -6,7 +6,7 @@
 //! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file), with any of eleven [`EFFECTS`] and with
 //!   [`Disturbance`]s that are none of them.
 //! - [`Remote`]: a device at the other end of a [`Line`]: a serial port, a CAN bus, a socket.
-//! - [`serve`]: a device made of software behind a line, with the plant as its actuator.
+//! - [`serve()`]: a device made of software behind a line, with the plant as its actuator.
 //! - [`wire`]: what host and device say to each other, and the device's side of it, `no_std` and without heap, for firmware.
 //!
 //! ```

@@ -33,6 +33,8 @@ const LONGEST_REST: Duration = Duration::from_secs(20);
 const LOOKAHEAD_S: f64 = 0.25;
 /// By how many times the first wait for an answer the last ones may be longer.
 const MOST_REPEATS: u32 = 8;
+/// Requests in the time that a device's watchdog waits, at least.
+const TRIES: f64 = 8.0;
 /// Room for noise at the ends of a range of references, as a share of it.
 const MARGIN: f64 = 0.05;
 
@@ -259,6 +261,8 @@ pub struct Remote<L> {
     /// When the last request was sent and its answer came, if that is known.
     round_trip: Option<(Instant, Instant)>,
     present_v: f64,
+    /// Slope that the next run needs \[V/s\].
+    gentle: f64,
     broken: u32,
 }
 
@@ -329,6 +333,7 @@ impl<L: Line> Remote<L> {
             clock: None,
             round_trip: None,
             present_v: 0.0,
+            gentle: f64::INFINITY,
             broken: 0,
         }
     }
@@ -381,8 +386,13 @@ impl<L: Line> Remote<L> {
     /// Drives and ramps of the next run are no steeper than this \[V/s\], unless the options say something else: a fault then ramps to rest as gently
     /// as the run itself went.
     pub fn gentle(&mut self, slew_v_per_s: f64) {
-        let most = self.capabilities.max_slew_v_per_s;
-        self.options.slew_v_per_s = self.options.slew_v_per_s.or(Some(slew_v_per_s.min(most)));
+        self.gentle = slew_v_per_s;
+    }
+
+    /// Steepest slope of a run \[V/s\].
+    fn slew(&self) -> f64 {
+        let most = f64::from(self.identity.max_slew_v_per_s);
+        self.options.slew_v_per_s.unwrap_or(most.min(self.gentle))
     }
 
     /// Hands over what [`recipe_head`](crate::wire::recipe_head) and a model's block make, and from then on drives are references \[output unit\] between
@@ -402,7 +412,7 @@ impl<L: Line> Remote<L> {
         Ok(())
     }
 
-    /// An emergency stop of the device at the other end of `line`, whatever it does and whichever version it speaks: nothing is asked before.
+    /// An emergency stop of the device at the other end of `line`, whatever it does: nothing is asked before.
     ///
     /// # Errors
     /// When nobody answers.
@@ -443,7 +453,7 @@ impl<L: Line> Remote<L> {
 
     /// How long the device may take to come to rest at its slew.
     fn longest_rest(&self) -> Duration {
-        let slew = self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s));
+        let slew = self.slew();
         let ramp = f64::from(self.identity.max_v - self.identity.min_v) / slew.max(f64::MIN_POSITIVE);
         LONGEST_REST + Duration::from_secs_f64(ramp.clamp(0.0, 1e6))
     }
@@ -492,6 +502,8 @@ impl<L: Line> Remote<L> {
         let began = self.line.now();
         let mut bytes = [0; 4096];
         let (mut repeat, mut asked) = (self.options.repeat, 0);
+        // A watchdog that hears one of so many requests is content.
+        let longest = (MOST_REPEATS * repeat).min(Duration::from_secs_f64(self.options.silence_s / TRIES)).max(repeat);
         while self.since(began) < self.lost() {
             // A zero ends what a line may have left of an earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
@@ -515,13 +527,14 @@ impl<L: Line> Remote<L> {
                 }
             }
             // A line that is slow, and not deaf, would only be filled.
-            repeat = (2 * repeat).min(MOST_REPEATS * self.options.repeat);
+            repeat = (2 * repeat).min(longest);
         }
         let advice = match request.ask {
             Ask::Hello if self.broken > 0 => {
                 "something else speaks there: is this the right port, its speed the device's, its firmware one that speaks this protocol?"
             }
             Ask::Hello => "is this the right port, its speed the device's, and the device powered?",
+            Ask::Emergency => "NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C where the run goes on",
             _ => "look at the cable; the device comes to rest by itself",
         };
         let seconds = self.lost().as_secs_f64();
@@ -677,7 +690,7 @@ impl<L: Line> Daq for Remote<L> {
             rate_hz: rate_hz as f32,
             low_v: low,
             high_v: high,
-            slew_v_per_s: o.slew_v_per_s.map_or(i.max_slew_v_per_s, |slew| slew as f32),
+            slew_v_per_s: self.slew() as f32,
             hottest_degc: o.hottest_degc as f32,
             error: o.error as f32,
             silence_s: o.silence_s as f32,
@@ -732,9 +745,7 @@ impl<L: Line> Daq for Remote<L> {
         // Its samples are nobody's: the device is only kept from missing its host.
         let VoltageRange { min_v, max_v, rest_v: rest } = self.capabilities.voltage;
         let slew = match self.options.mode {
-            Mode::Voltage | Mode::Nothing => {
-                self.options.slew_v_per_s.unwrap_or(f64::from(self.identity.max_slew_v_per_s))
-            }
+            Mode::Voltage | Mode::Nothing => self.slew(),
             // From one end to the other in a second.
             Mode::Reference => (max_v - min_v).max(f64::MIN_POSITIVE),
         };

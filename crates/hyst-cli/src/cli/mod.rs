@@ -8,6 +8,7 @@ mod linear;
 mod search;
 mod values;
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -291,9 +292,8 @@ pub(crate) struct CompensateArgs {
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
-    /// Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD],
-    /// slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT
-    #[arg(long, value_name = "DEVICE")]
+    // Not a comment for the documentation: it would take the brackets for links.
+    #[arg(long, value_name = "DEVICE", help = DEVICE)]
     pub(crate) daq: Device,
     /// Model file
     #[arg(long, requires = "reference", conflicts_with = "drive")]
@@ -338,6 +338,9 @@ pub(crate) struct RunArgs {
     /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,
+    /// Show the run while it goes on in Foxglove or Lichtblick, which connect over a WebSocket to this address; 127.0.0.1:8765 if none is given
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub(crate) live: Option<SocketAddr>,
     /// Show a bar on a terminal instead of a picture of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
@@ -356,6 +359,8 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }
+
+const DEVICE: &str = "Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
 
 /// Emergency stop: whatever a device does, let it come to rest and stay there
 ///
@@ -395,6 +400,9 @@ pub(crate) struct RecordArgs {
     /// End above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
+    /// Show the run while it goes on in Foxglove or Lichtblick, which connect over a WebSocket to this address; 127.0.0.1:8765 if none is given
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub(crate) live: Option<SocketAddr>,
     /// Show a bar on a terminal instead of a picture of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,

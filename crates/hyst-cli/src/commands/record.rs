@@ -75,7 +75,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         );
         return Err(CommandError::bad_input(message));
     }
-    let mut job = Job::at_rest(&can, rows as usize, rate_hz, args.hottest, args.plain);
+    let mut job = Job::at_rest(&can, rows as usize, rate_hz, args);
     let unit = recording::unit(can.output);
     let info = RunInfo { device: &can.device, output: unit, sample_rate_hz: rate_hz, model: None };
     let mut log = match &args.log {
@@ -89,11 +89,12 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let Played { recording, gaps, .. } = played?;
     let recording = gaps::split(recording);
-    closed?;
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;
     }
+    // The record may lie on another disk than a log that could not be closed.
+    closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let count = measured.len().max(1) as f64;
     let mean = measured.iter().sum::<f64>() / count;

@@ -168,7 +168,7 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
         clear: args.clear,
-        force: args.kout.is_some(),
+        force: args.kout.is_some() && args.control.closes(),
         silence_s: args.silence,
         hottest_degc: args.hottest,
         error: args.max_error,

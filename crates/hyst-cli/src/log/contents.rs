@@ -165,6 +165,11 @@ pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
     fields.into_iter().map(|(field, unit)| (format!("unit.{field}"), unit.to_owned())).collect()
 }
 
+/// As [`units`], of an event.
+pub(super) fn event_units() -> BTreeMap<String, String> {
+    BTreeMap::from([("unit.time_s".to_owned(), "s".to_owned())])
+}
+
 /// Something that happened on the way.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoggedEvent {

@@ -115,6 +115,8 @@ pub struct PidState<T> {
     reference: T,
     measured: T,
     feedforward: T,
+    /// The last drive.
+    drive: T,
     limited: bool,
 }
 
@@ -162,8 +164,16 @@ impl<T: Real> Pid<T> {
         let wanted = ff + self.proportional * (self.weights[0] * r - y) + s.integral + s.derivative;
         let drive = wanted.at_least(self.low).at_most(self.high);
         s.limited = drive != wanted;
+        s.drive = drive;
         s.integral = finite_or(s.integral + self.integral * (r - y) + self.tracking * (drive - wanted), s.integral);
         drive
+    }
+
+    /// What became of the last drive behind this loop, where a slew limit held it \[u\]: the integral is led back by that, too.
+    #[inline]
+    pub fn applied(&self, s: &mut PidState<T>, drive: T) {
+        s.integral = finite_or(s.integral + self.tracking * (drive - s.drive), s.integral);
+        s.drive = finite_or(drive, s.drive);
     }
 }
 
@@ -260,6 +270,26 @@ mod tests {
             }
             assert!((y - 4.0).abs() < 1e-3, "{y} after {glitch}");
         }
+    }
+
+    /// A plant of gain one whose drive may move by 0.01 a sample: told so, the loop does not go far beyond its reference.
+    #[test]
+    fn a_drive_that_is_slewed_does_not_wind_the_integral_up() {
+        let params = PidParams { proportional: 0.0, integral: 20.0, low: -100.0, high: 100.0, ..PARAMS };
+        let pid: Pid<f64> = params.build(&Sampling { period: 1e-3 }).unwrap();
+        let highest = |told: bool| {
+            let (mut s, mut y, mut most) = (pid.state(), 0.0f64, 0.0f64);
+            for _ in 0..2000 {
+                let asked = pid.step(&mut s, 1.0, y, 0.0);
+                y = asked.clamp(y - 0.002, y + 0.002);
+                if told {
+                    pid.applied(&mut s, y);
+                }
+                most = most.max(y);
+            }
+            most
+        };
+        assert!(highest(true) < 1.2 && highest(false) > 1.5, "{} {}", highest(true), highest(false));
     }
 
     #[test]

@@ -83,6 +83,12 @@ impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
         let now = self.late.step(&mut s.late, env, reference);
         self.pid.step(&mut s.pid, now, measured, ff)
     }
+
+    /// What became of the last drive, as [`Pid::applied`].
+    #[inline]
+    pub fn applied(&self, s: &mut TrackingState<T, F::State, D>, drive: T) {
+        self.pid.applied(&mut s.pid, drive);
+    }
 }
 
 #[cfg(test)]

@@ -42,6 +42,8 @@ pub trait Control {
     fn begin(&mut self, reference: f32, shown: &Shown, volts: f32);
     /// The drive that the reference asks for \[V\], which the limits may still change.
     fn step(&mut self, reference: f32, shown: &Shown) -> f32;
+    /// What limits made of that drive \[V\].
+    fn applied(&mut self, volts: f32);
     /// Whether a limit keeps the output away from its reference.
     fn limited(&self) -> bool;
     /// The reference at which the output should be now: what looks ahead is given references before they are due.
@@ -69,6 +71,7 @@ impl Control for Open {
     fn step(&mut self, reference: f32, _: &Shown) -> f32 {
         reference
     }
+    fn applied(&mut self, _: f32) {}
     fn limited(&self) -> bool {
         false
     }
@@ -190,7 +193,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let shown = board.measure();
         self.shown = shown;
         self.tick = self.tick.wrapping_add(1);
-        let force_n = if self.state == State::Running { self.control.force(self.present_v, &shown) } else { None };
+        let watches = self.state == State::Running && self.run.force;
+        let force_n = if watches { self.control.force(self.present_v, &shown) } else { None };
         if core::mem::take(&mut self.out) {
             let Shown { output, temperature_degc, load_n } = shown;
             let sample =
@@ -205,6 +209,12 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             State::Running => self.play(board, &shown),
             State::Stopping | State::Fault(_) => self.come_to_rest(board),
         }
+    }
+
+    /// Periods that have passed without a [`tick`](Self::tick), because something else took too long: nothing is put out for them, but they count.
+    pub fn missed(&mut self, periods: u32) {
+        self.tick = self.tick.wrapping_add(periods);
+        self.quiet = self.quiet.saturating_add(periods);
     }
 
     fn step_v(&self) -> f32 {
@@ -269,6 +279,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.saturated = if beyond { self.saturated + 1 } else { 0 };
         self.present_v = inside.clamp(self.present_v - step, self.present_v + step);
         board.put_out(self.present_v);
+        self.control.applied(self.present_v);
         self.out = next.is_some();
         if self.saturated as f32 > PATIENCE_S * self.run.rate_hz {
             self.fail(Fault::Saturation);
@@ -349,7 +360,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 return Err(Refusal::Start(field));
             }
         }
-        let follows = self.control.prepare(1.0 / start.rate_hz, &self.shown, self.present_v, start.force);
+        let follows = (start.mode == Mode::Reference || start.force)
+            && self.control.prepare(1.0 / start.rate_hz, &self.shown, self.present_v, start.force);
         if start.mode == Mode::Reference && !(self.loaded && self.control.ready()) {
             return Err(Refusal::NoModel);
         }

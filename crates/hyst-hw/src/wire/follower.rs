@@ -121,7 +121,7 @@ fn env(shown: &Shown) -> Env<f32> {
     Env { time: 0.0, temperature: shown.temperature_degc, load: shown.load_n }
 }
 
-/// As [`env`], free: a measured load is what the observer is to find.
+/// As [`env()`], free: a measured load is what the observer is to find.
 fn free(shown: &Shown) -> Env<f32> {
     Env { load: 0.0, ..env(shown) }
 }
@@ -174,6 +174,12 @@ impl Control for Follower {
         let away = (run.due - shown.output).abs() > run.tolerance;
         run.limited = away && run.state.pid().limited();
         drive
+    }
+
+    fn applied(&mut self, volts: f32) {
+        if let Some(Running { tracking, state, .. }) = &mut self.running {
+            tracking.applied(state, volts);
+        }
     }
 
     fn limited(&self) -> bool {

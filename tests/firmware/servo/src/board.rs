@@ -37,10 +37,10 @@ impl Clock {
         Some(Self { seen: 0 })
     }
 
-    /// Whether another period has passed. Those for which it comes too late are lost: made up for at once, they would be a jump of the output.
-    pub fn passed(&mut self) -> bool {
+    /// Periods that have passed since it was asked last.
+    pub fn passed(&mut self) -> u32 {
         let now = PERIODS.load(Ordering::Relaxed);
-        let passed = now != self.seen;
+        let passed = now.wrapping_sub(self.seen);
         self.seen = now;
         passed
     }

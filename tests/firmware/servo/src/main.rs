@@ -25,7 +25,9 @@ fn main() -> ! {
     let Some(mut clock) = Clock::start(RATE_HZ) else { panic!("SysTick is taken") };
     let mut server = SerialServer::new();
     loop {
-        if clock.passed() {
+        // Periods for which it comes too late are lost: made up for at once, they would be a jump of the output.
+        if let Some(late) = clock.passed().checked_sub(1) {
+            servo.missed(late);
             servo.tick(&mut actuator);
         }
         let Ok(()) = server.poll(&mut servo, &mut line);

@@ -24,6 +24,8 @@ pub(super) struct Beside {
     /// When the run began, by the device's clock \[s\].
     began_s: Option<f64>,
     segment: Option<usize>,
+    /// What was put out last \[V\].
+    last_v: f64,
     /// What the sensor shows beyond the model before the reference begins: its zero of today.
     zero: Mean,
     watch: Option<Watch<f64>>,
@@ -115,6 +117,7 @@ impl Beside {
             degc: degc.or(model.effects.temperature.map(|t| t.reference_degc)).unwrap_or_default(),
             began_s: None,
             segment: None,
+            last_v: 0.0,
             zero: Mean::default(),
             watch: sigma
                 .map(|sigma| Watch::new(sigma, USUAL, PATIENCE, block))
@@ -128,8 +131,8 @@ impl Beside {
         }))
     }
 
-    /// Takes the next sample of a segment.
-    pub(super) fn take(&mut self, segment: usize, phase: Phase, sample: &Sample) -> Expected {
+    /// Takes the next sample of a segment, before which so many periods are missing: the device has held its last value in these.
+    pub(super) fn take(&mut self, segment: usize, phase: Phase, sample: &Sample, missing: usize) -> Expected {
         let began_s = *self.began_s.get_or_insert(sample.time_s);
         let env = Env {
             time: sample.time_s - began_s,
@@ -137,12 +140,16 @@ impl Beside {
             load: sample.load_n.unwrap_or_default(),
         };
         let free = if self.segment == Some(segment) {
+            for _ in 0..missing {
+                self.chain.step(&mut self.state, &env, self.last_v);
+            }
             self.chain.step(&mut self.state, &env, sample.drive_v)
         } else {
             self.segment = Some(segment);
             self.zero = Mean::default();
             self.chain.reset(&mut self.state, &env, sample.drive_v)
         };
+        self.last_v = sample.drive_v;
         if phase == Phase::Approach {
             self.zero.add(sample.output - free);
         }

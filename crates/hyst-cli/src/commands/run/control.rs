@@ -69,6 +69,7 @@ impl ClosedLoop {
             let reference = wanted.get(of).copied().unwrap_or(measured);
             let asked = self.pid.step(&mut self.state, reference, measured, forward);
             *volts = asked.clamp(self.last_v - self.step_v, self.last_v + self.step_v);
+            self.pid.applied(&mut self.state, *volts);
             let limited = self.state.limited() || *volts != asked;
             self.limited += usize::from(limited);
             let away = self.state.limited() && (reference - measured).abs() > self.tolerance;

@@ -67,7 +67,7 @@ impl Gaps {
         let Self { times, periods } = *self;
         (times > 0).then(|| {
             format!(
-                "the line was too slow for this rate: {times} times the device had nothing to put out and held its last value, for {periods} periods altogether, and after each the record begins another segment; take a lower rate or a quicker line"
+                "the line was too slow for this rate: {times} times the device had nothing to put out and held its last value, for {periods} periods altogether; after each the record begins another segment, which a fit would take to begin at rest: take a lower rate or a quicker line before you fit this"
             )
         })
     }

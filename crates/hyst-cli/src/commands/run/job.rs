@@ -1,5 +1,6 @@
 //! What a run plays: a drive as it stands, or the one that makes the output follow a reference.
 
+use std::net::SocketAddr;
 use std::path::Path;
 
 use hyst_core::{ForceParams, PidParams};
@@ -15,7 +16,7 @@ use super::beside::{Beside, Force};
 use super::control::ClosedLoop;
 use super::live::Live;
 use super::shape::Shape;
-use crate::cli::{Control, PidGains, RunArgs, VoltageLimits};
+use crate::cli::{Control, PidGains, RecordArgs, RunArgs, VoltageLimits};
 use crate::commands::compensate::{Compensation, options};
 use crate::exit::{CommandError, CommandResult};
 use crate::{input, recording, text};
@@ -35,6 +36,8 @@ pub(in crate::commands) struct Job {
     pub(super) handed_over: Option<HandedOver>,
     /// Symbol of the output's unit.
     pub(super) symbol: &'static str,
+    /// Where viewers are served, if they are.
+    pub(super) live: Option<SocketAddr>,
     /// Whether a bar is to be shown instead of a picture.
     pub(super) plain: bool,
     /// Highest temperature \[°C\] and greatest tracking error \[output unit\] of the run.
@@ -201,7 +204,8 @@ impl Job {
         }
         let reference = match Shape::named(reference)? {
             Some(shape) => {
-                let rate_hz = args.rate.unwrap_or(model.recorded_at_hz).clamp(device.min_rate_hz, device.max_rate_hz);
+                let usual = model.recorded_at_hz.clamp(device.min_rate_hz, device.max_rate_hz);
+                let rate_hz = args.rate.unwrap_or(usual);
                 shape.record(reference, recording::unit(device.output), rate_hz)?
             }
             None if args.rate.is_some() => {
@@ -279,7 +283,15 @@ impl Job {
                 "what this device measures comes too late for a loop that is closed on this computer, and its own loop is around a model's inverse: give --control pid+feedforward",
             ));
         }
+        if model.needs_temperature() && !device.temperature {
+            return Err(CommandError::bad_input(
+                "the model's gain follows a temperature that this device does not measure: give --control feedforward with --temperature, or a model without that effect",
+            ));
+        }
         let period = 1.0 / play.rate_hz;
+        // The loop begins and ends where the device rests, also where the model's record does not reach that far.
+        let rest_v = device.voltage.rest_v;
+        let limits = (limits.0.min(rest_v), limits.1.max(rest_v));
         let Chosen { gains, why, .. } = Chosen::new(args, &model, limits, period)?;
         let block = block(&model).map_err(CommandError::bad_input)?;
         let force = args.kout.map(|stiffness| ForceParams { stiffness, kappa: 1.0, chi: 0.0 });
@@ -328,6 +340,7 @@ impl Job {
             wanted,
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
+            live: args.live,
             plain: args.plain,
             hottest_degc: args.hottest,
             greatest_error: args.max_error,
@@ -337,13 +350,7 @@ impl Job {
     }
 
     /// At rest for so many samples, without a drive and without a model.
-    pub(in crate::commands) fn at_rest(
-        device: &Capabilities,
-        rows: usize,
-        rate_hz: f64,
-        hottest_degc: Option<f64>,
-        plain: bool,
-    ) -> Self {
+    pub(in crate::commands) fn at_rest(device: &Capabilities, rows: usize, rate_hz: f64, args: &RecordArgs) -> Self {
         Self {
             segments: vec![vec![device.voltage.rest_v; rows]],
             options: RecordOptions::at(rate_hz),
@@ -351,8 +358,9 @@ impl Job {
             wanted: vec![None; rows],
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
-            plain,
-            hottest_degc,
+            live: args.live,
+            plain: args.plain,
+            hottest_degc: args.hottest,
             greatest_error: None,
             degc: None,
             stiffness: None,
@@ -465,9 +473,15 @@ fn straight(model: &Model, reference: &Record, low: f64, high: f64) -> CommandRe
 
 /// The voltages that may be applied: what the device can do, and no more than what the command line allows.
 fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits> {
-    let (low, high) = (device.voltage.min_v, device.voltage.max_v);
+    let (low, high, rest) = (device.voltage.min_v, device.voltage.max_v, device.voltage.rest_v);
     match args.limits.limit {
         None => Ok(VoltageLimits { low, high }),
+        Some(limit) if device.queued && !(limit.low..=limit.high).contains(&rest) => {
+            Err(CommandError::bad_input(format!(
+                "--limit {},{} leaves out the {rest} V at which the device rests; give limits around that",
+                limit.low, limit.high
+            )))
+        }
         Some(limit) if limit.low >= low && limit.high <= high => Ok(limit),
         Some(limit) => Err(CommandError::bad_input(format!(
             "--limit {},{} goes beyond the device, which can do {low} to {high} V; give limits within that",

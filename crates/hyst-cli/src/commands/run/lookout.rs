@@ -9,12 +9,14 @@ use super::beside::{Beside, Watched};
 use super::gaps::GapFinder;
 use super::guard::Guard;
 use super::view::{Seen, View};
-use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog};
+use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog, RunStream};
 use crate::text;
 
 /// Everything that looks at a run.
 pub(super) struct Lookout<'a> {
     pub(super) log: Option<&'a mut RunLog>,
+    /// Viewers that look on.
+    pub(super) stream: Option<RunStream>,
     /// Why the log could not be written; from then on nothing is.
     pub(super) log_error: Option<LogError>,
     pub(super) beside: Option<Beside>,
@@ -52,25 +54,27 @@ impl Lookout<'_> {
 
     fn one(&mut self, news: &Progress<'_>, sample: &Sample, wanted: Option<f64>) {
         self.now_s = sample.time_s;
-        if let Some(missing) = self.gaps.take(news.segment, sample)
-            && self.gaps.gaps().times == 1
-        {
+        let missing = self.gaps.take(news.segment, sample).unwrap_or(0);
+        if missing > 0 && self.gaps.gaps().times == 1 {
             let now = text::short(sample.time_s);
             self.event("gap", format!("before {now} s the device held its last value for {missing} periods: the line is too slow for this rate"));
         }
-        let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample));
+        let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample, missing));
         let force = expected.and_then(|e| e.force).or(sample.force_n);
         if news.phase == Phase::Record {
             self.forces.resize_with(self.forces.len().max(news.segment + 1), Vec::new);
             self.forces[news.segment].extend(force);
         }
-        if self.log_error.is_none()
-            && let Some(log) = &mut self.log
-        {
+        if self.log.is_some() || self.stream.is_some() {
             let mut logged = LoggedSample::new(news.segment + self.gaps.gaps().times, news.phase, sample, wanted);
             logged.predicted = expected.map(|e| e.output);
             logged.estimated_force_n = force;
-            self.log_error = log.sample(&logged).err();
+            if self.log_error.is_none()
+                && let Some(log) = &mut self.log
+            {
+                self.log_error = log.sample(&logged).err();
+            }
+            self.stream.iter_mut().for_each(|stream| stream.sample(&logged));
         }
         self.view.add(Seen { sample: *sample, wanted, predicted: expected.map(|e| e.output), force });
         if let Some(explains) = expected.and_then(|e| e.explains) {
@@ -118,13 +122,15 @@ impl Lookout<'_> {
         self.note(kind, text);
     }
 
-    /// Logs what has happened.
+    /// Logs what has happened, and shows it to viewers.
     pub(super) fn note(&mut self, kind: &'static str, text: String) {
+        let event = LoggedEvent { time_s: self.now_s, kind, text };
         if self.log_error.is_none()
             // A run that is refused before anything moves leaves no log.
             && let Some(log) = self.log.as_mut().filter(|log| log.samples() > 0)
         {
-            self.log_error = log.event(&LoggedEvent { time_s: self.now_s, kind, text }).err();
+            self.log_error = log.event(&event).err();
         }
+        self.stream.iter().for_each(|stream| stream.event(&event));
     }
 }

@@ -14,7 +14,7 @@ use super::job::Job;
 use super::lookout::Lookout;
 use super::view::View;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
-use crate::log::{LogError, RunLog};
+use crate::log::{LogError, RunLog, RunStream};
 use crate::output::say;
 use crate::text;
 
@@ -47,8 +47,14 @@ where
     }
     let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
     let patience = guard.patience();
+    let stream = job.live.map(|address| RunStream::at(address, job.symbol)).transpose();
+    let stream = stream.map_err(|error| CommandError::new(Exit::Failed, error))?;
+    if let Some(stream) = &stream {
+        say(&format!("note: viewers (Foxglove, Lichtblick) connect to {}", stream.url()));
+    }
     let mut lookout = Lookout {
         log,
+        stream,
         log_error: None,
         beside: job.beside()?,
         guard,
@@ -81,6 +87,9 @@ where
         if ended { ControlFlow::Break(()) } else { on }
     });
     match &played {
+        Err(Failure { not_stopped: Some(error), .. }) => {
+            lookout.note("fault", format!("the device may still be driven: {error}"));
+        }
         Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
             lookout.event("cancelled", "stopped on request; the device was brought to rest".to_owned());
         }
