@@ -26,6 +26,8 @@ pub struct StreamError {
 /// Serves viewers until it is dropped.
 pub struct RunStream {
     server: Option<WebSocketServerHandle>,
+    /// Channels live as long as it.
+    _context: Arc<Context>,
     url: String,
     samples: Arc<RawChannel>,
     events: Arc<RawChannel>,
@@ -59,7 +61,7 @@ impl RunStream {
             .start_blocking()
             .map_err(failed)?;
         let url = format!("ws://{}", SocketAddr::new(address.ip(), server.port()));
-        Ok(Self { server: Some(server), url, samples, events, began: None })
+        Ok(Self { server: Some(server), _context: context, url, samples, events, began: None })
     }
 
     /// Where viewers connect to.
