@@ -115,6 +115,33 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
 }
 
 #[test]
+fn a_loop_on_the_device_begins_where_it_rests_also_with_a_model_of_a_part_of_the_range() {
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
+    lab.ok("excite identification --rate 500 --low 20 --high 90 --seconds 4 --slow 4 --hold 0.3 -o u.csv");
+    lab.ok("run --daq sim:plant.toml --drive u.csv --record train.csv");
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok(&format!(
+        "run --daq {} --model model.json --reference sine:6,14,1,2 --control pid+feedforward --record y.csv {PATIENT}",
+        device.daq()
+    ));
+    let put_out = device.put_out();
+    let steepest = put_out.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
+    assert!(steepest < 5.0 && put_out[0].abs() < 5.0, "{steepest} V in 2 ms, from {} V", put_out[0]);
+}
+
+#[test]
+fn a_gain_that_follows_a_temperature_needs_a_thermometer() {
+    let (lab, device) = (Lab::with_train(WARM), Served::plant(PLANT, RATE_HZ));
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    assert!(lab.read("extended.json").contains("\"temperature\": {"), "the diagnosis finds it");
+    let line = format!("run --daq {} --model extended.json --reference sine:6,14,1,2 --record y.csv", device.daq());
+    let message = lab.refuses(&format!("{line} --control pid+feedforward"), 2);
+    assert!(message.contains("does not measure") && message.contains("--temperature"), "{message}");
+    assert_eq!(device.put_out(), [0.0; 0]);
+}
+
+#[test]
 fn a_drive_steeper_than_the_amplifier_is_refused() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     // 120,000 V/s; the device's amplifier can do 100,000.

@@ -156,6 +156,62 @@ impl Line for &mut Bench {
     }
 }
 
+/// The same with a clock of its own: a look at the line takes a millisecond, or as long as nothing comes.
+struct Timed<'a> {
+    bench: &'a mut Bench,
+    began: Instant,
+    passed: Duration,
+    periods: u32,
+}
+
+impl Timed<'_> {
+    fn go_on(&mut self, time: Duration) {
+        self.passed += time;
+        let due = (self.passed.as_secs_f64() * 1000.0) as u32;
+        self.bench.pass(due - self.periods);
+        self.periods = due;
+    }
+}
+
+impl Line for Timed<'_> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        Line::send(&mut &mut *self.bench, bytes)
+    }
+
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let nothing = self.bench.answers.is_empty();
+        self.go_on(if nothing { patience } else { patience.min(Duration::from_millis(1)) });
+        let n = bytes.len().min(self.bench.answers.len());
+        self.bench.answers.drain(..n).zip(bytes).for_each(|(from, to)| *to = from);
+        Ok(n)
+    }
+
+    fn now(&mut self) -> Instant {
+        self.began + self.passed
+    }
+
+    fn pause(&mut self, time: Duration) {
+        self.go_on(time);
+    }
+}
+
+/// With the waits, the watchdog and the look-ahead that a run has if nothing is said: a bad line costs neither the run nor a period of it.
+#[test]
+fn a_line_with_accidents_does_not_wake_the_watchdog() {
+    for seed in 0..20 {
+        let mut bench = Bench::new(12, seed);
+        let line = Timed { bench: &mut bench, began: Instant::now(), passed: Duration::ZERO, periods: 0 };
+        let mut remote = Remote::open(line, "bench", RemoteOptions::with_session(7)).unwrap();
+        let drive = wave(3000);
+        let played = record(&mut remote, &[&drive[..]], &RecordOptions::at(1000.0), |_| ControlFlow::Continue(()));
+        let samples = &played.unwrap_or_else(|failure| panic!("seed {seed}: {}", failure.cause)).segments[0].samples;
+        assert!(samples.iter().zip(&drive).all(|(sample, volts)| sample.drive_v == f64::from(*volts as f32)));
+        assert_eq!(samples.len(), drive.len());
+        let longest = samples.windows(2).map(|w| w[1].time_s - w[0].time_s).fold(0.0, f64::max);
+        assert!(longest < 0.0015, "seed {seed}: a gap of {longest} s");
+    }
+}
+
 fn options() -> RemoteOptions {
     RemoteOptions {
         repeat: Duration::from_millis(1),
