@@ -4,6 +4,8 @@ use hyst_hw::{Recording, Sample};
 use hyst_ident::record::{Columns, OutputUnit, Record};
 
 use crate::exit::CommandResult;
+use crate::output::{self, Target};
+use crate::text;
 
 /// The device's unit, as records know it.
 pub(crate) fn unit(unit: hyst_hw::OutputUnit) -> OutputUnit {
@@ -38,4 +40,17 @@ fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
     let first = samples.first().map_or(0.0, |sample| sample.time_s);
     let shift = (first * 1e9).round() / 1e9 - first;
     samples.iter().map(move |sample| sample.time_s + shift)
+}
+
+/// Writes what was measured until a run ended before its time, and says so.
+pub(crate) fn keep_partial(recording: &Recording, target: &Target, unit: OutputUnit) -> CommandResult {
+    let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
+    // A row alone has no sample period.
+    if rows < 2 {
+        return Ok(());
+    }
+    let record = to_record(recording, &target.to_string(), unit)?;
+    target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;
+    output::say(&format!("note: what was measured until then, {}, is kept in {target}", text::count(rows, "row")));
+    Ok(())
 }

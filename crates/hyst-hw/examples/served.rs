@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = PlantConfig::from_toml(&std::fs::read_to_string(file)?)?;
     let mut board = PlantBoard::new(Plant::new(config)?, rate_hz)?;
     let mut device: Device<Follower, 512, 4096> = Device::new(board.identity(rate_hz, true), Follower::new());
-    let listener = TcpListener::bind(address)?;
+    let listener = TcpListener::bind(&address).map_err(|error| format!("{address}: {error}; give another port"))?;
     println!("listening at {}", listener.local_addr()?);
     Ok(serve_at(&listener, &mut device, &mut board, || false)?)
 }

@@ -127,7 +127,7 @@ pub enum RemoteError {
     },
     /// The device ended an earlier run by itself, and nobody has looked at it since.
     #[error(
-        "{line}: the device stands with a fault ({}) of an earlier run: {fault}; when that is mended, clear it (hystctl run: --clear)",
+        "{line}: the device stands with a fault ({}) of an earlier run: {fault}; when that is mended, clear it (hystctl stop --clear, or run --clear)",
         fault.code()
     )]
     Standing {
@@ -168,7 +168,7 @@ pub enum RemoteError {
     },
     /// A rate that the device does not run at.
     #[error(
-        "{line}: {asked_hz} Hz; the device runs at {low_hz} to {high_hz} Hz: give a record of another rate, or --rate"
+        "{line}: {asked_hz} Hz; the device runs at {low_hz} to {high_hz} Hz: bring the record to such a rate (excite, record and references like sine: take --rate)"
     )]
     Rate {
         /// What the line is called.
@@ -533,9 +533,11 @@ impl<L: Line> Remote<L> {
             Ask::Hello if self.broken > 0 => {
                 "something else speaks there: is this the right port, its speed the device's, its firmware one that speaks this protocol?"
             }
-            Ask::Hello => "is this the right port, its speed the device's, and the device powered?",
+            Ask::Hello => {
+                "is this the right port, its speed the device's, the device powered, and no other program talking to it?"
+            }
             Ask::Emergency => "NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C where the run goes on",
-            _ => "look at the cable; the device comes to rest by itself",
+            _ => "look at the cable; its watchdog brings a device that still runs to rest",
         };
         let seconds = self.lost().as_secs_f64();
         Err(RemoteError::Silent { line: self.name.clone(), seconds, broken: self.broken, advice })

@@ -332,7 +332,7 @@ pub(crate) struct RunArgs {
     /// End the run and come to rest above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// End the run and come to rest when the output is further than this from the reference for half a second [output unit]
+    /// End the run and come to rest when the output is further than this from the reference for half a second, of which breaks of a tenth of a second are no end [output unit]
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
     /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
@@ -372,6 +372,9 @@ pub(crate) struct StopArgs {
     /// Device, as for run
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
+    /// Clear the fault of a device that has come to rest, so that it can be started again; nothing moves by that
+    #[arg(long)]
+    pub(crate) clear: bool,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }

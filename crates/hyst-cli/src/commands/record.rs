@@ -6,7 +6,7 @@ use hyst_hw::Daq;
 use serde::Serialize;
 
 use super::run::gaps::{self, Gaps};
-use super::run::job::Job;
+use super::run::job::{Job, thermometer};
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
 use crate::device::{AnyDevice, Wishes};
@@ -75,6 +75,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         );
         return Err(CommandError::bad_input(message));
     }
+    thermometer(args.hottest, &can)?;
     let mut job = Job::at_rest(&can, rows as usize, rate_hz, args);
     let unit = recording::unit(can.output);
     let info = RunInfo { device: &can.device, output: unit, sample_rate_hz: rate_hz, model: None };
@@ -87,8 +88,14 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         output::tell_set_aside(path, older);
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-    let Played { recording, gaps, .. } = played?;
+    let Played { recording, gaps, error, .. } = played?;
     let recording = gaps::split(recording);
+    if let Some(error) = error {
+        if let Some(target) = &args.output {
+            recording::keep_partial(&recording, target, unit)?;
+        }
+        return Err(error);
+    }
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;

@@ -9,6 +9,7 @@ mod live;
 mod lookout;
 pub(super) mod play;
 mod shape;
+mod sweep;
 mod view;
 
 use std::collections::BTreeMap;
@@ -143,7 +144,7 @@ struct Gains {
     derivative: f64,
     /// Where the loop's gain falls below one, as the model has it; none for given gains \[Hz\].
     crossover_hz: Option<f64>,
-    /// Share of the samples in which a limit held the drive; none where the device closed the loop \[%\].
+    /// Share of the samples in which a limit held the drive; on a device, and the output away from its reference \[%\].
     limited_percent: Option<f64>,
     /// Why the gains are these, in words.
     why: String,
@@ -205,7 +206,13 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         _ => Ok(()),
     };
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
-    let Played { mut recording, mut forces, watched, gaps } = played?;
+    let Played { mut recording, mut forces, watched, gaps, error } = played?;
+    if let Some(error) = error {
+        if let Some(target) = &args.record {
+            recording::keep_partial(&gaps::split(recording), target, unit)?;
+        }
+        return Err(error);
+    }
     job.align(&mut recording, &mut forces);
     let recording = gaps::split(recording);
     let forces = forces.concat();
@@ -233,7 +240,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         tracking: wanted.map(|wanted| Tracking::of(wanted, &measured)).transpose()?,
         compensation: job.followed.as_ref().and_then(Followed::compensation),
         control: job.followed.as_ref().map(|followed| followed.control),
-        pid: job.pid().map(Gains::of),
+        pid: job.pid(&recording).map(Gains::of),
         loop_on_device: job.handed_over.is_some(),
         watch: watched.map(WatchSummary::new),
         gaps,
@@ -311,7 +318,10 @@ impl Summary {
         if let (Some(WatchSummary { explains: false, .. }), Some(log), Some(model)) =
             (self.watch, &self.log, &self.model)
         {
-            lines.push(format!("next: hystctl diagnose {log} --model {model} -o extended.json"));
+            // Not over the model that is read.
+            let extended =
+                if Path::new(model).ends_with("extended.json") { "extended-again.json" } else { "extended.json" };
+            lines.push(format!("next: hystctl diagnose {log} --model {model} -o {extended}"));
         }
         lines.extend(self.log.iter().map(|path| format!("log: {path}")));
         lines.extend(self.record.iter().map(|path| format!("record: {path}")));

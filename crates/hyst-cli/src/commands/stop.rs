@@ -1,9 +1,10 @@
 //! `stop`: an emergency stop from another terminal.
 
+use hyst_hw::Daq;
 use serde::Serialize;
 
 use crate::cli::StopArgs;
-use crate::device::AnyDevice;
+use crate::device::{AnyDevice, Wishes};
 use crate::exit::CommandResult;
 use crate::output::Report;
 
@@ -12,14 +13,22 @@ struct Summary {
     device: String,
     /// What it put out when it was told \[V\].
     present_v: f64,
+    /// Whether a fault was cleared; else it was told to stop.
+    cleared: bool,
 }
 
 /// Runs the command.
 pub(super) fn run(args: &StopArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[])?;
+    if args.clear {
+        let daq = AnyDevice::open(&args.daq, &Wishes { clear: true, ..Wishes::default() })?;
+        let (device, present_v) = (daq.capabilities().device.clone(), daq.present_v());
+        let said = format!("{device}: stands at {present_v} V without a fault, and can be started");
+        return report.print(&said, &Summary { device, present_v, cleared: true });
+    }
     let (device, present_v) = AnyDevice::emergency_stop(&args.daq)?;
     let said = format!(
-        "{device}: comes to rest from {present_v} V, and starts again only once its fault is cleared (hystctl run --clear)"
+        "{device}: comes to rest from {present_v} V, and starts again only once its fault is cleared (hystctl stop --clear, or run --clear)"
     );
-    report.print(&said, &Summary { device, present_v })
+    report.print(&said, &Summary { device, present_v, cleared: false })
 }

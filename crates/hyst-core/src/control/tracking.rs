@@ -4,8 +4,9 @@ use crate::{Build, Delay, DelayParams, DelayState, Env, Error, Pid, PidState, Re
 
 /// Feedforward by an inverse `F`, corrected by a PID: the inverse does what the model knows, the PID what it does not.
 ///
-/// `F` is any stage from reference to drive: an inverse operator, a compensator with preview. Its `lead` delays the reference for the PID,
-/// so that both speak of the same time. `D` holds the lead: at least `lead + 2`.
+/// `F` is any stage from reference to drive: an inverse operator, a compensator with preview. Its lead delays the reference for the PID,
+/// so that both speak of the same time; where an output is measured only at the end of a period, by one more sample. `D` holds this delay: at
+/// least `late + 2`.
 ///
 /// ```
 /// use hyst_core::{Build, Env, Invert, Pi, PidParams, Sampling, Stage, Tracking};
@@ -47,12 +48,12 @@ impl<T, S, const D: usize> TrackingState<T, S, D> {
 }
 
 impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
-    /// From an inverse, the samples of preview that it needs, and a PID.
+    /// From an inverse, the samples by which the reference is later for the PID, and that PID.
     ///
     /// # Errors
-    /// If `D` does not hold the lead.
-    pub fn new(feedforward: F, lead: usize, pid: Pid<T>) -> Result<Self, Error> {
-        let late = DelayParams { seconds: lead as f64 }.build(&Sampling { period: 1.0 })?;
+    /// If `D` does not hold the delay.
+    pub fn new(feedforward: F, late: usize, pid: Pid<T>) -> Result<Self, Error> {
+        let late = DelayParams { seconds: late as f64 }.build(&Sampling { period: 1.0 })?;
         Ok(Self { feedforward, late, pid })
     }
 
@@ -76,7 +77,7 @@ impl<T: Real, F: Stage<T>, const D: usize> Tracking<T, F, D> {
         ff
     }
 
-    /// The drive of time k from the reference (and surroundings) of time k + lead and the output measured at time k.
+    /// The drive of time k from the reference (and surroundings) of time k + lead and the newest measured output.
     #[inline]
     pub fn step(&self, s: &mut TrackingState<T, F::State, D>, env: &Env<T>, reference: T, measured: T) -> T {
         let ff = self.feedforward.step(&mut s.feedforward, env, reference);

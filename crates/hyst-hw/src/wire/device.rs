@@ -3,6 +3,7 @@
 
 use heapless::{Deque, Vec};
 
+use super::lasting::Lasting;
 use super::message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_SAMPLES, Measured, Mode, PROTOCOL, Refusal, Reply, Request,
     Start, State, Status, Tell, model_sum,
@@ -115,8 +116,8 @@ pub struct Device<C, const Q: usize, const M: usize> {
     /// The reference that is followed now.
     reference: Option<f32>,
     quiet: u32,
-    saturated: u32,
-    astray: u32,
+    saturated: Lasting,
+    astray: Lasting,
 }
 
 impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
@@ -156,8 +157,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             out: false,
             reference: None,
             quiet: 0,
-            saturated: 0,
-            astray: 0,
+            saturated: Lasting::default(),
+            astray: Lasting::default(),
         }
     }
 
@@ -237,8 +238,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         } else {
             self.reference.and_then(|_| self.control.due()).and_then(|reference| {
                 let away = (reference - shown.output).abs() > self.run.error;
-                self.astray = if away { self.astray + 1 } else { 0 };
-                (self.astray as f32 > patience).then_some(Fault::TrackingError)
+                self.astray.step(away, patience).then_some(Fault::TrackingError)
             })
         };
         if let Some(fault) = fault {
@@ -276,12 +276,11 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let wanted = if wanted.is_finite() { wanted } else { self.present_v };
         let inside = wanted.clamp(low, high);
         let beyond = self.run.mode == Mode::Reference && self.control.limited();
-        self.saturated = if beyond { self.saturated + 1 } else { 0 };
         self.present_v = inside.clamp(self.present_v - step, self.present_v + step);
         board.put_out(self.present_v);
         self.control.applied(self.present_v);
         self.out = next.is_some();
-        if self.saturated as f32 > PATIENCE_S * self.run.rate_hz {
+        if self.saturated.step(beyond, PATIENCE_S * self.run.rate_hz) {
             self.fail(Fault::Saturation);
         }
     }
@@ -373,7 +372,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.state = State::Running;
         self.queue.clear();
         self.history.clear();
-        (self.tick, self.received, self.measured, self.quiet, self.saturated, self.astray) = (0, 0, 0, 0, 0, 0);
+        (self.tick, self.received, self.measured, self.quiet) = (0, 0, 0, 0);
+        (self.saturated, self.astray) = (Lasting::default(), Lasting::default());
         (self.out, self.reference) = (false, None);
         Ok(())
     }

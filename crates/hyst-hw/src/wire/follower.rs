@@ -50,7 +50,7 @@ struct Running {
     tracking: Loop,
     state: TrackingState<f32, <Inverse as Stage<f32>>::State, LEAD>,
     lead: usize,
-    /// References that are not due yet.
+    /// References that are not due yet: the output that is measured with one of them belongs to the one before.
     early: Deque<f32, LEAD>,
     due: f32,
     /// A limit that leaves less than this is of no account: references may touch the ends of the range \[output unit\].
@@ -99,7 +99,8 @@ impl Follower {
             high,
         };
         let pid = recipe.pid.unwrap_or(still).build(&sampling).ok()?;
-        Some((Tracking::new(inverse, lead, pid).ok()?, lead))
+        // What is measured at the end of a period is what the drive of the period before has made.
+        Some((Tracking::new(inverse, lead + 1, pid).ok()?, lead))
     }
 }
 
@@ -167,7 +168,7 @@ impl Control for Follower {
         let Some(run) = &mut self.running else { return f32::NAN };
         // There is room: no loop is built that looks further ahead.
         let _ = run.early.push_back(reference);
-        if run.early.len() > run.lead {
+        if run.early.len() > run.lead + 1 {
             run.due = run.early.pop_front().unwrap_or(run.due);
         }
         let drive = run.tracking.step(&mut run.state, &env(shown), reference, shown.output);

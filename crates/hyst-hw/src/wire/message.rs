@@ -277,7 +277,7 @@ impl fmt::Display for Fault {
                 "the output is further from the reference than the run allows; look for what holds the actuator"
             }
             Self::Saturation => {
-                "the drive stands at a limit and the reference asks for more; shrink or shift the reference"
+                "the drive stands at a limit and the output stays away from its reference; shrink or shift the reference, or look for what holds the actuator"
             }
         })
     }

@@ -12,6 +12,7 @@ mod device;
 mod follower;
 mod frame;
 mod iso_tp;
+mod lasting;
 mod message;
 mod recipe;
 mod server;
@@ -20,6 +21,7 @@ pub use device::{Board, Control, Device, Open, Shown};
 pub use follower::{Follower, lateness};
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
+pub use lasting::Lasting;
 pub use message::{
     Ask, Chunk, Exchange, Fault, Field, Identity, MOST_CHUNK, MOST_DRIVES, MOST_NAME, MOST_SAMPLES, Measured, Mode,
     PROTOCOL, Refusal, Reply, Request, Start, State, Status, Tell, Unit, model_sum,

@@ -5,6 +5,7 @@ use hyst_hw::{Phase, Sample};
 use hyst_ident::BetweenSamples;
 use hyst_ident::model::{Effect, HostChain, Model};
 
+use super::sweep::Sweep;
 use crate::exit::{CommandError, CommandResult};
 
 /// Length of a block of the watch \[s\], longer than what a residual remembers, and fewest samples of one.
@@ -28,8 +29,16 @@ pub(super) struct Beside {
     last_v: f64,
     /// What the sensor shows beyond the model before the reference begins: its zero of today.
     zero: Mean,
+    /// Whether the actuator still remembers what the model does not know of.
+    sweep: Sweep,
+    /// Samples of this segment's record until it did not any more, and the next ones, which tell the zero from then on.
+    before: usize,
+    anew: Mean,
     watch: Option<Watch<f64>>,
     watched: WatchState<f64>,
+    /// Whether anything was watched.
+    looked: bool,
+    block: u32,
     force: Option<ForceObservation<f64>>,
     /// What the model left of its own record \[output unit\].
     trained_to: Option<f64>,
@@ -119,6 +128,11 @@ impl Beside {
             segment: None,
             last_v: 0.0,
             zero: Mean::default(),
+            sweep: Sweep::new(),
+            before: 0,
+            anew: Mean::default(),
+            looked: false,
+            block,
             watch: sigma
                 .map(|sigma| Watch::new(sigma, USUAL, PATIENCE, block))
                 .transpose()
@@ -146,16 +160,18 @@ impl Beside {
             self.chain.step(&mut self.state, &env, sample.drive_v)
         } else {
             self.segment = Some(segment);
-            self.zero = Mean::default();
+            (self.zero, self.anew, self.sweep, self.before) = (Mean::default(), Mean::default(), Sweep::new(), 0);
             self.chain.reset(&mut self.state, &env, sample.drive_v)
         };
         self.last_v = sample.drive_v;
         if phase == Phase::Approach {
             self.zero.add(sample.output - free);
         }
+        let known = phase == Phase::Record && self.known(sample.drive_v, sample.output - free);
         let output = free + self.zero.value();
         let mut explains = None;
-        if let (Some(watch), Phase::Record) = (&self.watch, phase) {
+        if let (Some(watch), true) = (&self.watch, known) {
+            self.looked = true;
             let lost = watch.step(&mut self.watched, sample.output - output);
             explains = (lost != self.now_lost).then_some(!lost);
             self.now_lost = lost;
@@ -166,9 +182,35 @@ impl Beside {
         Expected { output, force: self.force.map(|force| force.force(sample.output, output)), explains }
     }
 
+    /// Whether model and actuator have the same history. An actuator that remembers earlier runs stands elsewhere than the model until the drive has gone
+    /// over its range both ways; the zero is found anew then, over as long a time as that took.
+    fn known(&mut self, drive_v: f64, beyond: f64) -> bool {
+        // A force would be taken for a zero.
+        if self.watch.is_none() {
+            return true;
+        }
+        if !self.sweep.take(drive_v) {
+            self.before += 1;
+            self.anew = Mean::default();
+            return false;
+        }
+        let enough = self.before.max(self.block as usize);
+        if (self.anew.count as usize) < enough {
+            self.anew.add(beyond);
+            if self.anew.count as usize == enough {
+                (self.zero, self.before) = (self.anew, 0);
+            }
+            return false;
+        }
+        true
+    }
+
     /// How the watch has ended; `None` where nothing was watched.
     pub(super) fn watched(&self) -> Option<Watched> {
         self.watch?;
+        if !self.looked {
+            return None;
+        }
         Some(Watched { lost_at: self.lost_at, residual: self.watched.last_rms(), trained_to: self.trained_to? })
     }
 }

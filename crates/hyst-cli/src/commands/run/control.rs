@@ -2,7 +2,9 @@
 
 use hyst_core::{Build, Pid, PidParams, PidState, Sampling};
 use hyst_hw::Revision;
+use hyst_hw::wire::Lasting;
 
+use super::guard::PATIENCE_S;
 use crate::exit::{CommandError, CommandResult};
 
 /// A loop that is closed sample by sample.
@@ -19,8 +21,11 @@ pub(super) struct ClosedLoop {
     last_v: f64,
     /// Samples in which a limit held the drive.
     limited: usize,
-    /// The last so many samples in which that kept the output away.
-    limited_for: usize,
+    /// Whether, and for how long, that has kept the output away.
+    held: Lasting,
+    /// Samples after which that is too long, and whether it has been.
+    patience: f32,
+    too_long: bool,
     /// A limit that leaves less than this is of no account \[output unit\].
     tolerance: f64,
     samples: usize,
@@ -47,7 +52,9 @@ impl ClosedLoop {
             step_v,
             last_v: 0.0,
             limited: 0,
-            limited_for: 0,
+            held: Lasting::default(),
+            patience: (PATIENCE_S / period) as f32,
+            too_long: false,
             tolerance,
             samples: 0,
         })
@@ -73,15 +80,15 @@ impl ClosedLoop {
             let limited = self.state.limited() || *volts != asked;
             self.limited += usize::from(limited);
             let away = self.state.limited() && (reference - measured).abs() > self.tolerance;
-            self.limited_for = if away { self.limited_for + 1 } else { 0 };
+            self.too_long |= self.held.step(away, self.patience);
             self.samples += 1;
             self.last_v = *volts;
         }
     }
 
-    /// Newest samples in a row in which a limit held the drive and the output away from its reference.
-    pub(super) fn limited_for(&self) -> usize {
-        self.limited_for
+    /// Whether a limit has held the drive, and the output away from its reference, for too long.
+    pub(super) fn limited_too_long(&self) -> bool {
+        self.too_long
     }
 
     /// Share of the samples in which a limit held the drive \[%\].

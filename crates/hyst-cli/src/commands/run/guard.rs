@@ -1,18 +1,18 @@
 //! The limits of a run that are watched on this computer, beside those that a device watches itself.
 
 use hyst_hw::Sample;
-use hyst_hw::wire::Fault;
+use hyst_hw::wire::{Fault, Lasting};
 
 /// How long the output may be too far away, or the drive at a limit \[s\]: as on a device.
-const PATIENCE_S: f64 = 0.5;
+pub(super) const PATIENCE_S: f64 = 0.5;
 
 /// What ends a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guard {
     hottest_degc: f64,
     error: f64,
-    patience: usize,
-    astray: usize,
+    patience: f32,
+    astray: Lasting,
 }
 
 impl Guard {
@@ -21,14 +21,9 @@ impl Guard {
         Self {
             hottest_degc: hottest_degc.unwrap_or(f64::INFINITY),
             error: error.unwrap_or(f64::INFINITY),
-            patience: (PATIENCE_S * rate_hz).ceil() as usize,
-            astray: 0,
+            patience: (PATIENCE_S * rate_hz) as f32,
+            astray: Lasting::default(),
         }
-    }
-
-    /// Samples that are waited for.
-    pub(super) fn patience(&self) -> usize {
-        self.patience
     }
 
     /// Why the run has to end, if it has to, by a sample and what was wanted then.
@@ -41,8 +36,7 @@ impl Guard {
             return Some(Fault::Temperature);
         }
         let away = reference.is_some_and(|wanted| (sample.output - wanted).abs() > self.error);
-        self.astray = if away { self.astray + 1 } else { 0 };
-        (self.astray > self.patience).then_some(Fault::TrackingError)
+        self.astray.step(away, self.patience).then_some(Fault::TrackingError)
     }
 }
 
@@ -62,7 +56,7 @@ mod tests {
         assert_eq!(guard.look(&sample(f64::NAN, 20.0), None), Some(Fault::Sensor));
         let mut away = |wanted| guard.look(&sample(1.0, 20.0), Some(wanted));
         assert!((0..50).all(|_| away(1.6).is_none()));
-        assert_eq!(away(1.4), None);
+        assert!((0..11).all(|_| away(1.4).is_none()));
         assert!((0..50).all(|_| away(1.6).is_none()));
         assert_eq!(away(1.6), Some(Fault::TrackingError));
         let mut none = Guard::new(None, None, 100.0);

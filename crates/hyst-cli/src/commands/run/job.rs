@@ -36,6 +36,8 @@ pub(in crate::commands) struct Job {
     pub(super) handed_over: Option<HandedOver>,
     /// Symbol of the output's unit.
     pub(super) symbol: &'static str,
+    /// Whether a record of it is written.
+    pub(super) recorded: bool,
     /// Where viewers are served, if they are.
     pub(super) live: Option<SocketAddr>,
     /// Whether a bar is to be shown instead of a picture.
@@ -59,6 +61,29 @@ pub(super) struct HandedOver {
     pub(super) late: usize,
     gains: PidParams,
     why: String,
+    slew_v_per_s: f64,
+}
+
+impl HandedOver {
+    /// Share of the rows in which the drive stood at a limit and the output away from what was wanted \[%\].
+    fn limited_percent(&self, recording: &Recording, followed: &Followed) -> f64 {
+        let PidParams { low, high, .. } = self.gains;
+        // The device's numbers are f32.
+        let (near, step) = (1e-5 * (high - low), 0.999 * self.slew_v_per_s / recording.rate_hz);
+        let tolerance = TOLERANCE * (followed.model.output.high - followed.model.output.low);
+        let wanted = followed.wanted();
+        let (mut held, mut rows) = (0, 0);
+        for segment in &recording.segments {
+            for (k, sample) in segment.samples.iter().enumerate() {
+                let before = k.checked_sub(1).map_or(sample.drive_v, |k| segment.samples[k].drive_v);
+                let at_end = sample.drive_v <= low + near || sample.drive_v >= high - near;
+                let away = wanted.get(rows).is_some_and(|wanted| (sample.output - wanted).abs() > tolerance);
+                held += usize::from(away && (at_end || (sample.drive_v - before).abs() >= step));
+                rows += 1;
+            }
+        }
+        100.0 * held as f64 / rows.max(1) as f64
+    }
 }
 
 /// A reference, and the model that computes its drive.
@@ -128,9 +153,10 @@ impl Job {
     }
 
     /// The PID that took part: its gains, where they come from, bandwidth \[Hz\] and share of limited samples \[%\].
-    pub(super) fn pid(&self) -> Option<Told<'_>> {
-        if let Some(HandedOver { gains, why, .. }) = &self.handed_over {
-            return Some(Told { gains, why, crossover_hz: None, limited_percent: None });
+    pub(super) fn pid(&self, recording: &Recording) -> Option<Told<'_>> {
+        if let (Some(handed), Some(followed)) = (&self.handed_over, &self.followed) {
+            let limited_percent = Some(handed.limited_percent(recording, followed));
+            return Some(Told { gains: &handed.gains, why: &handed.why, crossover_hz: None, limited_percent });
         }
         let Closed { running, gains, crossover_hz, why } = self.followed.as_ref()?.closed.as_ref()?;
         let limited_percent = Some(running.limited_percent());
@@ -177,6 +203,7 @@ impl Job {
     /// Reads the files that `args` names and computes the drive for a device that can do `device`.
     pub(super) fn read(args: &RunArgs, device: &Capabilities) -> CommandResult<Self> {
         let limits = limits(args, device)?;
+        thermometer(args.hottest, device)?;
         match (&args.model, &args.reference, &args.drive) {
             (Some(model), Some(reference), None) => Self::follow(args, device, model, reference, limits),
             (None, None, Some(drive)) => Self::play(args, device, drive, limits),
@@ -321,7 +348,8 @@ impl Job {
             closed: None,
             held_s: play.settle_s,
         };
-        let handed_over = Some(HandedOver { recipe, range, late, gains, why });
+        let slew_v_per_s = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
+        let handed_over = Some(HandedOver { recipe, range, late, gains, why, slew_v_per_s });
         Ok(Self { handed_over, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
@@ -340,6 +368,7 @@ impl Job {
             wanted,
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
+            recorded: args.record.is_some(),
             live: args.live,
             plain: args.plain,
             hottest_degc: args.hottest,
@@ -358,6 +387,7 @@ impl Job {
             wanted: vec![None; rows],
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
+            recorded: args.output.is_some(),
             live: args.live,
             plain: args.plain,
             hottest_degc: args.hottest,
@@ -469,6 +499,18 @@ fn straight(model: &Model, reference: &Record, low: f64, high: f64) -> CommandRe
     };
     let (gain, at_low) = model.straight_line().map_err(CommandError::bad_input)?;
     Ok(wanted.iter().map(|y| (model.input.low + (y - at_low) / gain).clamp(low, high)).collect())
+}
+
+/// A limit on a temperature that nobody measures would guard nothing.
+pub(in crate::commands) fn thermometer(hottest_degc: Option<f64>, device: &Capabilities) -> CommandResult {
+    if hottest_degc.is_some() && !device.temperature {
+        let message = format!(
+            "--hottest: {} measures no temperature; run without that limit, and watch it otherwise",
+            device.device
+        );
+        return Err(CommandError::bad_input(message));
+    }
+    Ok(())
 }
 
 /// The voltages that may be applied: what the device can do, and no more than what the command line allows.

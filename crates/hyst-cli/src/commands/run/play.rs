@@ -26,6 +26,8 @@ pub(in crate::commands) struct Played {
     /// None where no model was watched.
     pub(super) watched: Option<Watched>,
     pub(in crate::commands) gaps: Gaps,
+    /// Why it ended before its time, if it did.
+    pub(in crate::commands) error: Option<CommandError>,
 }
 
 /// Plays all segments; every sample goes to `log` as it comes in.
@@ -46,7 +48,6 @@ where
         say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
     }
     let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
-    let patience = guard.patience();
     let stream = job.live.map(|address| RunStream::at(address, job.symbol)).transpose();
     let stream = stream.map_err(|error| CommandError::new(Exit::Failed, error))?;
     if let Some(stream) = &stream {
@@ -75,7 +76,7 @@ where
         live.iter_mut().for_each(|live| live.revise(revision));
         if let Some(closed) = &mut closed {
             closed.running.revise(revision);
-            saturated.fetch_or(closed.running.limited_for() > patience, Ordering::Relaxed);
+            saturated.fetch_or(closed.running.limited_too_long(), Ordering::Relaxed);
         }
     };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
@@ -100,20 +101,24 @@ where
     let gaps = lookout.gaps.gaps();
     let Lookout { log, log_error, fault, forces, .. } = lookout;
     match played {
-        Ok(recording) => Ok(Played { recording, forces, watched, gaps }),
-        Err(failure) => Err(failed(failure, log_error, fault, log.map(|log| &*log))),
+        Ok(recording) => Ok(Played { recording, forces, watched, gaps, error: None }),
+        Err(mut failure) => {
+            let recording = std::mem::take(&mut failure.partial);
+            let error = Some(failed(failure, &recording, log_error, fault, (log.map(|log| &*log), job.recorded)));
+            Ok(Played { recording, forces, watched, gaps, error })
+        }
     }
 }
 
 /// What to say about a run that did not come to its end, and about what was measured until then.
 fn failed<E: Classified>(
     failure: Failure<E>,
+    partial: &Recording,
     log_error: Option<LogError>,
     fault: Option<Fault>,
-    log: Option<&RunLog>,
+    (log, recorded): (Option<&RunLog>, bool),
 ) -> CommandError {
-    let measured: usize =
-        failure.partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
+    let measured: usize = partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
     let many = text::count(measured, "sample");
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
     match (log, log_error) {
@@ -126,6 +131,7 @@ fn failed<E: Classified>(
         (Some(log), None) => {
             say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()));
         }
+        (None, _) if recorded => {}
         (None, _) => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
     }
     match fault {
