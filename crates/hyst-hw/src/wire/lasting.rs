@@ -36,8 +36,8 @@ mod tests {
         };
         assert_eq!(ends(&|_| true), Some(50));
         assert_eq!(ends(&|_| false), None);
-        // Ten periods of a break are a fifth of fifty, eleven are more.
-        assert_eq!(ends(&|k| k % 20 >= 10), Some(60));
+        // Ten periods of a break are a fifth of fifty, eleven are more. It ends while it is so.
+        assert_eq!(ends(&|k| k % 20 >= 10), Some(70));
         assert_eq!(ends(&|k| k % 22 >= 11), None);
     }
 }
