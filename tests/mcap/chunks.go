@@ -24,17 +24,8 @@ type chunk struct {
 
 // chunks takes every chunk apart and holds what is in it against what is said of it: sizes, times and check sum of its own head, the indexes
 // of its messages, the index of chunks and the statistics.
-func chunks(file []byte) error {
+func chunks(file []byte, info *mcap.Info) error {
 	found, err := cut(file)
-	if err != nil {
-		return err
-	}
-	reader, err := mcap.NewReader(bytes.NewReader(file))
-	if err != nil {
-		return err
-	}
-	defer reader.Close()
-	info, err := reader.Info()
 	if err != nil {
 		return err
 	}

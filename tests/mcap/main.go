@@ -93,9 +93,6 @@ func check(folder string, log entry) error {
 	if err := byIndex(file, found); err != nil {
 		return err
 	}
-	if err := chunks(file); err != nil {
-		return err
-	}
 	said := map[string]string{}
 	for name, entries := range found.metadata {
 		for key, value := range entries {
@@ -252,6 +249,9 @@ func byIndex(file []byte, found *seen) error {
 	}
 	if len(info.ChunkIndexes) == 0 || len(info.MetadataIndexes) != len(found.metadata) {
 		return fmt.Errorf("%d chunks and %d metadata records are indexed", len(info.ChunkIndexes), len(info.MetadataIndexes))
+	}
+	if err := chunks(file, info); err != nil {
+		return err
 	}
 	for _, index := range info.MetadataIndexes {
 		metadata, err := reader.GetMetadata(index.Offset)

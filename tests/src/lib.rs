@@ -3,6 +3,7 @@
 pub mod activation_study;
 pub mod calibration;
 pub mod control_study;
+pub mod controller;
 pub mod dpm_study;
 pub mod fod_study;
 pub mod force_ranking;

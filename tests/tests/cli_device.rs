@@ -1,5 +1,6 @@
 //! `run` and `record` on a device in real time at the other end of a line, and what watches over a run.
 
+use std::collections::HashSet;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -83,6 +84,13 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     let rmse = |said: &Value| said["tracking"]["rmse"].as_f64().unwrap();
     assert!(rmse(&looped) < 0.2 * rmse(&alone), "{looped}\n{alone}");
     assert_eq!((&looped["loop_on_device"], &alone["loop_on_device"]), (&true.into(), &false.into()));
+    // What the log has of it is the record, without the rows in which the output had not come to the reference yet.
+    let (converted, record) = (lab.ok("log convert run.mcap").stdout, lab.read("looped.csv"));
+    let header = |text: &str| text.lines().next().unwrap().split(',').map(str::to_owned).collect::<HashSet<_>>();
+    assert_eq!(header(&converted), header(&record));
+    for name in ["voltage_v", "displacement_um", "reference_um"] {
+        assert_eq!(column(&converted, name), column(&record, name), "{name}");
+    }
     // The force that acts goes from −2 to 2 N; what acts when the run begins is where the estimate begins.
     let force = column(&lab.read("looped.csv"), "estimated_force_n");
     let (low, high) = force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
@@ -256,15 +264,33 @@ fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_t
 #[test]
 fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
     let (lab, device) = (Lab::with_model(), Served::plant(PLANT, RATE_HZ));
+    let status = |of: &str| {
+        let said = lab.ok(&format!("status --daq {} --json", device.daq())).json();
+        assert_eq!((&said["present_v"], &said["high_v"]), (&0.0.into(), &100.0.into()), "{said}");
+        said[of].clone()
+    };
+    assert_eq!(status("state"), "idle");
     let said = lab.ok(&format!("stop --daq {}", device.daq())).stdout;
     assert!(said.contains("--clear"), "{said}");
+    assert_eq!(status("fault")["code"], 2);
+    let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
+    assert!(said.contains("fault 2: an emergency stop was asked for"), "{said}");
+    lab.refuses("status --daq sim:plant.toml", 2);
     let run = format!("run --daq {} --drive u.csv --record y.csv {PATIENT}", device.daq());
     let message = lab.refuses(&run, 2);
     assert!(message.contains(&Fault::Emergency.to_string()), "{message}");
     assert_eq!(device.put_out(), [0.0; 0]);
     lab.refuses("stop --daq sim:plant.toml", 2);
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 20 --frequency 5 --cycles 2 -o u.csv"));
-    lab.ok(&format!("{run} --clear"));
+    // What cannot be played clears nothing.
+    lab.refuses(&format!("{run} --clear").replace("u.csv", "absent.csv"), 2);
+    assert_eq!(status("state"), "fault");
+    let ran = lab.ok(&format!("{run} --clear --log y.mcap"));
+    assert!(ran.stderr.contains("cleared fault 2"), "{ran:?}");
+    let info = lab.ok("log info y.mcap").stdout;
+    assert!(info.contains("cleared.fault"), "{info}");
+    let said = lab.ok(&format!("stop --daq {} --clear", device.daq())).stdout;
+    assert!(said.contains("none to clear"), "{said}");
 }
 
 #[test]

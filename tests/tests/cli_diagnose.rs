@@ -67,6 +67,54 @@ fn files_that_mislead_are_told() {
     assert!(ran.stderr.contains("repeat a segment"), "{}", ran.stderr);
 }
 
+/// A device whose gain or whose zero has moved since the fit lacks no richer base.
+#[test]
+fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
+    let lab = lab();
+    lab.ok("diagnose train.csv --model model.json -o extended.json");
+    let record = lab.read("test.csv");
+    let moved = |name: &str, of: &dyn Fn(f64) -> f64| {
+        let mut lines = record.lines();
+        let head = lines.next().unwrap();
+        let column = head.split(',').position(|name| name == "displacement_um").unwrap();
+        let mut text = format!("{head}\n");
+        for line in lines {
+            let mut cells: Vec<String> = line.split(',').map(ToOwned::to_owned).collect();
+            cells[column] = of(cells[column].parse().unwrap()).to_string();
+            text += &format!("{}\n", cells.join(","));
+        }
+        lab.write(name, &text);
+    };
+    moved("tired.csv", &|y| 0.9 * y);
+    moved("zeroed.csv", &|y| y + 2.0);
+    let number = |text: &str, behind: &str| -> f64 {
+        let from = text.find(behind).unwrap_or_else(|| panic!("no \"{behind}\" in: {text}")) + behind.len();
+        text[from..].split_whitespace().next().unwrap().parse().unwrap()
+    };
+
+    let ran = lab.ok("diagnose tired.csv --model extended.json -o same.json --findings tired.json");
+    let findings: Value = serde_json::from_str(&lab.read("tired.json")).unwrap();
+    assert_eq!((&findings["verdict"], &findings["remainder"]["kind"]), (&"changed".into(), &"changed".into()));
+    assert!((number(&ran.stdout, "its output is ") - 0.9).abs() < 0.01, "{}", ran.stdout);
+    assert!(ran.stdout.contains("  hystctl fit tired.csv --model pi -o refitted.json"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("the same model, nothing was added: same.json"), "{}", ran.stdout);
+    assert_eq!(lab.read("same.json"), lab.read("extended.json"));
+    // What is advised takes it.
+    lab.ok("fit tired.csv --model pi -o refitted.json");
+    lab.ok("diagnose tired.csv --model refitted.json --findings tired.json");
+    let findings: Value = serde_json::from_str(&lab.read("tired.json")).unwrap();
+    assert_eq!(findings["effects"][0]["name"], "lag");
+
+    let ran = lab.ok("diagnose zeroed.csv --model extended.json --findings zeroed.json");
+    let findings: Value = serde_json::from_str(&lab.read("zeroed.json")).unwrap();
+    assert_eq!((&findings["verdict"], &findings["remainder"]["kind"]), (&"changed".into(), &"other-zero".into()));
+    assert!((number(&ran.stdout, "zero stands ") - 2.0).abs() < 0.1, "{}", ran.stdout);
+    let advised = "hystctl diagnose zeroed.csv --zero per-record --model extended.json";
+    assert!(ran.stdout.contains(advised), "{}", ran.stdout);
+    let findings = lab.ok("diagnose zeroed.csv --zero per-record --model extended.json --json").json();
+    assert_ne!(findings["verdict"], "changed");
+}
+
 #[test]
 fn outputs_have_places_of_their_own() {
     let lab = lab();

@@ -108,6 +108,11 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     assert!(!log.closed && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover run.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);
+    // That there is no room for the record either does not hide what has ended the run.
+    let ran = limited(&lab, 16, "run --daq sim:plant.toml --drive u.csv --log small.mcap --record small.csv");
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("error: small.mcap: the log cannot be written any further"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("cannot be kept: small.csv") && !lab.path("small.csv").exists(), "{}", ran.stderr);
     // All of it, as a run without limits has it.
     let ran = lab.ok(&format!("{run} --record u-record.csv"));
     assert!(ran.stderr.contains("run.mcap.~1~"), "{}", ran.stderr);

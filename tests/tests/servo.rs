@@ -8,13 +8,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hyst_core::{ChainParams, EffectParams, ForceParams, LagParams, OperatorParams, PiParams, PidParams, write_block};
 use hyst_hw::wire::{
     Ask, Chunk, Exchange, Fault, MOST_CHUNK, MOST_DRIVES, Mode, Reply, Request, Start, State, Tell, model_sum,
-    recipe_head,
 };
 use hyst_hw::{Daq, Line, Remote, RemoteError, RemoteOptions, Sample, Serial};
 use hyst_onboard::{OnBoard, RANGE_V, RATE_HZ, SLEW_V_PER_S, servo};
+use hyst_tests::controller::controller;
 
 /// The machine, which ends with it.
 struct Machine {
@@ -60,31 +59,9 @@ fn remote(machine: &Machine, session: u32, mode: Mode) -> Remote<Serial> {
     Remote::open(line, &machine.port, options).expect("the firmware answers")
 }
 
-/// A model of about that actuator, and a PID.
+/// A model of about that actuator, a PID and a force observer.
 fn recipe() -> Vec<u8> {
-    let operator = OperatorParams::Pi(PiParams {
-        gain: 0.07,
-        thresholds: (0..12).map(|i| 1.5 + 4.0 * f64::from(i)).collect(),
-        weights: (0..12).map(|i| 0.022 * (-0.25 * f64::from(i)).exp()).collect(),
-    });
-    let effects: EffectParams<Vec<f64>> =
-        EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
-    let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, zero: 0.0, input: RANGE_V.map(f64::from) };
-    let pid = PidParams {
-        proportional: 0.5,
-        integral: 60.0,
-        derivative: 0.0,
-        derivative_hz: 50.0,
-        proportional_weight: 1.0,
-        derivative_weight: 0.0,
-        anti_windup_seconds: 0.05,
-        low: RANGE_V[0].into(),
-        high: RANGE_V[1].into(),
-    };
-    let force = ForceParams { stiffness: 1.5, kappa: 1.0, chi: 0.0 };
-    let mut room = [0; 4096];
-    let block = write_block(&model, &mut room).expect("there is room");
-    [recipe_head(Some(&pid), Some(&force)).as_slice(), block].concat()
+    controller(0.07, 12, RANGE_V.map(f64::from)).concat()
 }
 
 /// Sines of two frequencies that begin at rest \[µm\].
@@ -217,7 +194,12 @@ struct Rough {
     port: Serial,
     chance: u64,
     late: Vec<u8>,
+    /// Bytes that come before the next accident: how many pieces they come in is the machine's affair.
+    sound: u64,
 }
+
+/// Bytes between two accidents on the way back, in the mean.
+const BYTES_AN_ACCIDENT: u64 = 4000;
 
 /// The next of a row of numbers without order (Knuth's multiplier).
 fn stirred(chance: &mut u64) -> u64 {
@@ -230,12 +212,8 @@ impl Rough {
         stirred(&mut self.chance) % n
     }
 
-    /// One in so many.
-    fn spoiled(&mut self, bytes: &[u8], of: u64) -> Vec<u8> {
+    fn spoiled(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
-        if bytes.len() < 2 || self.below(of) > 0 {
-            return bytes;
-        }
         let at = self.below(bytes.len() as u64) as usize;
         match self.below(5) {
             0 => bytes.clear(),
@@ -250,14 +228,19 @@ impl Rough {
 
 impl Line for Rough {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        let bytes = self.spoiled(bytes, 6);
+        let spoiled = bytes.len() > 1 && self.below(6) == 0;
+        let bytes = if spoiled { self.spoiled(bytes) } else { bytes.to_vec() };
         self.port.send(&bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> std::io::Result<usize> {
         let came = self.port.receive(bytes, patience)?;
-        // An answer comes in some pieces, of which each may be spoiled.
-        let spoiled = self.spoiled(&bytes[..came], 30);
+        if came as u64 <= self.sound {
+            self.sound -= came as u64;
+            return Ok(came);
+        }
+        self.sound = self.below(2 * BYTES_AN_ACCIDENT);
+        let spoiled = self.spoiled(&bytes[..came]);
         let kept = spoiled.len().min(bytes.len());
         bytes[..kept].copy_from_slice(&spoiled[..kept]);
         Ok(kept)
@@ -270,7 +253,7 @@ fn a_rough_line_does_the_firmware_no_harm() {
     let Some(machine) = machine() else { return };
     for seed in [1, 2] {
         let port = Serial::open(&machine.port, 115_200).expect("the pseudo terminal opens");
-        let rough = Rough { port, chance: seed, late: Vec::new() };
+        let rough = Rough { port, chance: seed, late: Vec::new(), sound: 0 };
         let options = RemoteOptions {
             lost: Duration::from_secs(20),
             silence_s: 20.0,

@@ -2,6 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use hyst_hw::wire::Fault;
 use hyst_hw::{
     CanLine, Capabilities, ClockFit, Daq, FROM_DEVICE, Line, Plant, PlantError, Remote, RemoteError, RemoteOptions,
     Sample, Serial, Slcan, TO_DEVICE, Tcp,
@@ -56,8 +57,6 @@ pub(crate) struct Wishes {
     pub(crate) force: bool,
     /// Silence of this computer after which the device comes to rest \[s\].
     pub(crate) silence_s: Option<f64>,
-    /// Whether a fault of an earlier run is cleared first.
-    pub(crate) clear: bool,
     /// Highest temperature \[°C\].
     pub(crate) hottest_degc: Option<f64>,
     /// Greatest tracking error \[output unit\].
@@ -72,11 +71,25 @@ impl AnyDevice {
         }
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
         let (line, name) = line(device)?;
-        let mut remote = Remote::open(line, name, options(wishes)).map_err(lost)?;
-        if wishes.clear {
-            remote.clear().map_err(lost)?;
-        }
+        let remote = Remote::open(line, name, options(wishes)).map_err(lost)?;
         Ok(Self::Remote(Box::new(remote)))
+    }
+
+    /// Clears the fault of an earlier run, and gives it.
+    pub(crate) fn clear(&mut self) -> Result<Option<Fault>, DeviceError> {
+        match self {
+            // It begins with the command that plays it.
+            Self::Plant(_) => Ok(None),
+            Self::Remote(remote) => Ok(remote.clear()?),
+        }
+    }
+
+    /// The device at the other end of a line.
+    pub(crate) fn remote(&mut self) -> Option<&mut Remote<Box<dyn Line>>> {
+        match self {
+            Self::Plant(_) => None,
+            Self::Remote(remote) => Some(remote),
+        }
     }
 
     /// Lets it come to rest and stay there, without a word before; gives its name and what it put out then \[V\].

@@ -71,7 +71,7 @@ impl CommandError {
     }
 
     /// The message and below it every cause that it does not contain already.
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut text = self.cause.to_string();
         for cause in self.cause.chain().skip(1) {
             let cause = cause.to_string();

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::clipping::clipped;
 use hyst_ident::model::{Model, ModelError};
+use hyst_ident::range;
 use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
 use hyst_ident::simulate::Zero;
 
@@ -87,7 +88,7 @@ fn leads(record: &Record) -> bool {
 
 /// Largest value less the smallest.
 fn span(x: &[f64]) -> f64 {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    let (low, high) = range(x.iter().copied());
     high - low
 }
 

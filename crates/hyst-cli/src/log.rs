@@ -17,6 +17,7 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use hyst_ident::atomic_file::set_aside;
+use hyst_ident::record::{EVENTS, TOPIC};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions};
 use tempfile::TempPath;
@@ -27,10 +28,6 @@ pub use recover::recovered;
 use sink::{Open, Sink, said};
 pub use stream::{RunStream, StreamError};
 
-/// Channel of the samples.
-pub const TOPIC: &str = "/actuator/sample";
-/// Channel of what happens on the way.
-const EVENTS: &str = "/actuator/event";
 const SAMPLE_SCHEMA: &str = "hyst.actuator.Sample";
 const EVENT_SCHEMA: &str = "hyst.actuator.Event";
 
@@ -91,10 +88,11 @@ impl RunLog {
     pub fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
         let failed = |source| LogError { path: path.to_owned(), saved: None, source };
         let (file, unnamed) = temporary(path).map_err(failed)?.into_parts();
+        let same = file.try_clone().map_err(failed)?;
         let (writer, channel_id) = begin(file, info).map_err(said).map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
-            sink: Sink::new(writer).map_err(failed)?,
+            sink: Sink::new(writer, same).map_err(failed)?,
             channel_id,
             text: Vec::new(),
             keeps_older: false,
@@ -162,7 +160,7 @@ impl RunLog {
         Ok(())
     }
 
-    /// Adds what is known only at the end of a run, as a metadata record.
+    /// Adds a metadata record: what was asked for, or what is known only at the end of a run.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
@@ -228,7 +226,7 @@ fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// Header, metadata, attachment, schema and channel, all of them on the disk: a log that is cut off later says what ran.
+/// Header, metadata, attachment, schema and channel, all of them in the file: a log that is cut off later says what ran.
 fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
     let mut writer = options().create(BufWriter::new(file))?;
     writer.write_metadata(&Metadata { name: "run".to_owned(), metadata: metadata(info) })?;

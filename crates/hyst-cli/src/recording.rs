@@ -42,15 +42,22 @@ fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
     samples.iter().map(move |sample| sample.time_s + shift)
 }
 
-/// Writes what was measured until a run ended before its time, and says so.
-pub(crate) fn keep_partial(recording: &Recording, target: &Target, unit: OutputUnit) -> CommandResult {
-    let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
+/// Writes what was measured until a run ended before its time, and says so; also if it cannot, since what ended the run is what has to be told at last.
+pub(crate) fn keep_partial(mut recording: Recording, target: &Target, unit: OutputUnit) {
+    // What a sensor without a number showed has ended the run.
+    let whole = |s: &Sample| [Some(s.output), s.temperature_degc, s.load_n].into_iter().flatten().all(f64::is_finite);
+    recording.segments.iter_mut().for_each(|segment| segment.samples.retain(whole));
     // A row alone has no sample period.
-    if rows < 2 {
-        return Ok(());
+    recording.segments.retain(|segment| segment.samples.len() > 1);
+    let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
+    if rows == 0 {
+        return;
     }
-    let record = to_record(recording, &target.to_string(), unit)?;
-    target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;
-    output::say(&format!("note: what was measured until then, {}, is kept in {target}", text::count(rows, "row")));
-    Ok(())
+    let written = to_record(&recording, &target.to_string(), unit)
+        .and_then(|record| target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error)));
+    let rows = text::count(rows, "row");
+    output::say(&match written {
+        Ok(()) => format!("note: what was measured until then, {rows}, is kept in {target}"),
+        Err(error) => format!("warning: what was measured until then, {rows}, cannot be kept: {}", error.text()),
+    });
 }

@@ -4,6 +4,7 @@ mod can;
 mod clock;
 mod interfaces;
 mod lines;
+mod retransmit;
 mod slcan;
 #[cfg(target_os = "linux")]
 mod socketcan;
@@ -18,6 +19,7 @@ use crate::wire::{
 };
 
 use clock::Clock;
+use retransmit::Retransmit;
 
 pub use can::{Bus, CanLine, FROM_DEVICE, TO_DEVICE};
 pub use clock::ClockFit;
@@ -33,8 +35,8 @@ const LONGEST_REST: Duration = Duration::from_secs(20);
 const LOOKAHEAD_S: f64 = 0.25;
 /// By how many times the first wait for an answer the last ones may be longer.
 const MOST_REPEATS: u32 = 8;
-/// Requests in the time that a device's watchdog waits, at least.
-const TRIES: f64 = 8.0;
+/// Requests in the time that a device's watchdog waits, at least; on a line that is slower than that, as many as go through.
+const TRIES: u32 = 8;
 /// Room for noise at the ends of a range of references, as a share of it.
 const MARGIN: f64 = 0.05;
 
@@ -260,6 +262,8 @@ pub struct Remote<L> {
     clock: Option<Clock>,
     /// When the last request was sent and its answer came, if that is known.
     round_trip: Option<(Instant, Instant)>,
+    /// How long answers take on this line.
+    retransmit: Retransmit,
     present_v: f64,
     /// Slope that the next run needs \[V/s\].
     gentle: f64,
@@ -332,6 +336,7 @@ impl<L: Line> Remote<L> {
             run: None,
             clock: None,
             round_trip: None,
+            retransmit: Retransmit::default(),
             present_v: 0.0,
             gentle: f64::INFINITY,
             broken: 0,
@@ -429,18 +434,25 @@ impl<L: Line> Remote<L> {
         self.stated(Ask::Emergency).map(|_| ())
     }
 
-    /// Clears a fault, if there is one, once the device is at rest; on its way there it is waited for.
+    /// Clears a fault, if there is one, once the device is at rest; on its way there it is waited for. Gives the fault.
     ///
     /// # Errors
     /// When it does not come to rest, or is lost.
-    pub fn clear(&mut self) -> Result<(), RemoteError> {
-        let began = self.line.now();
+    pub fn clear(&mut self) -> Result<Option<Fault>, RemoteError> {
+        let before = self.status()?;
+        let fault = if let State::Fault(fault) = before.state { Some(fault) } else { None };
+        let (mut moved, mut at_v) = (self.line.now(), before.present_v);
         loop {
             match self.stated(Ask::Clear) {
-                Err(RemoteError::Standing { .. }) if self.since(began) < self.longest_rest() => {
+                // The ramp is as steep as the run that has ended was to be, which nobody here knows.
+                Err(RemoteError::Standing { .. }) if self.since(moved) < LONGEST_REST => {
                     self.line.pause(Duration::from_millis(20));
+                    let now_v = self.status()?.present_v;
+                    if now_v != at_v {
+                        (moved, at_v) = (self.line.now(), now_v);
+                    }
                 }
-                told => return told.map(|_| ()),
+                told => return told.map(|_| fault),
             }
         }
     }
@@ -501,9 +513,10 @@ impl<L: Line> Remote<L> {
         let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
         let began = self.line.now();
         let mut bytes = [0; 4096];
-        let (mut repeat, mut asked) = (self.options.repeat, 0);
+        let silence = Duration::from_secs_f64(self.options.silence_s);
+        let (mut repeat, mut asked) = (self.retransmit.first(self.options.repeat, silence.min(self.lost()) / 2), 0);
         // A watchdog that hears one of so many requests is content.
-        let longest = (MOST_REPEATS * repeat).min(Duration::from_secs_f64(self.options.silence_s / TRIES)).max(repeat);
+        let longest = (MOST_REPEATS * repeat).min(silence / TRIES).max(repeat);
         while self.since(began) < self.lost() {
             // A zero ends what a line may have left of an earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
@@ -517,10 +530,12 @@ impl<L: Line> Remote<L> {
                         Ok(reply) if reply.number == self.number => {
                             // Asked twice, it is not known which one was answered.
                             self.round_trip = (asked == 1).then(|| (sent, self.line.now()));
+                            let took = self.since(began);
+                            self.retransmit.answered(self.number, asked, took);
                             return Ok(reply.tell);
                         }
                         // Of a request that was sent twice.
-                        Ok(_) => {}
+                        Ok(reply) => self.retransmit.answered_again(reply.number),
                         Err(FrameError::Message) if matches!(request.ask, Ask::Hello) => return Err(self.odd()),
                         Err(_) => self.broken += 1,
                     }

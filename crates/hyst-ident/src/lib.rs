@@ -38,4 +38,4 @@ pub mod simulate;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};
-pub use samples::Samples;
+pub use samples::{Samples, range};

@@ -5,13 +5,10 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use hyst_cli::log::{LoggedModel, LoggedSample, RunInfo, RunLog, recovered};
-use hyst_core::{
-    ChainParams, EffectParams, ForceParams, LagParams, List, OperatorParams, PiParams, PidParams, read_block,
-    write_block,
-};
+use hyst_core::{List, read_block};
 use hyst_hw::wire::{
     Ask, Chunk, Control, Deframer, Exchange, Follower, IsoTp, MAX_FRAME, MOST_SAMPLES, Measured, Reply, Request, Shown,
-    State, Status, Tell, encode, lateness, read_recipe, recipe_head,
+    State, Status, Tell, encode, lateness, read_recipe,
 };
 use hyst_hw::{Bus, Line, Phase, Plant, PlantConfig, Sample, Slcan};
 use hyst_ident::export::block;
@@ -19,6 +16,7 @@ use hyst_ident::model::Model;
 use hyst_ident::record::{self, ColumnMap, Need, Record};
 
 use super::luck::Luck;
+use crate::controller::controller;
 use crate::{PLANT, WARM, root};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -28,50 +26,31 @@ fn sealed(pid: &[u8], block: &[u8]) -> Vec<u8> {
     [pid, &CRC.checksum(pid).to_le_bytes(), block].concat()
 }
 
-/// A controller that a device can run: plays, a lag and a PID.
-pub(super) fn recipe() -> &'static [u8] {
-    static RECIPE: OnceLock<Vec<u8>> = OnceLock::new();
-    RECIPE.get_or_init(|| {
-        let operator = OperatorParams::Pi(PiParams {
-            gain: 0.1,
-            thresholds: (0..8).map(|i| 1.5 + 4.0 * f64::from(i)).collect(),
-            weights: (0..8).map(|i| 0.022 * (-0.25 * f64::from(i)).exp()).collect(),
-        });
-        let effects = EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
-        let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, zero: 0.0, input: [0.0, 100.0] };
-        let pid = PidParams {
-            proportional: 0.5,
-            integral: 60.0,
-            derivative: 0.0,
-            derivative_hz: 50.0,
-            proportional_weight: 1.0,
-            derivative_weight: 0.0,
-            anti_windup_seconds: 0.05,
-            low: 0.0,
-            high: 100.0,
-        };
-        let force = ForceParams { stiffness: 1.5, kappa: 1.0, chi: 0.0 };
-        let mut room = [0; 4096];
-        let block = write_block(&model, &mut room).expect("there is room");
-        [recipe_head(Some(&pid), Some(&force)).as_slice(), block].concat()
-    })
+/// A controller that a device can run, and where its model's block begins.
+pub(super) fn recipe() -> (&'static [u8], usize) {
+    static RECIPE: OnceLock<(Vec<u8>, usize)> = OnceLock::new();
+    let (bytes, block) = RECIPE.get_or_init(|| {
+        let parts = controller(0.1, 8, [0.0, 100.0]);
+        (parts.concat(), parts[0].len())
+    });
+    (bytes, *block)
 }
 
-/// Where the block begins in a controller with a PID: `HYCT`, version, flag, nine numbers, check sum.
-const BLOCK: usize = 4 + 2 + 72 + 4;
-/// Where the numbers begin.
+/// Where the numbers of a controller begin: behind `HYCT`, version and flags.
 const NUMBERS: usize = 4 + 2;
 
 /// Changes what stands in a controller, and makes its check sums right again.
 pub(super) fn reseal_recipe(luck: &mut Luck, recipe: &mut Vec<u8>) {
-    let (mut pid, mut block) = (recipe[..BLOCK - 4].to_vec(), recipe[BLOCK..].to_vec());
+    let begins = self::recipe().1;
+    // Before the block stands the sum of all before that.
+    let (mut head, mut block) = (recipe[..begins - 4].to_vec(), recipe[begins..].to_vec());
     if luck.once_in(2) {
-        odd_number(luck, &mut pid[NUMBERS..]);
+        odd_number(luck, &mut head[NUMBERS..]);
     }
     if !luck.once_in(3) {
         reseal_block(luck, &mut block);
     }
-    *recipe = sealed(&pid, &block);
+    *recipe = sealed(&head, &block);
 }
 
 /// Puts a number that nobody would write in one of the places of eight bytes.
@@ -264,7 +243,7 @@ pub(super) fn slcan(luck: &mut Luck) {
 
 /// Controllers, and a run with what could be read.
 pub(super) fn controllers(luck: &mut Luck) {
-    let mut bytes = recipe().to_vec();
+    let mut bytes = recipe().0.to_vec();
     match luck.below(4) {
         0 => luck.damage(&mut bytes),
         1 => bytes = luck.bytes(200),
@@ -376,5 +355,17 @@ pub(super) fn plants(luck: &mut Luck) {
         && config.actuator.relays <= 2000
     {
         let _ = Plant::new(config);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_controller_is_sealed_as_it_was() {
+        let (bytes, block) = recipe();
+        assert_eq!(sealed(&bytes[..block - 4], &bytes[block..]), bytes);
+        assert!(read_recipe(bytes).is_ok());
     }
 }

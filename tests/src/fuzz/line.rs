@@ -292,3 +292,28 @@ fn first_host(wire: &mut Wire, luck: &mut Luck, options: RemoteOptions, rate_hz:
         let _ = remote.stop();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With the waits and the watchdog that a run has by default, a bad line does not cost the run.
+    #[test]
+    fn accidents_do_not_wake_the_watchdog() {
+        for seed in 0..20 {
+            let mut wire = Wire::new(Luck::new(seed));
+            wire.accident = 12;
+            (wire.board.low, wire.board.high, wire.board.step) = (0.0, 80.0, 1.0);
+            let options = RemoteOptions { slew_v_per_s: Some(1000.0), ..RemoteOptions::with_session(7) };
+            let mut remote = Remote::open(&mut wire, "bad", options).unwrap();
+            remote.start(1000.0).unwrap();
+            let drive: Vec<f64> = (0..3000).map(|k| 40.0 - 40.0 * (0.01 * f64::from(k)).cos()).collect();
+            let (mut sent, mut measured) = (0, Vec::new());
+            while measured.len() < drive.len() {
+                sent += remote.exchange(&drive[sent..], &mut measured).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+            }
+            assert!(measured.iter().zip(&drive).all(|(sample, volts)| sample.drive_v == f64::from(*volts as f32)));
+            remote.stop().unwrap();
+        }
+    }
+}

@@ -90,7 +90,7 @@ fn ask(luck: &mut Luck, device: &Servo, recipe: &[u8]) -> Ask {
 
 /// Bytes by chance, and after them a sound run.
 pub(super) fn case(luck: &mut Luck) {
-    let mut recipe = inputs::recipe().to_vec();
+    let mut recipe = inputs::recipe().0.to_vec();
     if luck.once_in(4) {
         inputs::reseal_recipe(luck, &mut recipe);
     }

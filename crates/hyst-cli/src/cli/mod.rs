@@ -53,6 +53,7 @@ pub(crate) enum Command {
     Run(RunArgs),
     Record(RecordArgs),
     Stop(StopArgs),
+    Status(StatusArgs),
     Devices(DevicesArgs),
     Log(LogArgs),
     Export(ExportArgs),
@@ -315,7 +316,7 @@ pub(crate) struct RunArgs {
     pub(crate) pid: Option<PidGains>,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
-    /// Log to write while the device runs (MCAP): all samples, ramps included
+    /// Log to write while the device runs (MCAP): all samples but those of rests between segments, ramps included
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
     /// Record to write when all is measured (CSV); - for stdout
@@ -375,6 +376,19 @@ pub(crate) struct StopArgs {
     /// Clear the fault of a device that has come to rest, so that it can be started again; nothing moves by that
     #[arg(long)]
     pub(crate) clear: bool,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Ask a device how it stands: at rest, running, or with which fault
+///
+/// Nothing moves, and a run of another program goes on.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  hystctl status --daq serial:/dev/ttyACM0")]
+pub(crate) struct StatusArgs {
+    /// Device, as for run
+    #[arg(long, value_name = "DEVICE")]
+    pub(crate) daq: Device,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }

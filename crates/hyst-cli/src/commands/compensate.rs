@@ -2,6 +2,7 @@
 
 use hyst_ident::compensate::{CompensateOptions, Drive, Missed, compensate};
 use hyst_ident::model::{Channel, Effect, Model};
+use hyst_ident::range;
 use hyst_ident::record::{Extra, Need, Record};
 use hyst_ident::simulate::Extrapolated;
 use serde::Serialize;
@@ -98,8 +99,7 @@ fn below(drive: &Drive, row: usize) -> bool {
 
 impl Compensation {
     pub(super) fn new(model: &Model, reference: &Record, drive: &Drive) -> Self {
-        let (lowest, highest) =
-            drive.voltage.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let (lowest, highest) = range(drive.voltage.iter().copied());
         let in_the_sensor = model.effects.names().into_iter().filter(|effect| !effect.acts_on_the_motion());
         Self {
             rows: drive.voltage.len(),

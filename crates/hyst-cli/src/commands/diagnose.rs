@@ -59,7 +59,9 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         target.write(|out| out.write_all(page.as_bytes()))?;
     }
     let mut said = summary::of(findings, &next::advice(&contents));
-    for (target, what) in [(&args.output, "extended model"), (&args.findings, "findings"), (&args.report, "report")] {
+    let same = diagnosis.extended == model;
+    let model_written = if same { "the same model, nothing was added" } else { "extended model" };
+    for (target, what) in [(&args.output, model_written), (&args.findings, "findings"), (&args.report, "report")] {
         if let Some(Target::File(path)) = target {
             said.push_str(&format!("\n{what}: {}", path.display()));
         }

@@ -3,6 +3,7 @@
 use hyst_ident::force::{ForceOptions, Free, estimate_force};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::Effect;
+use hyst_ident::range;
 use hyst_ident::record::{Extra, Need};
 use hyst_ident::simulate::Extrapolated;
 use serde::Serialize;
@@ -75,8 +76,7 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
         let beyond = text::extrapolation("input", &text::from_one(estimated.extrapolated), &model.input);
         say(&format!("warning: {beyond}; the estimate is extrapolated there"));
     }
-    let (low, high) =
-        estimated.force.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
+    let (low, high) = range(estimated.force.iter().copied());
     let summary = Summary {
         record: args.record.display().to_string(),
         output: args.output.to_string(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use hyst_ident::record::{LogSample, RunLog};
+use hyst_ident::record::{LogEvent, LogSample, RunLog};
 use serde::Serialize;
 
 use crate::cli::{LogArgs, LogCommand, LogConvertArgs, LogInfoArgs, LogRecoverArgs};
@@ -47,6 +47,8 @@ struct Summary {
     tracking_rmse: Option<f64>,
     model: bool,
     metadata: BTreeMap<String, String>,
+    /// What happened on the way.
+    events: Vec<LogEvent>,
     #[serde(skip)]
     symbol: &'static str,
 }
@@ -70,6 +72,7 @@ impl Summary {
             tracking_rmse: (!errors.is_empty()).then_some(rmse),
             model: log.model.is_some(),
             metadata: log.metadata.clone(),
+            events: log.events.clone(),
             symbol: log.unit().map_or("", |unit| unit.symbol()),
         }
     }
@@ -88,6 +91,8 @@ impl Summary {
         lines.extend(
             self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
+        let told = |event: &LogEvent| format!("at {} s {}: {}", text::short(event.time_s), event.kind, event.text);
+        lines.extend(self.events.iter().map(told));
         lines.extend(self.metadata.iter().map(|(key, value)| format!("  {key}: {value}")));
         lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
         lines.join("\n")
@@ -110,7 +115,13 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let (_, log) = read(&args.log)?;
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
-    args.output.write(|out| out.write_all(text.as_bytes()))
+    if !args.ramps && !log.samples.is_empty() && !log.samples.iter().any(LogSample::is_record) {
+        let many = text::count(log.samples.len(), "sample");
+        output::say(&format!(
+            "note: {many}, and none of what was asked for: all are of the ramps before and after (--ramps)"
+        ));
+    }
+    args.output.write_beside_older(|out| out.write_all(text.as_bytes()))
 }
 
 /// What is said about a recovery.
@@ -130,7 +141,7 @@ fn recover(args: &LogRecoverArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (bytes, log) = read(&args.log)?;
     let whole = recovered(&bytes).map_err(CommandError::failed)?;
-    args.output.write(|out| out.write_all(&whole))?;
+    args.output.write_beside_older(|out| out.write_all(&whole))?;
     let done = Recovered {
         log: args.log.display().to_string(),
         output: args.output.to_string(),

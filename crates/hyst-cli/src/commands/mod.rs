@@ -16,6 +16,7 @@ mod record;
 mod response;
 mod run;
 mod simulate;
+mod status;
 mod stop;
 
 use clap::CommandFactory;
@@ -42,6 +43,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Run(args) => run::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Stop(args) => stop::run(&args),
+        Command::Status(args) => status::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Log(args) => log::run(&args),
         Command::Export(args) => export::run(&args),

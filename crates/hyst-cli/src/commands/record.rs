@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use hyst_hw::Daq;
+use hyst_ident::range;
 use serde::Serialize;
 
 use super::run::gaps::{self, Gaps};
@@ -92,7 +93,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let recording = gaps::split(recording);
     if let Some(error) = error {
         if let Some(target) = &args.output {
-            recording::keep_partial(&recording, target, unit)?;
+            recording::keep_partial(recording, target, unit);
         }
         return Err(error);
     }
@@ -106,7 +107,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let count = measured.len().max(1) as f64;
     let mean = measured.iter().sum::<f64>() / count;
     let deviation = (measured.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count).sqrt();
-    let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let (low, high) = range(measured.iter().copied());
     let summary = Summary {
         device: can.device,
         rate_hz: recording.rate_hz,

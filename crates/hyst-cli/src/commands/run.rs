@@ -15,14 +15,17 @@ mod view;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use hyst_core::PidParams;
 use hyst_hw::{ClockFit, Daq};
 use hyst_ident::metrics::Errors;
+use hyst_ident::range;
 use hyst_ident::record::Extra;
 use serde::Serialize;
 
 use super::compensate::Compensation;
-use crate::cli::{Control, RunArgs};
+use super::status::Stated;
+use crate::cli::{Control, PidGains, RunArgs};
 use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
@@ -54,6 +57,8 @@ struct Summary {
     loop_on_device: bool,
     /// Whether the model still explains the device; none where that was not watched.
     watch: Option<WatchSummary>,
+    /// Lowest and highest estimated force, counted from what acted when the run began \[N\]; none where none is estimated.
+    force_n: Option<(f64, f64)>,
     /// Periods for which the device had nothing to put out.
     gaps: Gaps,
     /// The device's clock against this computer's; none where it has no other.
@@ -168,7 +173,6 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
         noise: args.seed,
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
-        clear: args.clear,
         force: args.kout.is_some() && args.control.closes(),
         silence_s: args.silence,
         hottest_degc: args.hottest,
@@ -190,6 +194,16 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let create =
         |path: &PathBuf| RunLog::beside_older(path, &info).map_err(|error| CommandError::new(Exit::Failed, error));
     let mut log = args.log.as_ref().map(create).transpose()?;
+    if let Some(log) = &mut log {
+        log.note("asked", asked(args)).map_err(|error| CommandError::new(Exit::Failed, error))?;
+    }
+    // All that can be refused has been, but by the device itself.
+    if let Some(Stated { code, text }) = if args.clear { daq.clear()?.map(Stated::of) } else { None } {
+        output::say(&format!("note: cleared fault {code} of an earlier run: {text}"));
+        if let Some(log) = &mut log {
+            log.note("cleared", BTreeMap::from([("fault".to_owned(), format!("{code}: {text}"))]))?;
+        }
+    }
     if let Some(HandedOver { recipe, range, .. }) = &job.handed_over {
         daq.follow(recipe, *range)?;
     }
@@ -209,7 +223,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let Played { mut recording, mut forces, watched, gaps, error } = played?;
     if let Some(error) = error {
         if let Some(target) = &args.record {
-            recording::keep_partial(&gaps::split(recording), target, unit)?;
+            recording::keep_partial(gaps::split(recording), target, unit);
         }
         return Err(error);
     }
@@ -228,7 +242,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     // The record may lie on another disk than a log that could not be closed.
     closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
-    let (low, high) = measured.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(*y), h.max(*y)));
+    let (low, high) = range(measured.iter().copied());
     let summary = Summary {
         device,
         rate_hz: recording.rate_hz,
@@ -243,6 +257,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         pid: job.pid(&recording).map(Gains::of),
         loop_on_device: job.handed_over.is_some(),
         watch: watched.map(WatchSummary::new),
+        force_n: forces.first().map(|_| range(forces.iter().copied())),
         gaps,
         clock: daq.clock().map(ClockSummary::new),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
@@ -252,6 +267,39 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         symbol: unit.symbol(),
     };
     report.print(&summary.text(), &summary)
+}
+
+/// What was asked for, as a log has it.
+fn asked(args: &RunArgs) -> BTreeMap<String, String> {
+    let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+    let control = args.control.to_possible_value().map(|value| value.get_name().to_owned());
+    let limits = &args.limits;
+    let number = |number: Option<f64>| number.map(|number| number.to_string());
+    let entries = [
+        ("drive", path(&args.drive)),
+        ("reference", path(&args.reference)),
+        ("model", path(&args.model)),
+        ("control", args.reference.as_ref().and(control)),
+        (
+            "pid",
+            args.pid.map(|PidGains { proportional, integral, derivative }| {
+                format!("{proportional},{integral},{derivative}")
+            }),
+        ),
+        ("limit_v", limits.limit.map(|limit| format!("{},{}", limit.low, limit.high))),
+        ("slew_v_per_s", number(limits.slew)),
+        ("bandwidth_hz", number(limits.bandwidth)),
+        ("temperature_degc", number(args.temperature.degc)),
+        ("hottest_degc", number(args.hottest)),
+        ("max_error", number(args.max_error)),
+        ("silence_s", number(args.silence)),
+        ("rate_hz", number(args.rate)),
+        ("settle_s", number(args.settle)),
+        ("rest_s", Some(args.rest.to_string())),
+        ("kout", number(args.kout)),
+        ("seed", args.seed.map(|seed| seed.to_string())),
+    ];
+    entries.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect()
 }
 
 impl Tracking {
@@ -313,6 +361,13 @@ impl Summary {
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
         }
+        lines.extend(self.force_n.map(|(low, high)| {
+            format!(
+                "force: {} to {} N beyond what acted when the run began, and what the actuator remembered of earlier runs; the model is not watched meanwhile",
+                short(low),
+                short(high)
+            )
+        }));
         lines.extend(self.gaps.text());
         lines.extend(self.watch.and_then(|watch| watch.text(unit)));
         if let (Some(WatchSummary { explains: false, .. }), Some(log), Some(model)) =

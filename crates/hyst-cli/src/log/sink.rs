@@ -1,4 +1,4 @@
-//! The file of a log, and the clock that brings samples to the disk when no others follow them.
+//! The file of a log, and the clock that writes samples to it when no others follow them and has the disk keep them.
 
 use std::fs::File;
 use std::io::{self, BufWriter, IntoInnerError};
@@ -9,9 +9,13 @@ use std::time::{Duration, Instant};
 use mcap::records::MessageHeader;
 use mcap::{McapError, Writer};
 
-/// Longest time that a sample waits for the disk, on the wall's clock and on the lab's alike: a program that dies takes no more than a
+/// Longest time that a sample waits to be written, on the wall's clock and on the lab's alike: a program that dies takes no more than a
 /// second with it, what was on its way to this computer then included.
 const MOST: Duration = Duration::from_millis(500);
+
+/// How often the disk is asked to keep what was written to it: what a failure of power takes is no more than that, [`MOST`] and
+/// what the disk needs.
+const KEPT: Duration = Duration::from_secs(1);
 
 /// An open file.
 pub(super) type Open = Writer<BufWriter<File>>;
@@ -24,28 +28,31 @@ pub(super) struct Sink {
 
 struct Shared {
     state: Mutex<State>,
-    /// Something waits for the disk now, or nothing will any more.
+    /// Something waits to be written now, or nothing will any more.
     news: Condvar,
 }
 
 struct State {
     /// Until it is closed.
     writer: Option<Open>,
-    /// When the first message came that waits for the disk, and its lab time \[s\].
+    /// When the first message came that waits to be written, and its lab time \[s\].
     since: Option<(Instant, f64)>,
     written: u32,
-    /// Of them, those that are on the disk.
+    /// Of them, those that are in the file.
     saved: u32,
+    /// Whether the file has more than the disk was asked to keep.
+    unkept: bool,
     /// What the disk said when nobody asked.
     failure: Option<io::Error>,
 }
 
 impl Sink {
-    pub(super) fn new(writer: Open) -> io::Result<Self> {
-        let state = State { writer: Some(writer), since: None, written: 0, saved: 0, failure: None };
+    /// With the file that `writer` writes to.
+    pub(super) fn new(writer: Open, file: File) -> io::Result<Self> {
+        let state = State { writer: Some(writer), since: None, written: 0, saved: 0, unkept: true, failure: None };
         let shared = Arc::new(Shared { state: Mutex::new(state), news: Condvar::new() });
         let watched = Arc::clone(&shared);
-        let thread = std::thread::Builder::new().name("log".to_owned()).spawn(move || watched.watch())?;
+        let thread = std::thread::Builder::new().name("log".to_owned()).spawn(move || watched.watch(&file))?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
@@ -71,7 +78,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Does something else with the file, and brings all of it to the disk.
+    /// Does something else with the file, and writes all of it.
     pub(super) fn aside<T>(&self, does: impl FnOnce(&mut Open) -> Result<T, McapError>) -> io::Result<T> {
         let mut state = self.shared.lock();
         if let Some(failure) = state.failure.take() {
@@ -87,7 +94,7 @@ impl Sink {
         self.shared.lock().written
     }
 
-    /// Messages that are on the disk.
+    /// Messages that are in the file.
     pub(super) fn saved(&self) -> u32 {
         self.shared.lock().saved
     }
@@ -128,20 +135,31 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Until the file is closed, brings to the disk what has waited for long enough.
-    fn watch(&self) {
+    /// Until the file is closed, writes what has waited for long enough, and has the disk keep it.
+    fn watch(&self, file: &File) {
         let mut state = self.lock();
+        let mut kept = Instant::now();
         while state.writer.is_some() {
-            let left = state.since.map(|(began, _)| MOST.saturating_sub(began.elapsed()));
-            state = match left {
-                None => self.news.wait(state).unwrap_or_else(PoisonError::into_inner),
-                Some(Duration::ZERO) => {
-                    // Whoever comes next is told.
-                    state.failure = state.flush().err();
-                    state
-                }
-                Some(left) => self.news.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0,
-            };
+            let write_in = state.since.map(|(began, _)| MOST.saturating_sub(began.elapsed()));
+            let keep_in = state.unkept.then(|| KEPT.saturating_sub(kept.elapsed()));
+            if write_in == Some(Duration::ZERO) {
+                // Whoever comes next is told.
+                let done = state.flush();
+                state.failure = state.failure.take().or(done.err());
+            } else if keep_in == Some(Duration::ZERO) {
+                state.unkept = false;
+                drop(state);
+                // Nobody waits for the disk: a run goes on meanwhile.
+                let done = file.sync_data();
+                kept = Instant::now();
+                state = self.lock();
+                state.failure = state.failure.take().or(done.err());
+            } else {
+                state = match write_in.into_iter().chain(keep_in).min() {
+                    None => self.news.wait(state).unwrap_or_else(PoisonError::into_inner),
+                    Some(left) => self.news.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0,
+                };
+            }
         }
     }
 }
@@ -154,7 +172,7 @@ impl State {
     fn flush(&mut self) -> io::Result<()> {
         self.since = None;
         self.open()?.flush().map_err(said)?;
-        self.saved = self.written;
+        (self.saved, self.unkept) = (self.written, true);
         Ok(())
     }
 }

@@ -55,8 +55,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
     match f.remainder.kind {
         RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
-            let files = files(c.train);
-            let test = c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())));
+            let (files, test) = (files(c.train), test_option(c));
             let reading = further(&c.reading);
             advise(
                 "Most of what is left is the base's own misfit. A finer base, and its diagnosis:",
@@ -72,6 +71,30 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
             advise(
                 "Most of what is left is the base's own misfit, and there is no finer base that can be diagnosed.",
                 &[],
+            );
+        }
+        RemainderKind::OtherZero => {
+            let (files, test) = (files(c.train), test_option(c));
+            let reading = further(&c.reading);
+            let model = quoted(c.model_file);
+            advise(
+                "A zero that each record has of its own is taken from its measured output:",
+                &[format!("hystctl diagnose {files}{test}{reading} --zero per-record --model {model}")],
+            );
+        }
+        RemainderKind::Changed => {
+            let (files, test) = (files(c.train), test_option(c));
+            let (reading, kind) = (further(&c.reading), c.model.base.kind().name());
+            advise(
+                "The same kind of model, fitted to what the device is now, and its diagnosis:",
+                &[
+                    format!("hystctl fit {files}{reading} --model {kind} -o refitted.json"),
+                    format!("hystctl diagnose {files}{test}{reading} --model refitted.json -o refitted-extended.json"),
+                ],
+            );
+            advise(
+                "Where this record does not show every effect, record one that does before:",
+                &[identification(c, "")],
             );
         }
         RemainderKind::Unexplained
@@ -114,6 +137,11 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
 /// Names of the training files, as the command line takes them.
 pub(crate) fn files(train: &Record) -> String {
     train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
+}
+
+/// The option that names the test file, behind a space.
+fn test_option(c: &Contents<'_>) -> String {
+    c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())))
 }
 
 /// A word of the command line.

@@ -20,6 +20,10 @@ pub(crate) fn verdict(findings: &Findings) -> String {
         Verdict::BaseTooCoarse => {
             "base too coarse: what is left is a map of the input's history that a richer base would take".to_owned()
         }
+        Verdict::Changed if findings.remainder.kind == RemainderKind::OtherZero => {
+            "changed: the sensor's zero is not that of the record that the model was fitted to".to_owned()
+        }
+        Verdict::Changed => "changed: the device no longer does what the model was fitted to".to_owned(),
         Verdict::Unexplained => "unexplained: what is left is none of the effects that are looked for".to_owned(),
     }
 }
@@ -35,6 +39,8 @@ pub(crate) fn kind(kind: RemainderKind) -> &'static str {
     match kind {
         RemainderKind::None => "noise",
         RemainderKind::BaseCapacity => "the base's own misfit",
+        RemainderKind::OtherZero => "another zero",
+        RemainderKind::Changed => "a change of the device",
         RemainderKind::Unexplained => "unexplained",
     }
 }

@@ -25,6 +25,10 @@ use crate::{Env, Error, Real, Stage};
 /// twice what the tolerance needs elsewhere, and the tolerance is kept if the drive stays out for half the lead between two
 /// visits. [`with_lead`](Self::with_lead) shortens it for drives that keep out altogether.
 ///
+/// A plan begins at rest, off the drive by up to 1 + 2a/k₀ of its largest steps (a = |α|/h). A drive that stays nearer than that
+/// to the switch counts as one that visits it: plans that begin in there are thrown out as far as `chatter`, and forget that in
+/// time, but not always within the lead.
+///
 /// A *reference* that dwells between the two sides of the switch, z between β min f and β max f, has no drive that dwells in there:
 /// going back in time the drive jumps between the sides instead, up to [`chatter`](Self::chatter) to either side. In one pass
 /// that is a drive which the model turns into the reference exactly. Sample by sample the plans never meet there; they

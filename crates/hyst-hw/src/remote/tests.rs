@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
 use super::*;
+use crate::runner::STOPPABLE_S;
 use crate::wire::{Board, CanData, Device, Open, Shown};
 use crate::{Cause, RecordOptions, record};
 use proptest::prelude::*;
@@ -156,60 +157,6 @@ impl Line for &mut Bench {
     }
 }
 
-/// The same with a clock of its own: a look at the line takes a millisecond, or as long as nothing comes.
-struct Timed<'a> {
-    bench: &'a mut Bench,
-    began: Instant,
-    passed: Duration,
-    periods: u32,
-}
-
-impl Timed<'_> {
-    fn go_on(&mut self, time: Duration) {
-        self.passed += time;
-        let due = (self.passed.as_secs_f64() * 1000.0) as u32;
-        self.bench.pass(due - self.periods);
-        self.periods = due;
-    }
-}
-
-impl Line for Timed<'_> {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        Line::send(&mut &mut *self.bench, bytes)
-    }
-
-    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let nothing = self.bench.answers.is_empty();
-        self.go_on(if nothing { patience } else { patience.min(Duration::from_millis(1)) });
-        let n = bytes.len().min(self.bench.answers.len());
-        self.bench.answers.drain(..n).zip(bytes).for_each(|(from, to)| *to = from);
-        Ok(n)
-    }
-
-    fn now(&mut self) -> Instant {
-        self.began + self.passed
-    }
-
-    fn pause(&mut self, time: Duration) {
-        self.go_on(time);
-    }
-}
-
-/// With the waits and the watchdog that a run has if nothing is said, a bad line does not cost the run.
-#[test]
-fn a_line_with_accidents_does_not_wake_the_watchdog() {
-    for seed in 0..20 {
-        let mut bench = Bench::new(12, seed);
-        let line = Timed { bench: &mut bench, began: Instant::now(), passed: Duration::ZERO, periods: 0 };
-        let mut remote = Remote::open(line, "bench", RemoteOptions::with_session(7)).unwrap();
-        let drive = wave(3000);
-        let played = record(&mut remote, &[&drive[..]], &RecordOptions::at(1000.0), |_| ControlFlow::Continue(()));
-        let samples = &played.unwrap_or_else(|failure| panic!("seed {seed}: {}", failure.cause)).segments[0].samples;
-        assert!(samples.iter().zip(&drive).all(|(sample, volts)| sample.drive_v == f64::from(*volts as f32)));
-        assert_eq!(samples.len(), drive.len());
-    }
-}
-
 fn options() -> RemoteOptions {
     RemoteOptions {
         repeat: Duration::from_millis(1),
@@ -357,6 +304,197 @@ fn a_line_that_is_cut_is_told_and_the_device_comes_to_rest() {
     remote.stop().unwrap_err();
     bench.pass(200);
     assert_eq!((bench.device.state(), bench.board.volts), (State::Fault(Fault::Silence), 0.0));
+}
+
+/// A serial line, slow both ways: what is sent stands in a queue until all before it has gone through.
+struct Slow {
+    bench: Bench,
+    bytes_per_s: f64,
+    now: Duration,
+    began: Instant,
+    /// When the device was given its last period.
+    lived: Duration,
+    /// What is on its way, and when it arrives.
+    there: VecDeque<(Duration, Vec<u8>)>,
+    back: VecDeque<(Duration, u8)>,
+    busy: [Duration; 2],
+    asked: Vec<u8>,
+    repeats: usize,
+}
+
+impl Slow {
+    fn pass(&mut self, time: Duration) {
+        let (end, period) = (self.now + time, Duration::from_secs_f64(1.0 / f64::from(self.bench.device.rate_hz())));
+        while self.now < end {
+            self.now = end.min(self.now + Duration::from_micros(500));
+            while self.lived + period <= self.now {
+                self.lived += period;
+                self.bench.pass(1);
+            }
+            while self.there.front().is_some_and(|(at, _)| *at <= self.now) {
+                let (_, bytes) = self.there.pop_front().unwrap();
+                let carried = if bytes.len() > 1 { self.bench.carried(&bytes) } else { bytes };
+                self.bench.take(&carried);
+                for byte in self.bench.answers.drain(..) {
+                    self.busy[1] = self.busy[1].max(self.now) + Duration::from_secs_f64(1.0 / self.bytes_per_s);
+                    self.back.push_back((self.busy[1], byte));
+                }
+            }
+        }
+    }
+}
+
+impl Line for &mut Slow {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if bytes.len() > 1 {
+            self.repeats += usize::from(self.asked == bytes);
+            self.asked = bytes.to_vec();
+        }
+        self.busy[0] = self.busy[0].max(self.now) + Duration::from_secs_f64(bytes.len() as f64 / self.bytes_per_s);
+        self.there.push_back((self.busy[0], bytes.to_vec()));
+        Ok(())
+    }
+
+    fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let give_up = self.now + patience;
+        while self.now < give_up && self.back.front().is_none_or(|(at, _)| *at > self.now) {
+            self.pass(Duration::from_micros(500));
+        }
+        let now = self.now;
+        let count = self.back.iter().take_while(|(at, _)| *at <= now).count().min(bytes.len());
+        self.back.drain(..count).zip(bytes).for_each(|((_, from), to)| *to = from);
+        Ok(count)
+    }
+
+    fn now(&mut self) -> Instant {
+        self.began + self.now
+    }
+
+    fn pause(&mut self, time: Duration) {
+        self.pass(time);
+    }
+}
+
+impl Slow {
+    fn new(baud: f64, accident: u64, seed: u64) -> Self {
+        Self {
+            bench: Bench::new(accident, seed),
+            bytes_per_s: baud / 10.0,
+            now: Duration::ZERO,
+            began: Instant::now(),
+            lived: Duration::ZERO,
+            there: VecDeque::new(),
+            back: VecDeque::new(),
+            busy: [Duration::ZERO; 2],
+            asked: Vec::new(),
+            repeats: 0,
+        }
+    }
+
+    /// Ten seconds at a rate; gives the periods that were gaps.
+    fn run(&mut self, rate_hz: f64, lost_s: f64) -> f64 {
+        let options = RemoteOptions {
+            lost: Duration::from_secs_f64(4.0 * lost_s),
+            silence_s: lost_s,
+            ..RemoteOptions::with_session(7)
+        };
+        let mut remote = Remote::open(self, "slow", options).unwrap();
+        let drive = wave((10.0 * rate_hz) as usize);
+        // How slow the line is shows in the first second.
+        let options = RecordOptions { settle_s: 1.0, ..RecordOptions::at(rate_hz) };
+        let recording = record(&mut remote, &[&drive], &options, |_| ControlFlow::Continue(()));
+        let samples = &recording.unwrap().segments[0].samples;
+        let periods = (samples[samples.len() - 1].time_s - samples[0].time_s) * rate_hz;
+        periods.round() - (drive.len() - 1) as f64
+    }
+}
+
+#[test]
+fn a_slow_line_is_not_filled_with_requests() {
+    // What fits through a line of 19,200 and one of 38,400 baud.
+    for (baud, rate_hz) in [(19_200.0, 50.0), (38_400.0, 100.0)] {
+        let mut slow = Slow::new(baud, 0, 1);
+        assert_eq!(slow.run(rate_hz, 0.5), 0.0, "{baud}");
+        assert!(slow.repeats < 20, "{baud}: {} requests were repeated", slow.repeats);
+    }
+}
+
+#[test]
+fn a_slow_line_with_accidents_costs_gaps_and_no_run() {
+    for seed in 0..10 {
+        let mut slow = Slow::new(38_400.0, 20, seed);
+        let gaps = slow.run(50.0, 0.5);
+        assert!(gaps < 50.0, "seed {seed}: {gaps} periods of 500");
+    }
+}
+
+/// A wait that lost frames made long would lose more time with each frame that is lost, until the line counts as cut.
+#[test]
+fn a_line_that_loses_most_frames_is_asked_as_quickly_as_before() {
+    for seed in 0..20 {
+        let mut lossy = Slow::new(1e6, 2, seed);
+        lossy.run(100.0, 5.0);
+        assert!(lossy.now.as_secs_f64() < 60.0, "seed {seed}: {:?} for ten seconds", lossy.now);
+    }
+}
+
+/// Slices of a rest are whole periods, also where a period is longer than they are to be.
+#[test]
+fn a_rest_is_as_long_as_asked_for_at_any_rate() {
+    for (rate_hz, rest_s) in [(1.0, 20.0), (3.0, 7.0), (10.0, 5.0), (1000.0, 2.0)] {
+        let mut bench = Bench::new(0, 1);
+        let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
+        let drive = [vec![0.0; 3], vec![0.0; 3]];
+        let options = RecordOptions { rest_s, ..RecordOptions::at(rate_hz) };
+        let recording = record(&mut remote, &drive, &options, |_| ControlFlow::Continue(())).unwrap();
+        let [first, second] = [0, 1].map(|k| &recording.segments[k].samples);
+        let rested = second[0].time_s - first[2].time_s;
+        // The bench's time goes on while it is talked to.
+        let talk = 10.0 * (1.0 + rest_s / STOPPABLE_S.max(1.0 / rate_hz)) / rate_hz;
+        assert!((rest_s..rest_s + talk).contains(&rested), "{rate_hz} Hz: {rested} s for {rest_s}");
+    }
+}
+
+/// A run is prepared while its host waits; what the clock has counted meanwhile is not the host's silence.
+#[test]
+fn the_time_that_a_start_takes_wakes_no_watchdog() {
+    let mut bench = Bench::new(0, 1);
+    let start = Start {
+        session: 1,
+        mode: Mode::Voltage,
+        rate_hz: 1000.0,
+        low_v: 0.0,
+        high_v: 99.0,
+        slew_v_per_s: 1000.0,
+        hottest_degc: 50.0,
+        error: 1.0,
+        silence_s: 0.5,
+        force: false,
+    };
+    bench.device.answer(&Request { number: 1, ask: Ask::Start(start) });
+    bench.device.missed(800);
+    bench.pass(1);
+    assert_eq!(bench.device.state(), State::Running);
+    bench.device.missed(800);
+    bench.pass(1);
+    assert_eq!(bench.device.state(), State::Fault(Fault::Silence));
+}
+
+#[test]
+fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
+    let mut slow = Slow::new(115_200.0, 0, 1);
+    let options = RemoteOptions { slew_v_per_s: Some(1.0), ..RemoteOptions::with_session(7) };
+    let mut remote = Remote::open(&mut slow, "slow", options).unwrap();
+    remote.start(100.0).unwrap();
+    while remote.line_mut().bench.board.volts < 30.0 {
+        remote.exchange(&[30.0; 64], &mut Vec::new()).unwrap();
+    }
+    remote.emergency_stop().unwrap();
+    // Half a minute at the slew of that run, which another program does not know.
+    let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
+    assert_eq!(remote.clear().unwrap(), Some(Fault::Emergency));
+    assert_eq!(remote.clear().unwrap(), None);
+    assert_eq!(slow.bench.board.volts, 0.0);
 }
 
 #[test]

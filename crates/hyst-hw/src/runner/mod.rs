@@ -9,6 +9,9 @@ use crate::daq::{Daq, Sample};
 pub use failure::{Cause, Failure};
 use plan::{Place, Plan};
 
+/// How long a device rests without asking whether the run is still wanted, in whole periods \[s\].
+pub(crate) const STOPPABLE_S: f64 = 0.25;
+
 /// How to play segments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordOptions {
@@ -54,7 +57,7 @@ pub struct Progress<'a> {
     pub segments: usize,
     /// What the new samples are part of.
     pub phase: Phase,
-    /// The new samples, in order: a log that takes them all is complete whatever happens later.
+    /// The new samples, in order: a log that takes them all is complete whatever happens later. None during a rest.
     pub samples: &'a [Sample],
     /// Record samples so far, over all segments.
     pub done: usize,
@@ -140,12 +143,25 @@ pub fn record_with<D: Daq + ?Sized>(
     if let Err(cause) = plan::check(segments, daq.capabilities().voltage, options) {
         return Err(Failure { cause, partial: recording, not_stopped: None });
     }
-    let played = start_and_play(daq, segments, options, revise, progress, &mut recording);
-    match (played, daq.stop()) {
+    let daq = Driven(daq);
+    let played = start_and_play(&mut *daq.0, segments, options, revise, progress, &mut recording);
+    match (played, daq.0.stop()) {
         (Ok(()), Ok(())) => Ok(recording),
         (Ok(()), Err(error)) => Err(Failure { cause: Cause::Stop(error), partial: recording, not_stopped: None }),
         // The first error says what happened; that the device is still driven must not be lost over it.
         (Err(cause), stopped) => Err(Failure { cause, partial: recording, not_stopped: stopped.err() }),
+    }
+}
+
+/// A device that is stopped even if what looks at its samples panics.
+struct Driven<'a, D: Daq + ?Sized>(&'a mut D);
+
+impl<D: Daq + ?Sized> Drop for Driven<'_, D> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            // What goes wrong here as well, its watchdog finds.
+            let _ = self.0.stop();
+        }
     }
 }
 
@@ -191,7 +207,7 @@ where
 {
     fn segment(&mut self, segment: usize, drive: &[f64]) -> Result<(), Cause<D::Error>> {
         if segment > 0 {
-            self.daq.rest(self.options.rest_s).map_err(Cause::Device)?;
+            self.rest(segment)?;
         }
         let rest_v = self.daq.capabilities().voltage.rest_v;
         let block = self.options.block.min(self.daq.capabilities().max_block).max(1);
@@ -227,6 +243,31 @@ where
             }
         }
         if cancelled { Err(Cause::Cancelled) } else { Ok(()) }
+    }
+
+    /// Rests before a segment; its samples are nobody's.
+    fn rest(&mut self, segment: usize) -> Result<(), Cause<D::Error>> {
+        let mut left = self.options.rest_s;
+        // On a device that takes its time somebody may change their mind.
+        let rate_hz = self.recording.rate_hz;
+        let longest = if self.daq.capabilities().queued {
+            (STOPPABLE_S * rate_hz).round().max(1.0) / rate_hz
+        } else {
+            f64::INFINITY
+        };
+        loop {
+            let now = left.min(longest);
+            self.daq.rest(now).map_err(Cause::Device)?;
+            left -= now;
+            let &mut Self { segments, done, total, .. } = self;
+            let news = Progress { segment, segments, phase: Phase::Approach, samples: &[], done, total };
+            if (self.progress)(&news).is_break() {
+                return Err(Cause::Cancelled);
+            }
+            if left <= 0.0 {
+                return Ok(());
+            }
+        }
     }
 
     /// Sorts new samples, the first of which is number `first` of the plan, into the recording.

@@ -155,8 +155,33 @@ fn queued_device_gives_every_drive_sample_its_measurement() {
         // 0.5 V a sample: 0.5 to 3.5 on the way to 4 V.
         assert_eq!(drive_of(&recording.segments[1].approach), [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]);
         assert_eq!(recording.segments[1].retreat.last().unwrap().drive_v, 0.0);
-        assert_eq!((device.rests.as_slice(), device.running), ([3.0].as_slice(), false));
+        assert_eq!((device.rests.iter().sum::<f64>(), device.running), (3.0, false));
     }
+}
+
+#[test]
+fn a_rest_can_be_stopped() {
+    let mut device = Queued::new(5);
+    let failure = record(&mut device, &drives(), &RecordOptions { rest_s: 600.0, ..options() }, |p| {
+        if p.samples.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .unwrap_err();
+    assert_eq!(failure.cause, Cause::Cancelled);
+    assert!(device.rests.iter().sum::<f64>() < 1.0 && !device.running, "{:?}", device.rests);
+    assert_eq!((failure.partial.segments.len(), device.present_v), (1, 0.0));
+}
+
+#[test]
+fn a_panic_of_who_looks_on_leaves_no_device_driven() {
+    let mut device = Queued::new(5);
+    let looking = std::panic::AssertUnwindSafe(|| {
+        record(&mut device, &drives(), &options(), |p| {
+            assert!(p.done < 10, "seen enough");
+            ControlFlow::Continue(())
+        })
+    });
+    std::panic::catch_unwind(looking).unwrap_err();
+    assert!(!device.running);
 }
 
 #[test]

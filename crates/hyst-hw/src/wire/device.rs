@@ -47,7 +47,7 @@ pub trait Control {
     fn applied(&mut self, volts: f32);
     /// Whether a limit keeps the output away from its reference.
     fn limited(&self) -> bool;
-    /// The reference at which the output should be now: what looks ahead is given references before they are due.
+    /// The reference at which the output should be when it is measured next: what looks ahead is given references before they are due.
     fn due(&self) -> Option<f32>;
 }
 
@@ -81,8 +81,8 @@ impl Control for Open {
     }
 }
 
-/// How long the drive may stand at a limit, or the output be away from the reference, before that is a fault \[s\].
-const PATIENCE_S: f32 = 0.5;
+/// How long the drive may stand at a limit, or the output be away from the reference, before that is a fault \[s\]; on a device as on its host.
+pub const PATIENCE_S: f32 = 0.5;
 /// Longest silence that a run may allow \[s\].
 const LONGEST_SILENCE_S: f32 = 60.0;
 
@@ -124,7 +124,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     /// At rest.
     pub fn new(identity: Identity, control: C) -> Self {
         let present_v = identity.rest_v;
-        let follows = identity.follows;
+        let (follows, rate_hz) = (identity.follows, identity.max_rate_hz);
         let identity = Identity { queue: Q as u32, model: if follows { M as u32 } else { 0 }, ..identity };
         Self {
             identity,
@@ -137,7 +137,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             run: Start {
                 session: 0,
                 mode: Mode::Voltage,
-                rate_hz: 1.0,
+                rate_hz,
                 low_v: present_v,
                 high_v: present_v,
                 slew_v_per_s: 1.0,
@@ -167,7 +167,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.state
     }
 
-    /// Rate at which [`tick`](Self::tick) has to come \[Hz\].
+    /// Rate at which [`tick`](Self::tick) has to come \[Hz\]: that of the last run, before it the fastest. Where the identity leaves a choice, the clock has to follow.
     pub fn rate_hz(&self) -> f32 {
         self.run.rate_hz
     }
@@ -213,7 +213,11 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     }
 
     /// Periods that have passed without a [`tick`](Self::tick), because something else took too long: nothing is put out for them, but they count.
+    /// Those in which a run was being prepared do not: its host waited for the answer.
     pub fn missed(&mut self, periods: u32) {
+        if self.state == State::Running && self.tick == 0 {
+            return;
+        }
         self.tick = self.tick.wrapping_add(periods);
         self.quiet = self.quiet.saturating_add(periods);
     }

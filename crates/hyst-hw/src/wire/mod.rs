@@ -4,6 +4,7 @@
 //! - `iso_tp.rs`: messages over a CAN bus.
 //! - `message.rs`: what host and device say to each other.
 //! - `device.rs`: what a device does with it.
+//! - `lasting.rs`: for how long something has gone on, as an error that is too large.
 //! - `recipe.rs`: a model, a PID and a force observer as bytes.
 //! - `follower.rs`: how a device follows references with them.
 //! - `server.rs`: requests and answers over the drivers of a board.
@@ -17,8 +18,8 @@ mod message;
 mod recipe;
 mod server;
 
-pub use device::{Board, Control, Device, Open, Shown};
-pub use follower::{Follower, lateness};
+pub use device::{Board, Control, Device, Open, PATIENCE_S, Shown};
+pub use follower::{Follower, SATURATION_TOLERANCE, lateness};
 pub use frame::{Deframer, FrameError, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use iso_tp::{CanData, IsoTp, IsoTpError, MOST_CAN};
 pub use lasting::Lasting;

@@ -25,6 +25,8 @@ pub enum Verdict {
     NothingMissing,
     /// A richer base would take what is left.
     BaseTooCoarse,
+    /// The device, or its sensor's zero, is no longer what the model was fitted to: the same model, fitted anew, takes most of what is left.
+    Changed,
     /// Something is left that nothing on the list explains.
     Unexplained,
 }
@@ -37,6 +39,10 @@ pub enum RemainderKind {
     None,
     /// The base's own misfit.
     BaseCapacity,
+    /// Another zero of the sensor than in the record of the fit.
+    OtherZero,
+    /// Another device than that of the fit, or the same after a change.
+    Changed,
     /// Unknown.
     Unexplained,
 }
@@ -163,6 +169,7 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         (false, _) => Verdict::Explained,
         (true, RemainderKind::None) => Verdict::NothingMissing,
         (true, RemainderKind::BaseCapacity) => Verdict::BaseTooCoarse,
+        (true, RemainderKind::OtherZero | RemainderKind::Changed) => Verdict::Changed,
         (true, RemainderKind::Unexplained) => Verdict::Unexplained,
     };
     let on = |train: &Simulation, test: Option<&Simulation>| OnRecords {

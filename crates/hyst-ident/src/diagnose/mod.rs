@@ -9,6 +9,7 @@
 //! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and the own base whether it lacks a curve.
 //! 4. **Extend** the user's own model with the effects found, all weights refitted.
 
+mod changed;
 mod evidence;
 mod extension;
 mod findings;
@@ -194,7 +195,12 @@ pub fn diagnose(
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);
     }
-    let remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest).beside(only_loop, &useless);
+    let mut remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
+    if extended == *model {
+        let asked = Own { basis: &own, ..asked };
+        remainder = changed::told_apart(&asked, &start, found.noise, options.zero, remainder)?;
+    }
+    let remainder = remainder.beside(only_loop, &useless);
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
         .transpose()?;

@@ -9,7 +9,7 @@ use crate::samples::Samples;
 use crate::simulate::Simulation;
 
 /// A richer base that takes this share of the variance above the floor shows a lack of capacity.
-const RICHER: f64 = 0.5;
+pub(super) const RICHER: f64 = 0.5;
 /// Share that counts as nearly all.
 const NEARLY_ALL: f64 = 0.9;
 /// Share from which on what a richer base takes is told.
@@ -85,7 +85,8 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
 impl Remainder {
     /// With what else has to be said: that the record repeats one loop \[Hz\], and which effects of a rich base do not help this one.
     pub(super) fn beside(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
-        if let (Some(hz), false) = (only_loop, self.kind == RemainderKind::None) {
+        let of_shapes = matches!(self.kind, RemainderKind::BaseCapacity | RemainderKind::Unexplained);
+        if let Some(hz) = only_loop.filter(|_| of_shapes) {
             self.description += &format!(
                 "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
             );

@@ -8,7 +8,7 @@ mod records;
 use std::collections::BTreeMap;
 
 use mcap::records::{Metadata, Record as Entry};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::RecordError;
 use super::{OutputUnit, Record};
@@ -17,6 +17,8 @@ use records::MAGIC;
 
 /// Channel of the samples.
 pub const TOPIC: &str = "/actuator/sample";
+/// Channel of what happens on the way.
+pub const EVENTS: &str = "/actuator/event";
 
 /// One sample of a log, as it stands there.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -38,6 +40,19 @@ pub struct LogSample {
     pub temperature_degc: Option<f64>,
     /// Load \[N\].
     pub load_n: Option<f64>,
+    /// Force that was estimated on the way \[N\].
+    pub estimated_force_n: Option<f64>,
+}
+
+/// Something that happened on the way.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct LogEvent {
+    /// Time of the device's clock \[s\].
+    pub time_s: f64,
+    /// What, in one word.
+    pub kind: String,
+    /// What, in a sentence.
+    pub text: String,
 }
 
 /// JSON has no other word for what is no number than null.
@@ -61,6 +76,8 @@ pub struct RunLog {
     pub model: Option<String>,
     /// The samples, in order.
     pub samples: Vec<LogSample>,
+    /// What happened on the way, in order.
+    pub events: Vec<LogEvent>,
     /// Whether the log was closed; else its writer was cut off.
     pub closed: bool,
     /// Chunks and other records that are left out because they are damaged.
@@ -81,12 +98,12 @@ impl RunLog {
         let foreign = |what: String| RecordError::Log { file: name.to_owned(), what };
         let mut entries = LogRecords::new(bytes).ok_or_else(|| foreign("it is no MCAP file".to_owned()))?;
         let mut log = Self::default();
-        let mut channel = None;
+        let (mut channel, mut happened) = (None, None);
         // What is not whole at the end is what a cut takes.
         for entry in &mut entries {
             match entry {
                 Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata.extend(metadata),
-                // What was known only at the end, as how the device's clock went.
+                // What was asked for, and what was known only at the end, as how the device's clock went.
                 Entry::Metadata(Metadata { name, metadata }) => {
                     log.metadata.extend(metadata.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)));
                 }
@@ -99,6 +116,11 @@ impl RunLog {
                     let sample = serde_json::from_slice(&data)
                         .map_err(|error| foreign(format!("message {number} of {TOPIC} is no sample: {error}")))?;
                     log.samples.push(sample);
+                }
+                Entry::Channel(c) if c.topic == EVENTS && c.message_encoding == "json" => happened = Some(c.id),
+                // What is said there is for people: one that is no event is no reason to leave the samples.
+                Entry::Message { header, data } if Some(header.channel_id) == happened => {
+                    log.events.extend(serde_json::from_slice::<LogEvent>(&data));
                 }
                 Entry::Footer(_) => log.closed = true,
                 _ => {}
@@ -119,7 +141,25 @@ impl RunLog {
         self.metadata.get("output_column").and_then(|column| OutputUnit::of_column(column))
     }
 
-    /// The samples as a record file: those that were asked for, or the ramps and rests too.
+    /// The samples that belong to a record: those that were asked for, or the ramps too.
+    fn chosen(&self, with_ramps: bool) -> Vec<&LogSample> {
+        let has = |of: fn(&LogSample) -> Option<f64>| self.samples.iter().any(|s| of(s).is_some());
+        let (thermometer, load, followed) = (has(|s| s.temperature_degc), has(|s| s.load_n), has(|s| s.reference));
+        let shown = |s: &LogSample| {
+            s.output.is_finite() && (!thermometer || s.temperature_degc.is_some()) && (!load || s.load_n.is_some())
+        };
+        // A sensor that has lost its number has ended the run.
+        let end = self.samples.len() - usize::from(self.samples.last().is_some_and(|last| !shown(last)));
+        let mut follows = None;
+        let wanted = |s: &&LogSample| {
+            follows = s.reference.map(|_| s.segment).or(follows);
+            // The first rows of a device that looks ahead have no reference: its output is later.
+            with_ramps || s.is_record() && (!followed || follows == Some(s.segment))
+        };
+        self.samples[..end].iter().filter(wanted).filter(|s| s.output.is_finite()).collect()
+    }
+
+    /// The samples as a record file: those that were asked for, or the ramps too.
     ///
     /// # Errors
     /// If the log does not say its unit.
@@ -128,22 +168,25 @@ impl RunLog {
             file: name.to_owned(),
             what: "its metadata do not say the unit of the output".into(),
         };
-        let unit = self.unit().ok_or_else(no_unit)?;
-        // A sample without a number is the one that has ended its run.
-        let chosen = || self.samples.iter().filter(|s| (with_ramps || s.is_record()) && s.output.is_finite());
-        let reference = format!("reference_{}", unit.suffix());
         type Of = fn(&LogSample) -> Option<f64>;
-        let optional: [(&str, Of); 3] =
-            [(&reference, |s| s.reference), ("temperature_degc", |s| s.temperature_degc), ("load_n", |s| s.load_n)];
+        let unit = self.unit().ok_or_else(no_unit)?;
+        let chosen = self.chosen(with_ramps);
+        let reference = format!("reference_{}", unit.suffix());
+        let optional: [(&str, Of); 4] = [
+            (&reference, |s| s.reference),
+            ("temperature_degc", |s| s.temperature_degc),
+            ("load_n", |s| s.load_n),
+            ("estimated_force_n", |s| s.estimated_force_n),
+        ];
         // A column that some samples lack has no place in a record.
         let optional: Vec<(&str, Of)> = optional
             .into_iter()
-            .filter(|(_, of)| chosen().next().is_some() && chosen().all(|s| of(s).is_some()))
+            .filter(|(_, of)| !chosen.is_empty() && chosen.iter().all(|s| of(s).is_some()))
             .collect();
         let mut text = format!("segment,time_s,voltage_v,{}", unit.column());
         optional.iter().for_each(|(column, _)| text.extend([",", column]));
         text.push('\n');
-        for s in chosen() {
+        for s in chosen {
             text += &format!("{},{},{},{}", s.segment, s.time_s, s.drive_v, s.output);
             optional.iter().for_each(|(_, of)| text += &format!(",{}", of(s).unwrap_or(f64::NAN)));
             text.push('\n');
@@ -162,5 +205,57 @@ impl Record {
     ) -> Result<Self, RecordError> {
         let text = RunLog::parse(name, bytes)?.csv(name, false)?;
         Ok(Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sample of a segment; what is `None` is not there.
+    fn sample(k: u8, segment: u64, phase: &str, reference: Option<f64>, degc: Option<f64>) -> LogSample {
+        LogSample {
+            time_s: f64::from(k),
+            segment,
+            phase: phase.to_owned(),
+            drive_v: 1.0,
+            output: 2.0,
+            reference,
+            temperature_degc: degc,
+            load_n: None,
+            estimated_force_n: None,
+        }
+    }
+
+    fn log(samples: Vec<LogSample>) -> RunLog {
+        let metadata = BTreeMap::from([("output_column".to_owned(), "displacement_um".to_owned())]);
+        RunLog { metadata, samples, ..RunLog::default() }
+    }
+
+    #[test]
+    fn a_record_has_neither_ramps_nor_late_rows_nor_the_one_that_lost_its_sensor() {
+        let warm = Some(20.0);
+        let log = log(vec![
+            sample(0, 0, "approach", None, warm),
+            sample(1, 0, "record", None, warm),
+            sample(2, 0, "record", Some(5.0), warm),
+            sample(3, 0, "record", Some(6.0), warm),
+            sample(4, 1, "record", None, warm),
+            sample(5, 1, "record", Some(7.0), warm),
+            sample(6, 1, "record", Some(8.0), None),
+        ]);
+        let header = "segment,time_s,voltage_v,displacement_um,reference_um,temperature_degc\n";
+        let rows = "0,2,1,2,5,20\n0,3,1,2,6,20\n1,5,1,2,7,20\n";
+        assert_eq!(log.csv("run.mcap", false).unwrap(), format!("{header}{rows}"));
+        let all = log.csv("run.mcap", true).unwrap();
+        assert_eq!(all.lines().next(), Some("segment,time_s,voltage_v,displacement_um,temperature_degc"));
+        assert_eq!(all.lines().count(), 7);
+    }
+
+    #[test]
+    fn a_column_with_holes_is_left_out_and_its_rows_are_not() {
+        let log = log((0..6).map(|k| sample(k, 0, "record", None, (k % 2 == 1).then_some(20.0))).collect());
+        let text = log.csv("run.mcap", false).unwrap();
+        assert_eq!((text.lines().count(), text.contains("temperature")), (7, false));
     }
 }

@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 pub use columns::{ColumnMap, MapError, Need, is_input_column};
 pub use error::{Place, RecordError};
-pub use log::{LogRecords, LogSample, RunLog, TOPIC, is_log};
+pub use log::{EVENTS, LogEvent, LogRecords, LogSample, RunLog, TOPIC, is_log};
 pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
 

@@ -5,6 +5,7 @@ use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::Peripherals;
+use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
@@ -22,6 +23,7 @@ fn SysTick() {
 
 /// The clock.
 pub struct Clock {
+    systick: SYST,
     seen: u32,
 }
 
@@ -30,11 +32,17 @@ impl Clock {
     pub fn start(rate_hz: f32) -> Option<Self> {
         let mut systick = Peripherals::take()?.SYST;
         systick.set_clock_source(SystClkSource::Core);
-        systick.set_reload((CLOCK_HZ / rate_hz) as u32 - 1);
-        systick.clear_current();
         systick.enable_interrupt();
-        systick.enable_counter();
-        Some(Self { seen: 0 })
+        let mut clock = Self { systick, seen: 0 };
+        clock.set(rate_hz);
+        clock.systick.enable_counter();
+        Some(clock)
+    }
+
+    /// Another period, from now on. The counter has 24 bits: the slowest rate is 1.5 Hz.
+    pub fn set(&mut self, rate_hz: f32) {
+        self.systick.set_reload((CLOCK_HZ / rate_hz) as u32 - 1);
+        self.systick.clear_current();
     }
 
     /// Periods that have passed since it was asked last.

@@ -22,7 +22,8 @@ fn main() -> ! {
     let (mut servo, mut actuator) = (servo(), OnBoard::default());
     // Whatever stood there before a reset: the device takes it for granted that it begins at rest.
     actuator.put_out(REST_V);
-    let Some(mut clock) = Clock::start(RATE_HZ) else { panic!("SysTick is taken") };
+    let mut rate_hz = RATE_HZ;
+    let Some(mut clock) = Clock::start(rate_hz) else { panic!("SysTick is taken") };
     let mut server = SerialServer::new();
     loop {
         // Periods for which it comes too late are lost: made up for at once, they would be a jump of the output.
@@ -31,6 +32,11 @@ fn main() -> ! {
             servo.tick(&mut actuator);
         }
         let Ok(()) = server.poll(&mut servo, &mut line);
+        // Slew, patience and watchdog count periods of the run's rate, of which this board has one; another may leave the host a choice.
+        if servo.rate_hz() != rate_hz {
+            rate_hz = servo.rate_hz();
+            clock.set(rate_hz);
+        }
     }
 }
 

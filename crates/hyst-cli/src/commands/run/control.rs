@@ -2,9 +2,8 @@
 
 use hyst_core::{Build, Pid, PidParams, PidState, Sampling};
 use hyst_hw::Revision;
-use hyst_hw::wire::Lasting;
+use hyst_hw::wire::{Lasting, PATIENCE_S};
 
-use super::guard::PATIENCE_S;
 use crate::exit::{CommandError, CommandResult};
 
 /// A loop that is closed sample by sample.
@@ -53,7 +52,7 @@ impl ClosedLoop {
             last_v: 0.0,
             limited: 0,
             held: Lasting::default(),
-            patience: (PATIENCE_S / period) as f32,
+            patience: PATIENCE_S / period as f32,
             too_long: false,
             tolerance,
             samples: 0,

@@ -1,10 +1,7 @@
 //! The limits of a run that are watched on this computer, beside those that a device watches itself.
 
 use hyst_hw::Sample;
-use hyst_hw::wire::{Fault, Lasting};
-
-/// How long the output may be too far away, or the drive at a limit \[s\]: as on a device.
-pub(super) const PATIENCE_S: f64 = 0.5;
+use hyst_hw::wire::{Fault, Lasting, PATIENCE_S};
 
 /// What ends a run.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +18,7 @@ impl Guard {
         Self {
             hottest_degc: hottest_degc.unwrap_or(f64::INFINITY),
             error: error.unwrap_or(f64::INFINITY),
-            patience: (PATIENCE_S * rate_hz) as f32,
+            patience: PATIENCE_S * rate_hz as f32,
             astray: Lasting::default(),
         }
     }

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 
 use hyst_core::{ForceParams, PidParams};
-use hyst_hw::wire::{lateness, recipe_head};
+use hyst_hw::wire::{SATURATION_TOLERANCE, lateness, recipe_head};
 use hyst_hw::{Capabilities, RecordOptions, Recording};
 use hyst_ident::compensate::{Drive, compensate};
 use hyst_ident::export::block;
@@ -70,7 +70,7 @@ impl HandedOver {
         let PidParams { low, high, .. } = self.gains;
         // The device's numbers are f32.
         let (near, step) = (1e-5 * (high - low), 0.999 * self.slew_v_per_s / recording.rate_hz);
-        let tolerance = TOLERANCE * (followed.model.output.high - followed.model.output.low);
+        let tolerance = SATURATION_TOLERANCE * (followed.model.output.high - followed.model.output.low);
         let wanted = followed.wanted();
         let (mut held, mut rows) = (0, 0);
         for segment in &recording.segments {
@@ -192,8 +192,6 @@ impl Followed {
 
 /// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
 const USUAL_SETTLE_S: f64 = 2.0;
-/// An error that a limit leaves is of no account up to this share of the model's output, as on a device.
-const TOLERANCE: f64 = 0.02;
 /// By how much steeper than the planned drive, which may be corrected on the way, the device may go.
 const STEEPER: f64 = 1.5;
 /// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
@@ -480,7 +478,7 @@ impl Closed {
         (period, slew): (f64, f64),
     ) -> CommandResult<Self> {
         let Chosen { gains, crossover_hz, why } = Chosen::new(args, model, limits, period)?;
-        let tolerance = TOLERANCE * (model.output.high - model.output.low);
+        let tolerance = SATURATION_TOLERANCE * (model.output.high - model.output.low);
         let running = ClosedLoop::new(&gains, args.control.inverts(), wanted, period, slew, tolerance)?;
         Ok(Self { running, gains, crossover_hz, why })
     }

@@ -35,12 +35,21 @@ pub(in crate::commands) fn play<D: Daq>(daq: &mut D, job: &mut Job, log: Option<
 where
     D::Error: Classified,
 {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
+    let (stop, over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let (asked, ended, warned) = (Arc::clone(&stop), Arc::clone(&over), AtomicBool::new(false));
     let again = move || {
-        if asked.swap(true, Ordering::Relaxed) {
+        if ended.load(Ordering::Relaxed) {
+            // What was measured is being written: an impatient stop of the run is no wish to lose it.
+            if warned.swap(true, Ordering::Relaxed) {
+                say("error: left before all that was measured was written");
+                std::process::exit(i32::from(Exit::DeviceLost as u8));
+            }
+            say("note: what was measured is being written; once more, and it is left as it is");
+        } else if asked.swap(true, Ordering::Relaxed) {
             // Who asks twice does not want to wait for a device that does not answer.
-            say("error: left before the device was at rest; its watchdog brings it there, look whether it does");
+            say(
+                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status)",
+            );
             std::process::exit(i32::from(Exit::DeviceLost as u8));
         }
     };
@@ -87,6 +96,7 @@ where
         let ended = lookout.fault.is_some() || stop.load(Ordering::Relaxed);
         if ended { ControlFlow::Break(()) } else { on }
     });
+    over.store(true, Ordering::Relaxed);
     match &played {
         Err(Failure { not_stopped: Some(error), .. }) => {
             lookout.note("fault", format!("the device may still be driven: {error}"));
