@@ -12,7 +12,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("give the plant's file and an address, as plant.toml 127.0.0.1:4000".into());
     };
     let rate_hz = arguments.next().map_or(Ok(1000.0), |rate| rate.parse())?;
-    let config = PlantConfig::from_toml(&std::fs::read_to_string(file)?)?;
+    let config = std::fs::read_to_string(&file)
+        .map_err(|error| error.to_string())
+        .and_then(|text| PlantConfig::from_toml(&text).map_err(|error| error.to_string()))
+        .map_err(|error| format!("{file}: {error}"))?;
     let mut board = PlantBoard::new(Plant::new(config)?, rate_hz)?;
     let mut device: Device<Follower, 512, 4096> = Device::new(board.identity(rate_hz, true), Follower::new());
     let listener = TcpListener::bind(&address).map_err(|error| format!("{address}: {error}; give another port"))?;

@@ -268,6 +268,8 @@ pub struct Remote<L> {
     /// Slope that the next run needs \[V/s\].
     gentle: f64,
     broken: u32,
+    /// What the system said when the line went: what it says of a line that is gone tells less.
+    gone: Option<(io::ErrorKind, String)>,
 }
 
 /// What is known of a run.
@@ -340,6 +342,7 @@ impl<L: Line> Remote<L> {
             present_v: 0.0,
             gentle: f64::INFINITY,
             broken: 0,
+            gone: None,
         }
     }
 
@@ -483,8 +486,9 @@ impl<L: Line> Remote<L> {
         RemoteError::Refused { line: self.name.clone(), refusal }
     }
 
-    fn gone(&self, source: io::Error) -> RemoteError {
-        RemoteError::Line { line: self.name.clone(), source }
+    fn gone(&mut self, source: io::Error) -> RemoteError {
+        let (kind, said) = self.gone.get_or_insert_with(|| (source.kind(), source.to_string()));
+        RemoteError::Line { line: self.name.clone(), source: io::Error::new(*kind, said.clone()) }
     }
 
     /// Asks for something that is answered by a status.
@@ -551,7 +555,9 @@ impl<L: Line> Remote<L> {
             Ask::Hello => {
                 "is this the right port, its speed the device's, the device powered, and no other program talking to it?"
             }
-            Ask::Emergency => "NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C where the run goes on",
+            Ask::Emergency => {
+                "TAKE IT THAT NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C where the run goes on; hystctl status tells"
+            }
             _ => "look at the cable; its watchdog brings a device that still runs to rest",
         };
         let seconds = self.lost().as_secs_f64();

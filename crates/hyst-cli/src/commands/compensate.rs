@@ -201,7 +201,7 @@ impl Compensation {
                     "the drive starts at {first} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value"
                 ),
                 Some(seconds) => format!(
-                    "before the reference began the device was ramped to {first} {unit} and held there for {seconds} s; the model takes the actuator as settled there, and what creeps longer shows at first: --settle holds longer"
+                    "before the reference began the device was ramped to {first} {unit} and held there for {seconds} s; the model takes the actuator as settled there, as after a ramp from rest: what creeps longer (--settle holds longer) and what earlier runs have left shows at first"
                 ),
             });
         }

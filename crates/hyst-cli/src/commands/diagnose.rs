@@ -82,9 +82,8 @@ fn warn(model: &Model, train: &Record, test: Option<&Record>) {
         let names = text::listed(&strange);
         say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
     }
-    let of_model = |test: &Record| test.sources().iter().any(|s| s.sha256.as_deref().is_some_and(fitted));
     match test {
-        Some(test) if of_model(test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
+        Some(test) if input::was_fitted_to(model, test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
         Some(test) => input::tell_repeated(test, train),
         None => {}
     }

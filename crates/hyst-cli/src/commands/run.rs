@@ -73,6 +73,9 @@ struct Summary {
     symbol: &'static str,
 }
 
+/// An offset is told where less than this share of the error is left without it.
+const MOSTLY_OFFSET: f64 = 0.5;
+
 /// Measured output against the reference.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Tracking {
@@ -82,6 +85,10 @@ struct Tracking {
     max_abs: f64,
     /// RMSE over the last half, in which the start tells less.
     rmse_last_half: f64,
+    /// Mean of measured less reference: a zero, or what the actuator remembers of earlier runs.
+    mean: f64,
+    /// RMSE about that mean.
+    rmse_about_mean: f64,
 }
 
 /// Whether the model still explains the device.
@@ -308,7 +315,15 @@ impl Tracking {
         let half = wanted.len() / 2;
         let squares: f64 = wanted[half..].iter().zip(&measured[half..]).map(|(w, y)| (w - y) * (w - y)).sum();
         let rmse_last_half = (squares / (wanted.len() - half).max(1) as f64).sqrt();
-        Ok(Self { rmse: errors.rmse, nrmse_percent: errors.nrmse_percent, max_abs: errors.max_abs, rmse_last_half })
+        let mean = wanted.iter().zip(measured).map(|(w, y)| y - w).sum::<f64>() / wanted.len().max(1) as f64;
+        Ok(Self {
+            rmse: errors.rmse,
+            nrmse_percent: errors.nrmse_percent,
+            max_abs: errors.max_abs,
+            rmse_last_half,
+            mean,
+            rmse_about_mean: (errors.rmse * errors.rmse - mean * mean).max(0.0).sqrt(),
+        })
     }
 }
 
@@ -349,9 +364,17 @@ impl Summary {
         lines.extend(self.tracking.map(|t| {
             let (rmse, share, most) = (short(t.rmse), text::percent(t.nrmse_percent), short(t.max_abs));
             let late = short(t.rmse_last_half);
-            format!(
+            let mut line = format!(
                 "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
-            )
+            );
+            if t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
+                line += &format!(
+                    "\n          most of it is an offset of {:+.4} {unit}, about which RMSE {} {unit} is left: the sensor's zero, or what earlier runs have left in the actuator; pid takes it",
+                    t.mean,
+                    short(t.rmse_about_mean)
+                );
+            }
+            line
         }));
         lines.extend(self.pid.as_ref().map(|pid| pid.text(self.symbol)));
         lines.extend(self.compensation.as_ref().map(Compensation::text));

@@ -7,6 +7,7 @@ use hyst_ident::record::Record;
 
 use super::html::Page;
 use super::{Contents, words};
+use crate::input;
 use crate::text::listed;
 
 /// Up to so many noise floors of error there is little left to look for.
@@ -53,8 +54,19 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         advise("Record a drive that shows every effect, and fit and diagnose that:", &[identification(c, "")]);
     }
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
+    let finer = c.model.base.kind() != Kind::Preisach && !drags;
     match f.remainder.kind {
-        RemainderKind::BaseCapacity if c.model.base.kind() != Kind::Preisach && !drags => {
+        // A few loops of a run show less than the record of the fit did.
+        RemainderKind::BaseCapacity
+            if finer && !c.model.fitted_on.is_empty() && !input::was_fitted_to(c.model, c.train) =>
+        {
+            let names: Vec<String> = c.model.fitted_on.iter().map(|file| quoted(&file.file)).collect();
+            advise(
+                "Most of what is left is the base's own misfit. A finer base is best fitted to what this one was fitted to:",
+                &[format!("hystctl fit {} --model preisach -o finer.json", names.join(" "))],
+            );
+        }
+        RemainderKind::BaseCapacity if finer => {
             let (files, test) = (files(c.train), test_option(c));
             let reading = further(&c.reading);
             advise(

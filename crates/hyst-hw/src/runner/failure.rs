@@ -91,10 +91,11 @@ pub struct Failure<E> {
 impl<E: std::error::Error> std::fmt::Display for Failure<E> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.cause.fmt(f)?;
-        match &self.not_stopped {
-            Some(error) => write!(f, "; the device could not be stopped and may still be driven: {error}"),
-            None => Ok(()),
-        }
+        let Some(error) = &self.not_stopped else { return Ok(()) };
+        f.write_str("; the device could not be stopped and may still be driven")?;
+        // What is gone is gone for the stop too.
+        let (why, error) = (self.cause.to_string(), error.to_string());
+        if error == why { Ok(()) } else { write!(f, ": {error}") }
     }
 }
 
@@ -130,5 +131,7 @@ mod tests {
         assert_eq!(segment.to_string(), "drive segment 2 is empty");
         let driven = Failure { not_stopped: Some(CableOut(std::fmt::Error)), ..segment };
         assert!(driven.to_string().ends_with("may still be driven: cable out"), "{driven}");
+        let twice = Failure { cause: Cause::Device(CableOut(std::fmt::Error)), ..driven };
+        assert_eq!(twice.to_string(), "cable out; the device could not be stopped and may still be driven");
     }
 }

@@ -10,8 +10,12 @@ use crate::nested::Hypothesis;
 use crate::record::OutputUnit;
 use crate::simulate::{Zero, simulate};
 
+/// A model misses by as much more than in the record of its own fit before it is the device that is asked.
+const MORE_THAN_FITTED: f64 = 1.5;
+
 /// A device that is no longer the one of the fit misses in the same way as a base that is too coarse does: a richer one would take it. But so
-/// would the same base with other weights, which a coarse one does not. `start` is what the model holds, `noise` the floor \[output unit\].
+/// would the same base with other weights, and it misses by more than it did in the record of its fit; a coarse base may follow a small part
+/// of that record better with other weights too, but misses there as it always did. `start` is what the model holds, `noise` the floor \[output unit\].
 pub(super) fn told_apart(
     own: &Own<'_>,
     start: &Hypothesis,
@@ -19,7 +23,8 @@ pub(super) fn told_apart(
     zero: Zero,
     left: Remainder,
 ) -> Result<Remainder, FitError> {
-    if left.kind != RemainderKind::BaseCapacity {
+    let (Some(fitted), Some(errors)) = (own.model.rmse, &own.before.errors) else { return Ok(left) };
+    if left.kind != RemainderKind::BaseCapacity || errors.rmse <= MORE_THAN_FITTED * fitted {
         return Ok(left);
     }
     let again = simulate(&own.extended(start, &BTreeMap::new())?, own.train, zero)?;

@@ -59,8 +59,14 @@ impl Shape {
     /// What `path` names, if it is a shape and no file.
     pub(super) fn named(path: &Path) -> CommandResult<Option<Self>> {
         let Some(text) = path.to_str().filter(|_| !path.exists()) else { return Ok(None) };
-        if !["sine:", "triangle:", "steps:"].iter().any(|form| text.starts_with(form)) {
-            return Ok(None);
+        let Some((form, _)) = text.split_once(':') else { return Ok(None) };
+        if !["sine", "triangle", "steps"].contains(&form) {
+            // Windows has drives of one letter.
+            let word = form.len() > 1 && form.chars().all(|c| c.is_ascii_alphabetic());
+            let message = format!(
+                "{text}: there is no such file, and no form \"{form}\": give sine, triangle or steps, as sine:2,12,5,10"
+            );
+            return if word { Err(CommandError::bad_input(message)) } else { Ok(None) };
         }
         text.parse()
             .map(Some)
