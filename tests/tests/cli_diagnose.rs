@@ -94,7 +94,8 @@ fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
 
     let ran = lab.ok("diagnose tired.csv --model extended.json -o same.json --findings tired.json");
     let findings: Value = serde_json::from_str(&lab.read("tired.json")).unwrap();
-    assert_eq!((&findings["verdict"], &findings["remainder"]["kind"]), (&"changed".into(), &"changed".into()));
+    assert!(ran.stdout.starts_with("changed: the device"), "{}", ran.stdout);
+    assert_eq!((&findings["verdict"], &findings["remainder"]["change"]), (&"base-too-coarse".into(), &"device".into()));
     assert!((number(&ran.stdout, "its output is ") - 0.9).abs() < 0.01, "{}", ran.stdout);
     assert!(ran.stdout.contains("  hystctl fit tired.csv --model pi -o refitted.json"), "{}", ran.stdout);
     assert!(ran.stdout.contains("the same model, nothing was added: same.json"), "{}", ran.stdout);
@@ -107,12 +108,13 @@ fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
 
     let ran = lab.ok("diagnose zeroed.csv --model extended.json --findings zeroed.json");
     let findings: Value = serde_json::from_str(&lab.read("zeroed.json")).unwrap();
-    assert_eq!((&findings["verdict"], &findings["remainder"]["kind"]), (&"changed".into(), &"other-zero".into()));
+    assert!(ran.stdout.starts_with("changed: the sensor's zero"), "{}", ran.stdout);
+    assert_eq!((&findings["verdict"], &findings["remainder"]["change"]), (&"base-too-coarse".into(), &"zero".into()));
     assert!((number(&ran.stdout, "zero stands ") - 2.0).abs() < 0.1, "{}", ran.stdout);
     let advised = "hystctl diagnose zeroed.csv --zero per-record --model extended.json";
     assert!(ran.stdout.contains(advised), "{}", ran.stdout);
     let findings = lab.ok("diagnose zeroed.csv --zero per-record --model extended.json --json").json();
-    assert_ne!(findings["verdict"], "changed");
+    assert_eq!(findings["remainder"]["change"], Value::Null);
 }
 
 #[test]

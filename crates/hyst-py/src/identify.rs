@@ -153,7 +153,7 @@ impl Diagnosis {
         parse(py, &json)
     }
 
-    /// ``explained``, ``nothing-missing``, ``base-too-coarse``, ``changed`` or ``unexplained``.
+    /// ``explained``, ``nothing-missing``, ``base-too-coarse`` or ``unexplained``.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.findings(py)?.get_item("verdict")

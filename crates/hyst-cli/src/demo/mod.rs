@@ -238,7 +238,6 @@ fn verdict(v: Verdict) -> &'static str {
         Verdict::Explained => "explained",
         Verdict::NothingMissing => "the model is at the noise floor",
         Verdict::BaseTooCoarse => "the base is too coarse",
-        Verdict::Changed => "the device is another one",
         Verdict::Unexplained => "something is left that nothing on the list explains",
     }
 }

@@ -11,7 +11,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     page.section("left", "What is left");
     let remainder = &c.diagnosis.findings.remainder;
     let share = percent(100.0 * remainder.variance_share);
-    page.paragraph("verdict", &format!("{}, {share} of the output's variance", words::kind(remainder.kind)));
+    page.paragraph("verdict", &format!("{}, {share} of the output's variance", words::kind(remainder)));
     page.paragraph("", &remainder.description);
     page.list(&remainder.places);
     if remainder.kind != RemainderKind::None {

@@ -1,6 +1,6 @@
 //! The experiment or the fit that would tell more, as a command.
 
-use hyst_ident::diagnose::{RemainderKind, Verdict};
+use hyst_ident::diagnose::{Change, RemainderKind, Verdict};
 use hyst_ident::model::{Effect, Kind};
 
 use hyst_ident::record::Record;
@@ -56,6 +56,30 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
     let finer = c.model.base.kind() != Kind::Preisach && !drags;
     match f.remainder.kind {
+        RemainderKind::BaseCapacity if f.remainder.change == Some(Change::Zero) => {
+            let (files, test) = (files(c.train), test_option(c));
+            let reading = further(&c.reading);
+            let model = quoted(c.model_file);
+            advise(
+                "A zero that each record has of its own is taken from its measured output:",
+                &[format!("hystctl diagnose {files}{test}{reading} --zero per-record --model {model}")],
+            );
+        }
+        RemainderKind::BaseCapacity if f.remainder.change == Some(Change::Device) => {
+            let (files, test) = (files(c.train), test_option(c));
+            let (reading, kind) = (further(&c.reading), c.model.base.kind().name());
+            advise(
+                "The same kind of model, fitted to what the device is now, and its diagnosis:",
+                &[
+                    format!("hystctl fit {files}{reading} --model {kind} -o refitted.json"),
+                    format!("hystctl diagnose {files}{test}{reading} --model refitted.json -o refitted-extended.json"),
+                ],
+            );
+            advise(
+                "Where this record does not show every effect, record one that does before:",
+                &[identification(c, "")],
+            );
+        }
         // A few loops of a run show less than the record of the fit did.
         RemainderKind::BaseCapacity
             if finer && !c.model.fitted_on.is_empty() && !input::was_fitted_to(c.model, c.train) =>
@@ -83,30 +107,6 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
             advise(
                 "Most of what is left is the base's own misfit, and there is no finer base that can be diagnosed.",
                 &[],
-            );
-        }
-        RemainderKind::OtherZero => {
-            let (files, test) = (files(c.train), test_option(c));
-            let reading = further(&c.reading);
-            let model = quoted(c.model_file);
-            advise(
-                "A zero that each record has of its own is taken from its measured output:",
-                &[format!("hystctl diagnose {files}{test}{reading} --zero per-record --model {model}")],
-            );
-        }
-        RemainderKind::Changed => {
-            let (files, test) = (files(c.train), test_option(c));
-            let (reading, kind) = (further(&c.reading), c.model.base.kind().name());
-            advise(
-                "The same kind of model, fitted to what the device is now, and its diagnosis:",
-                &[
-                    format!("hystctl fit {files}{reading} --model {kind} -o refitted.json"),
-                    format!("hystctl diagnose {files}{test}{reading} --model refitted.json -o refitted-extended.json"),
-                ],
-            );
-            advise(
-                "Where this record does not show every effect, record one that does before:",
-                &[identification(c, "")],
             );
         }
         RemainderKind::Unexplained

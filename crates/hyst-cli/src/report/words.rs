@@ -2,29 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use hyst_ident::diagnose::{Finding, Findings, Found, RemainderKind, Verdict};
+use hyst_ident::diagnose::{Change, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
 
 use crate::text::{count, listed, symbol, with_error};
 
 /// The diagnosis in a sentence.
 pub(crate) fn verdict(findings: &Findings) -> String {
-    match findings.verdict {
-        Verdict::Explained => {
+    match (findings.verdict, findings.remainder.change) {
+        (Verdict::Explained, _) => {
             let mut names: Vec<String> = findings.effects.iter().map(with_ties).collect();
             names.dedup();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let part = if findings.remainder.kind == RemainderKind::None { "" } else { " in part" };
             format!("explained{part}: the model lacks {}", listed(&names))
         }
-        Verdict::NothingMissing => "nothing missing: the model is at the noise floor".to_owned(),
-        Verdict::BaseTooCoarse => {
-            "base too coarse: what is left is a map of the input's history that a richer base would take".to_owned()
-        }
-        Verdict::Changed if findings.remainder.kind == RemainderKind::OtherZero => {
+        (Verdict::NothingMissing, _) => "nothing missing: the model is at the noise floor".to_owned(),
+        (Verdict::BaseTooCoarse, Some(Change::Zero)) => {
             "changed: the sensor's zero is not that of the record that the model was fitted to".to_owned()
         }
-        Verdict::Changed => "changed: the device no longer does what the model was fitted to".to_owned(),
-        Verdict::Unexplained => "unexplained: what is left is none of the effects that are looked for".to_owned(),
+        (Verdict::BaseTooCoarse, Some(Change::Device)) => {
+            "changed: the device no longer does what the model was fitted to".to_owned()
+        }
+        (Verdict::BaseTooCoarse, None) => {
+            "base too coarse: what is left is a map of the input's history that a richer base would take".to_owned()
+        }
+        (Verdict::Unexplained, _) => "unexplained: what is left is none of the effects that are looked for".to_owned(),
     }
 }
 
@@ -35,13 +37,13 @@ fn with_ties(effect: &Finding) -> String {
 }
 
 /// What kind of remainder it is.
-pub(crate) fn kind(kind: RemainderKind) -> &'static str {
-    match kind {
-        RemainderKind::None => "noise",
-        RemainderKind::BaseCapacity => "the base's own misfit",
-        RemainderKind::OtherZero => "another zero",
-        RemainderKind::Changed => "a change of the device",
-        RemainderKind::Unexplained => "unexplained",
+pub(crate) fn kind(remainder: &Remainder) -> &'static str {
+    match (remainder.kind, remainder.change) {
+        (RemainderKind::None, _) => "noise",
+        (RemainderKind::BaseCapacity, None) => "the base's own misfit",
+        (RemainderKind::BaseCapacity, Some(Change::Zero)) => "another zero",
+        (RemainderKind::BaseCapacity, Some(Change::Device)) => "a change of the device",
+        (RemainderKind::Unexplained, _) => "unexplained",
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::extension::Own;
-use super::findings::{Remainder, RemainderKind};
+use super::findings::{Change, Remainder, RemainderKind};
 use super::remainder::RICHER;
 use crate::fit::FitError;
 use crate::nested::Hypothesis;
@@ -44,14 +44,14 @@ pub(super) fn told_apart(
             "most of it is one constant: the sensor's zero stands {:+.4} {unit} from that of the record that the model was fitted to",
             line.mean
         );
-        Remainder { kind: RemainderKind::OtherZero, description, ..left }
+        Remainder { change: Some(Change::Zero), description, ..left }
     } else {
         let description = format!(
             "the same model, fitted to this record, would leave {:.4} {unit} where it leaves {:.4} {unit}: the device is no longer the one that \
              it was fitted to (its output is {:.3} × what the model says, {:+.4} {unit} beside it)",
             after.rmse, before.rmse, line.slope, line.offset
         );
-        Remainder { kind: RemainderKind::Changed, description, ..left }
+        Remainder { change: Some(Change::Device), description, ..left }
     })
 }
 

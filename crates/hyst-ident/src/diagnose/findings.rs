@@ -25,8 +25,6 @@ pub enum Verdict {
     NothingMissing,
     /// A richer base would take what is left.
     BaseTooCoarse,
-    /// The device, or its sensor's zero, is no longer what the model was fitted to: the same model, fitted anew, takes most of what is left.
-    Changed,
     /// Something is left that nothing on the list explains.
     Unexplained,
 }
@@ -39,12 +37,18 @@ pub enum RemainderKind {
     None,
     /// The base's own misfit.
     BaseCapacity,
-    /// Another zero of the sensor than in the record of the fit.
-    OtherZero,
-    /// Another device than that of the fit, or the same after a change.
-    Changed,
     /// Unknown.
     Unexplained,
+}
+
+/// What is no longer as it was in the record that a model was fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Change {
+    /// The sensor's zero alone.
+    Zero,
+    /// The device: it is another one, or the same with another gain or shape.
+    Device,
 }
 
 /// What is left after everything that was found.
@@ -54,6 +58,9 @@ pub struct Remainder {
     pub kind: RemainderKind,
     /// Share of the output's variance.
     pub variance_share: f64,
+    /// Of what a richer base would take: what the same base would take too, fitted anew, since something has changed since the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub change: Option<Change>,
     /// In words.
     pub description: String,
     /// Where it lives, in sentences; none if it is noise.
@@ -169,7 +176,6 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         (false, _) => Verdict::Explained,
         (true, RemainderKind::None) => Verdict::NothingMissing,
         (true, RemainderKind::BaseCapacity) => Verdict::BaseTooCoarse,
-        (true, RemainderKind::OtherZero | RemainderKind::Changed) => Verdict::Changed,
         (true, RemainderKind::Unexplained) => Verdict::Unexplained,
     };
     let on = |train: &Simulation, test: Option<&Simulation>| OnRecords {

@@ -25,7 +25,7 @@ mod uncertainty;
 
 pub use evidence::{Axis, Breakdown, Curve, MOST_POINTS, Mark, Part, Picture, Role, Style};
 pub use findings::{
-    Alternative, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
+    Alternative, Change, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
 };
 
 use extension::Own;

@@ -25,7 +25,13 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
     let mean = settled().sum::<f64>() / n;
     let variance = settled().map(|y| (y - mean) * (y - mean)).sum::<f64>() / n;
     let share = rmse * rmse / variance.max(f64::MIN_POSITIVE);
-    let left = |kind, description: String| Remainder { kind, variance_share: share, description, places: Vec::new() };
+    let left = |kind, description: String| Remainder {
+        kind,
+        variance_share: share,
+        change: None,
+        description,
+        places: Vec::new(),
+    };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     if h.zero_wanders || h.gain_wanders {
         let what = match (h.zero_wanders, h.gain_wanders) {
@@ -85,7 +91,7 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
 impl Remainder {
     /// With what else has to be said: that the record repeats one loop \[Hz\], and which effects of a rich base do not help this one.
     pub(super) fn beside(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
-        let of_shapes = matches!(self.kind, RemainderKind::BaseCapacity | RemainderKind::Unexplained);
+        let of_shapes = self.kind != RemainderKind::None && self.change.is_none();
         if let Some(hz) = only_loop.filter(|_| of_shapes) {
             self.description += &format!(
                 "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"

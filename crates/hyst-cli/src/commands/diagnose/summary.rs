@@ -26,7 +26,7 @@ pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
         let _ = write!(text, "\n{}", finding(effect, unit));
     }
     let remainder = &findings.remainder;
-    let kind = words::kind(remainder.kind);
+    let kind = words::kind(remainder);
     let share = percent(100.0 * remainder.variance_share);
     let _ = writeln!(text, "\nremainder: {kind}, {share} of the output's variance\n  {}", remainder.description);
     for place in &remainder.places {
