@@ -293,6 +293,31 @@ fn an_emergency_stop_brings_a_device_to_rest_and_keeps_it_there() {
     assert!(said.contains("none to clear"), "{said}");
 }
 
+/// As on a bus, who sees that something goes wrong stops what somebody else has started.
+#[test]
+fn an_emergency_stop_from_another_terminal_ends_a_run() {
+    let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
+    lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.05 --cycles 1 -o u.csv"));
+    let line = format!("run --daq {} --drive u.csv --record y.csv --slew 100 {PATIENT}", device.daq());
+    let mut host = lab.command(&line).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    while device.put_out().last().is_none_or(|v| *v < 30.0) {
+        sleep(Duration::from_millis(20));
+        assert!(host.try_wait().unwrap().is_none(), "the run has ended by itself");
+    }
+    let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
+    assert!(said.contains(": runs\n"), "{said}");
+    lab.ok(&format!("stop --daq {}", device.daq()));
+    let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
+    assert!(said.contains("fault 2"), "{said}");
+    let ended = host.wait_with_output().unwrap();
+    let message = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(3), "{message}");
+    assert!(message.contains("fault 2") && message.contains("y.csv"), "{message}");
+    while device.put_out().last() != Some(&0.0) {
+        sleep(Duration::from_millis(20));
+    }
+}
+
 #[test]
 fn a_run_that_gets_too_hot_or_astray_is_ended_with_a_code_and_a_sentence() {
     let lab = Lab::with_model();

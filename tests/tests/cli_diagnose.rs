@@ -117,6 +117,19 @@ fn a_device_that_has_changed_and_a_zero_that_has_are_told() {
     assert_eq!(findings["remainder"]["change"], Value::Null);
 }
 
+/// A model of small loops knows nothing of large ones, and the device is the same.
+#[test]
+fn a_record_beyond_the_range_of_the_fit_is_no_changed_device() {
+    let lab = lab();
+    lab.ok("excite identification --low 0 --high 30 --rate 1000 -o small.csv");
+    lab.ok("run --daq sim:plant.toml --drive small.csv --record small-train.csv");
+    lab.ok("fit small-train.csv --model pi -o small.json");
+    lab.ok("diagnose small-train.csv --model small.json -o small-extended.json");
+    let ran = lab.ok("diagnose train.csv --model small-extended.json --json");
+    assert_eq!(ran.json()["remainder"]["change"], Value::Null, "{ran:?}");
+    assert!(ran.stdout.contains("beyond 0.0000 to 30.0000 V"), "{}", ran.stdout);
+}
+
 #[test]
 fn outputs_have_places_of_their_own() {
     let lab = lab();

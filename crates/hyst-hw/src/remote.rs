@@ -168,6 +168,16 @@ pub enum RemoteError {
         /// How long was waited \[s\].
         seconds: f64,
     },
+    /// The device answers and does nothing.
+    #[error(
+        "{line}: the device answers and has neither played nor measured anything for {seconds} s: its clock stands, and with it its watchdog; switch its amplifier off"
+    )]
+    Stands {
+        /// What the line is called.
+        line: String,
+        /// How long was waited \[s\].
+        seconds: f64,
+    },
     /// A rate that the device does not run at.
     #[error(
         "{line}: {asked_hz} Hz; the device runs at {low_hz} to {high_hz} Hz: bring the record to such a rate (excite, record and references like sine: take --rate)"
@@ -448,7 +458,9 @@ impl<L: Line> Remote<L> {
         loop {
             match self.stated(Ask::Clear) {
                 // The ramp is as steep as the run that has ended was to be, which nobody here knows.
-                Err(RemoteError::Standing { .. }) if self.since(moved) < LONGEST_REST => {
+                Err(RemoteError::Standing { .. } | RemoteError::Refused { refusal: Refusal::State, .. })
+                    if self.since(moved) < LONGEST_REST =>
+                {
                     self.line.pause(Duration::from_millis(20));
                     let now_v = self.status()?.present_v;
                     if now_v != at_v {
@@ -458,6 +470,14 @@ impl<L: Line> Remote<L> {
                 told => return told.map(|_| fault),
             }
         }
+    }
+
+    /// That a device which answers has done something at last: one whose clock has stopped has no watchdog either.
+    fn goes_on(&self, taken: usize, measured: &[Sample]) -> Result<(), RemoteError> {
+        if taken > 0 || !measured.is_empty() {
+            return Ok(());
+        }
+        Err(RemoteError::Stands { line: self.name.clone(), seconds: self.lost().as_secs_f64() })
     }
 
     /// How long to go without an answer: a slow clock gives no news for a while.
@@ -780,10 +800,14 @@ impl<L: Line> Daq for Remote<L> {
         while sent < total {
             nobody.clear();
             let block: Vec<f64> = (sent..total.min(sent + MOST_DRIVES)).map(volts).collect();
-            sent += self.trade_until_news(&block, &mut nobody)?;
+            let taken = self.trade_until_news(&block, &mut nobody)?;
+            self.goes_on(taken, &nobody)?;
+            sent += taken;
         }
         while self.run.is_some_and(|run| run.heard != run.sent) {
-            self.trade_until_news(&[], &mut nobody)?;
+            nobody.clear();
+            let taken = self.trade_until_news(&[], &mut nobody)?;
+            self.goes_on(taken, &nobody)?;
         }
         Ok(())
     }

@@ -1,19 +1,74 @@
 //! A device made of software, behind a line: for trying and testing what runs on hosts.
 
-use std::io;
-use std::net::TcpListener;
+use std::io::{self, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::Scope;
 use std::time::{Duration, Instant};
 
 use crate::daq::{Daq, Sample};
 use crate::plant::Plant;
 use crate::plant::error::PlantError;
-use crate::remote::{Line, Tcp};
+use crate::remote::Line;
 use crate::wire::{Board, Control, Deframer, Device, Identity, MAX_FRAME, MOST_NAME, Request, Shown, Unit, encode};
 
 /// Periods that are made up for when this computer was late; more than that the device's clock loses.
 const MOST_LATE: u32 = 1000;
 /// Of them, those that are made up for before the line is heard again: a host would seem silent that was not.
 const AT_ONCE: u32 = 20;
+/// Hosts at a time; another is hung up on.
+const MOST_HOSTS: usize = 8;
+
+/// The host's clock as the device's.
+struct Pace {
+    due: Instant,
+}
+
+impl Pace {
+    fn new() -> Self {
+        Self { due: Instant::now() }
+    }
+
+    /// Makes up for what has passed, and gives how long there is until the next period.
+    fn follow<C: Control, const Q: usize, const M: usize>(
+        &mut self,
+        device: &mut Device<C, Q, M>,
+        board: &mut impl Board,
+    ) -> Duration {
+        let period = Duration::from_secs_f64(1.0 / f64::from(device.rate_hz().max(1.0)));
+        let mut late = 0;
+        while late < AT_ONCE && self.due <= Instant::now() {
+            device.tick(board);
+            self.due += period;
+            late += 1;
+        }
+        if Instant::now().saturating_duration_since(self.due) > period * MOST_LATE {
+            self.due = Instant::now();
+        }
+        self.due.saturating_duration_since(Instant::now())
+    }
+
+    /// Answers what has come.
+    fn answer<C: Control, const Q: usize, const M: usize>(
+        &mut self,
+        device: &mut Device<C, Q, M>,
+        deframer: &mut Deframer,
+        mut fresh: &[u8],
+        mut send: impl FnMut(&[u8]) -> io::Result<()>,
+    ) -> io::Result<()> {
+        while let Some(request) = deframer.next::<Request>(&mut fresh) {
+            // What was changed on the way is asked again.
+            let Ok(request) = request else { continue };
+            let before = device.rate_hz();
+            let reply = device.answer(&request);
+            if device.rate_hz() != before {
+                self.due = Instant::now();
+            }
+            send(encode(&reply, &mut [0; MAX_FRAME]).map_err(io::Error::other)?)?;
+        }
+        Ok(())
+    }
+}
 
 /// Serves a device at `line` on the host's clock, until `stop` says so or the line is gone.
 ///
@@ -25,39 +80,53 @@ pub fn serve<C: Control, const Q: usize, const M: usize>(
     line: &mut impl Line,
     mut stop: impl FnMut() -> bool,
 ) -> io::Result<()> {
-    let (mut deframer, mut bytes, mut frame) = (Deframer::new(), [0; 4096], [0; MAX_FRAME]);
-    let mut due = Instant::now();
+    let (mut deframer, mut bytes, mut pace) = (Deframer::new(), [0; 4096], Pace::new());
     while !stop() {
-        let period = Duration::from_secs_f64(1.0 / f64::from(device.rate_hz().max(1.0)));
-        let mut late = 0;
-        while late < AT_ONCE && due <= Instant::now() {
-            device.tick(board);
-            due += period;
-            late += 1;
-        }
-        if Instant::now().saturating_duration_since(due) > period * MOST_LATE {
-            due = Instant::now();
-        }
-        let patience = due.saturating_duration_since(Instant::now());
+        let patience = pace.follow(device, board);
         let came = line.receive(&mut bytes, patience)?;
-        let mut fresh = &bytes[..came];
-        while let Some(request) = deframer.next::<Request>(&mut fresh) {
-            // What was changed on the way is asked again.
-            let Ok(request) = request else { continue };
-            let before = device.rate_hz();
-            let reply = device.answer(&request);
-            if device.rate_hz() != before {
-                due = Instant::now();
-            }
-            let bytes = encode(&reply, &mut frame).map_err(io::Error::other)?;
-            line.send(bytes)?;
-        }
+        pace.answer(device, &mut deframer, &bytes[..came], |frame| line.send(frame))?;
     }
     Ok(())
 }
 
-/// Serves a device to whoever comes to `listener`, one after the other, until `stop` says so. Between two of them its clock goes on, and with it
-/// its watchdog.
+/// What a host's socket has to say: its number, and what came, or nothing when it is gone.
+type Heard = (usize, Option<Vec<u8>>);
+
+/// A host at a socket.
+struct Host {
+    number: usize,
+    stream: TcpStream,
+    deframer: Deframer,
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // Who reads from it hears the end.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+impl Host {
+    /// With a thread that reads from it.
+    fn new<'s>(threads: &'s Scope<'s, '_>, number: usize, stream: TcpStream, heard: Sender<Heard>) -> io::Result<Self> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        let mut reader = stream.try_clone()?;
+        threads.spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(came @ 1..) = reader.read(&mut bytes) {
+                if heard.send((number, Some(bytes[..came].to_vec()))).is_err() {
+                    return;
+                }
+            }
+            let _ = heard.send((number, None));
+        });
+        Ok(Self { number, stream, deframer: Deframer::new() })
+    }
+}
+
+/// Serves a device to all who come to `listener` until `stop` says so: as on a bus, one may stop what another has started. Its clock goes on
+/// without any of them, and with it its watchdog.
 ///
 /// # Errors
 /// When the listener cannot be asked without waiting.
@@ -68,33 +137,34 @@ pub fn serve_at<C: Control, const Q: usize, const M: usize>(
     mut stop: impl FnMut() -> bool,
 ) -> io::Result<()> {
     listener.set_nonblocking(true)?;
-    while !stop() {
-        let mut host = None;
-        serve(device, board, &mut Nobody, || {
-            host = listener.accept().ok();
-            host.is_some() || stop()
-        })?;
-        if let Some((stream, _)) = host {
-            stream.set_nonblocking(false)?;
-            // A host that is gone is no end.
-            let _ = Tcp::over(stream).and_then(|mut line| serve(device, board, &mut line, &mut stop));
+    let (heard, inbox): (Sender<Heard>, Receiver<Heard>) = channel();
+    std::thread::scope(|threads| {
+        let (mut hosts, mut next, mut pace) = (Vec::<Host>::new(), 0, Pace::new());
+        while !stop() {
+            let patience = pace.follow(device, board);
+            if let Ok((stream, _)) = listener.accept()
+                && hosts.len() < MOST_HOSTS
+            {
+                // A host that is gone already is no end.
+                hosts.extend(Host::new(threads, next, stream, heard.clone()));
+                next += 1;
+            }
+            let (number, came) = match inbox.recv_timeout(patience) {
+                Ok(heard) => heard,
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => continue,
+            };
+            let Some(at) = hosts.iter().position(|host| host.number == number) else { continue };
+            let Host { stream, deframer, .. } = &mut hosts[at];
+            let answered = match came {
+                Some(bytes) => pace.answer(device, deframer, &bytes, |frame| stream.write_all(frame)),
+                None => Err(io::ErrorKind::UnexpectedEof.into()),
+            };
+            if answered.is_err() {
+                hosts.swap_remove(at);
+            }
         }
-    }
-    Ok(())
-}
-
-/// A line without a host.
-struct Nobody;
-
-impl Line for Nobody {
-    fn send(&mut self, _: &[u8]) -> io::Result<()> {
         Ok(())
-    }
-
-    fn receive(&mut self, _: &mut [u8], patience: Duration) -> io::Result<usize> {
-        std::thread::sleep(patience);
-        Ok(0)
-    }
+    })
 }
 
 /// The simulated plant as amplifier and sensors.

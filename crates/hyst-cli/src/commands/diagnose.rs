@@ -47,6 +47,7 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         diagnosis: &diagnosis,
         model: &model,
         model_file: &args.model.file_name().map_or_else(|| "model".into(), |name| name.to_string_lossy()),
+        model_path: &args.model.display().to_string(),
         model_sha256: &format!("{:x}", Sha256::digest(&model_text)),
         extended_file: extended_file.as_deref(),
         train: &train,

@@ -367,10 +367,11 @@ impl Summary {
             let mut line = format!(
                 "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
             );
-            if t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
+            // Without the inverse it is the hysteresis, with feedback a limit or a loop that is too slow.
+            if self.control == Some(Control::Feedforward) && t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
+                let (above, offset) = (if t.mean < 0.0 { "below" } else { "above" }, short(t.mean.abs()));
                 line += &format!(
-                    "\n          most of it is an offset of {:+.4} {unit}, about which RMSE {} {unit} is left: the sensor's zero, or what earlier runs have left in the actuator; pid takes it",
-                    t.mean,
+                    "\n          most of it is an offset: it stands {offset} {unit} {above} the reference, and RMSE {} {unit} is left about that; the sensor's zero, or what earlier runs have left in the actuator (--control pid+feedforward takes it)",
                     short(t.rmse_about_mean)
                 );
             }

@@ -87,7 +87,9 @@ impl Summary {
     fn text(&self) -> String {
         let short = text::short;
         let (volts, output) = (short(self.present_v.into()), short(self.output.into()));
+        let moves = f64::from(self.present_v) != self.rest_v;
         let stands = match (self.state, &self.fault) {
+            (_, Some(Stated { code, text })) if moves => format!("still on its way to rest after fault {code}: {text}"),
             (_, Some(Stated { code, text })) => format!(
                 "stands with fault {code}: {text}; when that is mended, clear it (hystctl stop --clear, or run --clear)"
             ),
@@ -103,7 +105,12 @@ impl Summary {
         let loops = if self.follows { "; takes a controller" } else { "" };
         format!(
             "{}: {stands}\nputs out {volts} V, shows {output} {}\ncan do {} to {} V, rests at {} V, at most {} V/s, {rates}{loops}",
-            self.device, self.symbol, self.low_v, self.high_v, self.rest_v, self.max_slew_v_per_s
+            self.device,
+            self.symbol,
+            short(self.low_v),
+            short(self.high_v),
+            short(self.rest_v),
+            short(self.max_slew_v_per_s)
         )
     }
 }

@@ -7,6 +7,7 @@ use crate::cli::StopArgs;
 use crate::device::{AnyDevice, Wishes};
 use crate::exit::CommandResult;
 use crate::output::Report;
+use crate::text;
 
 use super::status::Stated;
 
@@ -32,12 +33,14 @@ pub(super) fn run(args: &StopArgs) -> CommandResult {
             Some(Stated { code, text }) => format!("; cleared was fault {code}: {text}"),
             None => "; there was none to clear".to_owned(),
         };
-        let said = format!("{device}: stands at {present_v} V without a fault, and can be started{was}");
+        let volts = text::short(present_v);
+        let said = format!("{device}: stands at {volts} V without a fault, and can be started{was}");
         return report.print(&said, &Summary { device, present_v, cleared: true, fault });
     }
     let (device, present_v) = AnyDevice::emergency_stop(&args.daq)?;
+    let volts = text::short(present_v);
     let said = format!(
-        "{device}: comes to rest from {present_v} V, and starts again only once its fault is cleared (hystctl stop --clear, or run --clear)"
+        "{device}: comes to rest from {volts} V, and starts again only once its fault is cleared (hystctl stop --clear, or run --clear)"
     );
     report.print(&said, &Summary { device, present_v, cleared: false, fault: None })
 }

@@ -25,6 +25,8 @@ pub(crate) struct Contents<'a> {
     /// The model as it was given, and the name of its file.
     pub(crate) model: &'a Model,
     pub(crate) model_file: &'a str,
+    /// The same file as it was given.
+    pub(crate) model_path: &'a str,
     pub(crate) model_sha256: &'a str,
     /// The file of the extended model, if it is written to one.
     pub(crate) extended_file: Option<&'a str>,

@@ -59,7 +59,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         RemainderKind::BaseCapacity if f.remainder.change == Some(Change::Zero) => {
             let (files, test) = (files(c.train), test_option(c));
             let reading = further(&c.reading);
-            let model = quoted(c.model_file);
+            let model = quoted(c.model_path);
             advise(
                 "A zero that each record has of its own is taken from its measured output:",
                 &[format!("hystctl diagnose {files}{test}{reading} --zero per-record --model {model}")],
@@ -86,7 +86,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         {
             let names: Vec<String> = c.model.fitted_on.iter().map(|file| quoted(&file.file)).collect();
             advise(
-                "Most of what is left is the base's own misfit. A finer base is best fitted to what this one was fitted to:",
+                "Most of what is left is the base's own misfit. A finer base is best fitted to what this one was fitted to (from its folder, with the same --map), or to a new record of the whole range:",
                 &[format!("hystctl fit {} --model preisach -o finer.json", names.join(" "))],
             );
         }

@@ -12,33 +12,36 @@ const SLOWER: u32 = 2;
 /// A line that takes longer for an answer than the wait would be filled with requests that nobody needs, each with an answer of its own. Those
 /// are how it is known: what was sent twice and answered once was lost on the way, which says nothing of how long an answer takes (Karn's rule
 /// in RFC 6298), and a wait that lost frames made longer would lose more time with each. What was answered twice was waited for too shortly.
+/// Until the next answer has come, by which all of the line's others have, a request that was sent twice counts as waited for too shortly.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Retransmit {
     round_trips: [Duration; LATELY],
     next: usize,
-    /// A request that was sent more than once, and how long after the first time an answer came.
-    doubtful: Option<(u32, Duration)>,
+    doubtful: Option<Doubtful>,
+}
+
+/// A request that was sent more than once, and what stood where it was put down.
+#[derive(Clone, Copy, Debug)]
+struct Doubtful {
+    number: u32,
+    before: Duration,
 }
 
 impl Retransmit {
     /// An answer came so long after its request was first sent, after it was sent so often.
     pub(super) fn answered(&mut self, number: u32, sent: u32, took: Duration) {
-        self.doubtful = (sent > 1).then_some((number, took));
-        if sent == 1 {
-            self.observe(took);
+        if let Some(lost) = self.doubtful.take() {
+            self.next = (self.next + LATELY - 1) % LATELY;
+            self.round_trips[self.next] = lost.before;
         }
+        self.doubtful = (sent > 1).then_some(Doubtful { number, before: self.round_trips[self.next] });
+        self.round_trips[self.next] = took;
+        self.next = (self.next + 1) % LATELY;
     }
 
     /// An answer came to a request that had one already.
     pub(super) fn answered_again(&mut self, number: u32) {
-        if let Some((_, took)) = self.doubtful.take_if(|doubtful| doubtful.0 == number) {
-            self.observe(took);
-        }
-    }
-
-    fn observe(&mut self, took: Duration) {
-        self.round_trips[self.next] = took;
-        self.next = (self.next + 1) % LATELY;
+        self.doubtful = self.doubtful.filter(|doubtful| doubtful.number != number);
     }
 
     /// How long to wait first: `usual` on a quick line, and no longer than `most`.

@@ -72,6 +72,8 @@ struct Bench {
     late: Vec<Vec<u8>>,
     answers: VecDeque<u8>,
     cut: bool,
+    /// Its clock stands: it answers and does nothing.
+    frozen: bool,
 }
 
 impl Bench {
@@ -85,10 +87,12 @@ impl Bench {
             late: Vec::new(),
             answers: VecDeque::new(),
             cut: false,
+            frozen: false,
         }
     }
 
     fn pass(&mut self, periods: u32) {
+        let periods = if self.frozen { 0 } else { periods };
         (0..periods).for_each(|_| self.device.tick(&mut self.board));
     }
 
@@ -428,6 +432,14 @@ fn a_slow_line_with_accidents_costs_gaps_and_no_run() {
     }
 }
 
+/// A line with hardly room for the rate, and an answer takes most of the time for which the device may hear nothing.
+#[test]
+fn a_lost_frame_on_a_line_that_is_nearly_too_slow_costs_gaps_and_no_run() {
+    for seed in 0..10 {
+        Slow::new(19_200.0, 30, seed).run(50.0, 0.5);
+    }
+}
+
 /// A wait that lost frames made long would lose more time with each frame that is lost, until the line counts as cut.
 #[test]
 fn a_line_that_loses_most_frames_is_asked_as_quickly_as_before() {
@@ -495,6 +507,50 @@ fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
     assert_eq!(remote.clear().unwrap(), Some(Fault::Emergency));
     assert_eq!(remote.clear().unwrap(), None);
     assert_eq!(slow.bench.board.volts, 0.0);
+}
+
+/// Why a device came to rest is worth more than that it was asked to.
+#[test]
+fn an_emergency_stop_keeps_the_fault_that_is_there() {
+    let mut bench = Bench::new(0, 1);
+    let cool = RemoteOptions { hottest_degc: 10.0, ..options() };
+    let mut remote = Remote::open(&mut bench, "bench", cool).unwrap();
+    remote.start(1000.0).unwrap();
+    let failed = remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap_err();
+    let RemoteError::Fault { fault, .. } = failed else { panic!("{failed}") };
+    remote.emergency_stop().unwrap();
+    assert_eq!(remote.status().unwrap().state, State::Fault(fault));
+    assert_ne!(fault, Fault::Emergency);
+    assert_eq!(remote.clear().unwrap(), Some(fault));
+}
+
+#[test]
+fn a_device_that_comes_to_rest_is_waited_for_before_it_is_cleared() {
+    let mut slow = Slow::new(115_200.0, 0, 1);
+    let options = RemoteOptions { slew_v_per_s: Some(10.0), ..RemoteOptions::with_session(7) };
+    let mut remote = Remote::open(&mut slow, "slow", options).unwrap();
+    remote.start(100.0).unwrap();
+    while remote.line_mut().bench.board.volts < 30.0 {
+        remote.exchange(&[30.0; 64], &mut Vec::new()).unwrap();
+    }
+    // The host is gone while its stop is under way.
+    remote.stated(Ask::Stop).unwrap();
+    let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
+    assert_eq!(remote.status().unwrap().state, State::Stopping);
+    assert_eq!(remote.clear().unwrap(), None);
+    assert_eq!((slow.bench.device.state(), slow.bench.board.volts), (State::Idle, 0.0));
+}
+
+#[test]
+fn a_rest_on_a_device_whose_clock_has_stopped_ends() {
+    let mut bench = Bench::new(0, 1);
+    let hasty = RemoteOptions { lost: Duration::from_millis(50), ..options() };
+    let mut remote = Remote::open(&mut bench, "bench", hasty).unwrap();
+    remote.start(1000.0).unwrap();
+    remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap();
+    remote.line_mut().frozen = true;
+    let stands = remote.rest(1.0).unwrap_err();
+    assert!(matches!(stands, RemoteError::Stands { .. }), "{stands}");
 }
 
 #[test]

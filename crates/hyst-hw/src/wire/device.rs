@@ -314,7 +314,10 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 Ok(())
             }),
             Ask::Emergency => self.told(|device| {
-                device.fail(Fault::Emergency);
+                // A device with a fault is on its way to rest, or there: why is worth more than that it was asked to.
+                if !matches!(device.state, State::Fault(_)) {
+                    device.fail(Fault::Emergency);
+                }
                 Ok(())
             }),
             Ask::Clear => self.told(Self::clear),

@@ -13,6 +13,9 @@ use crate::simulate::{Zero, simulate};
 /// A model misses by as much more than in the record of its own fit before it is the device that is asked.
 const MORE_THAN_FITTED: f64 = 1.5;
 
+/// Share of the fitted range by which a drive may leave it before what is missed there is extrapolation's.
+const BEYOND: f64 = 0.01;
+
 /// A device that is no longer the one of the fit misses in the same way as a base that is too coarse does: a richer one would take it. But so
 /// would the same base with other weights, and it misses by more than it did in the record of its fit; a coarse base may follow a small part
 /// of that record better with other weights too, but misses there as it always did. `start` is what the model holds, `noise` the floor \[output unit\].
@@ -26,6 +29,14 @@ pub(super) fn told_apart(
     let (Some(fitted), Some(errors)) = (own.model.rmse, &own.before.errors) else { return Ok(left) };
     if left.kind != RemainderKind::BaseCapacity || errors.rmse <= MORE_THAN_FITTED * fitted {
         return Ok(left);
+    }
+    let (input, beyond) = (&own.model.input, own.before.extrapolated.largest);
+    if beyond > BEYOND * (input.high - input.low) {
+        let (low, high, unit) = (input.low, input.high, input.symbol());
+        let seen = format!(
+            "; its drive goes up to {beyond:.4} {unit} beyond {low:.4} to {high:.4} {unit}, which the model was fitted to"
+        );
+        return Ok(Remainder { description: left.description + &seen, ..left });
     }
     let again = simulate(&own.extended(start, &BTreeMap::new())?, own.train, zero)?;
     let (Some(before), Some(after)) = (&own.before.errors, &again.errors) else { return Ok(left) };
@@ -47,9 +58,9 @@ pub(super) fn told_apart(
         Remainder { change: Some(Change::Zero), description, ..left }
     } else {
         let description = format!(
-            "the same model, fitted to this record, would leave {:.4} {unit} where it leaves {:.4} {unit}: the device is no longer the one that \
-             it was fitted to (its output is {:.3} × what the model says, {:+.4} {unit} beside it)",
-            after.rmse, before.rmse, line.slope, line.offset
+            "{:.2} % of span; the same model, fitted to this record, would leave {:.2} %: the device is no longer the one that it was fitted to \
+             (its output is {:.3} × what the model says, {:+.4} {unit} beside it)",
+            before.nrmse_percent, after.nrmse_percent, line.slope, line.offset
         );
         Remainder { change: Some(Change::Device), description, ..left }
     })

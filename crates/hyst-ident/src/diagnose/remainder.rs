@@ -97,7 +97,7 @@ impl Remainder {
                 "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
             );
         }
-        if !useless.is_empty() {
+        if !useless.is_empty() && self.change.is_none() {
             let names: Vec<&str> = useless.iter().map(|e| e.name()).collect();
             self.description += &format!(
                 "; on a richer base {} would explain a part, but this base does not follow better with it: fit a richer one first",

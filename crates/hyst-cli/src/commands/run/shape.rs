@@ -29,6 +29,9 @@ enum Form {
     Steps,
 }
 
+/// Highest frequency, as a share of the rate: with fewer samples in a period a shape is another one.
+const FASTEST: f64 = 0.1;
+
 /// Steps from one end to the other.
 const STEPS: f64 = 5.0;
 
@@ -43,7 +46,7 @@ impl FromStr for Shape {
             "steps" => Form::Steps,
             _ => return Err(()),
         };
-        let numbers: Vec<f64> = numbers.split(',').map_while(|n| n.trim().parse().ok()).collect();
+        let numbers: Vec<f64> = numbers.split(',').map(|n| n.trim().parse().map_err(drop)).collect::<Result<_, _>>()?;
         match numbers[..] {
             [low, high, hz, seconds]
                 if low < high && low.is_finite() && high.is_finite() && hz > 0.0 && seconds > 0.0 =>
@@ -96,6 +99,15 @@ impl Shape {
             );
             return Err(CommandError::bad_input(message));
         }
+        if self.hz > FASTEST * rate_hz {
+            let message = format!(
+                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency or a higher --rate",
+                path.display(),
+                self.hz,
+                1.0 / FASTEST
+            );
+            return Err(CommandError::bad_input(message));
+        }
         let time: Vec<f64> = (0..rows as usize).map(|k| k as f64 / rate_hz).collect();
         let values = time.iter().map(|t| self.at(*t)).collect();
         let name = path.display().to_string();
@@ -122,9 +134,16 @@ mod tests {
 
     #[test]
     fn what_is_no_shape_is_told_and_files_are_left_alone() {
-        for text in
-            ["sine:1,2,3", "sine:2,1,5,1", "steps:0,1,0,1", "triangle:0,1,1,x", "sine:0,1,1,1,1", "sine:0,inf,1,1"]
-        {
+        for text in [
+            "sine:1,2,3",
+            "sine:2,1,5,1",
+            "steps:0,1,0,1",
+            "triangle:0,1,1,x",
+            "sine:0,1,1,1,1",
+            "sine:0,inf,1,1",
+            "sine:0,1,1,1,",
+            "sine:0,1,1,1,x",
+        ] {
             let message = Shape::named(Path::new(text)).unwrap_err();
             assert!(format!("{message:?}").contains("FORM:LOW,HIGH,HZ,SECONDS"), "{message:?}");
         }
