@@ -306,6 +306,11 @@ fn an_emergency_stop_from_another_terminal_ends_a_run() {
     }
     let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
     assert!(said.contains(": runs\n"), "{said}");
+    // To clear is not to stop, and is not put off until there is something to clear.
+    for clear in [format!("stop --daq {} --clear", device.daq()), format!("{line} --clear").replace("y.csv", "z.csv")] {
+        let message = lab.refuses(&clear, 2);
+        assert!(message.contains("busy with another run"), "{message}");
+    }
     lab.ok(&format!("stop --daq {}", device.daq()));
     let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
     assert!(said.contains("fault 2"), "{said}");

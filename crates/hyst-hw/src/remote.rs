@@ -447,27 +447,34 @@ impl<L: Line> Remote<L> {
         self.stated(Ask::Emergency).map(|_| ())
     }
 
-    /// Clears a fault, if there is one, once the device is at rest; on its way there it is waited for. Gives the fault.
+    /// Clears the fault that the device has now, if there is one, once it is at rest; on its way there it is waited for. Gives the fault.
     ///
     /// # Errors
-    /// When it does not come to rest, or is lost.
+    /// When the device runs, does not come to rest, is lost, or has another fault meanwhile: an emergency stop, say, which is none of those
+    /// that this was asked to clear.
     pub fn clear(&mut self) -> Result<Option<Fault>, RemoteError> {
-        let before = self.status()?;
-        let fault = if let State::Fault(fault) = before.state { Some(fault) } else { None };
-        let (mut moved, mut at_v) = (self.line.now(), before.present_v);
+        let first = self.status()?;
+        let fault = if let State::Fault(fault) = first.state { Some(fault) } else { None };
+        let (mut moved, mut at_v, mut status) = (self.line.now(), first.present_v, first);
         loop {
-            match self.stated(Ask::Clear) {
-                // The ramp is as steep as the run that has ended was to be, which nobody here knows.
-                Err(RemoteError::Standing { .. } | RemoteError::Refused { refusal: Refusal::State, .. })
-                    if self.since(moved) < LONGEST_REST =>
-                {
-                    self.line.pause(Duration::from_millis(20));
-                    let now_v = self.status()?.present_v;
-                    if now_v != at_v {
-                        (moved, at_v) = (self.line.now(), now_v);
-                    }
+            match (status.state, fault) {
+                (State::Idle, _) => return Ok(fault),
+                (State::Running, _) => return Err(self.refused(Refusal::State)),
+                (State::Fault(now), seen) if seen != Some(now) => {
+                    return Err(RemoteError::Standing { line: self.name.clone(), fault: now });
                 }
-                told => return told.map(|_| fault),
+                // The ramp is as steep as the run that has ended was to be, which nobody here knows.
+                _ if self.since(moved) > LONGEST_REST => {
+                    return Err(RemoteError::Restless { line: self.name.clone(), seconds: LONGEST_REST.as_secs_f64() });
+                }
+                (State::Fault(now), _) if status.present_v == self.identity.rest_v => {
+                    return self.stated(Ask::Clear(now)).map(|_| fault);
+                }
+                (State::Fault(_) | State::Stopping, _) => self.line.pause(Duration::from_millis(20)),
+            }
+            status = self.status()?;
+            if status.present_v != at_v {
+                (moved, at_v) = (self.line.now(), status.present_v);
             }
         }
     }

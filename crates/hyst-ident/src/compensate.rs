@@ -76,7 +76,7 @@ pub struct Missed {
 pub enum CompensateError {
     /// Beyond the stroke.
     #[error(
-        "{record}: row {} (time {time} s): {value} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference", row + 1
+        "{record}: row {} (time {time:.6} s): {value:.6} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference", row + 1
     )]
     OutOfReach {
         /// The reference.

@@ -1,8 +1,8 @@
 //! Requests of every kind with odd values, in frames that are damaged, among bytes that are none, to a device that follows references too.
 
 use hyst_hw::wire::{
-    Ask, Chunk, Deframer, Device, Exchange, Follower, MAX_FRAME, MOST_CHUNK, Mode, Request, Start, State, Tell, encode,
-    model_sum,
+    Ask, Chunk, Deframer, Device, Exchange, Fault, Follower, MAX_FRAME, MOST_CHUNK, Mode, Request, Start, State, Tell,
+    encode, model_sum,
 };
 
 use super::inputs;
@@ -59,13 +59,21 @@ fn chunk(luck: &mut Luck, recipe: &[u8]) -> Chunk {
     Chunk { offset: if luck.once_in(16) { luck.number() as u32 } else { offset as u32 }, total, sum, bytes }
 }
 
+/// The fault that is there, or another.
+fn fault(device: &Servo, luck: &mut Luck) -> Fault {
+    match device.state() {
+        State::Fault(fault) if luck.below(8) > 0 => fault,
+        _ => *luck.of(&[Fault::Silence, Fault::Emergency]),
+    }
+}
+
 fn ask(luck: &mut Luck, device: &Servo, recipe: &[u8]) -> Ask {
     match luck.below(16) {
         0 => Ask::Hello,
         1 => Ask::Describe,
         2 => Ask::Stop,
         3 => Ask::Emergency,
-        4 | 5 => Ask::Clear,
+        4 | 5 => Ask::Clear(fault(device, luck)),
         6 | 7 => Ask::Start(start(luck)),
         8 | 9 => Ask::Model(chunk(luck, recipe)),
         _ => {
@@ -137,7 +145,9 @@ fn sound_again(device: &mut Servo, board: &mut Watched) {
     assert_ne!(device.state(), State::Running, "it runs without a host");
     assert_eq!(board.volts, 0.0, "it is not at rest: {:?}", device.state());
     let told = |device: &mut Servo, ask| device.answer(&Request { number: 1, ask }).tell;
-    assert!(matches!(told(device, Ask::Clear), Tell::Status(status) if status.state == State::Idle));
+    if let State::Fault(fault) = device.state() {
+        assert!(matches!(told(device, Ask::Clear(fault)), Tell::Status(status) if status.state == State::Idle));
+    }
     let start = Start {
         session: 99,
         mode: Mode::Voltage,

@@ -366,7 +366,7 @@ const DEVICE: &str = "Device: sim:PLANT.toml (the simulated actuator that the fi
 /// Emergency stop: whatever a device does, let it come to rest and stay there
 ///
 /// The device ramps to rest at the slew limit of its run, and starts again only once that is cleared (run --clear). A serial port that another
-/// program holds, and a simulator that serves one host at a time, cannot be reached so: press Ctrl-C there. On a CAN bus there is room for both.
+/// program holds cannot be reached so: press Ctrl-C there. On a CAN bus, and at the socket of a simulator, there is room for both.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl stop --daq can:can0")]
 pub(crate) struct StopArgs {

@@ -98,6 +98,11 @@ fn below(drive: &Drive, row: usize) -> bool {
 }
 
 impl Compensation {
+    /// Whether no limit held the drive anywhere.
+    pub(super) fn is_unlimited(&self) -> bool {
+        self.voltage_limited_rows == 0 && self.slew_limited_rows == 0
+    }
+
     pub(super) fn new(model: &Model, reference: &Record, drive: &Drive) -> Self {
         let (lowest, highest) = range(drive.voltage.iter().copied());
         let in_the_sensor = model.effects.names().into_iter().filter(|effect| !effect.acts_on_the_motion());

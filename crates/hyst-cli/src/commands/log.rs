@@ -38,6 +38,8 @@ struct Summary {
     /// Chunks of samples and other records that are left out because they are damaged.
     damaged: usize,
     samples: usize,
+    /// Holes in time within a segment; behind each another segment begins.
+    holes: usize,
     /// Of the samples, those that are part of what was asked for.
     record_samples: usize,
     segments: usize,
@@ -65,6 +67,7 @@ impl Summary {
             log: path.display().to_string(),
             closed: log.closed,
             damaged: log.damaged,
+            holes: log.holes,
             samples: log.samples.len(),
             record_samples: record().count(),
             segments: segments.len(),
@@ -88,6 +91,7 @@ impl Summary {
             if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
         )];
         lines.extend(damage(self.damaged));
+        lines.extend(holes(self.holes));
         lines.extend(
             self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
@@ -105,6 +109,12 @@ fn damage(pieces: usize) -> Option<String> {
     (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
 }
 
+/// What to say about samples that are missing within a segment.
+fn holes(holes: usize) -> Option<String> {
+    let many = text::count(holes, "hole");
+    (holes > 0).then(|| format!("{many} in time, behind each of which another segment begins: what an actuator remembers from before is not known there"))
+}
+
 fn info(args: &LogInfoArgs) -> CommandResult {
     let (_, log) = read(&args.log)?;
     let summary = Summary::new(&args.log, &log);
@@ -115,6 +125,7 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let (_, log) = read(&args.log)?;
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
+    damage(log.damaged).into_iter().chain(holes(log.holes)).for_each(|told| output::say(&format!("note: {told}")));
     if !args.ramps && !log.samples.is_empty() && !log.samples.iter().any(LogSample::is_record) {
         let many = text::count(log.samples.len(), "sample");
         output::say(&format!(

@@ -368,7 +368,8 @@ impl Summary {
                 "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
             );
             // Without the inverse it is the hysteresis, with feedback a limit or a loop that is too slow.
-            if self.control == Some(Control::Feedforward) && t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
+            let free = self.compensation.as_ref().is_some_and(Compensation::is_unlimited);
+            if self.control == Some(Control::Feedforward) && free && t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
                 let (above, offset) = (if t.mean < 0.0 { "below" } else { "above" }, short(t.mean.abs()));
                 line += &format!(
                     "\n          most of it is an offset: it stands {offset} {unit} {above} the reference, and RMSE {} {unit} is left about that; the sensor's zero, or what earlier runs have left in the actuator (--control pid+feedforward takes it)",

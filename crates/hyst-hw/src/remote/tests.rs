@@ -509,9 +509,9 @@ fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
     assert_eq!(slow.bench.board.volts, 0.0);
 }
 
-/// Why a device came to rest is worth more than that it was asked to.
+/// Who has seen one fault, or none, does not clear an emergency stop that came after it.
 #[test]
-fn an_emergency_stop_keeps_the_fault_that_is_there() {
+fn an_emergency_stop_is_cleared_by_nobody_who_has_not_seen_it() {
     let mut bench = Bench::new(0, 1);
     let cool = RemoteOptions { hottest_degc: 10.0, ..options() };
     let mut remote = Remote::open(&mut bench, "bench", cool).unwrap();
@@ -519,9 +519,16 @@ fn an_emergency_stop_keeps_the_fault_that_is_there() {
     let failed = remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap_err();
     let RemoteError::Fault { fault, .. } = failed else { panic!("{failed}") };
     remote.emergency_stop().unwrap();
-    assert_eq!(remote.status().unwrap().state, State::Fault(fault));
-    assert_ne!(fault, Fault::Emergency);
-    assert_eq!(remote.clear().unwrap(), Some(fault));
+    remote.line_mut().pass(200);
+    let refused = remote.stated(Ask::Clear(fault)).unwrap_err();
+    assert!(matches!(refused, RemoteError::Standing { fault: Fault::Emergency, .. }), "{refused}");
+    assert_eq!(remote.clear().unwrap(), Some(Fault::Emergency));
+    let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { session: 8, ..options() }).unwrap();
+    remote.start(1000.0).unwrap();
+    // A device that runs has nothing to clear, and nobody waits for the end of its run.
+    let refused = Remote::open(&mut bench, "bench", options()).unwrap().clear().unwrap_err();
+    assert!(matches!(refused, RemoteError::Refused { refusal: Refusal::State, .. }), "{refused}");
+    assert_eq!(bench.device.state(), State::Running);
 }
 
 #[test]
@@ -681,7 +688,7 @@ proptest! {
                 1 => Ask::Start(Start { session, ..sound }),
                 2 if luck.below(4) == 0 => Ask::Stop,
                 3 if luck.below(4) == 0 => Ask::Emergency,
-                4 => Ask::Clear,
+                4 => Ask::Clear(if let State::Fault(fault) = bench.device.state() { fault } else { Fault::Silence }),
                 _ => {
                     let have = bench.device.status().received;
                     let (heard, first) = (luck.below(20) as u32, (have + 2).saturating_sub(luck.below(5) as u32));

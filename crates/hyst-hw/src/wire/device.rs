@@ -314,13 +314,11 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 Ok(())
             }),
             Ask::Emergency => self.told(|device| {
-                // A device with a fault is on its way to rest, or there: why is worth more than that it was asked to.
-                if !matches!(device.state, State::Fault(_)) {
-                    device.fail(Fault::Emergency);
-                }
+                // Over another fault too: who has seen that one is not to clear this.
+                device.fail(Fault::Emergency);
                 Ok(())
             }),
-            Ask::Clear => self.told(Self::clear),
+            Ask::Clear(fault) => self.told(|device| device.clear(*fault)),
             Ask::Status => Tell::Status(self.status()),
             Ask::Model(chunk) => match self.take_model(chunk) {
                 Ok(bytes) => Tell::ModelBytes(bytes),
@@ -393,9 +391,11 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         }
     }
 
-    fn clear(&mut self) -> Result<(), Refusal> {
+    fn clear(&mut self, fault: Fault) -> Result<(), Refusal> {
         match self.state {
-            State::Fault(_) if self.present_v == self.identity.rest_v => self.state = State::Idle,
+            State::Fault(stands) if stands == fault && self.present_v == self.identity.rest_v => {
+                self.state = State::Idle;
+            }
             State::Idle => {}
             _ => return Err(Refusal::State),
         }

@@ -11,7 +11,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of these messages. A host and a device of different ones do not talk.
-pub const PROTOCOL: u16 = 1;
+pub const PROTOCOL: u16 = 2;
 /// Most drives in a request.
 pub const MOST_DRIVES: usize = 64;
 /// Most samples in an answer.
@@ -45,8 +45,8 @@ pub enum Ask {
     Stop,
     /// To come to rest, and not to start again before the fault is cleared.
     Emergency,
-    /// To forget a fault, once at rest.
-    Clear,
+    /// To forget this fault, once at rest: who has seen another one does not know why it stands.
+    Clear(Fault),
     /// To take a part of a model.
     Model(Chunk),
     /// How it stands.

@@ -82,7 +82,12 @@ pub struct RunLog {
     pub closed: bool,
     /// Chunks and other records that are left out because they are damaged.
     pub damaged: usize,
+    /// Holes in time within a segment, where samples are lost; behind each another segment begins.
+    pub holes: usize,
 }
+
+/// A step in time of so many periods is a hole.
+const HOLE: f64 = 1.5;
 
 /// Whether these are the bytes of an MCAP file.
 pub fn is_log(bytes: &[u8]) -> bool {
@@ -127,12 +132,30 @@ impl RunLog {
             }
         }
         log.damaged = entries.damaged();
+        log.split_at_holes();
         match channel {
             Some(_) => Ok(log),
             None if !log.closed && log.damaged == 0 => {
                 Err(foreign(format!("it was cut off before the channel {TOPIC}: nothing of a run is in it")))
             }
             None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
+        }
+    }
+
+    /// What the actuator did meanwhile is not known: the rows behind a hole are no continuation of those before it.
+    fn split_at_holes(&mut self) {
+        let rate = self.metadata.get("sample_rate_hz").and_then(|rate| rate.parse::<f64>().ok());
+        let Some(longest) = rate.map(|rate| HOLE / rate).filter(|longest| longest.is_finite() && *longest > 0.0) else {
+            return;
+        };
+        let mut before: Option<(u64, f64)> = None;
+        for sample in &mut self.samples {
+            let (segment, time_s) = (sample.segment, sample.time_s);
+            if before.is_some_and(|(of, then)| of == segment && time_s - then > longest) {
+                self.holes += 1;
+            }
+            before = Some((segment, time_s));
+            sample.segment = segment.saturating_add(self.holes as u64);
         }
     }
 
@@ -250,6 +273,16 @@ mod tests {
         let all = log.csv("run.mcap", true).unwrap();
         assert_eq!(all.lines().next(), Some("segment,time_s,voltage_v,displacement_um,temperature_degc"));
         assert_eq!(all.lines().count(), 7);
+    }
+
+    #[test]
+    fn behind_a_hole_in_time_another_segment_begins() {
+        let times = [(0, 0), (1, 0), (2, 0), (5, 0), (6, 0), (9, 1), (10, 1)];
+        let mut log = log(times.map(|(k, segment)| sample(k, segment, "record", None, None)).to_vec());
+        log.metadata.insert("sample_rate_hz".into(), "1".into());
+        log.split_at_holes();
+        let segments: Vec<u64> = log.samples.iter().map(|s| s.segment).collect();
+        assert_eq!((segments, log.holes), (vec![0, 0, 0, 1, 1, 2, 2], 1));
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Shape {
         }
         text.parse()
             .map(Some)
-            .map_err(|()| CommandError::bad_input(format!("{text}: give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10")))
+            .map_err(|()| CommandError::bad_input(format!("{text}: give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10: four numbers, LOW below HIGH, the last two above zero")))
     }
 
     /// Its value at a time \[s\].
@@ -101,7 +101,7 @@ impl Shape {
         }
         if self.hz > FASTEST * rate_hz {
             let message = format!(
-                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency or a higher --rate",
+                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency, or a higher --rate where the device can",
                 path.display(),
                 self.hz,
                 1.0 / FASTEST
