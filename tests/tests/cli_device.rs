@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
-use std::process::Stdio;
+use std::process::{Child, Stdio};
 use std::sync::Arc;
 use std::thread::{self, sleep};
 use std::time::Duration;
@@ -236,16 +236,21 @@ fn slowed(device: &Served, pause: Duration) -> String {
     format!("tcp:{address}")
 }
 
+/// Waits until a run has driven the device so far \[V\].
+fn until_beyond(volts: f32, device: &Served, host: &mut Child) {
+    while device.put_out().last().is_none_or(|v| *v < volts) {
+        sleep(Duration::from_millis(20));
+        assert!(host.try_wait().unwrap().is_none(), "the run has ended by itself");
+    }
+}
+
 #[test]
 fn a_host_that_is_killed_leaves_the_device_to_its_watchdog_and_the_next_one_is_told() {
     let (lab, device) = (Lab::new(), Served::plant(PLANT, RATE_HZ));
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.2 --cycles 2 -o u.csv"));
     let line = format!("run --daq {} --drive u.csv --log killed.mcap --slew 400", device.daq());
     let mut host = lab.command(&line).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-    while device.put_out().last().is_none_or(|v| *v < 40.0) {
-        sleep(Duration::from_millis(20));
-        assert!(host.try_wait().unwrap().is_none(), "the run has ended by itself");
-    }
+    until_beyond(40.0, &device, &mut host);
     host.kill().unwrap();
     host.wait().unwrap();
     while device.put_out().last() != Some(&0.0) {
@@ -300,10 +305,7 @@ fn an_emergency_stop_from_another_terminal_ends_a_run() {
     lab.ok(&format!("excite sine --rate {RATE_HZ} --high 80 --frequency 0.05 --cycles 1 -o u.csv"));
     let line = format!("run --daq {} --drive u.csv --record y.csv --slew 100 {PATIENT}", device.daq());
     let mut host = lab.command(&line).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
-    while device.put_out().last().is_none_or(|v| *v < 30.0) {
-        sleep(Duration::from_millis(20));
-        assert!(host.try_wait().unwrap().is_none(), "the run has ended by itself");
-    }
+    until_beyond(30.0, &device, &mut host);
     let said = lab.ok(&format!("status --daq {}", device.daq())).stdout;
     assert!(said.contains(": runs\n"), "{said}");
     // To clear is not to stop, and is not put off until there is something to clear.

@@ -492,15 +492,21 @@ fn the_time_that_a_start_takes_wakes_no_watchdog() {
     assert_eq!(bench.device.state(), State::Fault(Fault::Silence));
 }
 
-#[test]
-fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
-    let mut slow = Slow::new(115_200.0, 0, 1);
-    let options = RemoteOptions { slew_v_per_s: Some(1.0), ..RemoteOptions::with_session(7) };
-    let mut remote = Remote::open(&mut slow, "slow", options).unwrap();
+/// A run that has reached 30 V.
+fn driven_to_30_v(slow: &mut Slow, slew_v_per_s: f64) -> Remote<&mut Slow> {
+    let options = RemoteOptions { slew_v_per_s: Some(slew_v_per_s), ..RemoteOptions::with_session(7) };
+    let mut remote = Remote::open(slow, "slow", options).unwrap();
     remote.start(100.0).unwrap();
     while remote.line_mut().bench.board.volts < 30.0 {
         remote.exchange(&[30.0; 64], &mut Vec::new()).unwrap();
     }
+    remote
+}
+
+#[test]
+fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
+    let mut slow = Slow::new(115_200.0, 0, 1);
+    let mut remote = driven_to_30_v(&mut slow, 1.0);
     remote.emergency_stop().unwrap();
     // Half a minute at the slew of that run, which another program does not know.
     let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
@@ -534,12 +540,7 @@ fn an_emergency_stop_is_cleared_by_nobody_who_has_not_seen_it() {
 #[test]
 fn a_device_that_comes_to_rest_is_waited_for_before_it_is_cleared() {
     let mut slow = Slow::new(115_200.0, 0, 1);
-    let options = RemoteOptions { slew_v_per_s: Some(10.0), ..RemoteOptions::with_session(7) };
-    let mut remote = Remote::open(&mut slow, "slow", options).unwrap();
-    remote.start(100.0).unwrap();
-    while remote.line_mut().bench.board.volts < 30.0 {
-        remote.exchange(&[30.0; 64], &mut Vec::new()).unwrap();
-    }
+    let mut remote = driven_to_30_v(&mut slow, 10.0);
     // The host is gone while its stop is under way.
     remote.stated(Ask::Stop).unwrap();
     let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
