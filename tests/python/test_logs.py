@@ -1,4 +1,4 @@
-"""Logs of runs, read with the `mcap` package as others would read them.
+"""Logs of runs, read as others would read them: with the `mcap` package and the command line `pymcap-cli`.
 
 `cargo xtask test` makes the logs and names their folder in HYST_LOGS.
 """
@@ -6,6 +6,8 @@
 import csv
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,6 +102,36 @@ def test_samples_keep_to_the_schema(log):
             sample = said if channel.topic != EVENTS else sample
     if log["log"].startswith("drive"):
         assert {"temperature_degc", "load_n"} <= set(sample)
+
+
+def pymcap(*arguments):
+    """The command line of this environment: its exit code and the JSON of its lines."""
+    program = Path(sys.executable).with_name("pymcap-cli")
+    ran = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
+    return ran.returncode, [json.loads(line) for line in ran.stdout.splitlines()]
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: log["log"])
+def test_a_doctor_finds_nothing(log):
+    path = FOLDER / log["log"]
+    code, [*findings, summary] = pymcap("doctor", "--strict-message-order", "--format", "jsonl", path)
+    # Remarks of the rank "info" are habits (no attachment, small chunks), not faults.
+    assert (code, [finding for finding in findings if finding["severity"] != "info"]) == (0, [])
+    code, [info] = pymcap("info-json", path)
+    assert code == 0
+    with open(path, "rb") as file:
+        wanted = SeekingReader(file).get_summary().statistics
+    assert summary["messages"] == info["statistics"]["message_count"] == wanted.message_count
+    counts = {channel["id"]: channel["message_count"] for channel in info["channels"]}
+    assert counts == wanted.channel_message_counts
+
+
+def test_the_doctor_finds_what_is_wrong(tmp_path):
+    whole = (FOLDER / LOGS[0]["log"]).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    code, lines = pymcap("doctor", "--format", "jsonl", tmp_path / "cut.mcap")
+    assert code == 1
+    assert "MISSING_FOOTER" in {line.get("code") for line in lines if line.get("severity") == "error"}
 
 
 def test_the_schema_refuses_what_is_no_sample():
