@@ -331,7 +331,7 @@ fn a_run_that_gets_too_hot_or_astray_is_ended_with_a_code_and_a_sentence() {
     lab.write("warm.toml", format!("{PLANT}{WARM}"));
     let run = |more: &str| {
         lab.run(&format!(
-            "run --daq sim:{more} --model model.json --reference sine:4,14,1,6 --control gain --log run.mcap"
+            "run --daq sim:{more} --model model.json --reference sine:4,14,1,6 --control gain --log run.mcap --record run.csv"
         ))
     };
     for (more, fault) in [
@@ -348,6 +348,10 @@ fn a_run_that_gets_too_hot_or_astray_is_ended_with_a_code_and_a_sentence() {
         // The ramp to rest is in the log, too.
         let all = lab.ok("log convert run.mcap --ramps").stdout;
         assert_eq!(column(&all, "voltage_v").last(), Some(&0.0));
+        // Each row that was measured stands beside what was wanted there.
+        let logged = column(&lab.ok("log convert run.mcap").stdout, "reference_um");
+        assert!(logged.len() < 6 * RATE_HZ as usize && !logged.is_empty(), "{}", logged.len());
+        assert_eq!(column(&lab.read("run.csv"), "reference_um"), logged);
     }
     assert_eq!(run("warm.toml --hottest 60 --temperature 22").code, 0);
     // A reference beyond what the drive can do holds the loop at its limit.

@@ -207,7 +207,12 @@ fn the_limits_of_a_reference_are_kept() {
     let lab = Lab::with_model();
     lab.reference("reference.csv", 1.0, 12.0);
     let follow = "run --daq sim:plant.toml --model model.json --reference reference.csv --record out.csv --json";
-    let report = lab.ok(&format!("{follow} --limit 0,40")).json();
+    let limited = lab.ok(&format!("{follow} --limit 0,40"));
+    // What goes wrong by the plan is told before anything moves.
+    let foreseen = "note: with the drive as planned the model itself misses the reference by ";
+    assert!(limited.stderr.contains(foreseen) && limited.stderr.contains("the voltage is limited in"), "{limited:?}");
+    assert!(!lab.ok(follow).stderr.contains(foreseen));
+    let report = limited.json();
     assert!(report["compensation"]["voltage_limited_rows"].as_u64().unwrap() > 0, "{report}");
     assert!(column(&lab.read("out.csv"), "voltage_v").iter().all(|u| (0.0..=40.0).contains(u)));
     lab.refuses(&format!("{follow} --limit -10,40"), 2);

@@ -1,7 +1,7 @@
 //! What a device measured, as a record.
 
 use hyst_hw::{Recording, Sample};
-use hyst_ident::record::{Columns, OutputUnit, Record};
+use hyst_ident::record::{Columns, Extra, OutputUnit, Record};
 
 use crate::exit::CommandResult;
 use crate::output::{self, Target};
@@ -42,19 +42,34 @@ fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
     samples.iter().map(move |sample| sample.time_s + shift)
 }
 
-/// Writes what was measured until a run ended before its time, and says so; also if it cannot, since what ended the run is what has to be told at last.
-pub(crate) fn keep_partial(mut recording: Recording, target: &Target, unit: OutputUnit) {
+/// Writes what was measured until a run ended before its time, with what is known of each of its rows, and says so; also if it cannot, since
+/// what ended the run is what has to be told at last.
+pub(crate) fn keep_partial(
+    mut recording: Recording,
+    beside: Vec<(String, Vec<f64>)>,
+    target: &Target,
+    unit: OutputUnit,
+) {
     // What a sensor without a number showed has ended the run.
     let whole = |s: &Sample| [Some(s.output), s.temperature_degc, s.load_n].into_iter().flatten().all(f64::is_finite);
-    recording.segments.iter_mut().for_each(|segment| segment.samples.retain(whole));
-    // A row alone has no sample period.
-    recording.segments.retain(|segment| segment.samples.len() > 1);
+    let mut kept = Vec::new();
+    for segment in &mut recording.segments {
+        // A row alone has no sample period.
+        let enough = segment.samples.iter().filter(|sample| whole(sample)).count() > 1;
+        kept.extend(segment.samples.iter().map(|sample| enough && whole(sample)));
+        segment.samples.retain(|sample| enough && whole(sample));
+    }
+    recording.segments.retain(|segment| !segment.samples.is_empty());
     let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
     if rows == 0 {
         return;
     }
+    let of_kept = |values: Vec<f64>| values.into_iter().zip(&kept).filter_map(|(value, kept)| kept.then_some(value));
+    let beside: Vec<(String, Vec<f64>)> =
+        beside.into_iter().map(|(name, values)| (name, of_kept(values).collect())).collect();
+    let extra: Vec<Extra<'_>> = beside.iter().map(|(name, values)| Extra::numbers(name, values)).collect();
     let written = to_record(&recording, &target.to_string(), unit)
-        .and_then(|record| target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error)));
+        .and_then(|record| target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error)));
     let rows = text::count(rows, "row");
     output::say(&match written {
         Ok(()) => format!("note: what was measured until then, {rows}, is kept in {target}"),

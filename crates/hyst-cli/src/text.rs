@@ -2,40 +2,28 @@
 
 use std::fmt::Write;
 
+pub(crate) use hyst_ident::digits::short;
+use hyst_ident::digits::{decimals_for, rounded};
 use hyst_ident::identify::{TableEstimate, TableOf};
 use hyst_ident::metrics::{Errors, Mape};
 use hyst_ident::model::Channel;
 use hyst_ident::record::{OutputUnit, Record};
 use hyst_ident::simulate::Extrapolated;
 
-/// `x` with four significant digits.
-pub(crate) fn short(x: f64) -> String {
-    rounded(x, digits_for(x, 4))
-}
-
 /// `value ± std_error`, both to the second significant digit of the standard error; the value alone without one.
 pub(crate) fn with_error(value: f64, std_error: Option<f64>) -> String {
     match std_error.filter(|error| *error > 0.0 && error.is_finite()) {
         Some(error) => {
-            let decimals = digits_for(error, 2);
+            let decimals = decimals_for(error, 2);
             format!("{} ± {}", rounded(value, decimals), rounded(error, decimals))
         }
         None => short(value),
     }
 }
 
-/// Decimals after the point that show `digits` significant digits of `x`.
-fn digits_for(x: f64, digits: i32) -> i32 {
-    if x == 0.0 || !x.is_finite() { 0 } else { digits - 1 - x.abs().log10().floor() as i32 }
-}
-
-fn rounded(x: f64, decimals: i32) -> String {
-    if decimals > 12 { format!("{x:.3e}") } else { format!("{x:.*}", decimals.max(0) as usize) }
-}
-
 /// `2.31 %`, or what stands for a span of zero.
 pub(crate) fn percent(x: f64) -> String {
-    if x.is_finite() { format!("{} %", rounded(x, digits_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
+    if x.is_finite() { format!("{} %", rounded(x, decimals_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
 }
 
 /// How much a record says of a table of weights.
@@ -149,8 +137,6 @@ mod tests {
 
     #[test]
     fn numbers_show_what_is_known_of_them() {
-        assert_eq!([1234.56, 0.012_345_6, 0.0, -5.0].map(short), ["1235", "0.01235", "0", "-5.000"]);
-        assert_eq!(short(1e-20), "1.000e-20");
         assert_eq!(with_error(0.123_456, Some(0.001_234)), "0.1235 ± 0.0012");
         assert_eq!(with_error(1234.5, Some(56.0)), "1234 ± 56");
         assert_eq!(with_error(2.0, None), "2.000");

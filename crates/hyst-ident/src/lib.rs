@@ -14,6 +14,7 @@ pub mod clipping;
 pub mod compare;
 pub mod compensate;
 pub mod diagnose;
+pub mod digits;
 mod drive;
 pub mod everett;
 pub mod excite;

@@ -93,7 +93,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let recording = gaps::split(recording);
     if let Some(error) = error {
         if let Some(target) = &args.output {
-            recording::keep_partial(recording, target, unit);
+            recording::keep_partial(recording, Vec::new(), target, unit);
         }
         return Err(error);
     }

@@ -73,6 +73,9 @@ struct Summary {
     symbol: &'static str,
 }
 
+/// Column of a record for the force that was estimated on the way.
+const FORCE_COLUMN: &str = "estimated_force_n";
+
 /// An offset is told where less than this share of the error is left without it.
 const MOSTLY_OFFSET: f64 = 0.5;
 
@@ -194,6 +197,9 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if args.record.is_none() && args.log.is_none() {
         output::say("note: what is measured is not kept; give --record, --log or both");
     }
+    if let Some(foreseen) = job.followed.as_ref().and_then(Followed::foreseen) {
+        output::say(&format!("note: {foreseen}"));
+    }
     let unit = recording::unit(daq.capabilities().output);
     let device = daq.capabilities().device.clone();
     let model = job.followed.as_ref().map(|followed| LoggedModel { model: &followed.model, json: &followed.json });
@@ -228,22 +234,26 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     };
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
     let Played { mut recording, mut forces, watched, gaps, error } = played?;
+    job.align(&mut recording, &mut forces);
+    let forces = forces.concat();
+    let reference_column = format!("reference_{}", unit.suffix());
     if let Some(error) = error {
         if let Some(target) = &args.record {
-            recording::keep_partial(gaps::split(recording), target, unit);
+            let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
+            let wanted = job.followed.as_ref().map(|followed| (reference_column, followed.wanted_at(&recording)));
+            let forces = (rows > 0 && forces.len() == rows).then(|| (FORCE_COLUMN.to_owned(), forces));
+            let beside = wanted.into_iter().chain(forces).collect();
+            recording::keep_partial(gaps::split(recording), beside, target, unit);
         }
         return Err(error);
     }
-    job.align(&mut recording, &mut forces);
     let recording = gaps::split(recording);
-    let forces = forces.concat();
 
     let wanted = job.followed.as_ref().map(Followed::wanted);
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
-        let column = format!("reference_{}", unit.suffix());
-        let mut extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&column, wanted)).collect();
-        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers("estimated_force_n", &forces)));
+        let mut extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&reference_column, wanted)).collect();
+        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers(FORCE_COLUMN, &forces)));
         target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     }
     // The record may lie on another disk than a log that could not be closed.

@@ -86,13 +86,25 @@ pub struct Failure<E> {
     pub partial: Recording,
     /// The device's error when, after the cause, it could not be stopped either: its drive may still be on.
     pub not_stopped: Option<E>,
+    /// Whether the device was asked for anything but to rest.
+    pub driven: bool,
 }
 
 impl<E: std::error::Error> std::fmt::Display for Failure<E> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let (Cause::Stop(error), false) = (&self.cause, self.driven) {
+            return write!(
+                f,
+                "the record is complete, but the device did not take the stop; nothing was driven: {error}"
+            );
+        }
         self.cause.fmt(f)?;
         let Some(error) = &self.not_stopped else { return Ok(()) };
-        f.write_str("; the device could not be stopped and may still be driven")?;
+        f.write_str(if self.driven {
+            "; the device could not be stopped and may still be driven"
+        } else {
+            "; the device did not take the stop either, nothing was driven"
+        })?;
         // What is gone is gone for the stop too.
         let (why, error) = (self.cause.to_string(), error.to_string());
         if error == why { Ok(()) } else { write!(f, ": {error}") }
@@ -120,6 +132,7 @@ mod tests {
             cause: Cause::Device(CableOut(std::fmt::Error)),
             partial: Recording::default(),
             not_stopped: None,
+            driven: true,
         };
         assert_eq!(failure.to_string(), "cable out");
         assert!(failure.source().is_some_and(|source| source.is::<std::fmt::Error>()));
@@ -127,11 +140,16 @@ mod tests {
             cause: Cause::<CableOut>::EmptySegment { segment: 2 },
             partial: Recording::default(),
             not_stopped: None,
+            driven: true,
         };
         assert_eq!(segment.to_string(), "drive segment 2 is empty");
         let driven = Failure { not_stopped: Some(CableOut(std::fmt::Error)), ..segment };
         assert!(driven.to_string().ends_with("may still be driven: cable out"), "{driven}");
         let twice = Failure { cause: Cause::Device(CableOut(std::fmt::Error)), ..driven };
         assert_eq!(twice.to_string(), "cable out; the device could not be stopped and may still be driven");
+        let resting = Failure { driven: false, ..twice };
+        assert_eq!(resting.to_string(), "cable out; the device did not take the stop either, nothing was driven");
+        let complete = Failure { cause: Cause::Stop(CableOut(std::fmt::Error)), not_stopped: None, ..resting };
+        assert!(complete.to_string().ends_with("did not take the stop; nothing was driven: cable out"), "{complete}");
     }
 }

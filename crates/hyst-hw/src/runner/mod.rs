@@ -141,15 +141,19 @@ pub fn record_with<D: Daq + ?Sized>(
 ) -> Result<Recording, Failure<D::Error>> {
     let mut recording = Recording::default();
     if let Err(cause) = plan::check(segments, daq.capabilities().voltage, options) {
-        return Err(Failure { cause, partial: recording, not_stopped: None });
+        return Err(Failure { cause, partial: recording, not_stopped: None, driven: false });
     }
+    let rest_v = daq.capabilities().voltage.rest_v;
+    let driven = daq.present_v() != rest_v || segments.iter().any(|drive| drive.as_ref().iter().any(|u| *u != rest_v));
     let daq = Driven(daq);
     let played = start_and_play(&mut *daq.0, segments, options, revise, progress, &mut recording);
     match (played, daq.0.stop()) {
         (Ok(()), Ok(())) => Ok(recording),
-        (Ok(()), Err(error)) => Err(Failure { cause: Cause::Stop(error), partial: recording, not_stopped: None }),
+        (Ok(()), Err(error)) => {
+            Err(Failure { cause: Cause::Stop(error), partial: recording, not_stopped: None, driven })
+        }
         // The first error says what happened; that the device is still driven must not be lost over it.
-        (Err(cause), stopped) => Err(Failure { cause, partial: recording, not_stopped: stopped.err() }),
+        (Err(cause), stopped) => Err(Failure { cause, partial: recording, not_stopped: stopped.err(), driven }),
     }
 }
 

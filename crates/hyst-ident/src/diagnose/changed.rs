@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::extension::Own;
 use super::findings::{Change, Remainder, RemainderKind};
 use super::remainder::RICHER;
+use crate::digits::short;
 use crate::fit::FitError;
 use crate::nested::Hypothesis;
 use crate::record::OutputUnit;
@@ -34,7 +35,10 @@ pub(super) fn told_apart(
     if beyond > BEYOND * (input.high - input.low) {
         let (low, high, unit) = (input.low, input.high, input.symbol());
         let seen = format!(
-            "; its drive goes up to {beyond:.4} {unit} beyond {low:.4} to {high:.4} {unit}, which the model was fitted to"
+            "; its drive goes up to {} {unit} beyond {} to {} {unit}, which the model was fitted to",
+            short(beyond),
+            short(low),
+            short(high)
         );
         return Ok(Remainder { description: left.description + &seen, ..left });
     }

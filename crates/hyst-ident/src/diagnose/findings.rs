@@ -6,6 +6,7 @@ use hyst_core::{AsymmetryParams, ViscousPiParams};
 use serde::{Deserialize, Serialize};
 
 use super::search::Named;
+use crate::digits::short;
 pub use crate::metrics::Errors;
 use crate::model::{Base, Effect, Kind, Model, creep_share};
 use crate::record::OutputUnit;
@@ -206,8 +207,9 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
     // First what a person can check against the device, then what the statistics say.
     let mut evidence: Vec<String> = signature(m, named.effect).into_iter().collect();
     evidence.push(format!(
-        "cross-validated error {:.4} {unit} without it, {after:.4} {unit} with it; better in {:.1} % of {} bootstrap draws",
-        named.cv_without,
+        "cross-validated error {} {unit} without it, {} {unit} with it; better in {:.1} % of {} bootstrap draws",
+        short(named.cv_without),
+        short(after),
         100.0 * j.confidence,
         super::score::DRAWS
     ));
@@ -234,6 +236,11 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
 fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
     let unit = &m.model.output.unit;
     OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
+}
+
+/// Four significant digits with their sign.
+fn signed(x: f64) -> String {
+    format!("{}{}", if x < 0.0 { "" } else { "+" }, short(x))
 }
 
 /// The effect in words that a person can check against the device.
@@ -266,10 +273,10 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                     .into()
             }
         },
-        Effect::Load => format!("the output yields by {:+.5} {} for each N", e.load?.per_newton, symbol(m)),
+        Effect::Load => format!("the output yields by {} {} for each N", signed(e.load?.per_newton), symbol(m)),
         Effect::Saturation => {
             let (name, limit) = limit(m)?;
-            format!("the output stops at {limit:.3} {} at its {name} end while the drive goes on", symbol(m))
+            format!("the output stops at {} {} at its {name} end while the drive goes on", short(limit), symbol(m))
         }
         Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
         Effect::Creep => {
@@ -288,16 +295,16 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         Effect::Drift => {
             let seconds = m.samples.time.last()? - m.samples.time.first()?;
             format!(
-                "the zero moves by {:+.4} {} over the record's {seconds:.0} s",
-                e.drift?.per_second * seconds,
+                "the zero moves by {} {} over the record's {seconds:.0} s",
+                signed(e.drift?.per_second * seconds),
                 symbol(m)
             )
         }
         Effect::Interference => {
             let p = e.interference?;
             format!(
-                "a tone of {:.4} {} at {:.3} Hz stands in the sensor, whatever the drive",
-                p.amplitude,
+                "a tone of {} {} at {:.3} Hz stands in the sensor, whatever the drive",
+                short(p.amplitude),
                 symbol(m),
                 p.hz
             )

@@ -181,6 +181,38 @@ impl Followed {
         self.reference.output().unwrap_or_default()
     }
 
+    /// What the model foresees to go wrong with the drive as planned, if that is much, and why.
+    pub(super) fn foreseen(&self) -> Option<String> {
+        let Drive { bandwidth_hz, voltage_limited, slew_limited, missed, .. } = self.drive.as_ref()?;
+        let wanted = self.wanted();
+        let count = wanted.len().max(1) as f64;
+        let mean = wanted.iter().sum::<f64>() / count;
+        let spread = (wanted.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count).sqrt();
+        if missed.settled_rmse <= FORESEEN * spread {
+            return None;
+        }
+        let mut why = Vec::new();
+        for (rows, what) in [(voltage_limited, "voltage"), (slew_limited, "slew")] {
+            if !rows.is_empty() {
+                why.push(format!("the {what} is limited in {} of {}", rows.len(), text::count(wanted.len(), "row")));
+            }
+        }
+        if let Some(hz) = bandwidth_hz {
+            why.push(format!("nothing above {} Hz is inverted", text::short(*hz)));
+        }
+        let unit = text::symbol(&self.model.output.unit);
+        let (missed, why) = (text::short(missed.settled_rmse), why.join(", "));
+        let why = if why.is_empty() { String::new() } else { format!(" ({why})") };
+        Some(format!("with the drive as planned the model itself misses the reference by {missed} {unit} RMS{why}"))
+    }
+
+    /// Wanted output at each row of a recording, whose segments may end before their time.
+    pub(super) fn wanted_at(&self, recording: &Recording) -> Vec<f64> {
+        let wanted = self.wanted();
+        let rows = self.reference.segments().iter().zip(&recording.segments);
+        rows.flat_map(|(rows, segment)| wanted[rows.clone()].iter().take(segment.samples.len())).copied().collect()
+    }
+
     /// What there is to say about the drive that was played.
     pub(super) fn compensation(&self) -> Option<Compensation> {
         let drive = self.live.as_ref().map(Live::drive).or(self.drive.as_ref())?;
@@ -190,6 +222,8 @@ impl Followed {
     }
 }
 
+/// Share of a reference's RMS that a planned drive may miss without a word.
+const FORESEEN: f64 = 0.05;
 /// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
 const USUAL_SETTLE_S: f64 = 2.0;
 /// By how much steeper than the planned drive, which may be corrected on the way, the device may go.

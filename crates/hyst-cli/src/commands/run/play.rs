@@ -98,7 +98,7 @@ where
     });
     over.store(true, Ordering::Relaxed);
     match &played {
-        Err(Failure { not_stopped: Some(error), .. }) => {
+        Err(Failure { not_stopped: Some(error), driven: true, .. }) => {
             lookout.note("fault", format!("the device may still be driven: {error}"));
         }
         Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
@@ -177,7 +177,7 @@ mod tests {
     use hyst_hw::PlantError;
 
     fn code(cause: Cause<PlantError>) -> Exit {
-        exit(&Failure { cause, partial: Recording::default(), not_stopped: None })
+        exit(&Failure { cause, partial: Recording::default(), not_stopped: None, driven: true })
     }
 
     #[test]
@@ -190,7 +190,8 @@ mod tests {
         assert_eq!(code(Cause::Stalled { outstanding: 3 }), Exit::DeviceLost);
         assert_eq!(code(Cause::EmptySegment { segment: 1 }), Exit::BadInput);
         assert_eq!(code(Cause::Cancelled), Exit::Failed);
-        let driven = Failure { cause: Cause::Cancelled, partial: Recording::default(), not_stopped: Some(lost) };
-        assert_eq!(exit(&driven), Exit::DeviceLost);
+        let partial = Recording::default();
+        let failure = Failure { cause: Cause::Cancelled, partial, not_stopped: Some(lost), driven: true };
+        assert_eq!(exit(&failure), Exit::DeviceLost);
     }
 }
