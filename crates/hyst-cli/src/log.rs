@@ -260,17 +260,21 @@ fn options() -> WriteOptions {
 mod tests {
     use super::*;
     use hyst_hw::Phase;
-    use hyst_ident::record::OutputUnit;
+    use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
 
     fn info() -> RunInfo<'static> {
         RunInfo { device: "test", output: OutputUnit::Micrometre, sample_rate_hz: 100.0, model: None }
     }
 
     fn sample(k: u32) -> LoggedSample {
+        sample_of(Phase::Record, k)
+    }
+
+    fn sample_of(phase: Phase, k: u32) -> LoggedSample {
         let time_s = f64::from(k) * 0.01;
         let measured =
             hyst_hw::Sample { time_s, drive_v: 1.0, output: 2.5, temperature_degc: None, load_n: None, force_n: None };
-        LoggedSample::new(0, Phase::Record, &measured, Some(2.0))
+        LoggedSample::new(0, phase, &measured, Some(2.0))
     }
 
     fn read(path: &Path) -> Vec<serde_json::Value> {
@@ -337,6 +341,17 @@ mod tests {
         let begun = hyst_ident::record::RunLog::parse("run.mcap", &std::fs::read(&path).unwrap()).unwrap();
         assert_eq!((begun.samples.len(), begun.closed), (0, false));
         assert_eq!(begun.metadata["device"], "test");
+    }
+
+    #[test]
+    fn a_log_of_a_ramp_alone_is_no_record() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let mut log = RunLog::create(&path, &info()).unwrap();
+        (0..9).for_each(|k| log.sample(&sample_of(Phase::Approach, k)).unwrap());
+        log.finish().unwrap();
+        let refused = Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).unwrap_err().to_string();
+        assert!(refused.contains("9 samples, all of the ramp there"), "{refused}");
     }
 
     #[test]

@@ -114,7 +114,12 @@ impl PlantConfig {
     /// When the text is not TOML, a field is unknown or missing, or a value makes no sense; the
     /// message names the field and says what to do.
     pub fn from_toml(text: &str) -> Result<Self, ConfigError> {
-        let config: Self = toml::from_str(text).map_err(|e| ConfigError::Syntax(e.to_string()))?;
+        let config: Self = toml::from_str(text).map_err(|error| {
+            let single = |name: &&str| text.lines().any(|line| line.trim_start().starts_with(&format!("[{name}]")));
+            let several = ["mode", "disturbance"].iter().find(|name| single(name));
+            let hint = several.map(|name| format!("there may be several: write [[{name}]], not [{name}]"));
+            ConfigError::Syntax(format!("{error}{}", hint.unwrap_or_default()))
+        })?;
         config.validate()?;
         Ok(config)
     }

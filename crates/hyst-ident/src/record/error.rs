@@ -40,6 +40,16 @@ pub enum RecordError {
         /// What is not as it should be.
         what: String,
     },
+    /// A log that ends before what was asked for began.
+    #[error(
+        "{file}: the log ends before the run came to what it was to play: {samples} samples, all of the ramp there; run it again"
+    )]
+    NotBegun {
+        /// The file.
+        file: String,
+        /// Samples of the ramp.
+        samples: usize,
+    },
     /// The file has no header line.
     #[error(
         "{file}, line 1: the file is empty; a record starts with a header line such as \"time_s,voltage_v,displacement_um\""

@@ -226,7 +226,11 @@ impl Record {
         map: &super::ColumnMap,
         need: super::Need,
     ) -> Result<Self, RecordError> {
-        let text = RunLog::parse(name, bytes)?.csv(name, false)?;
+        let log = RunLog::parse(name, bytes)?;
+        if log.chosen(false).is_empty() {
+            return Err(RecordError::NotBegun { file: name.to_owned(), samples: log.samples.len() });
+        }
+        let text = log.csv(name, false)?;
         Ok(Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes))
     }
 }

@@ -29,6 +29,24 @@ enum Form {
     Steps,
 }
 
+/// Which of a shape's numbers is none or makes no sense.
+fn wrong(text: &str) -> Option<String> {
+    let (_, numbers) = text.split_once(':')?;
+    let cells: Vec<&str> = numbers.split(',').map(str::trim).collect();
+    if cells.len() != 4 {
+        return Some(format!("there are {} numbers", cells.len()));
+    }
+    let of = |k: usize| cells[k].parse::<f64>().ok().filter(|x| x.is_finite());
+    let names = ["LOW", "HIGH", "HZ", "SECONDS"];
+    if let Some(k) = (0..4).find(|k| of(*k).is_none()) {
+        return Some(format!("{} is \"{}\", no number", names[k], cells[k]));
+    }
+    match (2..4).find(|k| of(*k).is_some_and(|x| x <= 0.0)) {
+        Some(k) => Some(format!("{} is {}, and has to be above zero", names[k], cells[k])),
+        None => Some(format!("LOW is {}, and has to be below HIGH, {}", cells[0], cells[1])),
+    }
+}
+
 /// Highest frequency, as a share of the rate: with fewer samples in a period a shape is another one.
 const FASTEST: f64 = 0.1;
 
@@ -71,9 +89,10 @@ impl Shape {
             );
             return if word { Err(CommandError::bad_input(message)) } else { Ok(None) };
         }
-        text.parse()
-            .map(Some)
-            .map_err(|()| CommandError::bad_input(format!("{text}: give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10: four numbers, LOW below HIGH, the last two above zero")))
+        text.parse().map(Some).map_err(|()| {
+            let wrong = wrong(text).map_or_else(String::new, |what| format!("; {what}"));
+            CommandError::bad_input(format!("{text}: give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10{wrong}"))
+        })
     }
 
     /// Its value at a time \[s\].
@@ -146,6 +165,15 @@ mod tests {
         ] {
             let message = Shape::named(Path::new(text)).unwrap_err();
             assert!(format!("{message:?}").contains("FORM:LOW,HIGH,HZ,SECONDS"), "{message:?}");
+        }
+        for (text, what) in [
+            ("sine:1,2,3", "there are 3 numbers"),
+            ("sine:1,2,x,3", "HZ is \"x\", no number"),
+            ("steps:1,inf,2,3", "HIGH is \"inf\", no number"),
+            ("sine:1,2,5,-1", "SECONDS is -1, and has to be above zero"),
+            ("triangle:3,2,5,1", "LOW is 3, and has to be below HIGH, 2"),
+        ] {
+            assert_eq!(wrong(text).unwrap(), what);
         }
         assert_eq!(Shape::named(Path::new("reference.csv")).unwrap(), None);
         let shape: Shape = "sine:0,1,1,1e9".parse().unwrap();
