@@ -104,20 +104,28 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
     assert!(refused("pid").contains("--control pid+feedforward"));
     // An output that does not come to its reference ends the run on the device.
     let line = format!(
-        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap {PATIENT}",
+        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap --record astray.csv {PATIENT}",
         device.daq()
     );
     let ran = lab.run(&line);
     assert_eq!(ran.code, 3, "{ran:?}");
     assert!(ran.stderr.contains(&Fault::TrackingError.to_string()), "{ran:?}");
+    assert!(ran.stderr.contains("astray.csv is not written"), "it never came to its reference: {ran:?}");
     // Nor does one for which the drive may not go far enough.
     let line = format!(
-        "run --daq {} --model model.json --reference triangle:4,18,0.1,10 --control pid+feedforward --limit 0,40 --clear {PATIENT}",
+        "run --daq {} --model model.json --reference triangle:4,18,0.1,10 --control pid+feedforward --limit 0,40 --clear --log held.mcap --record held.csv {PATIENT}",
         device.daq()
     );
     let ran = lab.run(&line);
     assert_eq!(ran.code, 3, "{ran:?}");
     assert!(ran.stderr.contains(&Fault::Saturation.to_string()), "{ran:?}");
+    // Each row that was measured stands beside what was wanted there, also where the device looks ahead.
+    let (logged, kept) = (lab.ok("log convert held.mcap").stdout, lab.read("held.csv"));
+    for name in ["reference_um", "voltage_v"] {
+        let kept = column(&kept, name);
+        assert!(!kept.is_empty() && kept.len() < 5000, "{}", kept.len());
+        assert_eq!(kept, column(&logged, name), "{name}");
+    }
     assert!(device.put_out().iter().rev().take_while(|v| **v <= 40.0).count() > 500, "{:?}", device.put_out());
     assert_eq!(device.put_out().last(), Some(&0.0));
 }

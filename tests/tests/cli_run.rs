@@ -361,7 +361,13 @@ fn a_section_that_makes_no_sense_is_named() {
         let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
         assert!(message.contains("odd.toml") && message.contains(field) && message.contains("give"), "{message}");
     }
-    lab.write("odd.toml", format!("{}[mode]\nhz = 90\ndamping = 0.1\ngain = 1\n", hyst_tests::PLANT));
-    let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
-    assert!(message.contains("write [[mode]], not [mode]"), "{message}");
+    for (name, section) in [
+        ("mode", "[mode]\nhz = 90\ndamping = 0.1\ngain = 1\n"),
+        ("mode", "[ mode ]\nhz = 90\ndamping = 0.1\ngain = 1\n"),
+        ("disturbance", "[disturbance]\nkind = \"slip\"\num = 1\nat_v = 50\n"),
+    ] {
+        lab.write("odd.toml", format!("{}{section}", hyst_tests::PLANT));
+        let message = lab.refuses("run --daq sim:odd.toml --drive u.csv --record out.csv", 2);
+        assert!(message.contains(&format!("write [[{name}]], not [{name}]")), "{message}");
+    }
 }

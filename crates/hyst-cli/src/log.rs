@@ -350,8 +350,8 @@ mod tests {
         let mut log = RunLog::create(&path, &info()).unwrap();
         (0..9).for_each(|k| log.sample(&sample_of(Phase::Approach, k)).unwrap());
         log.finish().unwrap();
-        let refused = Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).unwrap_err().to_string();
-        assert!(refused.contains("9 samples, all of the ramp there"), "{refused}");
+        let refused = || Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).unwrap_err().to_string();
+        assert!(refused().contains("its samples, 9 in all, are of the ramps"), "{}", refused());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What a device measured, as a record.
 
-use hyst_hw::{Recording, Sample};
+use hyst_hw::{Recording, Sample, SegmentRecord};
 use hyst_ident::record::{Columns, Extra, OutputUnit, Record};
 
 use crate::exit::CommandResult;
@@ -42,37 +42,120 @@ fn times(samples: &[Sample]) -> impl Iterator<Item = f64> {
     samples.iter().map(move |sample| sample.time_s + shift)
 }
 
-/// Writes what was measured until a run ended before its time, with what is known of each of its rows, and says so; also if it cannot, since
-/// what ended the run is what has to be told at last.
-pub(crate) fn keep_partial(
-    mut recording: Recording,
-    beside: Vec<(String, Vec<f64>)>,
-    target: &Target,
-    unit: OutputUnit,
-) {
-    // What a sensor without a number showed has ended the run.
-    let whole = |s: &Sample| [Some(s.output), s.temperature_degc, s.load_n].into_iter().flatten().all(f64::is_finite);
-    let mut kept = Vec::new();
-    for segment in &mut recording.segments {
-        // A row alone has no sample period.
-        let enough = segment.samples.iter().filter(|sample| whole(sample)).count() > 1;
-        kept.extend(segment.samples.iter().map(|sample| enough && whole(sample)));
-        segment.samples.retain(|sample| enough && whole(sample));
+/// Periods that are missing before `next`.
+pub(crate) fn missing(before: &Sample, next: &Sample, rate_hz: f64) -> usize {
+    let periods = ((next.time_s - before.time_s) * rate_hz).round() as usize;
+    periods.saturating_sub(1)
+}
+
+/// Begins another segment after each gap: a record's rows are evenly spaced in time.
+pub(crate) fn split(recording: Recording) -> Recording {
+    let rate_hz = recording.rate_hz;
+    let mut segments = Vec::with_capacity(recording.segments.len());
+    for SegmentRecord { approach, samples, retreat } in recording.segments {
+        let mut parts = samples.chunk_by(|a, b| missing(a, b, rate_hz) == 0).map(<[Sample]>::to_vec);
+        segments.push(SegmentRecord { approach, samples: parts.next().unwrap_or_default(), retreat: Vec::new() });
+        segments.extend(parts.map(|samples| SegmentRecord { samples, ..SegmentRecord::default() }));
+        if let Some(last) = segments.last_mut() {
+            last.retreat = retreat;
+        }
     }
-    recording.segments.retain(|segment| !segment.samples.is_empty());
+    Recording { segments, ..recording }
+}
+
+/// Columns beside what was measured: a name, and a value for each row of all segments.
+pub(crate) type Beside = Vec<(String, Vec<f64>)>;
+
+/// As a record has them.
+pub(crate) fn extra(beside: &Beside) -> Vec<Extra<'_>> {
+    beside.iter().map(|(name, values)| Extra::numbers(name, values)).collect()
+}
+
+/// Writes what was measured until a run ended before its time, and says so; also if it cannot, since what ended the run is what has to be told
+/// at last.
+pub(crate) fn keep_partial(recording: Recording, beside: Beside, target: &Target, unit: OutputUnit) {
+    let moved =
+        recording.segments.iter().any(|s| !(s.approach.is_empty() && s.samples.is_empty() && s.retreat.is_empty()));
+    let (recording, beside) = whole(recording, beside);
     let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
     if rows == 0 {
+        if moved {
+            output::say(&format!("note: nothing of what was asked for had been measured; {target} is not written"));
+        }
         return;
     }
-    let of_kept = |values: Vec<f64>| values.into_iter().zip(&kept).filter_map(|(value, kept)| kept.then_some(value));
-    let beside: Vec<(String, Vec<f64>)> =
-        beside.into_iter().map(|(name, values)| (name, of_kept(values).collect())).collect();
-    let extra: Vec<Extra<'_>> = beside.iter().map(|(name, values)| Extra::numbers(name, values)).collect();
-    let written = to_record(&recording, &target.to_string(), unit)
-        .and_then(|record| target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error)));
+    let written = to_record(&recording, &target.to_string(), unit).and_then(|record| {
+        target.write_beside_older(|out| record.write_with(out, &extra(&beside)).map_err(output::io_error))
+    });
     let rows = text::count(rows, "row");
     output::say(&match written {
         Ok(()) => format!("note: what was measured until then, {rows}, is kept in {target}"),
         Err(error) => format!("warning: what was measured until then, {rows}, cannot be kept: {}", error.text()),
     });
+}
+
+/// Without the rows in which a sensor had no number, in segments of evenly spaced rows, of two or more: a row alone has no sample period.
+/// Columns that have no number somewhere are left out.
+fn whole(mut recording: Recording, mut beside: Beside) -> (Recording, Beside) {
+    let shown = |s: &Sample| [Some(s.output), s.temperature_degc, s.load_n].into_iter().flatten().all(f64::is_finite);
+    let keep = |beside: &mut Beside, kept: &[bool]| {
+        for (_, values) in beside {
+            let mut kept = kept.iter();
+            values.retain(|_| kept.next().is_some_and(|kept| *kept));
+        }
+    };
+    let kept: Vec<bool> = recording.segments.iter().flat_map(|s| &s.samples).map(shown).collect();
+    recording.segments.iter_mut().for_each(|segment| segment.samples.retain(shown));
+    keep(&mut beside, &kept);
+    let mut recording = split(recording);
+    let lengths = recording.segments.iter().map(|segment| segment.samples.len());
+    let kept: Vec<bool> = lengths.flat_map(|rows| std::iter::repeat_n(rows > 1, rows)).collect();
+    recording.segments.retain(|segment| segment.samples.len() > 1);
+    keep(&mut beside, &kept);
+    beside.retain(|(_, values)| values.iter().all(|value| value.is_finite()));
+    (recording, beside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(period: u32) -> Sample {
+        let time_s = f64::from(period) / 100.0;
+        Sample { time_s, drive_v: 0.0, output: 0.0, temperature_degc: None, load_n: None, force_n: None }
+    }
+
+    #[test]
+    fn a_recording_is_split_where_something_is_missing() {
+        let of = |approach: &[u32], samples: &[u32], retreat: &[u32]| {
+            let [approach, samples, retreat] =
+                [approach, samples, retreat].map(|periods| periods.iter().map(|p| at(*p)).collect());
+            SegmentRecord { approach, samples, retreat }
+        };
+        let whole = Recording { rate_hz: 100.0, segments: vec![of(&[1], &[2, 3, 6, 7], &[8]), of(&[20], &[], &[21])] };
+        let parts = split(whole).segments;
+        assert_eq!(parts, [of(&[1], &[2, 3], &[]), of(&[], &[6, 7], &[8]), of(&[20], &[], &[21])]);
+    }
+
+    #[test]
+    fn what_is_kept_of_a_run_has_its_own_reference_in_each_row() {
+        let lost = |period| Sample { output: f64::NAN, ..at(period) };
+        let segment = |samples: &[Sample]| SegmentRecord { samples: samples.to_vec(), ..SegmentRecord::default() };
+        let segments = vec![
+            segment(&[at(1), at(2), lost(3), at(4), at(5), at(6)]),
+            // A row alone on both sides of a gap.
+            segment(&[at(20), at(23)]),
+            segment(&[at(40), at(41), lost(42)]),
+        ];
+        let named = |name: &str, values: Vec<f64>| (name.to_owned(), values);
+        let reference: Vec<f64> = (0..11).map(f64::from).collect();
+        let force = [vec![0.5; 9], vec![f64::NAN; 2]].concat();
+        let whole = whole(
+            Recording { rate_hz: 100.0, segments },
+            vec![named("reference_um", reference), named("estimated_force_n", force)],
+        );
+        let parts = [&[at(1), at(2)][..], &[at(4), at(5), at(6)], &[at(40), at(41)]].map(segment);
+        assert_eq!(whole.0.segments, parts);
+        assert_eq!(whole.1, [named("reference_um", vec![0.0, 1.0, 3.0, 4.0, 5.0, 8.0, 9.0])]);
+    }
 }

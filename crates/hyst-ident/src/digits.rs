@@ -1,6 +1,12 @@
 //! Numbers for people: as many digits as tell something.
 
-/// `x` with four significant digits.
+/// `x` with its sign and four significant digits.
+pub fn signed(x: f64) -> String {
+    let sign = if x < 0.0 { "-" } else { "+" };
+    format!("{sign}{}", short(x.abs()))
+}
+
+/// `x` with four significant digits, or as many as stand before its point.
 pub fn short(x: f64) -> String {
     rounded(x, decimals_for(x, 4))
 }
@@ -23,5 +29,6 @@ mod tests {
     fn numbers_show_what_is_known_of_them() {
         assert_eq!([1234.56, 0.012_345_6, 0.0, -5.0].map(short), ["1235", "0.01235", "0", "-5.000"]);
         assert_eq!(short(1e-20), "1.000e-20");
+        assert_eq!([-0.0, 0.5, -0.000_012_34].map(signed), ["+0", "+0.5000", "-0.00001234"]);
     }
 }

@@ -6,7 +6,7 @@ use hyst_hw::Daq;
 use hyst_ident::range;
 use serde::Serialize;
 
-use super::run::gaps::{self, Gaps};
+use super::run::gaps::Gaps;
 use super::run::job::{Job, thermometer};
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
@@ -90,13 +90,13 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let Played { recording, gaps, error, .. } = played?;
-    let recording = gaps::split(recording);
     if let Some(error) = error {
         if let Some(target) = &args.output {
             recording::keep_partial(recording, Vec::new(), target, unit);
         }
         return Err(error);
     }
+    let recording = recording::split(recording);
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;

@@ -20,7 +20,6 @@ use hyst_core::PidParams;
 use hyst_hw::{ClockFit, Daq};
 use hyst_ident::metrics::Errors;
 use hyst_ident::range;
-use hyst_ident::record::Extra;
 use serde::Serialize;
 
 use super::compensate::Compensation;
@@ -30,6 +29,7 @@ use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
+use crate::recording::Beside;
 use crate::{recording, text};
 use beside::Watched;
 use gaps::Gaps;
@@ -72,9 +72,6 @@ struct Summary {
     #[serde(skip)]
     symbol: &'static str,
 }
-
-/// Column of a record for the force that was estimated on the way.
-const FORCE_COLUMN: &str = "estimated_force_n";
 
 /// An offset is told where less than this share of the error is left without it.
 const MOSTLY_OFFSET: f64 = 0.5;
@@ -236,25 +233,23 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let Played { mut recording, mut forces, watched, gaps, error } = played?;
     job.align(&mut recording, &mut forces);
     let forces = forces.concat();
-    let reference_column = format!("reference_{}", unit.suffix());
+    let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
+    let force_n = forces.first().map(|_| range(forces.iter().copied()));
+    let wanted = job.followed.as_ref().map(|followed| followed.wanted_at(&recording));
+    let wanted = wanted.map(|wanted| (format!("reference_{}", unit.suffix()), wanted));
+    let forces = (forces.len() == rows).then(|| ("estimated_force_n".to_owned(), forces));
+    let beside: Beside = wanted.into_iter().chain(forces).collect();
     if let Some(error) = error {
         if let Some(target) = &args.record {
-            let rows: usize = recording.segments.iter().map(|segment| segment.samples.len()).sum();
-            let wanted = job.followed.as_ref().map(|followed| (reference_column, followed.wanted_at(&recording)));
-            let forces = (rows > 0 && forces.len() == rows).then(|| (FORCE_COLUMN.to_owned(), forces));
-            let beside = wanted.into_iter().chain(forces).collect();
-            recording::keep_partial(gaps::split(recording), beside, target, unit);
+            recording::keep_partial(recording, beside, target, unit);
         }
         return Err(error);
     }
-    let recording = gaps::split(recording);
-
-    let wanted = job.followed.as_ref().map(Followed::wanted);
+    let recording = recording::split(recording);
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
-        let mut extra: Vec<Extra<'_>> = wanted.iter().map(|wanted| Extra::numbers(&reference_column, wanted)).collect();
-        extra.extend((forces.len() == record.rows()).then(|| Extra::numbers(FORCE_COLUMN, &forces)));
-        target.write_beside_older(|out| record.write_with(out, &extra).map_err(output::io_error))?;
+        target
+            .write_beside_older(|out| record.write_with(out, &recording::extra(&beside)).map_err(output::io_error))?;
     }
     // The record may lie on another disk than a log that could not be closed.
     closed?;
@@ -268,13 +263,13 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         unit: unit.suffix(),
         lowest_output: low,
         highest_output: high,
-        tracking: wanted.map(|wanted| Tracking::of(wanted, &measured)).transpose()?,
+        tracking: job.followed.as_ref().map(|followed| Tracking::of(followed.wanted(), &measured)).transpose()?,
         compensation: job.followed.as_ref().and_then(Followed::compensation),
         control: job.followed.as_ref().map(|followed| followed.control),
         pid: job.pid(&recording).map(Gains::of),
         loop_on_device: job.handed_over.is_some(),
         watch: watched.map(WatchSummary::new),
-        force_n: forces.first().map(|_| range(forces.iter().copied())),
+        force_n,
         gaps,
         clock: daq.clock().map(ClockSummary::new),
         temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),

@@ -115,7 +115,13 @@ impl PlantConfig {
     /// message names the field and says what to do.
     pub fn from_toml(text: &str) -> Result<Self, ConfigError> {
         let config: Self = toml::from_str(text).map_err(|error| {
-            let single = |name: &&str| text.lines().any(|line| line.trim_start().starts_with(&format!("[{name}]")));
+            let compact = |line: &str| line.split_whitespace().collect::<String>();
+            let single = |name: &&str| {
+                let alone = |line: &str| {
+                    [format!("[{name}]"), format!("{name}={{")].iter().any(|s| compact(line).starts_with(s))
+                };
+                text.lines().any(alone)
+            };
             let several = ["mode", "disturbance"].iter().find(|name| single(name));
             let hint = several.map(|name| format!("there may be several: write [[{name}]], not [{name}]"));
             ConfigError::Syntax(format!("{error}{}", hint.unwrap_or_default()))

@@ -86,7 +86,7 @@ pub struct Failure<E> {
     pub partial: Recording,
     /// The device's error when, after the cause, it could not be stopped either: its drive may still be on.
     pub not_stopped: Option<E>,
-    /// Whether the device was asked for anything but to rest.
+    /// Whether the device may have left its rest: it stood elsewhere, or something else was put to it.
     pub driven: bool,
 }
 
@@ -103,7 +103,7 @@ impl<E: std::error::Error> std::fmt::Display for Failure<E> {
         f.write_str(if self.driven {
             "; the device could not be stopped and may still be driven"
         } else {
-            "; the device did not take the stop either, nothing was driven"
+            "; the device did not take the stop, nothing was driven"
         })?;
         // What is gone is gone for the stop too.
         let (why, error) = (self.cause.to_string(), error.to_string());
@@ -148,7 +148,7 @@ mod tests {
         let twice = Failure { cause: Cause::Device(CableOut(std::fmt::Error)), ..driven };
         assert_eq!(twice.to_string(), "cable out; the device could not be stopped and may still be driven");
         let resting = Failure { driven: false, ..twice };
-        assert_eq!(resting.to_string(), "cable out; the device did not take the stop either, nothing was driven");
+        assert_eq!(resting.to_string(), "cable out; the device did not take the stop, nothing was driven");
         let complete = Failure { cause: Cause::Stop(CableOut(std::fmt::Error)), not_stopped: None, ..resting };
         assert!(complete.to_string().ends_with("did not take the stop; nothing was driven: cable out"), "{complete}");
     }

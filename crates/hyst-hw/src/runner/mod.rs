@@ -143,10 +143,9 @@ pub fn record_with<D: Daq + ?Sized>(
     if let Err(cause) = plan::check(segments, daq.capabilities().voltage, options) {
         return Err(Failure { cause, partial: recording, not_stopped: None, driven: false });
     }
-    let rest_v = daq.capabilities().voltage.rest_v;
-    let driven = daq.present_v() != rest_v || segments.iter().any(|drive| drive.as_ref().iter().any(|u| *u != rest_v));
     let daq = Driven(daq);
-    let played = start_and_play(&mut *daq.0, segments, options, revise, progress, &mut recording);
+    let mut driven = daq.0.present_v() != daq.0.capabilities().voltage.rest_v;
+    let played = start_and_play(&mut *daq.0, segments, options, revise, progress, (&mut recording, &mut driven));
     match (played, daq.0.stop()) {
         (Ok(()), Ok(())) => Ok(recording),
         (Ok(()), Err(error)) => {
@@ -175,8 +174,9 @@ fn start_and_play<D: Daq + ?Sized>(
     options: &RecordOptions,
     revise: impl FnMut(&mut Revision<'_>),
     progress: impl FnMut(&Progress<'_>) -> ControlFlow<()>,
-    recording: &mut Recording,
+    (recording, driven): (&mut Recording, &mut bool),
 ) -> Result<(), Cause<D::Error>> {
+    let rest_v = daq.capabilities().voltage.rest_v;
     let actual_hz = daq.start(options.rate_hz).map_err(Cause::Device)?;
     let difference = (actual_hz / options.rate_hz - 1.0).abs();
     // A rate that is not a number is refused as well.
@@ -185,8 +185,19 @@ fn start_and_play<D: Daq + ?Sized>(
     }
     recording.rate_hz = actual_hz;
     let total = segments.iter().map(|drive| drive.as_ref().len()).sum();
-    let mut run =
-        Run { daq, options, revise, progress, recording, segments: segments.len(), done: 0, total, latest: None };
+    let mut run = Run {
+        daq,
+        options,
+        revise,
+        progress,
+        recording,
+        driven,
+        rest_v,
+        segments: segments.len(),
+        done: 0,
+        total,
+        latest: None,
+    };
     segments.iter().enumerate().try_for_each(|(k, drive)| run.segment(k, drive.as_ref()))
 }
 
@@ -197,6 +208,10 @@ struct Run<'a, D: ?Sized, R, F> {
     revise: R,
     progress: F,
     recording: &'a mut Recording,
+    /// Whether anything but rest was put to the device, taken or not.
+    driven: &'a mut bool,
+    /// Where it rested before it was started \[V\].
+    rest_v: f64,
     segments: usize,
     done: usize,
     total: usize,
@@ -226,6 +241,8 @@ where
             }
             let end = plan.drive_v.len().min(sent + block);
             let offered = &plan.drive_v[sent..end];
+            // A device that is given references rests at one, and makes the drive itself.
+            *self.driven |= rest_v != self.rest_v || offered.iter().any(|u| *u != self.rest_v);
             let outcome = self.daq.exchange(offered, &mut fresh);
             let accepted = *outcome.as_ref().unwrap_or(&0);
             if accepted > offered.len() || (outcome.is_ok() && received + fresh.len() > sent + accepted) {

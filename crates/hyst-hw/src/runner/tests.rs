@@ -235,6 +235,26 @@ fn device_that_cannot_be_stopped_is_reported_beside_the_cause() {
     assert_eq!(drive_of(&failure.partial.segments[1].samples), drives()[1]);
     let cancelled = record(&mut device, &drives(), &options(), |_| ControlFlow::Break(())).unwrap_err();
     assert_eq!((cancelled.cause, cancelled.not_stopped), (Cause::Cancelled, Some(CableOut)));
+    assert!(failure.driven && cancelled.driven);
+}
+
+#[test]
+fn device_that_was_only_looked_at_is_not_called_driven() {
+    let rest = [[0.0; 20]];
+    let stuck = || Queued { stuck: true, ..Queued::new(5) };
+    assert!(!record(&mut stuck(), &rest, &options(), on).unwrap_err().driven);
+    // What was planned need not be what was asked for.
+    let raise = |revision: &mut Revision<'_>| revision.drive_v.fill(1.0);
+    assert!(record_with(&mut stuck(), &rest, &options(), raise, on).unwrap_err().driven);
+    // A drive that was sent may have been taken, though nothing came back.
+    let mut lost = Queued { stuck: true, fails_at: Some(1), ..Queued::new(5) };
+    assert!(record(&mut lost, &[[3.0; 20]], &options(), on).unwrap_err().driven);
+    // It stood elsewhere when it was found.
+    let mut raised = Queued { stuck: true, present_v: 2.0, ..Queued::new(5) };
+    assert!(record(&mut raised, &rest, &options(), on).unwrap_err().driven);
+    // Refused before anything moved.
+    let odd = RecordOptions { rate_tolerance: -1.0, ..options() };
+    assert!(!record(&mut stuck(), &[[3.0; 20]], &odd, on).unwrap_err().driven);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::extension::Own;
 use super::findings::{Change, Remainder, RemainderKind};
 use super::remainder::RICHER;
-use crate::digits::short;
+use crate::digits::{short, signed};
 use crate::fit::FitError;
 use crate::nested::Hypothesis;
 use crate::record::OutputUnit;
@@ -56,15 +56,18 @@ pub(super) fn told_apart(
     let zero_alone = behind_zero <= (1.0 - RICHER) * stood && above(line.mean_square) >= (1.0 - RICHER) * behind_zero;
     Ok(if zero_alone {
         let description = format!(
-            "most of it is one constant: the sensor's zero stands {:+.4} {unit} from that of the record that the model was fitted to",
-            line.mean
+            "most of it is one constant: the sensor's zero stands {} {unit} from that of the record that the model was fitted to",
+            signed(line.mean)
         );
         Remainder { change: Some(Change::Zero), description, ..left }
     } else {
         let description = format!(
             "{:.2} % of span; the same model, fitted to this record, would leave {:.2} %: the device is no longer the one that it was fitted to \
-             (its output is {:.3} × what the model says, {:+.4} {unit} beside it)",
-            before.nrmse_percent, after.nrmse_percent, line.slope, line.offset
+             (its output is {:.3} × what the model says, {} {unit} beside it)",
+            before.nrmse_percent,
+            after.nrmse_percent,
+            line.slope,
+            signed(line.offset)
         );
         Remainder { change: Some(Change::Device), description, ..left }
     })

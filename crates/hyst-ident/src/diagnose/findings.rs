@@ -6,7 +6,7 @@ use hyst_core::{AsymmetryParams, ViscousPiParams};
 use serde::{Deserialize, Serialize};
 
 use super::search::Named;
-use crate::digits::short;
+use crate::digits::{short, signed};
 pub use crate::metrics::Errors;
 use crate::model::{Base, Effect, Kind, Model, creep_share};
 use crate::record::OutputUnit;
@@ -236,11 +236,6 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
 fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
     let unit = &m.model.output.unit;
     OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
-}
-
-/// Four significant digits with their sign.
-fn signed(x: f64) -> String {
-    format!("{}{}", if x < 0.0 { "" } else { "+" }, short(x))
 }
 
 /// The effect in words that a person can check against the device.

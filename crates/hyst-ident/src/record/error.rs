@@ -40,15 +40,13 @@ pub enum RecordError {
         /// What is not as it should be.
         what: String,
     },
-    /// A log that ends before what was asked for began.
-    #[error(
-        "{file}: the log ends before the run came to what it was to play: {samples} samples, all of the ramp there; run it again"
-    )]
-    NotBegun {
+    /// A log without a row of the drive or reference that was asked for.
+    #[error("{file}: the log has nothing of what was to be played: {what}")]
+    NothingAsked {
         /// The file.
         file: String,
-        /// Samples of the ramp.
-        samples: usize,
+        /// Why, and what to do.
+        what: String,
     },
     /// The file has no header line.
     #[error(

@@ -182,6 +182,24 @@ impl RunLog {
         self.samples[..end].iter().filter(wanted).filter(|s| s.output.is_finite()).collect()
     }
 
+    /// Why there is nothing of what was asked for.
+    fn why_empty(&self) -> String {
+        let samples = self.samples.len();
+        if self.damaged > 0 {
+            return format!(
+                "{} pieces of it are damaged, and of the {samples} samples that are left none is of it",
+                self.damaged
+            );
+        }
+        if samples == 0 {
+            return "it ends before the first sample; let the run come further".to_owned();
+        }
+        if self.samples.iter().any(LogSample::is_record) {
+            return "the sensor shows no number there; look at it, and run again".to_owned();
+        }
+        format!("its samples, {samples} in all, are of the ramps before and after; let the run come further")
+    }
+
     /// The samples as a record file: those that were asked for, or the ramps too.
     ///
     /// # Errors
@@ -228,7 +246,7 @@ impl Record {
     ) -> Result<Self, RecordError> {
         let log = RunLog::parse(name, bytes)?;
         if log.chosen(false).is_empty() {
-            return Err(RecordError::NotBegun { file: name.to_owned(), samples: log.samples.len() });
+            return Err(RecordError::NothingAsked { file: name.to_owned(), what: log.why_empty() });
         }
         let text = log.csv(name, false)?;
         Ok(Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes))

@@ -1,7 +1,9 @@
 //! Periods in which a device had nothing to put out: it holds its last value then, and nothing is measured.
 
-use hyst_hw::{Recording, Sample, SegmentRecord};
+use hyst_hw::Sample;
 use serde::Serialize;
+
+use crate::recording::missing;
 
 /// Where the line or this computer was too slow for the rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -10,12 +12,6 @@ pub(in crate::commands) struct Gaps {
     pub(super) times: usize,
     /// Periods altogether.
     periods: usize,
-}
-
-/// Periods that are missing before `next`.
-fn missing(before: &Sample, next: &Sample, rate_hz: f64) -> usize {
-    let periods = ((next.time_s - before.time_s) * rate_hz).round() as usize;
-    periods.saturating_sub(1)
 }
 
 /// Looks for gaps between samples.
@@ -44,21 +40,6 @@ impl GapFinder {
     pub(super) fn gaps(&self) -> Gaps {
         self.gaps
     }
-}
-
-/// Begins another segment after each gap: a record's rows are evenly spaced in time.
-pub(in crate::commands) fn split(recording: Recording) -> Recording {
-    let rate_hz = recording.rate_hz;
-    let mut segments = Vec::with_capacity(recording.segments.len());
-    for SegmentRecord { approach, samples, retreat } in recording.segments {
-        let mut parts = samples.chunk_by(|a, b| missing(a, b, rate_hz) == 0).map(<[Sample]>::to_vec);
-        segments.push(SegmentRecord { approach, samples: parts.next().unwrap_or_default(), retreat: Vec::new() });
-        segments.extend(parts.map(|samples| SegmentRecord { samples, ..SegmentRecord::default() }));
-        if let Some(last) = segments.last_mut() {
-            last.retreat = retreat;
-        }
-    }
-    Recording { segments, ..recording }
 }
 
 impl Gaps {
@@ -93,17 +74,5 @@ mod tests {
         assert_eq!(finder.gaps(), Gaps { times: 2, periods: 3 });
         assert!(finder.gaps().text().unwrap().contains("for 3 periods"));
         assert_eq!(Gaps::default().text(), None);
-    }
-
-    #[test]
-    fn a_recording_is_split_where_something_is_missing() {
-        let of = |approach: &[u32], samples: &[u32], retreat: &[u32]| {
-            let [approach, samples, retreat] =
-                [approach, samples, retreat].map(|periods| periods.iter().map(|p| at(*p)).collect());
-            SegmentRecord { approach, samples, retreat }
-        };
-        let whole = Recording { rate_hz: 100.0, segments: vec![of(&[1], &[2, 3, 6, 7], &[8]), of(&[20], &[], &[21])] };
-        let parts = split(whole).segments;
-        assert_eq!(parts, [of(&[1], &[2, 3], &[]), of(&[], &[6, 7], &[8]), of(&[20], &[], &[21])]);
     }
 }

@@ -188,7 +188,8 @@ impl Followed {
         let count = wanted.len().max(1) as f64;
         let mean = wanted.iter().sum::<f64>() / count;
         let spread = (wanted.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count).sqrt();
-        if missed.settled_rmse <= FORESEEN * spread {
+        let (low, high) = (self.model.output.low, self.model.output.high);
+        if missed.settled_rmse <= (FORESEEN * spread).max(FORESEEN_OF_RANGE * (high - low)) {
             return None;
         }
         let mut why = Vec::new();
@@ -197,7 +198,7 @@ impl Followed {
                 why.push(format!("the {what} is limited in {} of {}", rows.len(), text::count(wanted.len(), "row")));
             }
         }
-        if let Some(hz) = bandwidth_hz {
+        if let (Some(hz), true) = (bandwidth_hz, why.is_empty()) {
             why.push(format!("nothing above {} Hz is inverted", text::short(*hz)));
         }
         let unit = text::symbol(&self.model.output.unit);
@@ -222,8 +223,9 @@ impl Followed {
     }
 }
 
-/// Share of a reference's RMS that a planned drive may miss without a word.
+/// What a planned drive may miss without a word: as a share of the reference's deviation from its mean, and of the model's travel.
 const FORESEEN: f64 = 0.05;
+const FORESEEN_OF_RANGE: f64 = 1e-3;
 /// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
 const USUAL_SETTLE_S: f64 = 2.0;
 /// By how much steeper than the planned drive, which may be corrected on the way, the device may go.

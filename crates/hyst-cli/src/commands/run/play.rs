@@ -98,8 +98,9 @@ where
     });
     over.store(true, Ordering::Relaxed);
     match &played {
-        Err(Failure { not_stopped: Some(error), driven: true, .. }) => {
-            lookout.note("fault", format!("the device may still be driven: {error}"));
+        Err(Failure { not_stopped: Some(error), driven, .. }) => {
+            let what = if *driven { "the device may still be driven" } else { "the device did not take the stop" };
+            lookout.note("fault", format!("{what}: {error}"));
         }
         Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
             lookout.event("cancelled", "stopped on request; the device was brought to rest".to_owned());

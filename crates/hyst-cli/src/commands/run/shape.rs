@@ -29,24 +29,6 @@ enum Form {
     Steps,
 }
 
-/// Which of a shape's numbers is none or makes no sense.
-fn wrong(text: &str) -> Option<String> {
-    let (_, numbers) = text.split_once(':')?;
-    let cells: Vec<&str> = numbers.split(',').map(str::trim).collect();
-    if cells.len() != 4 {
-        return Some(format!("there are {} numbers", cells.len()));
-    }
-    let of = |k: usize| cells[k].parse::<f64>().ok().filter(|x| x.is_finite());
-    let names = ["LOW", "HIGH", "HZ", "SECONDS"];
-    if let Some(k) = (0..4).find(|k| of(*k).is_none()) {
-        return Some(format!("{} is \"{}\", no number", names[k], cells[k]));
-    }
-    match (2..4).find(|k| of(*k).is_some_and(|x| x <= 0.0)) {
-        Some(k) => Some(format!("{} is {}, and has to be above zero", names[k], cells[k])),
-        None => Some(format!("LOW is {}, and has to be below HIGH, {}", cells[0], cells[1])),
-    }
-}
-
 /// Highest frequency, as a share of the rate: with fewer samples in a period a shape is another one.
 const FASTEST: f64 = 0.1;
 
@@ -54,25 +36,35 @@ const FASTEST: f64 = 0.1;
 const STEPS: f64 = 5.0;
 
 impl FromStr for Shape {
-    type Err = ();
+    /// What makes no sense.
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, ()> {
-        let (form, numbers) = text.split_once(':').ok_or(())?;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (form, numbers) = text.split_once(':').ok_or("there is no colon")?;
         let form = match form {
             "sine" => Form::Sine,
             "triangle" => Form::Triangle,
             "steps" => Form::Steps,
-            _ => return Err(()),
+            _ => return Err(format!("there is no form \"{form}\"")),
         };
-        let numbers: Vec<f64> = numbers.split(',').map(|n| n.trim().parse().map_err(drop)).collect::<Result<_, _>>()?;
-        match numbers[..] {
-            [low, high, hz, seconds]
-                if low < high && low.is_finite() && high.is_finite() && hz > 0.0 && seconds > 0.0 =>
-            {
-                Ok(Self { form, low, high, hz, seconds })
-            }
-            _ => Err(()),
+        let cells: Vec<&str> = numbers.split(',').map(str::trim).collect();
+        let &[low, high, hz, seconds] = &cells[..] else {
+            let many = if numbers.is_empty() { 0 } else { cells.len() };
+            return Err(format!("four numbers have to follow, not {many}"));
+        };
+        let number = |name: &str, cell: &str| {
+            let x = cell.parse::<f64>().ok().filter(|x| x.is_finite());
+            x.ok_or_else(|| format!("{name} is \"{cell}\", no finite number"))
+        };
+        let positive = |name: &str, cell: &str| match number(name, cell)? {
+            x if x > 0.0 => Ok(x),
+            x => Err(format!("{name} is {x}, and has to be above zero")),
+        };
+        let (low, high) = (number("LOW", low)?, number("HIGH", high)?);
+        if low >= high {
+            return Err(format!("LOW is {low}, and has to be below HIGH, {high}"));
         }
+        Ok(Self { form, low, high, hz: positive("HZ", hz)?, seconds: positive("SECONDS", seconds)? })
     }
 }
 
@@ -89,9 +81,8 @@ impl Shape {
             );
             return if word { Err(CommandError::bad_input(message)) } else { Ok(None) };
         }
-        text.parse().map(Some).map_err(|()| {
-            let wrong = wrong(text).map_or_else(String::new, |what| format!("; {what}"));
-            CommandError::bad_input(format!("{text}: give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10{wrong}"))
+        text.parse().map(Some).map_err(|wrong: String| {
+            CommandError::bad_input(format!("{text}: {wrong}; give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10"))
         })
     }
 
@@ -153,27 +144,19 @@ mod tests {
 
     #[test]
     fn what_is_no_shape_is_told_and_files_are_left_alone() {
-        for text in [
-            "sine:1,2,3",
-            "sine:2,1,5,1",
-            "steps:0,1,0,1",
-            "triangle:0,1,1,x",
-            "sine:0,1,1,1,1",
-            "sine:0,inf,1,1",
-            "sine:0,1,1,1,",
-            "sine:0,1,1,1,x",
-        ] {
-            let message = Shape::named(Path::new(text)).unwrap_err();
-            assert!(format!("{message:?}").contains("FORM:LOW,HIGH,HZ,SECONDS"), "{message:?}");
-        }
         for (text, what) in [
-            ("sine:1,2,3", "there are 3 numbers"),
-            ("sine:1,2,x,3", "HZ is \"x\", no number"),
-            ("steps:1,inf,2,3", "HIGH is \"inf\", no number"),
-            ("sine:1,2,5,-1", "SECONDS is -1, and has to be above zero"),
-            ("triangle:3,2,5,1", "LOW is 3, and has to be below HIGH, 2"),
+            ("sine:1,2,3", "follow, not 3;"),
+            ("sine:", "follow, not 0;"),
+            ("sine:0,1,1,1,", "follow, not 5;"),
+            ("sine:1,2,x,3", "HZ is \"x\", no finite number;"),
+            ("sine:0,1,1,inf", "SECONDS is \"inf\", no finite number;"),
+            ("steps:1,inf,2,3", "HIGH is \"inf\", no finite number;"),
+            ("steps:0,1,0,1", "HZ is 0, and has to be above zero;"),
+            ("sine:1,2,5,-1", "SECONDS is -1, and has to be above zero;"),
+            ("triangle:3,2,5,1", "LOW is 3, and has to be below HIGH, 2;"),
         ] {
-            assert_eq!(wrong(text).unwrap(), what);
+            let message = Shape::named(Path::new(text)).unwrap_err().text();
+            assert!(message.contains(what) && message.contains("FORM:LOW,HIGH,HZ,SECONDS"), "{message}");
         }
         assert_eq!(Shape::named(Path::new("reference.csv")).unwrap(), None);
         let shape: Shape = "sine:0,1,1,1e9".parse().unwrap();
