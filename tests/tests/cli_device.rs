@@ -126,6 +126,9 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
         assert!(!kept.is_empty() && kept.len() < 5000, "{}", kept.len());
         assert_eq!(kept, column(&logged, name), "{name}");
     }
+    let steepest = device.put_out().windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
+    // A fault is about as gentle as the run.
+    assert!(steepest < 5.0, "{steepest} V in 2 ms");
     assert!(device.put_out().iter().rev().take_while(|v| **v <= 40.0).count() > 500, "{:?}", device.put_out());
     assert_eq!(device.put_out().last(), Some(&0.0));
 }

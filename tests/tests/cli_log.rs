@@ -112,7 +112,11 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     let ran = limited(&lab, 16, "run --daq sim:plant.toml --drive u.csv --log small.mcap --record small.csv");
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert!(ran.stderr.contains("error: small.mcap: the log cannot be written any further"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("cannot be kept: small.csv") && !lab.path("small.csv").exists(), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("cannot be kept there: small.csv") && !lab.path("small.csv").exists(),
+        "{}",
+        ran.stderr
+    );
     // All of it, as a run without limits has it.
     let ran = lab.ok(&format!("{run} --record u-record.csv"));
     assert!(ran.stderr.contains("run.mcap.~1~"), "{}", ran.stderr);

@@ -277,6 +277,37 @@ fn what_was_measured_before_a_failure_is_in_the_log() {
     assert!(!samples.is_empty() && samples.iter().all(|sample| sample["output"].as_f64().unwrap() <= 10.0));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_record_that_its_folder_refuses_is_kept_elsewhere() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    lab.ok("excite sine --rate 500 --high 50 --cycles 1 -o u.csv");
+    for line in [
+        "run --daq sim:plant.toml --drive u.csv --record /dev/full",
+        "record --daq sim:plant.toml --seconds 1 -o /dev/full",
+    ] {
+        let ran = hyst_tests::Ran::from(lab.command(line).env("TMPDIR", lab.path("")).output().unwrap());
+        assert_eq!(ran.code, 3, "{ran:?}");
+        assert!(ran.stderr.contains("/full: take it from there"), "{ran:?}");
+        assert!(column(&lab.read("full"), "displacement_um").len() > 100);
+    }
+}
+
+#[test]
+fn what_is_something_else_is_not_overwritten() {
+    let lab = Lab::with_model();
+    let record = lab.read("train.csv");
+    let drive = "excite sine --rate 500 --high 50 --cycles 1 -o train.csv";
+    assert!(lab.ok(drive).stderr.contains("train.csv was there already; it is train.csv.~1~ now"));
+    assert_eq!(lab.read("train.csv.~1~"), record);
+    // A drive that is designed anew takes the older one's place.
+    assert!(!lab.ok(drive).stderr.contains("note: "));
+    lab.write("train.csv", &record);
+    lab.ok("compensate --model model.json sine:6,14,1,2 -o train.csv");
+    assert_eq!(lab.read("train.csv.~2~"), record);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ramps_the_device_to_rest() {

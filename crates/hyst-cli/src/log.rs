@@ -12,7 +12,7 @@ mod stream;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
@@ -88,6 +88,9 @@ impl RunLog {
     pub fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
         let failed = |source| LogError { path: path.to_owned(), saved: None, source };
         let (file, unnamed) = temporary(path).map_err(failed)?.into_parts();
+        // Elsewhere a lock keeps readers away; where there are none, two runs have to take care of themselves.
+        #[cfg(unix)]
+        let _ = file.try_lock();
         let same = file.try_clone().map_err(failed)?;
         let (writer, channel_id) = begin(file, info).map_err(said).map_err(failed)?;
         Ok(Self {
@@ -106,8 +109,12 @@ impl RunLog {
     /// As [`create`](Self::create); an older file is set aside instead of replaced.
     ///
     /// # Errors
-    /// When the folder cannot be written.
+    /// When the folder cannot be written, or another run writes the older file.
     pub fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
+        if File::open(path).is_ok_and(|older| matches!(older.try_lock_shared(), Err(TryLockError::WouldBlock))) {
+            let source = io::Error::other("another run is writing it: give this one another name");
+            return Err(LogError { path: path.to_owned(), saved: None, source });
+        }
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
@@ -363,7 +370,10 @@ mod tests {
         assert_eq!(log.older(), None);
         log.sample(&sample(0)).unwrap();
         assert_eq!(std::fs::read(log.older().unwrap()).unwrap(), b"older");
+        #[cfg(unix)]
+        assert!(RunLog::beside_older(&path, &info()).err().unwrap().to_string().contains("another run is writing it"));
         log.finish().unwrap();
+        RunLog::beside_older(&path, &info()).unwrap();
         assert_eq!(read(&path).len(), 1);
     }
 

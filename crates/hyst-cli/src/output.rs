@@ -6,11 +6,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use hyst_ident::atomic_file::{write_atomic, write_beside_older};
+use hyst_ident::atomic_file::{check_writable, write_beside_older, write_over_alike};
 use hyst_ident::record::WriteError;
 use serde::Serialize;
 
-use crate::exit::{CommandError, CommandResult};
+use crate::exit::{CommandError, CommandResult, Exit};
 
 /// The target of one result.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,10 +55,28 @@ impl Target {
         Ok(())
     }
 
-    /// Writes what `content` writes.
+    /// As [`write_beside_older`](Self::write_beside_older), of what cannot be had again: where its folder refuses it, it goes to the folder for
+    /// temporary files.
+    pub(crate) fn write_measured(&self, content: impl Fn(&mut dyn Write) -> io::Result<()>) -> CommandResult {
+        let Err(refused) = self.write_beside_older(&content) else { return Ok(()) };
+        let Some(name) = self.file().and_then(Path::file_name) else { return Err(refused) };
+        let refuge = std::env::temp_dir().join(name);
+        let what = match write_beside_older(&refuge, content) {
+            Ok(_) => format!("what was measured is kept in {}: take it from there", refuge.display()),
+            Err(_) => "what was measured is in no record".to_owned(),
+        };
+        Err(CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{}; {what}", refused.text())))
+    }
+
+    /// Writes what `content` writes. An older file that is something else, as a record where a drive is written, keeps its content under another name.
     pub(crate) fn write(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         match self {
-            Self::File(path) => Ok(write_atomic(path, content)?),
+            Self::File(path) => {
+                if let Some(older) = write_over_alike(path, content)? {
+                    tell_set_aside(path, &older);
+                }
+                Ok(())
+            }
             Self::Stdout => {
                 let mut out = io::BufWriter::new(Pipe(io::stdout().lock()));
                 content(&mut out)?;
@@ -118,6 +136,7 @@ pub(crate) fn check(read: &[&Path], written: &[&Target]) -> CommandResult {
             let message = format!("{shown}: the folder {} does not exist; make it first", folder.display());
             return Err(CommandError::bad_input(message));
         }
+        check_writable(path)?;
     }
     Ok(())
 }

@@ -27,6 +27,13 @@ impl Progress {
         bar
     }
 
+    /// A bar of `total` steps of work that keeps its own pace.
+    pub(crate) fn steady(message: &str, total: usize) -> Self {
+        let bar = Self::on_terminal(ProgressBar::new(total as u64), "{msg} {wide_bar} {percent} % [{elapsed}]");
+        bar.0.set_message(message.to_owned());
+        bar
+    }
+
     fn on_terminal(bar: ProgressBar, template: &str) -> Self {
         let target = if stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         bar.set_draw_target(target);

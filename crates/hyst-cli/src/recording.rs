@@ -85,12 +85,12 @@ pub(crate) fn keep_partial(recording: Recording, beside: Beside, target: &Target
         return;
     }
     let written = to_record(&recording, &target.to_string(), unit).and_then(|record| {
-        target.write_beside_older(|out| record.write_with(out, &extra(&beside)).map_err(output::io_error))
+        target.write_measured(|out| record.write_with(out, &extra(&beside)).map_err(output::io_error))
     });
     let rows = text::count(rows, "row");
     output::say(&match written {
         Ok(()) => format!("note: what was measured until then, {rows}, is kept in {target}"),
-        Err(error) => format!("warning: what was measured until then, {rows}, cannot be kept: {}", error.text()),
+        Err(error) => format!("warning: what was measured until then, {rows}, cannot be kept there: {}", error.text()),
     });
 }
 
@@ -117,10 +117,11 @@ fn whole(mut recording: Recording, mut beside: Beside) -> (Recording, Beside) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn at(period: u32) -> Sample {
+    /// A sample of so many periods at 100 Hz.
+    pub(crate) fn at(period: u32) -> Sample {
         let time_s = f64::from(period) / 100.0;
         Sample { time_s, drive_v: 0.0, output: 0.0, temperature_degc: None, load_n: None, force_n: None }
     }

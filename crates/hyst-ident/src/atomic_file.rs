@@ -4,7 +4,7 @@
 //! on the disk. A command that fails half-way leaves an older file as it was, and no fragment.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// A file could not be written; whatever stood at the path is unchanged.
@@ -56,6 +56,29 @@ pub fn write_beside_older(
     put(path, Older::SetAside, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
 }
 
+/// As [`write_beside_older`], but an older file of the same kind is replaced: one that begins as the new one does, with the same line of a text, or as
+/// JSON, markup or binary data do. What was computed is computed anew; what is something else is kept.
+///
+/// # Errors
+/// As [`write_beside_older`].
+pub fn write_over_alike(
+    path: impl AsRef<Path>,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Option<PathBuf>, AtomicFileError> {
+    let path = path.as_ref();
+    put(path, Older::SetAsideIfOther, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
+/// Whether a file could be written at `path`: before work is done whose result would be lost.
+///
+/// # Errors
+/// When the folder is missing or not writable, or there is a file that is protected.
+pub fn check_writable(path: impl AsRef<Path>) -> Result<(), AtomicFileError> {
+    let path = path.as_ref();
+    let check = || place(path)?.map_or(Ok(()), |place| in_folder(&place.folder).map(drop));
+    check().map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
 /// Gives the regular file `target` a second name, `target.~1~` or the next free number, under which it stays when `target` is
 /// replaced. Where the file system knows no second names, the file is renamed; what fails between taking the new name and that may leave
 /// an empty file there.
@@ -93,6 +116,57 @@ enum Older {
     Replaced,
     Kept,
     SetAside,
+    SetAsideIfOther,
+}
+
+/// Where a file goes: under a name in a folder, perhaps instead of an older one.
+struct Place {
+    target: PathBuf,
+    folder: PathBuf,
+    existing: Option<fs::Metadata>,
+}
+
+/// Where the file at `path` goes; `None` where something stands that is no regular file.
+fn place(path: &Path) -> io::Result<Option<Place>> {
+    // Of the target, if there is one: the temporary file has to lie beside what it replaces.
+    let target = match path.canonicalize() {
+        Ok(target) => target,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_owned(),
+        Err(error) => return Err(error),
+    };
+    let existing = target.metadata().ok();
+    match &existing {
+        Some(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
+        Some(metadata) if !metadata.is_file() => return Ok(None),
+        // Renaming would replace a file that its owner protects.
+        Some(metadata) if metadata.permissions().readonly() => {
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is read-only"));
+        }
+        _ => {}
+    }
+    if target.file_name().is_none() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
+    }
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+    if !folder.is_dir() {
+        let message = format!("the folder {} does not exist", folder.display());
+        return Err(io::Error::new(io::ErrorKind::NotFound, message));
+    }
+    Ok(Some(Place { target, folder, existing }))
+}
+
+/// How files of one kind begin.
+fn kind(mut file: File) -> io::Result<Vec<u8>> {
+    file.rewind()?;
+    let mut head = Vec::new();
+    file.take(8192).read_to_end(&mut head)?;
+    let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let most = match first.first() {
+        Some(b'{' | b'[' | b'<') => 1,
+        _ if first.contains(&0) => 4,
+        _ => first.len(),
+    };
+    Ok(first[..most.min(first.len())].to_vec())
 }
 
 fn put(
@@ -104,33 +178,10 @@ fn put(
     if older == Older::Kept && path.symlink_metadata().is_ok() {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
-    // Of the target, if there is one: the temporary file has to lie beside what it replaces.
-    let target = match path.canonicalize() {
-        Ok(target) => target,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_owned(),
-        Err(error) => return Err(error),
+    let Some(Place { target, folder, existing }) = place(path)? else {
+        return write_through(File::options().write(true).open(path)?, content).map(|()| None);
     };
-    let existing = target.metadata().ok();
-    match &existing {
-        Some(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-        Some(metadata) if !metadata.is_file() => {
-            return write_through(File::options().write(true).open(path)?, content).map(|()| None);
-        }
-        // Renaming would replace a file that its owner protects.
-        Some(metadata) if metadata.permissions().readonly() => {
-            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is read-only"));
-        }
-        _ => {}
-    }
-    if target.file_name().is_none() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
-    }
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        let message = format!("the folder {} does not exist", folder.display());
-        return Err(io::Error::new(io::ErrorKind::NotFound, message));
-    }
-    let mut temporary = in_folder(folder)?;
+    let mut temporary = in_folder(&folder)?;
     {
         let mut buffered = BufWriter::new(temporary.as_file_mut());
         content(&mut buffered)?;
@@ -141,9 +192,20 @@ fn put(
         temporary.as_file().set_permissions(metadata.permissions())?;
     }
     temporary.as_file().sync_all()?;
-    let aside = if replaces && older == Older::SetAside { Some(set_aside(&target)?) } else { None };
+    let keeps = replaces
+        && match older {
+            Older::SetAside => true,
+            // Of an empty file nothing would be lost; one that cannot be read may be anything.
+            Older::SetAsideIfOther => {
+                let there = File::open(&target).and_then(kind).ok();
+                there.as_ref().is_none_or(|there| !there.is_empty())
+                    && there != Some(kind(temporary.as_file().try_clone()?)?)
+            }
+            Older::Replaced | Older::Kept => false,
+        };
+    let aside = if keeps { Some(set_aside(&target)?) } else { None };
     let named = match older {
-        Older::Replaced | Older::SetAside => temporary.persist(&target),
+        Older::Replaced | Older::SetAside | Older::SetAsideIfOther => temporary.persist(&target),
         // Somebody else may have made one meanwhile.
         Older::Kept => temporary.persist_noclobber(&target),
     };
@@ -243,6 +305,37 @@ mod tests {
         // A failure leaves all names as they were.
         write_beside_older(&path, |_| Err(io::Error::other("no"))).unwrap_err();
         assert_eq!(names(folder.path()).len(), 4);
+    }
+
+    #[test]
+    fn what_is_of_another_kind_is_set_aside_and_what_is_alike_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let write = |bytes: &[u8]| {
+            write_over_alike(&path, |out| out.write_all(bytes)).unwrap().map(|older| fs::read(older).unwrap())
+        };
+        let older = |bytes: &[u8]| Some(bytes.to_vec());
+        assert_eq!(write(b"time_s,voltage_v\n0,1\n"), None);
+        assert_eq!(write(b"time_s,voltage_v\n0,2\n"), None);
+        let record = b"time_s,voltage_v,displacement_um\n0,2,3\n";
+        assert_eq!(write(record), older(b"time_s,voltage_v\n0,2\n"));
+        assert_eq!(write(b"{\n  \"a\": 1}"), older(record));
+        assert_eq!(write(b"{\"b\": 2}"), None);
+        assert_eq!(write(b"<svg>"), older(b"{\"b\": 2}"));
+        let block = b"HYST\0\x01\x02";
+        assert_eq!(write(block), older(b"<svg>"));
+        assert_eq!(write(b"HYST\0\x09\x08"), None);
+        assert_eq!(write(b""), older(b"HYST\0\x09\x08"));
+        assert_eq!(write(record), None);
+    }
+
+    #[test]
+    fn whether_a_file_could_be_written_is_known_before() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(folder.path().join("new.csv")).unwrap();
+        assert!(names(folder.path()).is_empty());
+        check_writable(folder.path()).unwrap_err();
+        check_writable(folder.path().join("absent").join("new.csv")).unwrap_err();
     }
 
     #[test]

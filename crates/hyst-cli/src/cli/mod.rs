@@ -268,7 +268,7 @@ pub(crate) struct CompensateArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record of the wanted output
+    /// Record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS with sine, triangle or steps, at the rate of the model's record
     pub(crate) reference: PathBuf,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,

@@ -7,6 +7,7 @@ use hyst_ident::record::{Extra, Need, Record};
 use hyst_ident::simulate::Extrapolated;
 use serde::Serialize;
 
+use super::run::shape::Shape;
 use crate::cli::{CompensateArgs, LimitArgs};
 use crate::exit::CommandResult;
 use crate::output::{self, Report, say};
@@ -56,14 +57,18 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
     output::check(&[&args.model, &args.reference], &[&args.output])?;
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (model, _) = input::model(&args.model)?;
-    let reference = input::record(&args.reference, &args.map.map, Need::Output)?;
+    let shape = Shape::named(&args.reference)?;
+    let reference = match shape {
+        Some(shape) => shape.record(&args.reference, input::output_unit(&model)?, model.recorded_at_hz)?,
+        None => input::record(&args.reference, &args.map.map, Need::Output)?,
+    };
     let temperature = input::temperature(args.temperature, &model, &reference);
     let options = CompensateOptions { temperature, ..options(&args.limits) };
     let drive = compensate(&model, &reference, &options)?;
 
     // The reference file keeps its own input, if it has one: no output is an input's file.
     let column = model.input.column.as_str();
-    let replaced = !input::present(&args.reference, &[column])?.is_empty();
+    let replaced = shape.is_none() && !input::present(&args.reference, &[column])?.is_empty();
     let extra = [Extra::numbers(column, &drive.voltage)];
     args.output.write(|out| reference.write_with(out, &extra).map_err(output::io_error))?;
     if replaced {

@@ -57,11 +57,11 @@ struct Summary {
 
 impl Summary {
     fn new(path: &Path, log: &RunLog) -> Self {
-        let record = || log.samples.iter().filter(|s| s.is_record());
-        let errors: Vec<f64> = record().filter_map(|s| Some(s.output - s.reference?)).collect();
+        let record = log.record_samples();
+        let errors: Vec<f64> = record.iter().filter_map(|s| Some(s.output - s.reference?)).collect();
         let rmse = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
         let time = |s: Option<&LogSample>| s.map_or(0.0, |s| s.time_s);
-        let mut segments: Vec<u64> = record().map(|s| s.segment).collect();
+        let mut segments: Vec<u64> = record.iter().map(|s| s.segment).collect();
         segments.dedup();
         Self {
             log: path.display().to_string(),
@@ -69,7 +69,7 @@ impl Summary {
             damaged: log.damaged,
             holes: log.holes,
             samples: log.samples.len(),
-            record_samples: record().count(),
+            record_samples: record.len(),
             segments: segments.len(),
             seconds: time(log.samples.last()) - time(log.samples.first()),
             tracking_rmse: (!errors.is_empty()).then_some(rmse),
@@ -124,6 +124,13 @@ fn info(args: &LogInfoArgs) -> CommandResult {
 fn convert(args: &LogConvertArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let (_, log) = read(&args.log)?;
+    if log.samples.is_empty() {
+        let message = format!("{}: the log has no sample", args.log.display());
+        return Err(CommandError::bad_input(message));
+    }
+    if !log.closed {
+        output::say("note: the log was cut off; its last half second may be missing");
+    }
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
     damage(log.damaged).into_iter().chain(holes(log.holes)).for_each(|told| output::say(&format!("note: {told}")));
     if !args.ramps && !log.samples.is_empty() && !log.samples.iter().any(LogSample::is_record) {

@@ -99,7 +99,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let recording = recording::split(recording);
     if let Some(target) = &args.output {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
-        target.write_beside_older(|out| record.write_with(out, &[]).map_err(output::io_error))?;
+        target.write_measured(|out| record.write_with(out, &[]).map_err(output::io_error))?;
     }
     // The record may lie on another disk than a log that could not be closed.
     closed?;

@@ -8,7 +8,7 @@ pub(super) mod job;
 mod live;
 mod lookout;
 pub(super) mod play;
-mod shape;
+pub(super) mod shape;
 mod sweep;
 mod view;
 
@@ -194,7 +194,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if args.record.is_none() && args.log.is_none() {
         output::say("note: what is measured is not kept; give --record, --log or both");
     }
-    if let Some(foreseen) = job.followed.as_ref().and_then(Followed::foreseen) {
+    if let Some(foreseen) = job.foreseen() {
         output::say(&format!("note: {foreseen}"));
     }
     let unit = recording::unit(daq.capabilities().output);
@@ -248,8 +248,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let recording = recording::split(recording);
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
-        target
-            .write_beside_older(|out| record.write_with(out, &recording::extra(&beside)).map_err(output::io_error))?;
+        target.write_measured(|out| record.write_with(out, &recording::extra(&beside)).map_err(output::io_error))?;
     }
     // The record may lie on another disk than a log that could not be closed.
     closed?;

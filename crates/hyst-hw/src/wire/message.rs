@@ -272,7 +272,7 @@ impl fmt::Display for Fault {
             }
             Self::Emergency => "an emergency stop was asked for",
             Self::Temperature => "the temperature is above the limit of the run; let it cool or raise the limit",
-            Self::Sensor => "a sensor shows what is no number; look at its cable",
+            Self::Sensor => "a sensor shows no number: it is past the end of its range, as where a loop oscillates, or its cable is out",
             Self::TrackingError => {
                 "the output is further from the reference than the run allows; look for what holds the actuator"
             }
@@ -324,7 +324,7 @@ pub enum Field {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::State => "the device is busy with another run, or on its way to rest: stop that one, or wait",
+            Self::State => "the device is busy with another run, or on its way to rest: stop that one, or wait and look (hystctl status)",
             Self::Session => "the device is in another run, or was started anew: begin again",
             Self::Start(Field::Rate) => "the device cannot run at this rate",
             Self::Start(Field::Voltage) => "the voltage limits are not within the device's own",

@@ -164,6 +164,11 @@ impl RunLog {
         self.metadata.get("output_column").and_then(|column| OutputUnit::of_column(column))
     }
 
+    /// The samples that make a record: what was asked for, without rows in which a device that looks ahead had no reference yet.
+    pub fn record_samples(&self) -> Vec<&LogSample> {
+        self.chosen(false)
+    }
+
     /// The samples that belong to a record: those that were asked for, or the ramps too.
     fn chosen(&self, with_ramps: bool) -> Vec<&LogSample> {
         let has = |of: fn(&LogSample) -> Option<f64>| self.samples.iter().any(|s| of(s).is_some());
@@ -245,7 +250,7 @@ impl Record {
         need: super::Need,
     ) -> Result<Self, RecordError> {
         let log = RunLog::parse(name, bytes)?;
-        if log.chosen(false).is_empty() {
+        if log.record_samples().is_empty() {
             return Err(RecordError::NothingAsked { file: name.to_owned(), what: log.why_empty() });
         }
         let text = log.csv(name, false)?;

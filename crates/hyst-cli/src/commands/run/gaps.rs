@@ -57,11 +57,7 @@ impl Gaps {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn at(period: u32) -> Sample {
-        let time_s = f64::from(period) / 100.0;
-        Sample { time_s, drive_v: 0.0, output: 0.0, temperature_degc: None, load_n: None, force_n: None }
-    }
+    use crate::recording::tests::at;
 
     #[test]
     fn only_what_is_missing_within_a_segment_counts() {

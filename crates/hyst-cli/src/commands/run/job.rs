@@ -19,6 +19,7 @@ use super::shape::Shape;
 use crate::cli::{Control, PidGains, RecordArgs, RunArgs, VoltageLimits};
 use crate::commands::compensate::{Compensation, options};
 use crate::exit::{CommandError, CommandResult};
+use crate::output::say;
 use crate::{input, recording, text};
 
 /// Everything that has to be known before a device moves.
@@ -62,6 +63,8 @@ pub(super) struct HandedOver {
     gains: PidParams,
     why: String,
     slew_v_per_s: f64,
+    /// The drive that the model's inverse has in mind, where there is one: the loop stays near it.
+    plan: Option<Drive>,
 }
 
 impl HandedOver {
@@ -131,14 +134,27 @@ impl Job {
         Ok(beside)
     }
 
-    /// How steep the device has to go \[V/s\]; none where it makes the drive itself.
+    /// How steep the device has to go \[V/s\]; none where nothing is known of its drive.
     pub(super) fn steepest(&self) -> Option<f64> {
-        if self.handed_over.is_some() {
-            return None;
-        }
-        let steps = self.segments.iter().flat_map(|volts| volts.windows(2)).map(|pair| (pair[1] - pair[0]).abs());
-        let steepest = steps.fold(0.0, f64::max) * self.options.rate_hz;
-        Some(STEEPER * steepest.max(self.options.slew_v_per_s))
+        let steep = |volts: &[f64]| {
+            let steps = volts.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+            steps.fold(0.0, f64::max) * self.options.rate_hz
+        };
+        let (Some(HandedOver { plan, .. }), Some(followed)) = (&self.handed_over, &self.followed) else {
+            let steepest = self.segments.iter().map(|volts| steep(volts)).fold(0.0, f64::max);
+            return Some(STEEPER * steepest.max(self.options.slew_v_per_s));
+        };
+        let plan = plan.as_ref()?;
+        let rows = followed.reference.segments().iter();
+        let steepest = rows.map(|rows| steep(&plan.voltage[rows.clone()])).fold(0.0, f64::max);
+        Some(LOOP_STEEPER * steepest.max(RecordOptions::at(self.options.rate_hz).slew_v_per_s))
+    }
+
+    /// What the model foresees to go wrong, if that is much.
+    pub(super) fn foreseen(&self) -> Option<String> {
+        let followed = self.followed.as_ref()?;
+        let plan = self.handed_over.as_ref().and_then(|handed| handed.plan.as_ref());
+        followed.foreseen(followed.drive.as_ref().or(plan)?)
     }
 
     /// Takes the rows away in which the output had not come to a reference's beginning yet, and the forces of these rows.
@@ -182,8 +198,8 @@ impl Followed {
     }
 
     /// What the model foresees to go wrong with the drive as planned, if that is much, and why.
-    pub(super) fn foreseen(&self) -> Option<String> {
-        let Drive { bandwidth_hz, voltage_limited, slew_limited, missed, .. } = self.drive.as_ref()?;
+    fn foreseen(&self, drive: &Drive) -> Option<String> {
+        let Drive { bandwidth_hz, voltage_limited, slew_limited, missed, .. } = drive;
         let wanted = self.wanted();
         let count = wanted.len().max(1) as f64;
         let mean = wanted.iter().sum::<f64>() / count;
@@ -230,6 +246,8 @@ const FORESEEN_OF_RANGE: f64 = 1e-3;
 const USUAL_SETTLE_S: f64 = 2.0;
 /// By how much steeper than the planned drive, which may be corrected on the way, the device may go.
 const STEEPER: f64 = 1.5;
+/// As [`STEEPER`], where a loop on the device corrects it.
+const LOOP_STEEPER: f64 = 4.0;
 /// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
@@ -259,8 +277,10 @@ impl Job {
             return Err(CommandError::bad_input(message));
         }
         if measured != device.output.column() {
-            let message =
-                format!("the model's output is {measured}, but the device measures {}", device.output.column());
+            let message = format!(
+                "the model's output is {measured}, but the device measures {}: fit a model to records of that column",
+                device.output.column()
+            );
             return Err(CommandError::bad_input(message));
         }
         let reference = match Shape::named(reference)? {
@@ -303,7 +323,9 @@ impl Job {
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
         if args.control.closes() && device.queued {
             let degc = options.temperature;
-            let job = Self::hand_over(args, device, model, json, reference, (low, high), play)?;
+            // Where the inverse alone would be refused, the loop may find its way or end with a fault that says why.
+            let plan = compensate(&model, &reference, &options).ok();
+            let job = Self::hand_over(args, device, model, json, reference, ((low, high), plan), play)?;
             return Ok(Self { degc, ..job });
         }
         let drive = args.control.inverts().then(|| compensate(&model, &reference, &options)).transpose()?;
@@ -336,7 +358,7 @@ impl Job {
         model: Model,
         json: String,
         reference: Record,
-        limits: (f64, f64),
+        (limits, plan): ((f64, f64), Option<Drive>),
         mut play: RecordOptions,
     ) -> CommandResult<Self> {
         if args.control != Control::PidFeedforward {
@@ -383,7 +405,7 @@ impl Job {
             held_s: play.settle_s,
         };
         let slew_v_per_s = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
-        let handed_over = Some(HandedOver { recipe, range, late, gains, why, slew_v_per_s });
+        let handed_over = Some(HandedOver { recipe, range, late, gains, why, slew_v_per_s, plan });
         Ok(Self { handed_over, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
@@ -476,6 +498,9 @@ impl Job {
     }
 }
 
+/// From how many times the model's own integral gain on a given one leaves no margin.
+const TOO_MUCH: f64 = 2.0;
+
 /// Gains, as given or from the model.
 struct Chosen {
     gains: PidParams,
@@ -491,6 +516,13 @@ impl Chosen {
                 // Where nothing is integrated, nothing winds up.
                 let back = if integral == 0.0 { 1.0 } else { (proportional / integral).abs().max(10.0 * period) };
                 let given = PidParams { proportional, integral, derivative, anti_windup_seconds: back, ..own.pid };
+                if integral.abs() > TOO_MUCH * own.pid.integral.abs() {
+                    say(&format!(
+                        "note: an integral gain of {} is {} times what the model allows with a margin of two: the loop may oscillate",
+                        text::short(integral),
+                        text::short(integral / own.pid.integral)
+                    ));
+                }
                 (given, "as given".to_owned())
             }
             None => {

@@ -29,6 +29,8 @@ pub(super) struct Lookout<'a> {
     pub(super) unit: &'a str,
     /// Why the run is ended from here.
     pub(super) fault: Option<Fault>,
+    /// More about it.
+    pub(super) detail: String,
     /// Estimated force at each row of each segment \[N\]; empty where none is estimated.
     pub(super) forces: Vec<Vec<f64>>,
     /// Time of the newest sample \[s\].
@@ -84,6 +86,14 @@ impl Lookout<'_> {
         if self.fault.is_none()
             && let Some(fault) = self.guard.look(sample, wanted)
         {
+            self.detail = match (fault, wanted, sample.temperature_degc) {
+                (Fault::TrackingError, Some(wanted), _) => {
+                    let away = text::short((sample.output - wanted).abs());
+                    format!(" ({away} {} away at {} s)", self.unit, text::short(sample.time_s))
+                }
+                (Fault::Temperature, _, Some(degc)) => format!(" ({} °C)", text::short(degc)),
+                _ => String::new(),
+            };
             self.end(fault);
         }
     }
@@ -92,7 +102,7 @@ impl Lookout<'_> {
     pub(super) fn end(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
-            self.event("fault", format!("fault {}: {fault}", fault.code()));
+            self.event("fault", format!("fault {}: {fault}{}", fault.code(), self.detail));
         }
     }
 

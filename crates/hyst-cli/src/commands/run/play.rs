@@ -37,6 +37,11 @@ where
 {
     let (stop, over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     let (asked, ended, warned) = (Arc::clone(&stop), Arc::clone(&over), AtomicBool::new(false));
+    let kept = match &log {
+        Some(log) => format!("; what was measured until now can be read in {}", log.path().display()),
+        None if job.recorded => "; what was measured is lost: give --log, too, which is written as it comes".to_owned(),
+        None => String::new(),
+    };
     let again = move || {
         if ended.load(Ordering::Relaxed) {
             // What was measured is being written: an impatient stop of the run is no wish to lose it.
@@ -47,9 +52,9 @@ where
             say("note: what was measured is being written; once more, and it is left as it is");
         } else if asked.swap(true, Ordering::Relaxed) {
             // Who asks twice does not want to wait for a device that does not answer.
-            say(
-                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status)",
-            );
+            say(&format!(
+                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status){kept}"
+            ));
             std::process::exit(i32::from(Exit::DeviceLost as u8));
         }
     };
@@ -73,9 +78,13 @@ where
         wanted: &job.wanted,
         unit: job.symbol,
         fault: None,
+        detail: String::new(),
         forces: Vec::new(),
         now_s: 0.0,
     };
+    if View::interrupted() || stop.load(Ordering::Relaxed) {
+        return Err(CommandError::failed("stopped on request before anything moved"));
+    }
     let (mut live, mut closed) = match &mut job.followed {
         Some(followed) => (followed.live.as_mut(), followed.closed.as_mut()),
         None => (None, None),
@@ -102,20 +111,31 @@ where
             let what = if *driven { "the device may still be driven" } else { "the device did not take the stop" };
             lookout.note("fault", format!("{what}: {error}"));
         }
-        Err(Failure { cause: Cause::Cancelled, .. }) if lookout.fault.is_none() && lookout.log_error.is_none() => {
-            lookout.event("cancelled", "stopped on request; the device was brought to rest".to_owned());
+        Err(Failure { cause: Cause::Cancelled, driven, .. })
+            if lookout.fault.is_none() && lookout.log_error.is_none() =>
+        {
+            let how = if *driven { "the device was brought to rest" } else { "the device was at rest all the time" };
+            lookout.event("cancelled", format!("stopped on request; {how}"));
         }
         Err(Failure { cause: Cause::Device(error), .. }) => lookout.note("fault", error.to_string()),
         _ => {}
     }
     let watched = lookout.watched();
     let gaps = lookout.gaps.gaps();
-    let Lookout { log, log_error, fault, forces, .. } = lookout;
+    let Lookout { log, log_error, fault, detail, forces, view, .. } = lookout;
+    // What is said from here on stands below the picture.
+    drop(view);
     match played {
         Ok(recording) => Ok(Played { recording, forces, watched, gaps, error: None }),
         Err(mut failure) => {
             let recording = std::mem::take(&mut failure.partial);
-            let error = Some(failed(failure, &recording, log_error, fault, (log.map(|log| &*log), job.recorded)));
+            let error = Some(failed(
+                failure,
+                &recording,
+                log_error,
+                fault.map(|fault| (fault, detail)),
+                (log.map(|log| &*log), job.recorded),
+            ));
             Ok(Played { recording, forces, watched, gaps, error })
         }
     }
@@ -126,7 +146,7 @@ fn failed<E: Classified>(
     failure: Failure<E>,
     partial: &Recording,
     log_error: Option<LogError>,
-    fault: Option<Fault>,
+    fault: Option<(Fault, String)>,
     (log, recorded): (Option<&RunLog>, bool),
 ) -> CommandError {
     let measured: usize = partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
@@ -146,9 +166,12 @@ fn failed<E: Classified>(
         (None, _) => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
     }
     match fault {
-        Some(fault) if cancelled => CommandError::new(
+        Some((fault, detail)) if cancelled => CommandError::new(
             Exit::DeviceLost,
-            anyhow::anyhow!("the run was ended and the device brought to rest (fault {}): {fault}", fault.code()),
+            anyhow::anyhow!(
+                "the run was ended and the device brought to rest (fault {}): {fault}{detail}",
+                fault.code()
+            ),
         ),
         _ => CommandError::new(exit(&failure), failure),
     }

@@ -13,7 +13,7 @@ const MOST_ROWS: f64 = 1e8;
 
 /// A reference as its arguments say it. It begins at its lower end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shape {
+pub(in crate::commands) struct Shape {
     form: Form,
     low: f64,
     high: f64,
@@ -70,7 +70,7 @@ impl FromStr for Shape {
 
 impl Shape {
     /// What `path` names, if it is a shape and no file.
-    pub(super) fn named(path: &Path) -> CommandResult<Option<Self>> {
+    pub(in crate::commands) fn named(path: &Path) -> CommandResult<Option<Self>> {
         let Some(text) = path.to_str().filter(|_| !path.exists()) else { return Ok(None) };
         let Some((form, _)) = text.split_once(':') else { return Ok(None) };
         if !["sine", "triangle", "steps"].contains(&form) {
@@ -99,7 +99,7 @@ impl Shape {
     }
 
     /// As a record at `rate_hz`.
-    pub(super) fn record(&self, path: &Path, unit: OutputUnit, rate_hz: f64) -> CommandResult<Record> {
+    pub(in crate::commands) fn record(&self, path: &Path, unit: OutputUnit, rate_hz: f64) -> CommandResult<Record> {
         let rows = (self.seconds * rate_hz).round();
         if !(2.0..=MOST_ROWS).contains(&rows) {
             let message = format!(

@@ -8,6 +8,9 @@ use std::time::{Duration, Instant};
 
 use hyst_hw::Sample;
 use ratatui::backend::CrosstermBackend;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyModifiers};
+use ratatui::crossterm::terminal;
+use ratatui::layout::Size;
 use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Widget};
 use ratatui::{Terminal, TerminalOptions, Viewport};
@@ -19,6 +22,8 @@ use seconds::Seconds;
 const EVERY: Duration = Duration::from_millis(100);
 /// Lines of the terminal that it takes.
 const LINES: u16 = 16;
+/// Columns and lines that a terminal has at least where there is a picture: on one of no size nothing can ever be written above it.
+const LEAST: Size = Size::new(20, 8);
 
 /// One instant.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +51,13 @@ pub(super) struct Picture {
     /// Symbol of the output's unit.
     unit: &'static str,
     drawn: Option<Instant>,
+    /// What there was no room for.
+    untold: Vec<String>,
+}
+
+/// Whether a picture, and a line above it, has room.
+fn roomy(size: Size) -> bool {
+    size.width >= LEAST.width && size.height >= LEAST.height
 }
 
 impl View {
@@ -54,16 +66,32 @@ impl View {
         let options = TerminalOptions { viewport: Viewport::Inline(LINES) };
         // Where the cursor is, is asked on stdout and answered on stdin: neither may be anything else.
         let asked = stdout().is_terminal() && stdin().is_terminal();
-        let terminal = (stderr().is_terminal() && asked && !plain)
+        let able = std::env::var_os("TERM").is_none_or(|name| name != "dumb");
+        let able = able && terminal::size().is_ok_and(|(width, height)| roomy(Size::new(width, height)));
+        let terminal = (stderr().is_terminal() && asked && able && !plain)
             // A terminal that does not say where its cursor is has no picture.
             .then(|| Terminal::with_options(CrosstermBackend::new(stderr()), options).ok())
             .flatten();
         match terminal {
             Some(terminal) => {
-                Self::Picture(Box::new(Picture { terminal, seconds: Seconds::default(), unit, drawn: None }))
+                let seconds = Seconds::default();
+                Self::Picture(Box::new(Picture { terminal, seconds, unit, drawn: None, untold: Vec::new() }))
             }
-            None => Self::Bar(Progress::bar("playing", total)),
+            None => Self::Bar(Progress::steady("playing", total)),
         }
+    }
+
+    /// Whether Ctrl-C was typed while the terminal was asked where its cursor is: it is a key then, and no signal.
+    pub(super) fn interrupted() -> bool {
+        if !(stdout().is_terminal() && stdin().is_terminal()) {
+            return false;
+        }
+        let mut interrupted = false;
+        while event::poll(Duration::ZERO).unwrap_or(false) {
+            let Ok(event) = event::read() else { break };
+            interrupted |= matches!(event, Event::Key(KeyEvent { code: KeyCode::Char('c'), modifiers, .. }) if modifiers.contains(KeyModifiers::CONTROL));
+        }
+        interrupted
     }
 
     /// Takes a sample.
@@ -103,8 +131,12 @@ impl Picture {
 
     /// Above the picture, where it stays.
     fn tell(&mut self, text: &str) {
-        let width = self.terminal.size().map_or(80, |size| size.width.max(1));
-        let height = (text.chars().count() as u16).div_ceil(width).max(1);
+        let Some(size) = self.terminal.size().ok().filter(|size| roomy(*size)) else {
+            // Made small meanwhile.
+            self.untold.push(text.to_owned());
+            return;
+        };
+        let height = (text.chars().count() as u16).div_ceil(size.width).max(1);
         let line = Paragraph::new(Line::from(text.to_owned())).wrap(ratatui::widgets::Wrap { trim: true });
         let _ = self.terminal.insert_before(height, |buffer| line.render(buffer.area, buffer));
     }
@@ -117,5 +149,6 @@ impl Drop for Picture {
         // What is said next begins where the picture was.
         let _ = self.terminal.set_cursor_position(place);
         let _ = self.terminal.show_cursor();
+        self.untold.iter().for_each(|text| crate::output::say(text));
     }
 }
