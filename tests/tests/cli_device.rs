@@ -102,6 +102,11 @@ fn a_loop_that_the_device_closes_follows_better_than_its_inverse_alone_and_tells
         lab.refuses(&line, 2)
     };
     assert!(refused("pid").contains("--control pid+feedforward"));
+    let line = format!(
+        "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid=0,-5",
+        device.daq()
+    );
+    assert!(lab.refuses(&line, 2).contains("wrong sign"));
     // An output that does not come to its reference ends the run on the device.
     let line = format!(
         "run --daq {} --model model.json --reference sine:4,14,1,3 --control pid+feedforward --pid 0,0.001 --max-error 0.2 --log astray.mcap --record astray.csv {PATIENT}",

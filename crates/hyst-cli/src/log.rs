@@ -111,10 +111,7 @@ impl RunLog {
     /// # Errors
     /// When the folder cannot be written, or another run writes the older file.
     pub fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
-        if File::open(path).is_ok_and(|older| matches!(older.try_lock_shared(), Err(TryLockError::WouldBlock))) {
-            let source = io::Error::other("another run is writing it: give this one another name");
-            return Err(LogError { path: path.to_owned(), saved: None, source });
-        }
+        left_alone(&behind_links(path)).map_err(|source| LogError { path: path.to_owned(), saved: None, source })?;
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
@@ -205,10 +202,21 @@ impl RunLog {
         let Some(temporary) = self.unnamed.take() else { return Ok(()) };
         let target = behind_links(&self.path);
         if self.keeps_older && target.is_file() {
+            // One may have begun since this was asked for.
+            left_alone(&target)?;
             self.older = Some(set_aside(&target)?);
         }
         temporary.persist(&target).map_err(|error| error.error)
     }
+}
+
+/// Refuses a log that another run is writing: its readers would take it for this one.
+fn left_alone(target: &Path) -> io::Result<()> {
+    let busy = |older: File| matches!(older.try_lock_shared(), Err(TryLockError::WouldBlock));
+    if target.is_file() && File::open(target).is_ok_and(busy) {
+        return Err(io::Error::other("another run is writing it: give this one another name"));
+    }
+    Ok(())
 }
 
 /// The file that `path` leads to: a link stays one.
@@ -374,6 +382,23 @@ mod tests {
         assert!(RunLog::beside_older(&path, &info()).err().unwrap().to_string().contains("another run is writing it"));
         log.finish().unwrap();
         RunLog::beside_older(&path, &info()).unwrap();
+        assert_eq!(read(&path).len(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_refused_and_two_runs_do_not_share_a_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.mcap");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(RunLog::beside_older(&pipe, &info()).err().unwrap().to_string().contains("no regular file"));
+        // Both began before either had a sample.
+        let path = folder.path().join("run.mcap");
+        let mut first = RunLog::beside_older(&path, &info()).unwrap();
+        let mut second = RunLog::beside_older(&path, &info()).unwrap();
+        first.sample(&sample(0)).unwrap();
+        assert!(second.sample(&sample(0)).unwrap_err().to_string().contains("another run is writing it"));
+        first.finish().unwrap();
         assert_eq!(read(&path).len(), 1);
     }
 

@@ -1,6 +1,7 @@
 //! Where results go: files that are written whole or not at all, stdout, and what is said about them.
 
 use std::convert::Infallible;
+use std::ffi::OsStr;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -59,10 +60,16 @@ impl Target {
     /// temporary files.
     pub(crate) fn write_measured(&self, content: impl Fn(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         let Err(refused) = self.write_beside_older(&content) else { return Ok(()) };
-        let Some(name) = self.file().and_then(Path::file_name) else { return Err(refused) };
-        let refuge = std::env::temp_dir().join(name);
-        let what = match write_beside_older(&refuge, content) {
-            Ok(_) => format!("what was measured is kept in {}: take it from there", refuge.display()),
+        let stem = self.file().and_then(Path::file_stem).unwrap_or(OsStr::new("record")).to_string_lossy();
+        // In a folder of everybody: a file of its own, that nobody can have put there.
+        let refuge = || -> io::Result<PathBuf> {
+            let mut file = tempfile::Builder::new().prefix(&format!("{stem}-")).suffix(".csv").tempfile()?;
+            content(&mut file)?;
+            file.as_file().sync_all()?;
+            Ok(file.into_temp_path().keep()?)
+        };
+        let what = match refuge() {
+            Ok(path) => format!("what was measured is kept in {}: take it from there", path.display()),
             Err(_) => "what was measured is in no record".to_owned(),
         };
         Err(CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{}; {what}", refused.text())))

@@ -160,7 +160,7 @@ fn kind(mut file: File) -> io::Result<Vec<u8>> {
     file.rewind()?;
     let mut head = Vec::new();
     file.take(8192).read_to_end(&mut head)?;
-    let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let first = head.split(|byte| *byte == b'\n').find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
     let most = match first.first() {
         Some(b'{' | b'[' | b'<') => 1,
         _ if first.contains(&0) => 4,
@@ -187,7 +187,7 @@ fn put(
         content(&mut buffered)?;
         buffered.flush()?;
     }
-    let replaces = existing.is_some();
+    let replaces = existing.as_ref().is_some_and(|metadata| metadata.len() > 0 || older == Older::SetAside);
     if let Some(metadata) = existing {
         temporary.as_file().set_permissions(metadata.permissions())?;
     }
@@ -195,11 +195,9 @@ fn put(
     let keeps = replaces
         && match older {
             Older::SetAside => true,
-            // Of an empty file nothing would be lost; one that cannot be read may be anything.
+            // One that cannot be read may be anything.
             Older::SetAsideIfOther => {
-                let there = File::open(&target).and_then(kind).ok();
-                there.as_ref().is_none_or(|there| !there.is_empty())
-                    && there != Some(kind(temporary.as_file().try_clone()?)?)
+                File::open(&target).and_then(kind).ok() != Some(kind(temporary.as_file().try_clone()?)?)
             }
             Older::Replaced | Older::Kept => false,
         };
@@ -327,6 +325,8 @@ mod tests {
         assert_eq!(write(b"HYST\0\x09\x08"), None);
         assert_eq!(write(b""), older(b"HYST\0\x09\x08"));
         assert_eq!(write(record), None);
+        fs::write(&path, "\nnotes\n").unwrap();
+        assert_eq!(write(record), older(b"\nnotes\n"));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::run::shape::Shape;
 use crate::cli::{CompensateArgs, LimitArgs};
-use crate::exit::CommandResult;
+use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report, say};
 use crate::{input, text};
 
@@ -59,6 +59,9 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
     let (model, _) = input::model(&args.model)?;
     let shape = Shape::named(&args.reference)?;
     let reference = match shape {
+        Some(_) if !args.map.map.is_empty() => {
+            return Err(CommandError::bad_input("--map is for a reference in a file"));
+        }
         Some(shape) => shape.record(&args.reference, input::output_unit(&model)?, model.recorded_at_hz)?,
         None => input::record(&args.reference, &args.map.map, Need::Output)?,
     };

@@ -125,15 +125,15 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let (_, log) = read(&args.log)?;
     if log.samples.is_empty() {
-        let message = format!("{}: the log has no sample", args.log.display());
-        return Err(CommandError::bad_input(message));
+        let what = damage(log.damaged).unwrap_or_else(|| "it ends before the first sample".to_owned());
+        return Err(CommandError::bad_input(format!("{}: the log has no sample: {what}", args.log.display())));
     }
     if !log.closed {
         output::say("note: the log was cut off; its last half second may be missing");
     }
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
     damage(log.damaged).into_iter().chain(holes(log.holes)).for_each(|told| output::say(&format!("note: {told}")));
-    if !args.ramps && !log.samples.is_empty() && !log.samples.iter().any(LogSample::is_record) {
+    if !args.ramps && !log.samples.iter().any(LogSample::is_record) {
         let many = text::count(log.samples.len(), "sample");
         output::say(&format!(
             "note: {many}, and none of what was asked for: all are of the ramps before and after (--ramps)"

@@ -217,9 +217,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some(HandedOver { recipe, range, .. }) = &job.handed_over {
         daq.follow(recipe, *range)?;
     }
-    if let Some(slew_v_per_s) = job.steepest() {
-        daq.gentle(slew_v_per_s);
-    }
+    daq.gentle(job.steepest());
     let played = play::play(daq, &mut job, log.as_mut());
     // What was measured is kept in any case; the first error is the one to tell.
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {

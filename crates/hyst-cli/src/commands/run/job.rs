@@ -134,20 +134,14 @@ impl Job {
         Ok(beside)
     }
 
-    /// How steep the device has to go \[V/s\]; none where nothing is known of its drive.
-    pub(super) fn steepest(&self) -> Option<f64> {
-        let steep = |volts: &[f64]| {
-            let steps = volts.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-            steps.fold(0.0, f64::max) * self.options.rate_hz
-        };
-        let (Some(HandedOver { plan, .. }), Some(followed)) = (&self.handed_over, &self.followed) else {
-            let steepest = self.segments.iter().map(|volts| steep(volts)).fold(0.0, f64::max);
-            return Some(STEEPER * steepest.max(self.options.slew_v_per_s));
-        };
-        let plan = plan.as_ref()?;
-        let rows = followed.reference.segments().iter();
-        let steepest = rows.map(|rows| steep(&plan.voltage[rows.clone()])).fold(0.0, f64::max);
-        Some(LOOP_STEEPER * steepest.max(RecordOptions::at(self.options.rate_hz).slew_v_per_s))
+    /// How steep the device has to go \[V/s\].
+    pub(super) fn steepest(&self) -> f64 {
+        if let Some(HandedOver { slew_v_per_s, .. }) = self.handed_over {
+            return slew_v_per_s;
+        }
+        let steep = |volts: &[f64]| steepest_step(volts) * self.options.rate_hz;
+        let steepest = self.segments.iter().map(|volts| steep(volts)).fold(0.0, f64::max);
+        STEEPER * steepest.max(self.options.slew_v_per_s)
     }
 
     /// What the model foresees to go wrong, if that is much.
@@ -404,7 +398,14 @@ impl Job {
             closed: None,
             held_s: play.settle_s,
         };
-        let slew_v_per_s = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
+        // On the way to the reference the drive goes over its range in about a second.
+        let planned = plan.as_ref().map_or(f64::INFINITY, |plan| {
+            let rows = followed.reference.segments().iter();
+            rows.map(|rows| steepest_step(&plan.voltage[rows.clone()])).fold(0.0, f64::max) / period
+        });
+        let least = (limits.1 - limits.0).max(RecordOptions::at(play.rate_hz).slew_v_per_s);
+        let usual = (LOOP_STEEPER * planned.max(least)).min(device.max_slew_v_per_s);
+        let slew_v_per_s = args.limits.slew.unwrap_or(usual);
         let handed_over = Some(HandedOver { recipe, range, late, gains, why, slew_v_per_s, plan });
         Ok(Self { handed_over, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
@@ -501,6 +502,11 @@ impl Job {
 /// From how many times the model's own integral gain on a given one leaves no margin.
 const TOO_MUCH: f64 = 2.0;
 
+/// Largest step between neighbours \[V\].
+fn steepest_step(volts: &[f64]) -> f64 {
+    volts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
+}
+
 /// Gains, as given or from the model.
 struct Chosen {
     gains: PidParams,
@@ -516,11 +522,18 @@ impl Chosen {
                 // Where nothing is integrated, nothing winds up.
                 let back = if integral == 0.0 { 1.0 } else { (proportional / integral).abs().max(10.0 * period) };
                 let given = PidParams { proportional, integral, derivative, anti_windup_seconds: back, ..own.pid };
-                if integral.abs() > TOO_MUCH * own.pid.integral.abs() {
+                let ratio = integral / own.pid.integral;
+                let turned = |gain: f64| gain * own.pid.integral < 0.0;
+                if turned(integral) || (integral == 0.0 && turned(proportional)) {
+                    return Err(CommandError::bad_input(
+                        "--pid: the gain has the wrong sign for this model: the loop would drive the output away from its reference",
+                    ));
+                }
+                if ratio > TOO_MUCH {
                     say(&format!(
                         "note: an integral gain of {} is {} times what the model allows with a margin of two: the loop may oscillate",
                         text::short(integral),
-                        text::short(integral / own.pid.integral)
+                        text::short(ratio)
                     ));
                 }
                 (given, "as given".to_owned())

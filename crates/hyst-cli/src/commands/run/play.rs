@@ -37,10 +37,17 @@ where
 {
     let (stop, over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     let (asked, ended, warned) = (Arc::clone(&stop), Arc::clone(&over), AtomicBool::new(false));
-    let kept = match &log {
-        Some(log) => format!("; what was measured until now can be read in {}", log.path().display()),
-        None if job.recorded => "; what was measured is lost: give --log, too, which is written as it comes".to_owned(),
-        None => String::new(),
+    let logged = Arc::new(AtomicBool::new(false));
+    let kept = {
+        let (path, logged, recorded) =
+            (log.as_ref().map(|log| log.path().to_owned()), Arc::clone(&logged), job.recorded);
+        move || match path.as_ref().filter(|_| logged.load(Ordering::Relaxed)) {
+            Some(path) => {
+                format!("; what was measured, but for the last half second, can be read in {}", path.display())
+            }
+            None if recorded => "; what was measured is lost: give --log, too, which is written as it comes".to_owned(),
+            None => String::new(),
+        }
     };
     let again = move || {
         if ended.load(Ordering::Relaxed) {
@@ -53,7 +60,8 @@ where
         } else if asked.swap(true, Ordering::Relaxed) {
             // Who asks twice does not want to wait for a device that does not answer.
             say(&format!(
-                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status){kept}"
+                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status){}",
+                kept()
             ));
             std::process::exit(i32::from(Exit::DeviceLost as u8));
         }
@@ -82,7 +90,7 @@ where
         forces: Vec::new(),
         now_s: 0.0,
     };
-    if View::interrupted() || stop.load(Ordering::Relaxed) {
+    if lookout.view.interrupted() || stop.load(Ordering::Relaxed) {
         return Err(CommandError::failed("stopped on request before anything moved"));
     }
     let (mut live, mut closed) = match &mut job.followed {
@@ -99,10 +107,11 @@ where
     };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
         let on = lookout.take(news);
+        logged.store(lookout.log.as_ref().is_some_and(|log| log.samples() > 0), Ordering::Relaxed);
         if saturated.load(Ordering::Relaxed) {
             lookout.end(Fault::Saturation);
         }
-        let ended = lookout.fault.is_some() || stop.load(Ordering::Relaxed);
+        let ended = lookout.fault.is_some() || lookout.view.interrupted() || stop.load(Ordering::Relaxed);
         if ended { ControlFlow::Break(()) } else { on }
     });
     over.store(true, Ordering::Relaxed);

@@ -102,16 +102,13 @@ impl Shape {
     pub(in crate::commands) fn record(&self, path: &Path, unit: OutputUnit, rate_hz: f64) -> CommandResult<Record> {
         let rows = (self.seconds * rate_hz).round();
         if !(2.0..=MOST_ROWS).contains(&rows) {
-            let message = format!(
-                "{}: {} s at {rate_hz} Hz are {rows} rows; give another time or rate",
-                path.display(),
-                self.seconds
-            );
+            let message =
+                format!("{}: {} s at {rate_hz} Hz are {rows} rows; give another time", path.display(), self.seconds);
             return Err(CommandError::bad_input(message));
         }
         if self.hz > FASTEST * rate_hz {
             let message = format!(
-                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency, or a higher --rate where the device can",
+                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency, or, to run, a higher --rate where the device can",
                 path.display(),
                 self.hz,
                 1.0 / FASTEST

@@ -37,15 +37,23 @@ pub(super) struct Seen {
     pub(super) force: Option<f64>,
 }
 
+/// What is shown.
+pub(super) struct View {
+    shown: Shown,
+    /// Whether Ctrl-C was typed while the terminal was asked where its cursor is: it is a key then, and no signal.
+    interrupted: bool,
+}
+
 /// What is shown where.
-pub(super) enum View {
+enum Shown {
     /// A bar, or nothing where stderr is no terminal.
     Bar(Progress),
     Picture(Box<Picture>),
 }
 
 /// A picture in the terminal.
-pub(super) struct Picture {
+struct Picture {
+    size: Option<Size>,
     terminal: Terminal<CrosstermBackend<Stderr>>,
     seconds: Seconds,
     /// Symbol of the output's unit.
@@ -68,54 +76,68 @@ impl View {
         let asked = stdout().is_terminal() && stdin().is_terminal();
         let able = std::env::var_os("TERM").is_none_or(|name| name != "dumb");
         let able = able && terminal::size().is_ok_and(|(width, height)| roomy(Size::new(width, height)));
-        let terminal = (stderr().is_terminal() && asked && able && !plain)
-            // A terminal that does not say where its cursor is has no picture.
-            .then(|| Terminal::with_options(CrosstermBackend::new(stderr()), options).ok())
-            .flatten();
-        match terminal {
+        let wanted = stderr().is_terminal() && asked && able && !plain;
+        // A terminal that does not say where its cursor is has no picture.
+        let terminal = wanted.then(|| Terminal::with_options(CrosstermBackend::new(stderr()), options).ok()).flatten();
+        let shown = match terminal {
             Some(terminal) => {
-                let seconds = Seconds::default();
-                Self::Picture(Box::new(Picture { terminal, seconds, unit, drawn: None, untold: Vec::new() }))
+                let (seconds, size) = (Seconds::default(), terminal.size().ok());
+                Shown::Picture(Box::new(Picture { size, terminal, seconds, unit, drawn: None, untold: Vec::new() }))
             }
-            None => Self::Bar(Progress::steady("playing", total)),
-        }
+            None => Shown::Bar(Progress::steady("playing", total)),
+        };
+        Self { shown, interrupted: wanted && typed_interrupt() }
     }
 
-    /// Whether Ctrl-C was typed while the terminal was asked where its cursor is: it is a key then, and no signal.
-    pub(super) fn interrupted() -> bool {
-        if !(stdout().is_terminal() && stdin().is_terminal()) {
-            return false;
-        }
-        let mut interrupted = false;
-        while event::poll(Duration::ZERO).unwrap_or(false) {
-            let Ok(event) = event::read() else { break };
-            interrupted |= matches!(event, Event::Key(KeyEvent { code: KeyCode::Char('c'), modifiers, .. }) if modifiers.contains(KeyModifiers::CONTROL));
-        }
-        interrupted
+    /// Whether Ctrl-C was typed where it is no signal.
+    pub(super) fn interrupted(&self) -> bool {
+        self.interrupted
     }
 
     /// Takes a sample.
     pub(super) fn add(&mut self, seen: Seen) {
-        if let Self::Picture(picture) = self {
+        if let Shown::Picture(picture) = &mut self.shown {
             picture.seconds.add(seen);
         }
     }
 
     /// Shows how far the run is.
     pub(super) fn show(&mut self, done: usize, total: usize) {
-        match self {
-            Self::Bar(bar) => bar.at(done),
-            Self::Picture(picture) => picture.draw(done, total),
+        match &mut self.shown {
+            Shown::Bar(bar) => bar.at(done),
+            Shown::Picture(picture) => {
+                picture.draw(done, total);
+                // Of another size, the terminal was asked anew.
+                let size = picture.terminal.size().ok();
+                if size != picture.size {
+                    picture.size = size;
+                    self.interrupted |= typed_interrupt();
+                }
+            }
         }
     }
 
     /// Says something that has happened.
     pub(super) fn tell(&mut self, text: &str) {
-        match self {
-            Self::Bar(bar) => bar.tell(text),
-            Self::Picture(picture) => picture.tell(text),
+        match &mut self.shown {
+            Shown::Bar(bar) => bar.tell(text),
+            Shown::Picture(picture) => {
+                picture.tell(text);
+                self.interrupted |= typed_interrupt();
+            }
         }
     }
+}
+
+/// Whether Ctrl-C is among the keys that were read along with the terminal's answer.
+fn typed_interrupt() -> bool {
+    let mut interrupted = false;
+    while event::poll(Duration::ZERO).unwrap_or(false) {
+        let Ok(event) = event::read() else { break };
+        let Event::Key(KeyEvent { code: KeyCode::Char('c'), modifiers, .. }) = event else { continue };
+        interrupted |= modifiers.contains(KeyModifiers::CONTROL);
+    }
+    interrupted
 }
 
 impl Picture {
@@ -131,6 +153,8 @@ impl Picture {
 
     /// Above the picture, where it stays.
     fn tell(&mut self, text: &str) {
+        // What is written above goes by the size that was known at the last drawing.
+        let _ = self.terminal.autoresize();
         let Some(size) = self.terminal.size().ok().filter(|size| roomy(*size)) else {
             // Made small meanwhile.
             self.untold.push(text.to_owned());
