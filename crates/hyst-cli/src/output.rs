@@ -64,7 +64,11 @@ impl Target {
         // In a folder of everybody: a file of its own, that nobody can have put there.
         let refuge = || -> io::Result<PathBuf> {
             let mut file = tempfile::Builder::new().prefix(&format!("{stem}-")).suffix(".csv").tempfile()?;
-            content(&mut file)?;
+            {
+                let mut buffered = io::BufWriter::new(&mut file);
+                content(&mut buffered)?;
+                buffered.flush()?;
+            }
             file.as_file().sync_all()?;
             Ok(file.into_temp_path().keep()?)
         };

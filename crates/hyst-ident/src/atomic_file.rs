@@ -28,8 +28,7 @@ pub fn write_atomic(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), AtomicFileError> {
-    let path = path.as_ref();
-    put(path, Older::Replaced, content).map(|_| ()).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path.as_ref(), Older::Replaced, content).map(|_| ())
 }
 
 /// As [`write_atomic`], but nothing that is there already is replaced.
@@ -40,8 +39,7 @@ pub fn create_atomic(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), AtomicFileError> {
-    let path = path.as_ref();
-    put(path, Older::Kept, content).map(|_| ()).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path.as_ref(), Older::Kept, content).map(|_| ())
 }
 
 /// As [`write_atomic`], but an older file keeps its content under the name that is returned: `path.~1~` or the next free number.
@@ -52,8 +50,7 @@ pub fn write_beside_older(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<Option<PathBuf>, AtomicFileError> {
-    let path = path.as_ref();
-    put(path, Older::SetAside, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path.as_ref(), Older::SetAside, content)
 }
 
 /// As [`write_beside_older`], but an older file of the same kind is replaced: one that begins as the new one does, with the same line of a text, or as
@@ -65,8 +62,7 @@ pub fn write_over_alike(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<Option<PathBuf>, AtomicFileError> {
-    let path = path.as_ref();
-    put(path, Older::SetAsideIfOther, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+    put(path.as_ref(), Older::SetAsideIfOther, content)
 }
 
 /// Whether a file could be written at `path`: before work is done whose result would be lost.
@@ -169,7 +165,16 @@ fn kind(mut file: File) -> io::Result<Vec<u8>> {
     Ok(first[..most.min(first.len())].to_vec())
 }
 
+/// Writes a file, and gives the name that an older one has then.
 fn put(
+    path: &Path,
+    older: Older,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<Option<PathBuf>, AtomicFileError> {
+    try_put(path, older, content).map_err(|source| AtomicFileError { path: path.to_owned(), source })
+}
+
+fn try_put(
     path: &Path,
     older: Older,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
