@@ -1,10 +1,12 @@
 //! How often a diagnosis is right, on simulated actuators that were drawn at random:
-//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED] [ONE]`; ONE is the number of a case that is told at length.
+//! `cargo run --release -p hyst-tests --example calibration [COUNT] [SEED] [ONE] [clumps]`; ONE is the number of a case that is told at length; with
+//! `clumps` the relays stand in clumps.
 
 use std::collections::BTreeMap;
 
+use hyst_hw::Bed;
 use hyst_ident::model::Effect;
-use hyst_tests::calibration::{Outcome, draw, right, run};
+use hyst_tests::calibration::{Outcome, draw_on, right, run};
 use rayon::prelude::*;
 
 /// Actuators that are computed side by side.
@@ -13,8 +15,9 @@ const AT_ONCE: usize = 8;
 fn main() {
     let argument = |i: usize| std::env::args().nth(i).and_then(|s| s.parse::<u64>().ok());
     let (count, seed) = (argument(1).unwrap_or(40), argument(2).unwrap_or(1));
+    let relays = if std::env::args().any(|word| word == "clumps") { Bed::Clumps } else { Bed::Relays };
     if let Some(one) = argument(3) {
-        let o = run(&draw(seed, one));
+        let o = run(&draw_on(relays, seed, one));
         println!("{}", line(&o));
         println!("test RMSE {:.5} µm after, {:.5} µm without the effect", o.test.0, o.test.1);
         for (name, found, truth, error) in &o.parameters {
@@ -27,7 +30,7 @@ fn main() {
     let mut outcomes: Vec<Outcome> = Vec::new();
     let numbers: Vec<u64> = (0..count).collect();
     for some in numbers.chunks(AT_ONCE) {
-        let done: Vec<Outcome> = some.par_iter().map(|i| run(&draw(seed, *i))).collect();
+        let done: Vec<Outcome> = some.par_iter().map(|i| run(&draw_on(relays, seed, *i))).collect();
         for outcome in &done {
             let mark = if outcome.exact() { "" } else { "NOT: " };
             println!("  {mark:5} {}", line(outcome));

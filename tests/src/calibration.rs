@@ -171,6 +171,14 @@ fn parameters(plant: &PlantConfig, findings: &Findings) -> Vec<(String, f64, f64
 /// # Panics
 /// When an ordinary actuator is refused.
 pub fn draw(seed: u64, i: u64) -> Case {
+    draw_on(Bed::Relays, seed, i)
+}
+
+/// The same with relays of another kind, as in clumps.
+///
+/// # Panics
+/// When an ordinary actuator is refused.
+pub fn draw_on(relays: Bed, seed: u64, i: u64) -> Case {
     let own = seed * 10_000 + i;
     let round = (i / 20) as usize;
     let effect = |k: usize| EFFECTS[k % EFFECTS.len()];
@@ -184,13 +192,13 @@ pub fn draw(seed: u64, i: u64) -> Case {
         _ => Vec::new(),
     };
     let disturbed = (place >= 18).then(|| DISTURBANCES[(2 * round + place) % DISTURBANCES.len()].to_owned());
-    let bed = if effects.contains(&"asymmetry") || (i + round as u64) % 2 == 1 { Bed::Plays } else { Bed::Relays };
+    let bed = if effects.contains(&"asymmetry") || (i + round as u64) % 2 == 1 { Bed::Plays } else { relays };
     let plant = |effects: &[&str]| PlantConfig::random_on(bed, own, effects).expect("an ordinary actuator");
     let bare = plant(&[]);
     let plant = match &disturbed {
         Some(kind) => bare.clone().with_disturbance(kind).expect("a disturbance"),
         None => plant(&effects),
     };
-    let triangle = bed == Bed::Relays && !effects.contains(&"rate-dependence") && !i.is_multiple_of(4);
+    let triangle = bed != Bed::Plays && !effects.contains(&"rate-dependence") && !i.is_multiple_of(4);
     Case { seed: own, kind: if triangle { Kind::Preisach } else { Kind::Pi }, plant, bare, disturbed }
 }

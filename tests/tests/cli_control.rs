@@ -99,6 +99,21 @@ fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
         // 500 samples a second; one chunk is lost at most.
         assert!(left as f64 + 501.0 >= share * all as f64 * 0.9, "{left} of {all} at {share}");
     }
+    // Whoever fits it is told, too.
+    let fitted = |name: &str| lab.ok(&format!("fit {name} --model pi -o of-{name}.json")).stderr;
+    assert!(fitted("cut.mcap").contains("note: cut.mcap: the log was cut off"));
+    assert!(!fitted("recovered.mcap").contains("cut off"));
+    let mut damaged = whole.clone();
+    let chunks = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes;
+    let chunk = chunks.iter().nth(chunks.len() / 2).unwrap();
+    damaged[(chunk.chunk_start_offset + chunk.chunk_length / 2) as usize] ^= 0xff;
+    lab.write("damaged.mcap", damaged);
+    let said = fitted("damaged.mcap");
+    for told in
+        ["damaged.mcap: 1 damaged piece of the log left out", "damaged.mcap: 1 hole in time", "is not known there"]
+    {
+        assert!(said.contains(told), "{told}: {said}");
+    }
     lab.write("no.mcap", "time_s,voltage_v\n");
     assert!(lab.refuses("log info no.mcap", 2).contains("no.mcap"));
     assert!(lab.refuses("log info absent.mcap", 2).contains("absent.mcap"));

@@ -43,10 +43,10 @@ fn killed(trial: u64) -> usize {
     // More than the host has heard of: what was on its way to it is lost as well.
     let measured = device.when_left().measured as usize;
 
-    assert!(!parsed(&lab, "cut.mcap").closed, "it was killed too late");
+    assert!(parsed(&lab, "cut.mcap").lost.cut_off, "it was killed too late");
     lab.ok("log recover cut.mcap -o whole.mcap");
     let log = parsed(&lab, "whole.mcap");
-    assert!(log.closed);
+    assert!(!log.lost.cut_off);
     let samples = log.samples.len();
     assert!(measured - samples <= RATE_HZ as usize, "trial {trial}: {samples} of {measured} samples are left");
     // From the first one on, none left out.
@@ -105,7 +105,7 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     let log = parsed(&lab, "run.mcap");
     told(&ran, &log, "File too large");
     assert!(ran.stderr.contains("the device was brought to rest"), "{}", ran.stderr);
-    assert!(!log.closed && log.samples.len() > 100, "{}", log.samples.len());
+    assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover run.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);
     // That there is no room for the record either does not hide what has ended the run.
@@ -165,7 +165,7 @@ fn a_full_disk_ends_the_run_at_rest() {
     let ran = own(&format!("{mount} && cd disk && {run}; code=$?; cp run.mcap ../full.mcap; exit $code")).unwrap();
     let log = parsed(&lab, "full.mcap");
     told(&ran, &log, "No space left on device");
-    assert!(!log.closed && log.samples.len() > 100, "{}", log.samples.len());
+    assert!(log.lost.cut_off && log.samples.len() > 100, "{}", log.samples.len());
     lab.ok("log recover full.mcap -o whole.mcap");
     assert_eq!(parsed(&lab, "whole.mcap").samples, log.samples);
 }

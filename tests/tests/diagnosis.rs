@@ -7,7 +7,7 @@ use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Effect, Kind, Model};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
-use hyst_tests::calibration::{draw, run};
+use hyst_tests::calibration::{draw, draw_on, run};
 use hyst_tests::experiment;
 
 /// Train and test record of an actuator with these effects.
@@ -85,6 +85,17 @@ fn plays_that_an_effect_has_misplaced_are_placed_anew() {
         assert!(outcome.exact(), "{:?} instead of {:?}", outcome.named, outcome.truth);
         assert!(outcome.ratio() < 1.25, "{} times the error without the effect", outcome.ratio());
     }
+}
+
+/// Relays in clumps bend a loop as no smooth curve does: what drowns in that is found on a triangle, which in its turn cannot take its time
+/// and must not call that late.
+#[test]
+fn what_drowns_in_the_misfit_of_a_smooth_base_is_found_on_a_triangle() {
+    let drift = run(&draw_on(Bed::Clumps, 33, 14));
+    assert!(drift.exact(), "{:?} instead of {:?}", drift.named, drift.truth);
+    assert!(drift.ratio() < 1.25, "{} times the error without the effect", drift.ratio());
+    let slow = run(&draw_on(Bed::Clumps, 33, 29));
+    assert_eq!((slow.truth.as_slice(), slow.wrong()), ([Effect::RateDependence].as_slice(), Vec::new()));
 }
 
 #[test]

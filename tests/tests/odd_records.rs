@@ -34,6 +34,30 @@ fn record(segments: usize, rows: usize, rate_hz: f64, unit: OutputUnit, scale: f
     Record::from_samples(columns).unwrap()
 }
 
+/// Relays that only the first rise flips stand beside the sensor's zero ever after: a jump of the sensor, after which the drive goes a little
+/// further than before, is no reason to guess at many of them.
+#[test]
+fn a_jump_does_not_pay_for_a_steep_first_rise() {
+    let made = |highest: f64| {
+        let (mut p, mut time, mut input, mut output) = (0.0, Vec::new(), Vec::new(), Vec::new());
+        for k in 0..12_000_u32 {
+            let x = f64::from(k) / 12_000.0;
+            let (top, jump) = if x < 0.5 { (highest - 0.4, 0.0) } else { (highest, 0.3) };
+            let u = top * (0.5 - 0.5 * (75.0 * x).cos()) * (1.0 - 0.6 * (x % 0.5));
+            p = hyst_core::play(p, u, 8.0);
+            time.push(f64::from(k) * 1e-3);
+            input.push(u);
+            output.push(0.1 * u + 0.05 * p + jump + 1e-3 * (1e4 * (u + 0.37 * f64::from(k))).sin());
+        }
+        let (input, output) = (Some(input), Some((OutputUnit::Micrometre, output)));
+        Record::from_samples(Columns { name: "jump".into(), time, input, output, ..Columns::default() }).unwrap()
+    };
+    let model = fit(&made(100.0), Kind::Preisach, &FitOptions::default()).unwrap();
+    let errors = simulate(&model, &made(97.0), Zero::None).unwrap().errors.unwrap();
+    // The jump is 2.2 % of the span.
+    assert!(errors.nrmse_percent < 5.0, "{errors:?}");
+}
+
 fn whole_way(record: &Record, kind: Kind) -> Result<Vec<&'static str>, FitError> {
     let model = fit(record, kind, &FitOptions::default())?;
     let d = diagnose(record, Some(record), &model, &DiagnoseOptions::default(), &|_| {})?;

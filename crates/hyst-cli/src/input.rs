@@ -9,7 +9,7 @@ use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::clipping::clipped;
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::range;
-use hyst_ident::record::{ColumnMap, Need, OutputUnit, Record};
+use hyst_ident::record::{ColumnMap, Losses, Need, OutputUnit, Record};
 use hyst_ident::simulate::Zero;
 
 use crate::cli::{MapArg, TemperatureArg, ZeroArg};
@@ -105,6 +105,7 @@ fn tell_oddities(record: &Record) {
             if rate < ORDINARY_RATES.start { "time_ms" } else { "time_s" }
         ));
     }
+    losses(record.lost()).iter().for_each(|told| say(&format!("note: {name}: {told}")));
     if leads(record) {
         say(&format!(
             "note: {name}: the output runs ahead of the input in its loops, where hysteresis makes it follow; are the columns of input and output exchanged?"
@@ -121,6 +122,24 @@ fn tell_oddities(record: &Record) {
             text::short(record.time()[end.first])
         ));
     }
+}
+
+/// What a log lost of its run, a sentence each.
+pub(crate) fn losses(lost: Losses) -> Vec<String> {
+    let cut = lost.cut_off.then(|| "the log was cut off; its last half second may be missing".to_owned());
+    cut.into_iter().chain(damage(lost.damaged)).chain(holes(lost.holes)).collect()
+}
+
+/// What to say about pieces of a log that are damaged, if there are any.
+pub(crate) fn damage(pieces: usize) -> Option<String> {
+    let many = text::count(pieces, "damaged piece");
+    (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
+}
+
+/// What to say about samples that are missing within a segment.
+pub(crate) fn holes(holes: usize) -> Option<String> {
+    let many = text::count(holes, "hole");
+    (holes > 0).then(|| format!("{many} in time, behind each of which another segment begins: what an actuator remembers from before is not known there"))
 }
 
 /// Options with which records are read, as the command line takes them.

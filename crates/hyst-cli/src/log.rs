@@ -354,7 +354,7 @@ mod tests {
         let mut log = RunLog::create(&path, &info()).unwrap();
         log.sample(&sample(0)).unwrap();
         let begun = hyst_ident::record::RunLog::parse("run.mcap", &std::fs::read(&path).unwrap()).unwrap();
-        assert_eq!((begun.samples.len(), begun.closed), (0, false));
+        assert_eq!((begun.samples.len(), begun.lost.cut_off), (0, true));
         assert_eq!(begun.metadata["device"], "test");
     }
 

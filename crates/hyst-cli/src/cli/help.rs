@@ -66,7 +66,7 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   max_v = 120
   gain_um_per_v = 0.2
   loop_share = 0.12        # opening of the hysteresis loop over its span
-  bed = \"relays\"           # random relays; or \"plays\": symmetric loops
+  bed = \"relays\"           # random relays; or \"clumps\" of them, or \"plays\": symmetric loops
   [sensor]
   range_um = [-12, 43]
   noise_um = 0.007

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::cli::{LogArgs, LogCommand, LogConvertArgs, LogInfoArgs, LogRecoverArgs};
 use crate::exit::{CommandError, CommandResult};
+use crate::input;
 use crate::log::recovered;
 use crate::output::{self, Report};
 use crate::text;
@@ -65,9 +66,9 @@ impl Summary {
         segments.dedup();
         Self {
             log: path.display().to_string(),
-            closed: log.closed,
-            damaged: log.damaged,
-            holes: log.holes,
+            closed: !log.lost.cut_off,
+            damaged: log.lost.damaged,
+            holes: log.lost.holes,
             samples: log.samples.len(),
             record_samples: record.len(),
             segments: segments.len(),
@@ -90,8 +91,8 @@ impl Summary {
             text::count(self.segments, "segment"),
             if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
         )];
-        lines.extend(damage(self.damaged));
-        lines.extend(holes(self.holes));
+        lines.extend(input::damage(self.damaged));
+        lines.extend(input::holes(self.holes));
         lines.extend(
             self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
@@ -101,18 +102,6 @@ impl Summary {
         lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
         lines.join("\n")
     }
-}
-
-/// What to say about pieces that are damaged, if there are any.
-fn damage(pieces: usize) -> Option<String> {
-    let many = text::count(pieces, "damaged piece");
-    (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
-}
-
-/// What to say about samples that are missing within a segment.
-fn holes(holes: usize) -> Option<String> {
-    let many = text::count(holes, "hole");
-    (holes > 0).then(|| format!("{many} in time, behind each of which another segment begins: what an actuator remembers from before is not known there"))
 }
 
 fn info(args: &LogInfoArgs) -> CommandResult {
@@ -125,14 +114,11 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
     output::check(&[&args.log], &[&args.output])?;
     let (_, log) = read(&args.log)?;
     if log.samples.is_empty() {
-        let what = damage(log.damaged).unwrap_or_else(|| "it ends before the first sample".to_owned());
+        let what = input::damage(log.lost.damaged).unwrap_or_else(|| "it ends before the first sample".to_owned());
         return Err(CommandError::bad_input(format!("{}: the log has no sample: {what}", args.log.display())));
     }
-    if !log.closed {
-        output::say("note: the log was cut off; its last half second may be missing");
-    }
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
-    damage(log.damaged).into_iter().chain(holes(log.holes)).for_each(|told| output::say(&format!("note: {told}")));
+    input::losses(log.lost).iter().for_each(|told| output::say(&format!("note: {told}")));
     if !args.ramps && !log.samples.iter().any(LogSample::is_record) {
         let many = text::count(log.samples.len(), "sample");
         output::say(&format!(
@@ -164,11 +150,11 @@ fn recover(args: &LogRecoverArgs) -> CommandResult {
         log: args.log.display().to_string(),
         output: args.output.to_string(),
         samples: log.samples.len(),
-        was_closed: log.closed,
-        damaged: log.damaged,
+        was_closed: !log.lost.cut_off,
+        damaged: log.lost.damaged,
     };
-    let how = if log.closed { "was closed already" } else { "had been cut off" };
+    let how = if !log.lost.cut_off { "was closed already" } else { "had been cut off" };
     let said = format!("{} {how}; {}: {}", done.log, done.output, text::count(done.samples, "sample"));
-    let said: Vec<String> = std::iter::once(said).chain(damage(done.damaged)).collect();
+    let said: Vec<String> = std::iter::once(said).chain(input::damage(done.damaged)).collect();
     report.print(&said.join("\n"), &done)
 }

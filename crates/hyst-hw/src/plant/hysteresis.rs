@@ -3,7 +3,7 @@
 use super::config::{Actuator, Bed, Viscosity};
 use super::error::ConfigError;
 use super::plays::{PlayBed, draw_plays};
-use super::relays::{RelayBed, draw_thresholds};
+use super::relays::{RelayBed, draw_clumps, draw_thresholds};
 use super::rng::{Draws, Purpose};
 use super::viscous::ViscousBed;
 use super::viscous_plays::ViscousPlays;
@@ -22,8 +22,9 @@ impl Elements {
     fn new(seed: u64, actuator: &Actuator, viscosity: Option<&Viscosity>) -> Self {
         let &Actuator { min_v, max_v, rest_v, relays: elements, .. } = actuator;
         match actuator.bed {
-            Bed::Relays => {
-                let thresholds = draw_thresholds(&mut Draws::new(seed, Purpose::Relays), elements, min_v, max_v);
+            Bed::Relays | Bed::Clumps => {
+                let law = if actuator.bed == Bed::Clumps { draw_clumps } else { draw_thresholds };
+                let thresholds = law(&mut Draws::new(seed, Purpose::Relays), elements, min_v, max_v);
                 match viscosity {
                     None => Self::Relays(RelayBed::new(&thresholds, rest_v)),
                     Some(viscosity) => Self::ViscousRelays(ViscousBed::new(seed, &thresholds, rest_v, viscosity)),

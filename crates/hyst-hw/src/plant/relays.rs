@@ -111,6 +111,29 @@ pub(crate) fn draw_thresholds(draws: &mut Draws, relays: usize, min: f64, max: f
     thresholds
 }
 
+/// As [`draw_thresholds`], but most relays stand in two clumps, each of which centres round one voltage and has a narrow and a wide part.
+pub(crate) fn draw_clumps(draws: &mut Draws, relays: usize, min: f64, max: f64) -> Vec<(f64, f64)> {
+    let scattered = draws.between(0.15, 0.3);
+    let first_share = draws.between(0.4, 0.6);
+    let centres = [draws.between(0.2, 0.32), draws.between(0.68, 0.8)];
+    let (width, narrow, wide) = (draws.between(0.08, 0.14), draws.between(0.04, 0.08), draws.between(0.22, 0.34));
+    let span = max - min;
+    let mut thresholds: Vec<(f64, f64)> = (0..relays)
+        .map(|_| {
+            let centre = if draws.unit() < scattered {
+                draws.between(-0.1, 1.1)
+            } else {
+                centres[usize::from(draws.unit() >= first_share)] + width * draws.normal()
+            };
+            let of = if draws.unit() < 0.6 { narrow } else { wide };
+            let half_width = (of * (1.0 + 0.3 * draws.normal())).max(1e-6);
+            (min + span * (centre + half_width), min + span * (centre - half_width))
+        })
+        .collect();
+    thresholds.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    thresholds
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::rng::Purpose;

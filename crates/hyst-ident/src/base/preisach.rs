@@ -13,6 +13,8 @@ use crate::model::capacity::NODES;
 
 /// Reversible slope of each diagonal cell is at least this share of the mean gain.
 const FLOOR: f64 = 0.05;
+/// A cell of the strip rises by at most so many mean cells of the whole stroke: a first rise is steeper, but none jumps.
+const STEEPEST: f64 = 3.0;
 /// Margin of the grid around the record's input, as a share of its swing.
 const MARGIN: f64 = 0.02;
 /// Weight of the differences between neighbouring cells against the record.
@@ -196,7 +198,12 @@ impl Basis for PreisachBasis {
     }
 
     fn bounds(&self) -> Vec<Bounds> {
-        let mut bounds = vec![Bounds::above(0.0); self.triangle() + if self.has_strip() { self.grid.cells } else { 0 }];
+        let mut bounds = vec![Bounds::above(0.0); self.triangle()];
+        if self.has_strip() {
+            // The floor is a share of the same mean cell.
+            let steepest = STEEPEST * self.floor / FLOOR;
+            bounds.extend(std::iter::repeat_n(Bounds { lower: 0.0, upper: steepest }, self.grid.cells));
+        }
         for i in 0..self.grid.cells {
             bounds[preisach_cell(i, i)] = Bounds::above(self.floor);
         }
@@ -205,7 +212,8 @@ impl Basis for PreisachBasis {
 
     /// Smoothness: neighbouring cells of the triangle's inside, of its diagonal and of the strip
     /// differ little. What the record shows overrules it; cells it never visits follow their
-    /// neighbours.
+    /// neighbours. The strip is small, too: once passed it stands beside the sensor's zero, and a
+    /// record that shows no rise from rest says nothing of either alone.
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let n = self.len();
         let weight = SMOOTHNESS * level;
@@ -229,6 +237,9 @@ impl Basis for PreisachBasis {
             if self.has_strip() {
                 tie(self.triangle() + i, self.triangle() + i - 1);
             }
+        }
+        for once in self.triangle()..n {
+            p[(once, once)] += weight;
         }
         Some(p)
     }

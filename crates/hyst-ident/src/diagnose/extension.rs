@@ -146,11 +146,14 @@ impl Own<'_> {
     }
 
     /// Whether it errs less than the model as it was, over the rows that count for the search: a model that misses a stop, say, takes
-    /// the rows on it for a start-up.
+    /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
     pub(super) fn is_helped(&self, after: &Simulation) -> bool {
         let samples = self.samples;
-        let rows = || (0..samples.len()).filter(|k| !samples.settling[*k]);
-        let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
-        squares(after) < squares(self.before)
+        let errs_less = |counts: &dyn Fn(usize) -> bool| {
+            let rows = || (0..samples.len()).filter(|k| !samples.settling[*k] && counts(*k));
+            let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
+            squares(after) < squares(self.before)
+        };
+        errs_less(&|_| true) || errs_less(&|k| !after.settling[k])
     }
 }

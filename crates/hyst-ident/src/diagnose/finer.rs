@@ -1,18 +1,21 @@
-//! What was found, on the finest base at hand: parameters refitted, and names that this base does not need taken back.
+//! What was found, on the finest base at hand: parameters refitted, names that this base does not need taken back, and what drowned in the
+//! misfit of the base of the search looked for anew.
 //!
-//! The base of the search is rich but smooth. Where a Preisach triangle predicts the record better, what the search took for an effect
-//! may have been the base's own misfit, and what it found may be bent by it.
+//! That base is rich but smooth. Where a Preisach triangle predicts the record better, what the search took for an effect may have been the
+//! base's own misfit, what it found may be bent by it, and what it missed may be hidden by it.
 
 use std::collections::BTreeMap;
 
 use hyst_core::Error;
 
 use super::score;
-use super::search::{Search, beyond};
+use super::search::{Search, beyond, further};
+use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::standard_errors;
-use crate::base::PreisachBasis;
+use crate::base::{PreisachBasis, ScreeningBasis};
 use crate::lsq::Blocks;
+use crate::model::Effect;
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
@@ -23,8 +26,12 @@ pub(super) const AT_FLOOR: f64 = 1.3;
 const NOTHING_LEFT: f64 = 1.1;
 /// Error from which on the finer base is the better one.
 const BETTER: f64 = 0.9;
+/// Error from which on it is searched anew: it sees what the base of the search cannot.
+const FAR_BETTER: f64 = 0.7;
 /// Cells along an edge of the triangle.
 const CELLS: usize = 24;
+/// Cells along an edge of the one that is searched, which a trial passes four times as fast.
+const SEARCHED_CELLS: usize = 16;
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
 /// Error of the search up to which the finer base is asked about another effect in the place of one that was named.
@@ -41,13 +48,14 @@ pub(super) struct Finer {
     pub(super) cv_rmse: f64,
 }
 
-/// Takes names back that the finest base does not need, and refits the others there.
+/// Looks on the finest base for what the search could not see, takes names back that it does not need, and refits the others there.
 pub(super) fn refine(
     problem: &Problem<'_>,
     found: &mut Search,
     already: &[Cause],
     samples: &Samples,
     seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
     beside_wandering(problem, found, already)?;
     let of = |trial: &Trial| Finer {
@@ -73,6 +81,13 @@ pub(super) fn refine(
     let Some(mut best) = fitted(&found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
     if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
         return Ok(of(&found.best));
+    }
+    if best.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()
+        && best.cv_rmse() > AT_FLOOR * found.noise
+        && let Some(anew) = searched_anew(problem, &triangle, found, already, seed, progress)?
+        && let Some(with) = fitted(&anew.best.fit.hypothesis)?
+    {
+        (*found, best) = (anew, with);
     }
     decide_rivals(&triangle, found, &mut best, seed)?;
     loop {
@@ -133,6 +148,54 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
     }
     found.named.sort_by_key(|n| n.effect);
     Ok(())
+}
+
+fn is_named(found: &Search, effect: Effect) -> bool {
+    found.named.iter().any(|n| n.effect == effect)
+}
+
+/// What a triangle of fewer cells finds beyond what was found, where it sees far better too; nothing where its word does not stand.
+fn searched_anew(
+    problem: &Problem<'_>,
+    triangle: &Problem<'_>,
+    found: &Search,
+    already: &[Cause],
+    seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Option<Search>, Error> {
+    let basis = PreisachBasis::for_samples(problem.samples, SEARCHED_CELLS);
+    let coarser = Problem::new(triangle.samples, &basis, triangle.blocks, triangle.zero_per_file);
+    let from = coarser.fit(&found.best.fit.hypothesis)?.and_then(|f| Trial::of(&coarser, f));
+    let Some(from) = from.filter(|t| t.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()) else { return Ok(None) };
+    let mut anew = further(&coarser, from.fit, already, found.noise, seed, progress)?;
+    beside_wandering(&coarser, &mut anew, already)?;
+    // A wandering alone is no news: of what a triangle leaves some is its own, and wanders like anything.
+    let news = anew.named.iter().any(|n| !is_named(found, n.effect));
+    Ok((news && !may_be_drag(problem, found, &anew)?).then_some(anew))
+}
+
+/// Whether what the triangle alone calls late, or creep, is better explained by a hysteresis that takes its time, which the triangle cannot do:
+/// the base of the search, which can, is asked.
+fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<bool, Error> {
+    let slow = [Effect::Delay, Effect::Lag, Effect::Resonance, Effect::Creep];
+    let late: Vec<Effect> =
+        anew.named.iter().map(|n| n.effect).filter(|e| slow.contains(e) && !is_named(found, *e)).collect();
+    if late.is_empty() {
+        return Ok(false);
+    }
+    let basis = ScreeningBasis::for_samples(problem.samples, true, None);
+    let dragging = Problem::new(problem.samples, &basis, problem.blocks, problem.zero_per_file);
+    let squares =
+        |h: &Hypothesis| Ok::<_, Error>(dragging.fit(h)?.and_then(|f| Trial::of(&dragging, f)).map(|t| t.total()));
+    let with = &anew.best.fit.hypothesis;
+    let without = late.iter().fold(with.clone(), |h, e| h.without(Cause::Effect(*e)));
+    let (Some(as_found), Some(from)) = (squares(with)?, dragging.fit_linear(&without)?) else { return Ok(false) };
+    for start in starts(&dragging, &from, Cause::Effect(Effect::RateDependence))? {
+        if squares(&start)?.is_some_and(|dragged| dragged < as_found) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Takes back what is small beside a wandering that was found.

@@ -6,7 +6,8 @@
 //!    Every trial refits the whole nested model.
 //! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,
 //!    and it must matter against the noise floor and against what is left.
-//! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and the own base whether it lacks a curve.
+//! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and what else, and the own base whether it
+//!    lacks a curve.
 //! 4. **Extend** the user's own model with the effects found, all weights refitted.
 
 mod changed;
@@ -148,7 +149,7 @@ pub fn diagnose(
     progress("asking a finer base whether it needs what was found");
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: richest } =
-        finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed).map_err(stage)?;
+        finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
     let only_loop = problem.only_loop;
     drop(problem);
 

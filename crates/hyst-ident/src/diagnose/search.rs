@@ -86,16 +86,29 @@ impl Judge<'_> {
     }
 }
 
+/// Searches from what a model already holds.
 pub(crate) fn search(
     problem: &Problem<'_>,
     base: Fitted,
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Search, Error> {
-    let steps = quantisation(&problem.samples.output);
-    let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments).max(steps);
-    let mut judge = Judge { problem, noise, seed };
     let already = base.hypothesis.causes();
+    further(problem, base, &already, f64::INFINITY, seed, progress)
+}
+
+/// Searches on from a fit that may hold more than what was there `already`; the noise is `known` to be no more \[output unit\].
+pub(super) fn further(
+    problem: &Problem<'_>,
+    base: Fitted,
+    already: &[Cause],
+    known: f64,
+    seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Search, Error> {
+    let steps = quantisation(&problem.samples.output);
+    let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments).min(known).max(steps);
+    let mut judge = Judge { problem, noise, seed };
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
         let nothing = Trial { blocks: vec![base.squares], fit: base };
@@ -147,12 +160,12 @@ pub(crate) fn search(
     let mut left: Vec<Vec<Cause>> = Vec::new();
     let named = loop {
         progress("checking whether each effect is needed");
-        let needed = eliminate(&judge, &best, &already)?;
+        let needed = eliminate(&judge, &best, already)?;
         let change = match needed {
             Some(less) => Some(less),
             None => {
                 progress("trying other effects in place of those found");
-                let (better, list) = swaps(&judge, &best, &already, &left)?;
+                let (better, list) = swaps(&judge, &best, already, &left)?;
                 match better {
                     Some(better) => Some(better),
                     None => break list,

@@ -60,6 +60,7 @@ impl Record {
         let (rows, files) = (self.rows(), self.sources.len());
         self.sources.extend(next.sources);
         self.labelled |= next.labelled;
+        self.lost = self.lost.and(next.lost);
         self.labels.extend(next.labels);
         self.segments.extend(next.segments.into_iter().map(|s| s.start + rows..s.end + rows));
         self.file_of_segment.extend(next.file_of_segment.into_iter().map(|file| file + files));

@@ -78,12 +78,30 @@ pub struct RunLog {
     pub samples: Vec<LogSample>,
     /// What happened on the way, in order.
     pub events: Vec<LogEvent>,
-    /// Whether the log was closed; else its writer was cut off.
-    pub closed: bool,
+    /// What is missing of the run.
+    pub lost: Losses,
+}
+
+/// What a log lost of the run that it tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Whether its writer was cut off: the log was never closed.
+    pub cut_off: bool,
     /// Chunks and other records that are left out because they are damaged.
     pub damaged: usize,
     /// Holes in time within a segment, where samples are lost; behind each another segment begins.
     pub holes: usize,
+}
+
+impl Losses {
+    /// Those of several logs together.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            cut_off: self.cut_off || other.cut_off,
+            damaged: self.damaged + other.damaged,
+            holes: self.holes + other.holes,
+        }
+    }
 }
 
 /// A step in time of so many periods is a hole.
@@ -104,6 +122,7 @@ impl RunLog {
         let mut entries = LogRecords::new(bytes).ok_or_else(|| foreign("it is no MCAP file".to_owned()))?;
         let mut log = Self::default();
         let (mut channel, mut happened) = (None, None);
+        log.lost.cut_off = true;
         // What is not whole at the end is what a cut takes.
         for entry in &mut entries {
             match entry {
@@ -127,15 +146,15 @@ impl RunLog {
                 Entry::Message { header, data } if Some(header.channel_id) == happened => {
                     log.events.extend(serde_json::from_slice::<LogEvent>(&data));
                 }
-                Entry::Footer(_) => log.closed = true,
+                Entry::Footer(_) => log.lost.cut_off = false,
                 _ => {}
             }
         }
-        log.damaged = entries.damaged();
+        log.lost.damaged = entries.damaged();
         log.split_at_holes();
         match channel {
             Some(_) => Ok(log),
-            None if !log.closed && log.damaged == 0 => {
+            None if log.lost.cut_off && log.lost.damaged == 0 => {
                 Err(foreign(format!("it was cut off before the channel {TOPIC}: nothing of a run is in it")))
             }
             None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
@@ -152,10 +171,10 @@ impl RunLog {
         for sample in &mut self.samples {
             let (segment, time_s) = (sample.segment, sample.time_s);
             if before.is_some_and(|(of, then)| of == segment && time_s - then > longest) {
-                self.holes += 1;
+                self.lost.holes += 1;
             }
             before = Some((segment, time_s));
-            sample.segment = segment.saturating_add(self.holes as u64);
+            sample.segment = segment.saturating_add(self.lost.holes as u64);
         }
     }
 
@@ -190,10 +209,10 @@ impl RunLog {
     /// Why there is nothing of what was asked for.
     fn why_empty(&self) -> String {
         let samples = self.samples.len();
-        if self.damaged > 0 {
+        if self.lost.damaged > 0 {
             return format!(
                 "{} pieces of it are damaged, and of the {samples} samples that are left none is of it",
-                self.damaged
+                self.lost.damaged
             );
         }
         if samples == 0 {
@@ -254,7 +273,8 @@ impl Record {
             return Err(RecordError::NothingAsked { file: name.to_owned(), what: log.why_empty() });
         }
         let text = log.csv(name, false)?;
-        Ok(Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes))
+        let record = Self::parse(name, text.as_bytes(), map, need)?.kept_as(bytes);
+        Ok(Self { lost: log.lost, ..record })
     }
 }
 
@@ -309,7 +329,7 @@ mod tests {
         log.metadata.insert("sample_rate_hz".into(), "1".into());
         log.split_at_holes();
         let segments: Vec<u64> = log.samples.iter().map(|s| s.segment).collect();
-        assert_eq!((segments, log.holes), (vec![0, 0, 0, 1, 1, 2, 2], 1));
+        assert_eq!((segments, log.lost.holes), (vec![0, 0, 0, 1, 1, 2, 2], 1));
     }
 
     #[test]

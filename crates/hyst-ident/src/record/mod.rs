@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 pub use columns::{ColumnMap, MapError, Need, is_input_column};
 pub use error::{Place, RecordError};
-pub use log::{EVENTS, LogEvent, LogRecords, LogSample, RunLog, TOPIC, is_log};
+pub use log::{EVENTS, LogEvent, LogRecords, LogSample, Losses, RunLog, TOPIC, is_log};
 pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
 
@@ -78,6 +78,7 @@ pub struct Record {
     output: Option<(OutputUnit, Vec<f64>)>,
     temperature: Option<Vec<f64>>,
     load: Option<Vec<f64>>,
+    lost: Losses,
     /// The file's text without a byte-order mark, for writing its columns again as they stand.
     text: Option<Arc<[u8]>>,
 }
@@ -204,6 +205,7 @@ impl Record {
             output,
             temperature,
             load,
+            lost: Losses::default(),
             text: None,
         })
     }
@@ -219,6 +221,11 @@ impl Record {
     /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
     pub fn sources(&self) -> &[Source] {
         &self.sources
+    }
+
+    /// What the logs that it was read from, if any, lost of their runs.
+    pub fn lost(&self) -> Losses {
+        self.lost
     }
 
     /// The names of all sources, as messages use them.

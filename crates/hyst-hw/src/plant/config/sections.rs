@@ -36,6 +36,8 @@ pub enum Bed {
     /// Plays with random thresholds and weights: loops that are symmetric about their centre. It is the element of
     /// Prandtl-Ishlinskii models too, which have few of them on a grid.
     Plays,
+    /// Relays most of which stand in two clumps: loops that bend where these are passed, as smooth curves do not.
+    Clumps,
 }
 
 impl Bed {
