@@ -105,7 +105,7 @@ fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
     assert!(!fitted("recovered.mcap").contains("cut off"));
     let mut damaged = whole.clone();
     let chunks = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes;
-    let chunk = chunks.iter().nth(chunks.len() / 2).unwrap();
+    let chunk = chunks.get(chunks.len() / 2).unwrap();
     damaged[(chunk.chunk_start_offset + chunk.chunk_length / 2) as usize] ^= 0xff;
     lab.write("damaged.mcap", damaged);
     let said = fitted("damaged.mcap");

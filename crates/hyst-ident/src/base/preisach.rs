@@ -14,7 +14,7 @@ use crate::model::capacity::NODES;
 /// Reversible slope of each diagonal cell is at least this share of the mean gain.
 const FLOOR: f64 = 0.05;
 /// A cell of the strip rises by at most so many mean cells of the whole stroke: a first rise is steeper, but none jumps.
-const STEEPEST: f64 = 3.0;
+const STEEPEST: f64 = 2.0;
 /// Margin of the grid around the record's input, as a share of its swing.
 const MARGIN: f64 = 0.02;
 /// Weight of the differences between neighbouring cells against the record.
@@ -212,8 +212,7 @@ impl Basis for PreisachBasis {
 
     /// Smoothness: neighbouring cells of the triangle's inside, of its diagonal and of the strip
     /// differ little. What the record shows overrules it; cells it never visits follow their
-    /// neighbours. The strip is small, too: once passed it stands beside the sensor's zero, and a
-    /// record that shows no rise from rest says nothing of either alone.
+    /// neighbours.
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let n = self.len();
         let weight = SMOOTHNESS * level;
@@ -237,9 +236,6 @@ impl Basis for PreisachBasis {
             if self.has_strip() {
                 tie(self.triangle() + i, self.triangle() + i - 1);
             }
-        }
-        for once in self.triangle()..n {
-            p[(once, once)] += weight;
         }
         Some(p)
     }
