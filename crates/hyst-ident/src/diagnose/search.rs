@@ -14,8 +14,6 @@ use crate::noise::{noise_floor, quantisation};
 const BEAM: usize = 2;
 /// Error, over that of what is named, up to which what is late otherwise is alike in one loop.
 const ALIKE: f64 = 1.1;
-/// Error, over that of what is named, below which something that makes no sense in its place shows that the name makes none either.
-const OUTDONE: f64 = 0.8;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -243,13 +241,9 @@ fn swaps(
         let trials: Vec<Result<Option<Trial>, Error>> =
             others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
         let mut instead = Vec::new();
-        let mut outdone = false;
         for (other, trial) in others.iter().zip(trials) {
             let Some(trial) = trial? else { continue };
             let judgement = judge.judge(&without, &trial);
-            outdone |= !judgement.sensible
-                && trial.cv_rmse() < OUTDONE * best.cv_rmse()
-                && score::clearly_better(best, &trial, judge.seed);
             let accepted = judgement.accepted();
             // In one loop all that is late is alike.
             let alike = one_loop && is_late(*other) && trial.cv_rmse() < ALIKE * best.cv_rmse();
@@ -264,10 +258,6 @@ fn swaps(
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 better = Some(trial);
             }
-        }
-        // What is there looks like this cause, and is another thing.
-        if outdone && !left.contains(&without.fit.hypothesis.causes()) && score::sensible(judge.problem, &without) {
-            return Ok((Some(without), Vec::new()));
         }
         instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
         if let Some(effect) = cause.effect() {
