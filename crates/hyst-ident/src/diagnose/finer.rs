@@ -28,6 +28,8 @@ const NOTHING_LEFT: f64 = 1.1;
 const BETTER: f64 = 0.9;
 /// Error from which on it is searched anew: it sees what the base of the search cannot.
 const FAR_BETTER: f64 = 0.7;
+/// What it leaves, in noise floors, from which on something may hide in it that is worth the time: less is mostly its own.
+const WORTH_A_SEARCH: f64 = 3.0;
 /// Cells along an edge of the triangle.
 const CELLS: usize = 24;
 /// Cells along an edge of the one that is searched, which a trial passes four times as fast.
@@ -83,7 +85,7 @@ pub(super) fn refine(
         return Ok(of(&found.best));
     }
     if best.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()
-        && best.cv_rmse() > AT_FLOOR * found.noise
+        && best.cv_rmse() > WORTH_A_SEARCH * found.noise
         && let Some(anew) = searched_anew(problem, &triangle, found, already, seed, progress)?
         && let Some(with) = fitted(&anew.best.fit.hypothesis)?
     {
