@@ -22,6 +22,25 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
     assert_eq!(files, 5 * turns.len() + 1);
 }
 
+/// What an amplifier has not followed is measured anew with a drive that it follows.
+#[test]
+fn the_loop_closes_on_an_amplifier_that_is_slow() {
+    let lab = Lab::new();
+    lab.write("plant.toml", format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT));
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 3 --out loop --json");
+    let summary = ran.json();
+    let turns = summary["turns"].as_array().unwrap();
+    let limit = turns[0]["slew_limit"].as_f64().unwrap();
+    assert!((limit / 1500.0 - 1.0).abs() < 0.1, "{summary:#}");
+    assert_eq!(turns[1]["slew_limit"], serde_json::Value::Null, "{summary:#}");
+    assert_eq!(turns[1]["found"], serde_json::json!(["lag"]), "{summary:#}");
+    let error = |turn: &serde_json::Value| turn["tracking_rmse"].as_f64().unwrap();
+    assert!(error(turns.last().unwrap()) < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(), "{summary:#}");
+    let drive = lab.read("loop/train-2.csv");
+    let volts: Vec<f64> = drive.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 500.0 < 0.81 * limit), "segments begin where they end");
+}
+
 #[test]
 fn a_folder_with_files_is_left_alone() {
     let lab = Lab::new();

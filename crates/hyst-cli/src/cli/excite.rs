@@ -39,7 +39,7 @@ pub(crate) struct Common {
     /// Highest voltage
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(crate) high: f64,
-    /// Steepest slope that the amplifier stands; a steeper drive is refused
+    /// Steepest slope that the amplifier stands; a steeper drive is refused, but what an identification is free in is slowed down
     #[arg(long, value_name = "V_PER_S")]
     pub(crate) slew: Option<f64>,
     #[command(flatten)]
@@ -57,19 +57,19 @@ pub(crate) enum ExciteKind {
         /// Rest between segments
         #[arg(long, value_name = "S", default_value_t = 1.0)]
         rest: f64,
-        /// Frequency of the slow loops; chosen by the rate if not given
+        /// Frequency of the slow loops; chosen by the rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         slow: Option<f64>,
-        /// Frequency of the fast loops; chosen by the rate if not given
+        /// Frequency of the fast loops; chosen by the rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         fast: Option<f64>,
-        /// Highest frequency of the multisine; chosen by the rate if not given
+        /// Highest frequency of the multisine; chosen by the rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         band: Option<f64>,
         /// How long levels are held
         #[arg(long, value_name = "S", default_value_t = 2.0)]
         hold: f64,
-        /// How long the ramps between levels take; chosen by the rate if not given
+        /// How long the ramps between levels take; chosen by the rate and --slew if not given
         #[arg(long, value_name = "S")]
         ramp: Option<f64>,
         /// The drive for a test record: as the one without this option, but with other frequencies, levels and phases

@@ -110,7 +110,8 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   [[disturbance]]
   kind = \"jump\"            # um at at_s of the reading; or gain-step (share, at_s),
   um = 0.2                 # bursts (um, seconds, every_s) of noise, wander (um, period_s)
-  at_s = 12                # of the zero, slip (um, at_v) of the mount";
+  at_s = 12                # of the zero, slip (um, at_v) of the mount,
+                           # slew-limit (v_per_s) of the amplifier";
 
 pub(super) const RECORDS: &str = "\
 Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one \

@@ -20,6 +20,7 @@ use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::progress::Progress;
+use crate::report::next::FOLLOWED;
 use crate::tracking::{Files, Run, Task};
 use crate::{recording, text};
 
@@ -34,6 +35,8 @@ struct Turn {
     /// Effects that were found in this turn.
     found: Vec<String>,
     remainder: RemainderKind,
+    /// Slope from which on the drive was not followed \[V/s\]; the next turn's stays below.
+    slew_limit: Option<f64>,
     /// What is left, in words.
     left: String,
     /// Error of the followed reference \[output unit\].
@@ -86,15 +89,17 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
     let (mut records, mut model): (Vec<Record>, Option<Model>) = (Vec::new(), None);
     let mut list: Vec<Turn> = Vec::new();
     let mut kind = args.model;
+    let (mut slew, mut unit) = (None, None);
     let (mut plain, mut base_alone) = (f64::NAN, f64::NAN);
     let mut ended = format!("all {} turns are done; give more with --turns", args.turns);
     for turn in 1..=args.turns {
         progress.say(&format!("turn {turn}: experiment"));
-        let record = experiment(daq, args, turn)?;
+        let record = experiment(daq, args, turn, slew)?;
         let mut csv = Vec::new();
         record.write_csv(&mut csv).map_err(output::io_error)?;
         write_atomic(file("train", turn, "csv"), |f| f.write_all(&csv))?;
         let record = record.kept_as(&csv);
+        unit = record.output_unit();
         let before = model.as_ref().map(|m| simulate(m, &record, Zero::None)).transpose()?.and_then(|s| s.errors);
         records.push(record);
         let train = Record::join(records.clone())?;
@@ -129,11 +134,18 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             before,
             found: names,
             remainder: remainder.kind,
+            slew_limit: remainder.slew_limit,
             left: remainder.description.clone(),
             tracking_rmse: rmse,
             tracking_max_abs: max_abs,
             tracking_shown_rmse: shown_rmse,
         });
+        if let Some(limit) = remainder.slew_limit {
+            // What the amplifier has not followed says little of the actuator: all is measured anew, less steeply.
+            slew = Some(FOLLOWED * limit);
+            records.clear();
+            continue;
+        }
         if too_coarse {
             // What is left is a map of the input's history: a richer one is fitted, and the effects are looked for anew on it.
             kind = Kind::Preisach;
@@ -144,7 +156,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         model = Some(found.extended);
     }
     Ok(Summary {
-        unit: records.first().and_then(Record::output_unit).map_or("", |u| u.suffix()).to_owned(),
+        unit: unit.map_or("", |u| u.suffix()).to_owned(),
         plain_gain_rmse: plain,
         base_inverse_rmse: base_alone,
         turns: list,
@@ -153,12 +165,12 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
     })
 }
 
-/// Plays the identification drive of a turn over the device's range.
-fn experiment<D: Daq>(daq: &mut D, args: &CloseLoopArgs, turn: u32) -> CommandResult<Record> {
+/// Plays the identification drive of a turn over the device's range, no steeper than `slew` \[V/s\].
+fn experiment<D: Daq>(daq: &mut D, args: &CloseLoopArgs, turn: u32, slew: Option<f64>) -> CommandResult<Record> {
     let range = daq.capabilities().voltage;
-    let limits = Limits { rate_hz: args.rate, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
+    let limits = Limits { rate_hz: args.rate, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: slew };
     let seed = args.seed.wrapping_add(u64::from(turn) << 32);
-    let drive: Drive = Identification::at_rate(args.rate, seed).drive(&limits)?;
+    let drive: Drive = Identification::at_rate(args.rate, seed).within_slew(&limits, &|_| true).drive(&limits)?;
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
     let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(args.rate), |_| ControlFlow::Continue(()))
         .map_err(|failure| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}")))?;
@@ -181,7 +193,8 @@ fn said(summary: &Summary) -> String {
     rows.push(blank("plain gain", summary.plain_gain_rmse));
     rows.push(blank("base inverse", summary.base_inverse_rmse));
     for t in &summary.turns {
-        let found: Vec<&str> = t.found.iter().map(String::as_str).collect();
+        let slow = t.slew_limit.map(|_| "a slow amplifier");
+        let found: Vec<&str> = t.found.iter().map(String::as_str).chain(slow).collect();
         rows.push(vec![
             t.turn.to_string(),
             t.base.name().to_owned(),

@@ -78,6 +78,13 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
                 seed: *seed,
             };
             let spec = if *test { spec.for_test() } else { spec };
+            let free = |field: &str| match field {
+                "slow_hz" => slow.is_none(),
+                "fast_hz" => fast.is_none(),
+                "band_hz" => band.is_none(),
+                _ => ramp.is_none(),
+            };
+            let spec = spec.within_slew(&limits(common), &free);
             return Ok(Made { common, drive: spec.drive(&limits(common)), crest_factor: None });
         }
         ExciteKind::Separate(args) => return Err(args),

@@ -13,6 +13,9 @@ use crate::text::listed;
 /// Up to so many noise floors of error there is little left to look for.
 const NEAR_THE_FLOOR: f64 = 2.0;
 
+/// Share of the slope at which an amplifier has been seen to fall behind that a drive may have.
+pub(crate) const FOLLOWED: f64 = 0.8;
+
 /// What to do next, and why.
 #[derive(Debug)]
 pub(crate) struct Advice {
@@ -55,7 +58,15 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
     }
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
     let finer = c.model.base.kind() != Kind::Preisach && !drags;
+    if let Some(limit) = f.remainder.slew_limit {
+        let slope = format!(" --slew {:.0}", FOLLOWED * limit);
+        advise(
+            "A drive that the amplifier follows; fit and diagnose its record instead of this one:",
+            &[identification(c, &slope)],
+        );
+    }
     match f.remainder.kind {
+        RemainderKind::Unexplained if f.remainder.slew_limit.is_some() => {}
         RemainderKind::BaseCapacity if f.remainder.change == Some(Change::Zero) => {
             let (files, test) = (files(c.train), test_option(c));
             let reading = further(&c.reading);

@@ -26,6 +26,9 @@ pub(crate) fn verdict(findings: &Findings) -> String {
         (Verdict::BaseTooCoarse, None) => {
             "base too coarse: what is left is a map of the input's history that a richer base would take".to_owned()
         }
+        (Verdict::Unexplained, _) if findings.remainder.slew_limit.is_some() => {
+            "unexplained: the drive is not followed where it is steep".to_owned()
+        }
         (Verdict::Unexplained, _) => "unexplained: what is left is none of the effects that are looked for".to_owned(),
     }
 }
@@ -43,13 +46,16 @@ pub(crate) fn kind(remainder: &Remainder) -> &'static str {
         (RemainderKind::BaseCapacity, None) => "the base's own misfit",
         (RemainderKind::BaseCapacity, Some(Change::Zero)) => "another zero",
         (RemainderKind::BaseCapacity, Some(Change::Device)) => "a change of the device",
+        (RemainderKind::Unexplained, _) if remainder.slew_limit.is_some() => "a drive that is not followed",
         (RemainderKind::Unexplained, _) => "unexplained",
     }
 }
 
-/// Whether the error on the test record has grown, so that the extended model should not be used.
+/// Whether the error on the test record has grown, so that the extended model should not be used. Not where an amplifier has not followed
+/// the drive: what that costs, each model shares out in its own way.
 pub(crate) fn worse_on_test(findings: &Findings) -> bool {
-    findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)
+    findings.remainder.slew_limit.is_none()
+        && findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)
 }
 
 /// That the plays of the extended base stand elsewhere than the model's, if they do.

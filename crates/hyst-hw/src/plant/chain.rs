@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::asymmetry::Curve;
-use super::config::PlantConfig;
+use super::config::{Disturbance, PlantConfig};
 use super::creep::Creep;
 use super::hysteresis::Hysteresis;
 use super::input::InputPath;
@@ -16,7 +16,7 @@ const MIN_STEPS: f64 = 8.0;
 /// Fine step times the fastest rate of the chain (`ω` of a mode, `1/τ` of a lag or creep element).
 const MAX_STEP_RATE: f64 = 0.05;
 
-/// Drive → delay → lag → hysteresis, asymmetry → × temperature → + creep → + load → modes → stops, with all their memory.
+/// Drive → delay → the amplifier's steepest slope → lag → hysteresis, asymmetry → × temperature → + creep → + load → modes → stops, with all their memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Fine steps in a sample period.
@@ -47,6 +47,7 @@ impl Chain {
             input: InputPath::new(
                 config.actuator.rest_v,
                 config.delay.as_ref().map_or(0.0, |delay| delay.seconds * rate_hz),
+                slew_limit(config).map(|v_per_s| v_per_s * step_s),
                 config.lag.as_ref().map(|lag| step_s / lag.seconds),
             ),
             hysteresis,
@@ -95,6 +96,15 @@ impl Chain {
         self.loaded = around.deflection(t);
         self.structure.rest_at(self.loaded);
     }
+}
+
+/// The lowest of the amplifier's limits (V/s), if it has one.
+fn slew_limit(config: &PlantConfig) -> Option<f64> {
+    let limits = config.disturbances.iter().filter_map(|d| match d {
+        Disturbance::SlewLimit { v_per_s } => Some(*v_per_s),
+        _ => None,
+    });
+    limits.min_by(f64::total_cmp)
 }
 
 /// Fine steps in a sample period, so that the fastest motion is well resolved.

@@ -56,7 +56,7 @@ impl Active {
         let draws = |purpose| Draws::numbered(config.seed, purpose, k);
         Some(match *disturbance {
             Disturbance::Jump { um, at_s } => Self::Jump { um, at_s },
-            Disturbance::GainStep { .. } => return None,
+            Disturbance::GainStep { .. } | Disturbance::SlewLimit { .. } => return None,
             Disturbance::Bursts { um, seconds, every_s } => {
                 let mut moments = draws(Purpose::BurstMoments);
                 let begins = (0..BURSTS).map(|_| moments.between(0.0, every_s - seconds)).collect();

@@ -1,4 +1,4 @@
-//! Between the drive samples and the actuator: interpolating amplifier, dead time, first-order lag.
+//! Between the drive samples and the actuator: interpolating amplifier, dead time, limited slope, first-order lag.
 
 /// The drive as the actuator sees it at any phase of the running sample period.
 ///
@@ -10,8 +10,16 @@ pub(crate) struct InputPath {
     knots: Vec<f64>,
     newest: usize,
     delay_periods: f64,
+    slope: Option<Slope>,
     lag: Option<Lag>,
     rest_v: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Slope {
+    /// What the amplifier's output changes by in a fine step at most (V).
+    most: f64,
+    value: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -22,12 +30,13 @@ struct Lag {
 }
 
 impl InputPath {
-    /// Dead time in sample periods, step of the fine grid over the lag's time constant.
-    pub(crate) fn new(rest_v: f64, delay_periods: f64, lag_step: Option<f64>) -> Self {
+    /// Dead time in sample periods, largest change in a step of the fine grid (V), that step over the lag's time constant.
+    pub(crate) fn new(rest_v: f64, delay_periods: f64, most: Option<f64>, lag_step: Option<f64>) -> Self {
         // Read from age 0 to 1 + delay and one knot further to interpolate; one more for rounding.
         let knots = vec![rest_v; delay_periods as usize + 4];
+        let slope = most.map(|most| Slope { most, value: rest_v });
         let lag = lag_step.map(|step| Lag { step, value: rest_v });
-        Self { knots, newest: 0, delay_periods, lag, rest_v }
+        Self { knots, newest: 0, delay_periods, slope, lag, rest_v }
     }
 
     /// Begins a sample period that ends at drive `v`.
@@ -51,15 +60,29 @@ impl InputPath {
 
     /// Integrates the fine step from phase `from` to phase `to`; returns the voltage at its end.
     pub(crate) fn advance(&mut self, from: f64, to: f64) -> f64 {
-        let end = self.delayed(to);
+        let (begin, middle, end) = self.followed(from, to);
         let Some(lag) = self.lag else { return end };
-        let lag = lag.advance(self.delayed(from), self.delayed(0.5 * (from + to)), end);
+        let lag = lag.advance(begin, middle, end);
         self.lag = Some(lag);
         lag.value
     }
 
+    /// What the amplifier puts out at begin, middle and end of a fine step.
+    fn followed(&mut self, from: f64, to: f64) -> (f64, f64, f64) {
+        let end = self.delayed(to);
+        let Some(slope) = &mut self.slope else {
+            return (self.delayed(from), self.delayed(0.5 * (from + to)), end);
+        };
+        let begin = slope.value;
+        slope.value += (end - begin).clamp(-slope.most, slope.most);
+        (begin, 0.5 * (begin + slope.value), slope.value)
+    }
+
     pub(crate) fn reset(&mut self) {
         self.knots.fill(self.rest_v);
+        if let Some(slope) = &mut self.slope {
+            slope.value = self.rest_v;
+        }
         if let Some(lag) = &mut self.lag {
             lag.value = self.rest_v;
         }
@@ -92,7 +115,7 @@ mod tests {
 
     #[test]
     fn no_delay_and_no_lag_pass_the_drive_through() {
-        let mut path = InputPath::new(0.0, 0.0, None);
+        let mut path = InputPath::new(0.0, 0.0, None, None);
         for v in [1.0, 5.0, -2.0] {
             assert_eq!(run_period(&mut path, v), v);
         }
@@ -102,7 +125,7 @@ mod tests {
     fn delay_is_exact_between_samples_too() {
         let drive = |k: f64| 3.0 * k + 7.0 * (0.3 * k).sin();
         for delay in [0.25, 1.0, 2.6, 5.0] {
-            let mut path = InputPath::new(0.0, delay, None);
+            let mut path = InputPath::new(0.0, delay, None, None);
             for k in 1..60 {
                 let out = run_period(&mut path, drive(f64::from(k)));
                 let t = f64::from(k) - delay;
@@ -119,7 +142,7 @@ mod tests {
     fn lag_follows_its_step_response() {
         // One period of ramp, then constant: 1 - tau/h (e^(h/tau) - 1) e^(-t/tau) from the ramp's end on.
         let (period, tau) = (1.0, 2.5);
-        let mut path = InputPath::new(0.0, 0.0, Some(period / f64::from(STEPS) / tau));
+        let mut path = InputPath::new(0.0, 0.0, None, Some(period / f64::from(STEPS) / tau));
         for k in 1..40 {
             let t = f64::from(k) * period;
             let expected = 1.0 - tau / period * (period / tau).exp_m1() * (-t / tau).exp();
@@ -129,8 +152,23 @@ mod tests {
     }
 
     #[test]
+    fn a_limited_slope_lags_behind_a_jump_and_not_behind_what_is_slower() {
+        let mut path = InputPath::new(0.0, 0.0, Some(0.5 / f64::from(STEPS)), None);
+        // A jump of 2 takes four periods, whichever way.
+        for (k, expected) in [0.5, 1.0, 1.5, 2.0, 2.0].into_iter().enumerate() {
+            assert!((run_period(&mut path, 2.0) - expected).abs() < 1e-12, "{k}");
+        }
+        assert!((run_period(&mut path, -3.0) - 1.5).abs() < 1e-12);
+        let mut path = InputPath::new(1.0, 0.0, Some(0.5 / f64::from(STEPS)), None);
+        for k in 0..20 {
+            let v = 1.0 + (0.4 * f64::from(k)).sin();
+            assert!((run_period(&mut path, v) - v).abs() < 1e-12, "{k}");
+        }
+    }
+
+    #[test]
     fn reset_forgets() {
-        let mut path = InputPath::new(2.0, 1.5, Some(0.02));
+        let mut path = InputPath::new(2.0, 1.5, Some(0.03), Some(0.02));
         let first: Vec<f64> = (0..5).map(|k| run_period(&mut path, f64::from(k))).collect();
         path.reset();
         let second: Vec<f64> = (0..5).map(|k| run_period(&mut path, f64::from(k))).collect();

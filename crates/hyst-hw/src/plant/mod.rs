@@ -57,8 +57,8 @@ pub const EFFECTS: [&str; 11] = [
 
 /// Kinds of disturbance that [`PlantConfig::disturbed`] knows: those of the file's `[[disturbance]]`, and a load and a
 /// temperature that act but are not recorded.
-pub const DISTURBANCES: [&str; 7] =
-    ["jump", "gain-step", "bursts", "wander", "slip", "hidden-load", "hidden-temperature"];
+pub const DISTURBANCES: [&str; 8] =
+    ["jump", "gain-step", "bursts", "wander", "slip", "slew-limit", "hidden-load", "hidden-temperature"];
 
 /// A simulated actuator with amplifier, sensor and lab clock.
 ///

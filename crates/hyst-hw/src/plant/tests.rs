@@ -76,7 +76,9 @@ fn another_noise_is_all_that_another_noise_seed_makes() {
 
 #[test]
 fn same_seed_same_bits_in_any_block_size() {
-    for config in [everything(), disturbed()] {
+    let mut slow = everything();
+    slow.disturbances = vec![Disturbance::SlewLimit { v_per_s: 300.0 }];
+    for config in [everything(), disturbed(), slow] {
         let drive = triangle(1500, config.actuator.max_v);
         let run = |block| {
             let mut plant = Plant::new(config.clone()).unwrap();
@@ -301,6 +303,18 @@ fn disturbances_come_on_the_labs_clock() {
         let gain = [1.0, 1.1, 1.1, 0.55][((time_s - 0.05) / 2.0) as usize];
         let jump = if time_s > 4.0 { 0.5 } else { 0.0 };
         assert!((output - 5.0 * gain - jump).abs() < 1e-9, "{time_s}: {output}");
+    }
+}
+
+#[test]
+fn an_amplifier_follows_no_faster_than_its_limit() {
+    let mut config = clean();
+    config.disturbances = [400.0, 250.0].map(|v_per_s| Disturbance::SlewLimit { v_per_s }).to_vec();
+    let mut plant = Plant::new(config).unwrap();
+    plant.start(100.0).unwrap();
+    for (k, sample) in (1..).zip(play(&mut plant, &[50.0; 40], 7)) {
+        let expected = 0.1 * f64::min(2.5 * f64::from(k), 50.0);
+        assert!((sample.output - expected).abs() < 1e-9, "{k}: {}", sample.output);
     }
 }
 

@@ -207,6 +207,7 @@ fn disturbances(config: &PlantConfig) -> Checked {
                 let passed = config.actuator.min_v < at_v && at_v <= config.actuator.max_v;
                 is("at_v", at_v, passed, "a voltage above actuator.min_v, up to actuator.max_v")?;
             }
+            Disturbance::SlewLimit { v_per_s } => is("v_per_s", v_per_s, v_per_s > 0.0, "a slope in V/s above 0")?,
         }
     }
     Ok(())

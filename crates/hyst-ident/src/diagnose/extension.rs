@@ -10,7 +10,7 @@ use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
-use crate::nested::{Fitted, Hypothesis, Problem, without_sensor_effects};
+use crate::nested::{Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{Settled, start_up_and, unless_followed};
@@ -145,15 +145,22 @@ impl Own<'_> {
         Ok(extended)
     }
 
-    /// Whether it errs less than the model as it was, over the rows that count for the search: a model that misses a stop, say, takes
+    /// Whether it errs less `after` than `before`, over the rows that count for the search: a model that misses a stop, say, takes
     /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
-    pub(super) fn is_helped(&self, after: &Simulation) -> bool {
+    pub(super) fn is_helped(&self, before: &Simulation, after: &Simulation) -> bool {
         let samples = self.samples;
         let errs_less = |counts: &dyn Fn(usize) -> bool| {
             let rows = || (0..samples.len()).filter(|k| !samples.settling[*k] && counts(*k));
             let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
-            squares(after) < squares(self.before)
+            squares(after) < squares(before)
         };
         errs_less(&|_| true) || errs_less(&|k| !after.settling[k])
+    }
+
+    /// The record with what an amplifier makes of its drive that follows no steeper slope than this \[V/s\].
+    pub(super) fn amplified(&self, v_per_s: f64) -> Record {
+        let mut drive = self.train.input().to_vec();
+        limit_slope(&mut drive, self.train.segments(), v_per_s * self.samples.period);
+        self.train.driven_by(drive)
     }
 }

@@ -62,6 +62,9 @@ pub struct Remainder {
     /// Of what a richer base would take: what the same base would take too, fitted anew, since something has changed since the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
+    /// Slope from which on the drive is not followed, as by an amplifier whose current is limited \[input unit/s\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slew_limit: Option<f64>,
     /// In words.
     pub description: String,
     /// Where it lives, in sentences; none if it is noise.

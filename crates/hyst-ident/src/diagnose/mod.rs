@@ -188,15 +188,24 @@ pub fn diagnose(
     progress("judging what is left");
     let mut after = simulate(&extended, train, options.zero)?;
     let mut useless = Vec::new();
-    if !found.named.is_empty() && !asked.is_helped(&after) {
+    // What an amplifier does not follow would hide the rest.
+    let mut amplified = None;
+    if let Some(v_per_s) = hypothesis.slew_limit.filter(|_| !found.named.is_empty()) {
+        let record = asked.amplified(v_per_s);
+        amplified = Some((simulate(model, &record, options.zero)?, simulate(&extended, &record, options.zero)?));
+    }
+    let (without, with) = amplified.as_ref().map_or((&before, &after), |(without, with)| (without, with));
+    if !found.named.is_empty() && !asked.is_helped(without, with) {
         // What the rich base shows drowns in what this one misses.
         useless = found.named.drain(..).map(|n| n.effect).collect();
-        (extended, hypothesis, after) = (model.clone(), start.clone(), before.clone());
+        (extended, after, amplified) = (model.clone(), before.clone(), None);
+        hypothesis = Hypothesis { effects: start.effects.clone(), drag: start.drag, ..hypothesis };
     }
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);
     }
-    let mut remainder = remainder::judge(&found, &hypothesis, &after, &samples, richest);
+    let mut remainder =
+        remainder::judge(&found, &hypothesis, &after, amplified.as_ref(), &samples, richest, model.input.symbol());
     if extended == *model {
         let asked = Own { basis: &own, ..asked };
         remainder = changed::told_apart(&asked, &start, found.noise, options.zero, remainder)?;
@@ -257,7 +266,9 @@ fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
         Cause::Effect(Effect::RateDependence) => problem.basis.drags() && problem.only_loop.is_none(),
         // What changes one loop's shape may as well be a hysteresis of that shape. That the output turns after the drive does is none:
         // of what is late, the simplest stands for all.
-        Cause::Effect(Effect::Resonance | Effect::Saturation | Effect::Asymmetry) => problem.only_loop.is_none(),
+        Cause::Effect(Effect::Resonance | Effect::Saturation | Effect::Asymmetry) | Cause::SlewLimit => {
+            problem.only_loop.is_none()
+        }
         _ => true,
     }
 }

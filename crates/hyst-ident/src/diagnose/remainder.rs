@@ -3,6 +3,7 @@
 use super::findings::{Remainder, RemainderKind};
 use super::finer::AT_FLOOR;
 use super::search::Search;
+use crate::digits::short;
 use crate::model::Effect;
 use crate::nested::Hypothesis;
 use crate::samples::Samples;
@@ -15,8 +16,17 @@ const NEARLY_ALL: f64 = 0.9;
 /// Share from which on what a richer base takes is told.
 const MENTIONED: f64 = 0.1;
 
-/// Whether the rest is noise, lack of capacity of the base, or unexplained.
-pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples: &Samples, richest: f64) -> Remainder {
+/// Whether the rest is noise, lack of capacity of the base, or unexplained. `amplified` is what the model says, without and with what was
+/// found, about the record as an amplifier drives it that does not follow every slope. The drive is in the unit `input`.
+pub(super) fn judge(
+    found: &Search,
+    h: &Hypothesis,
+    after: &Simulation,
+    amplified: Option<&(Simulation, Simulation)>,
+    samples: &Samples,
+    richest: f64,
+    input: &str,
+) -> Remainder {
     let noise2 = found.noise * found.noise;
     let rmse = after.errors.as_ref().map_or(0.0, |e| e.rmse);
     let span = samples.output_span();
@@ -29,23 +39,41 @@ pub(super) fn judge(found: &Search, h: &Hypothesis, after: &Simulation, samples:
         kind,
         variance_share: share,
         change: None,
+        slew_limit: h.slew_limit,
         description,
         places: Vec::new(),
     };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
-    if h.zero_wanders || h.gain_wanders {
-        let what = match (h.zero_wanders, h.gain_wanders) {
-            (true, true) => "the zero and the gain wander",
-            (true, false) => "the zero wanders",
-            _ => "the gain wanders",
-        };
-        return left(
-            RemainderKind::Unexplained,
+    let wanders = match (h.zero_wanders, h.gain_wanders) {
+        (true, true) => Some("the zero and the gain wander"),
+        (true, false) => Some("the zero wanders"),
+        (false, true) => Some("the gain wanders"),
+        (false, false) => None,
+    };
+    let wanders = wanders.map(|what| {
+        format!(
+            "{what} in time as no effect of the list does; look for what was not recorded (a load, a temperature, a mount that slips)"
+        )
+    });
+    let limited = h.slew_limit.map(|v_per_s| {
+        let limit = short(v_per_s);
+        let left = |s: &Simulation| percent(s.errors.as_ref().map_or(f64::NAN, |e| e.rmse));
+        let helped = amplified.map_or(String::new(), |(without, with)| {
             format!(
-                "{:.2} % of span: {what} in time as no effect of the list does; look for what was not recorded (a load, a temperature, a mount that slips)",
-                percent(rmse)
-            ),
-        );
+                " (of what such an amplifier makes of the drive the model misses {:.2} %, {:.2} % without what was found)",
+                left(with),
+                left(without)
+            )
+        });
+        format!(
+            "the drive is not followed where it is steeper than {limit} {input}/s, as by an amplifier whose current is limited{helped}; no model \
+             makes up for that: measure with a drive below that slope (`excite --slew`), and keep to it"
+        )
+    });
+    let nameless: Vec<String> = limited.into_iter().chain(wanders).collect();
+    if !nameless.is_empty() {
+        let what = format!("{:.2} % of span: {}", percent(rmse), nameless.join("; "));
+        return left(RemainderKind::Unexplained, what);
     }
     if rmse <= AT_FLOOR * found.noise {
         return left(

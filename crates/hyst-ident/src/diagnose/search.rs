@@ -185,7 +185,7 @@ pub(super) fn further(
 fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
     let effects = Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry).map(Cause::Effect);
     effects
-        .chain([Cause::ZeroWanders, Cause::GainWanders])
+        .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::SlewLimit])
         .filter(|c| fit.hypothesis.has_room(*c) && visible(*c, problem))
         .collect()
 }

@@ -11,15 +11,18 @@ use hyst_core::{
 use super::spectrum::{peaks, tone};
 use crate::base::DragParams;
 use crate::model::{CreepBank, Effect, Effects};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion, steepest};
 use crate::samples::Samples;
 
 /// Creep elements per decade of time.
 const PER_DECADE: f64 = 2.0;
-/// Modes that are followed up.
+/// Modes, and slopes, that are followed up.
 const FOLLOWED: usize = 2;
 /// Frequencies of the coarse scan.
 const SCAN: usize = 48;
+/// Slopes of the coarse scan, and what each is of the one before.
+const SLOPES: usize = 12;
+const LESS_STEEP: f64 = 0.75;
 
 /// Hypotheses to begin at: that of `from`, and `cause`.
 pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Result<Vec<Hypothesis>, Error> {
@@ -34,6 +37,10 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         Cause::Effect(effect) => effect,
         Cause::ZeroWanders => return Ok(vec![also(&|h| h.zero_wanders = true)]),
         Cause::GainWanders => return Ok(vec![also(&|h| h.gain_wanders = true)]),
+        Cause::SlewLimit => {
+            let limits = slew_limits(problem, from)?;
+            return Ok(limits.into_iter().map(|v_per_s| also(&|h| h.slew_limit = Some(v_per_s))).collect());
+        }
     };
     Ok(match effect {
         Effect::Delay => vec![with(&|e| e.delay = Some(DelayParams { seconds: samples.period }))],
@@ -113,6 +120,27 @@ fn bank(samples: &Samples, share: f64) -> CreepBank {
     let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
     let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
     CreepBank { shares: vec![share; seconds.len()], seconds }
+}
+
+/// Slopes of the drive from which on it may not be followed, the one that takes most of the residual and a neighbour.
+fn slew_limits(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<f64>, Error> {
+    let residual = problem.residual(from)?;
+    let motion = problem.motion(&from.hypothesis, &from.solution)?;
+    let projector = problem.projector(from)?;
+    let mut scored = Vec::new();
+    let mut limit = steepest(problem.samples);
+    for _ in 0..SLOPES {
+        limit *= LESS_STEEP;
+        let limited = Hypothesis { slew_limit: Some(limit), ..from.hypothesis.clone() };
+        let mut moved = problem.motion(&limited, &from.solution)?;
+        moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);
+        let (gain, amplitude) = projector.gain(&moved, &residual);
+        if amplitude > 0.0 {
+            scored.push((gain, limit));
+        }
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Ok(scored.into_iter().take(FOLLOWED).map(|(_, limit)| limit).collect())
 }
 
 /// Modes whose first-order change takes most of the residual.

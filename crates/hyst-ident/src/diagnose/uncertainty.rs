@@ -58,15 +58,15 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     let mut next = layout.len();
     let (mut creep, mut hz) = (Vec::new(), None);
     hypothesis.visit_nonlinear(&mut |p| {
-        match p.effect {
-            Effect::Creep => creep.push(next),
-            Effect::Interference => hz = Some(next),
+        match p.cause.effect() {
+            Some(Effect::Creep) => creep.push(next),
+            Some(Effect::Interference) => hz = Some(next),
             _ => {}
         }
-        if let Some(e) = of(next) {
+        if let (Some(e), Some(effect)) = (of(next), p.cause.effect()) {
             let (stage, name) = match p.name.strip_suffix("_2") {
-                Some(name) => (format!("{}_2", p.effect), name.to_owned()),
-                None => (p.effect.to_string(), p.name.clone()),
+                Some(name) => (format!("{effect}_2"), name.to_owned()),
+                None => (effect.to_string(), p.name.clone()),
             };
             errors.insert(format!("{stage}.{name}"), e);
         }

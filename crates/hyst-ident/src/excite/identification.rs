@@ -6,6 +6,10 @@ use super::{
 
 /// Added to the seed of a test record's drive.
 const TEST_SEED: u64 = 1 << 32;
+/// Share of a slope limit that is aimed at.
+const AIM: f64 = 0.98;
+/// Rounds in which the drive is slowed down: each field has its own in the end.
+const ROUNDS: usize = 12;
 
 /// A drive that shows every effect that a diagnosis can name: nested loops (decaying sine), slow and fast full loops
 /// (lag, resonance, rate), triangles, long holds (creep, drift) and a broad band (multisine).
@@ -54,6 +58,33 @@ impl Identification {
         // What is out of its range is told as it was given.
         let legal = self.slow_hz > 0.0 && inwards.is_finite() && inwards > 1.0;
         if legal { Self { slow_hz: self.slow_hz * inwards, fast_hz: self.fast_hz / inwards, ..other } } else { other }
+    }
+
+    /// The same, no steeper than the limits allow: what is too steep is slowed down, where `free` says of `slow_hz`, `fast_hz`, `band_hz` or
+    /// `ramp_s` that nobody has fixed it.
+    #[must_use]
+    pub fn within_slew(mut self, limits: &Limits, free: &dyn Fn(&str) -> bool) -> Self {
+        for _ in 0..ROUNDS {
+            let Err(ExciteError::Slew { shape, needed, limit, .. }) = self.drive(limits) else { break };
+            let field = match shape {
+                // The slow one is no steeper than the decaying sine.
+                "sine" => "fast_hz",
+                "stairs" => "ramp_s",
+                "multisine" => "band_hz",
+                _ => "slow_hz",
+            };
+            if !free(field) {
+                break;
+            }
+            let slower = AIM * limit / needed;
+            match field {
+                "fast_hz" => self.fast_hz *= slower,
+                "band_hz" => self.band_hz *= slower,
+                "ramp_s" => self.ramp_s /= slower,
+                _ => self.slow_hz *= slower,
+            }
+        }
+        self
     }
 
     /// The segments. Of the time without rests the stairs take two fifths and the decaying sine a fifth.

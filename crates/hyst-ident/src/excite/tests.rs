@@ -305,6 +305,26 @@ fn the_slew_limit_is_kept_or_refused() {
 }
 
 #[test]
+fn an_identification_is_slowed_down_where_it_is_free() {
+    let usual = Identification { duration_s: 90.0, ..Identification::at_rate(1000.0, 3) };
+    assert_eq!(usual.within_slew(&LIMITS, &|_| true), usual);
+    for (v_per_s, test) in [(8000.0, false), (1000.0, true), (400.0, false)] {
+        let limits = Limits { slew_v_per_s: Some(v_per_s), ..LIMITS };
+        let spec = if test { usual.for_test() } else { usual };
+        assert!(spec.drive(&limits).is_err());
+        let slower = spec.within_slew(&limits, &|_| true);
+        let drive = slower.drive(&limits).unwrap();
+        assert!(drive.steepest() > 0.9 * v_per_s, "{v_per_s}: {}", drive.steepest());
+        // What is no steeper stays as it is.
+        assert_eq!(slower.slow_hz == spec.slow_hz, v_per_s > 5000.0, "{v_per_s}: {slower:?}");
+        // What is fixed stays, and is an error.
+        let fixed = spec.within_slew(&limits, &|field| field != "band_hz");
+        assert_eq!(fixed.band_hz, spec.band_hz);
+        assert!(fixed.drive(&limits).unwrap_err().to_string().contains("band_hz"));
+    }
+}
+
+#[test]
 fn fields_out_of_range_are_named() {
     let shape = |shape: Shape| Drive::new(&[shape], &LIMITS, 1.0).unwrap_err().to_string();
     let limits = |limits: Limits| Drive::new(&shapes(), &limits, 1.0).unwrap_err().to_string();

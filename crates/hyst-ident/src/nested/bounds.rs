@@ -1,20 +1,29 @@
 //! Steps and bounds of the nonlinear parameters on a record.
 
-use super::Hypothesis;
+use super::{Cause, Hypothesis, Unknown};
 use crate::Samples;
 use crate::lsq::Bounds;
-use crate::model::{Effect, Parameter};
+use crate::model::Effect;
 
 /// Bounds of a nonlinear parameter for this record.
-pub(super) fn box_of(p: &Parameter<'_>, samples: &Samples) -> Bounds {
+pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;
-    let bounds = match (p.effect, p.name.starts_with("hz")) {
-        (Effect::Resonance, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist },
-        (Effect::Interference, true) => Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist },
-        (Effect::RateDependence, _) if p.name == "volt_seconds" => {
+    let bounds = match (p.cause, p.name.starts_with("hz")) {
+        // Below the lower bound the amplifier follows next to nothing of the drive, at the upper one all of it.
+        (Cause::SlewLimit, _) => {
+            let steepest = steepest(samples);
+            Bounds { lower: LEAST_SLEW * steepest, upper: steepest }
+        }
+        (Cause::Effect(Effect::Resonance), true) => {
+            Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist }
+        }
+        (Cause::Effect(Effect::Interference), true) => {
+            Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist }
+        }
+        (Cause::Effect(Effect::RateDependence), _) if p.name == "volt_seconds" => {
             Bounds { lower: 0.0, upper: range_of(samples) * 0.1 * samples.longest_segment() }
         }
-        (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => {
+        (Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence), _) => {
             Bounds { lower: 0.0, upper: p.upper.min(0.1 * samples.longest_segment()).min(4000.0 * samples.period) }
         }
         _ => Bounds { lower: p.lower, upper: p.upper },
@@ -27,18 +36,28 @@ pub(super) fn box_of(p: &Parameter<'_>, samples: &Samples) -> Bounds {
 const INSIDE: f64 = 0.9;
 const GAIN_INSIDE: f64 = 0.99;
 
-/// Whether the search for a delay, a lag, a drag or a mode's gain has run up against its upper bound.
+/// Whether the search for a slew limit, a delay, a lag, a drag or a mode's gain has run up against its upper bound.
 pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     let mut ends = false;
     h.clone().visit_nonlinear(&mut |p| {
-        let inside = match p.effect {
-            Effect::Delay | Effect::Lag | Effect::RateDependence => INSIDE,
-            Effect::Resonance if p.name.starts_with("gain") => GAIN_INSIDE,
+        let inside = match p.cause {
+            Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence) | Cause::SlewLimit => INSIDE,
+            Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => GAIN_INSIDE,
             _ => return,
         };
-        ends |= *p.value >= inside * box_of(&p, samples).upper;
+        let bounds = box_of(&p, samples);
+        ends |= *p.value >= inside * bounds.upper || (p.cause == Cause::SlewLimit && *p.value <= bounds.lower);
     });
     ends
+}
+
+/// Steepest slope of the drive that a search goes down to, as a share of the drive's own steepest.
+const LEAST_SLEW: f64 = 0.01;
+
+/// Steepest slope of the drive \[V/s\].
+pub(crate) fn steepest(samples: &Samples) -> f64 {
+    let rises = samples.segments.iter().flat_map(|s| samples.input[s.clone()].windows(2));
+    rises.fold(0.0, |most: f64, w| most.max((w[1] - w[0]).abs())) / samples.period
 }
 
 /// Highest minus lowest input.
@@ -58,7 +77,7 @@ pub(super) fn stepped(
     index: usize,
     samples: &Samples,
     motion: (f64, f64),
-) -> Option<(Hypothesis, f64, Effect)> {
+) -> Option<(Hypothesis, f64, Cause)> {
     let mut moved = h.clone();
     let mut found = None;
     let mut i = 0;
@@ -66,26 +85,30 @@ pub(super) fn stepped(
     let room = OUT_OF_REACH * (motion.1 - motion.0);
     moved.visit_nonlinear(&mut |p| {
         if i == index {
-            let step = match (p.effect, p.name.trim_end_matches("_2")) {
-                (Effect::RateDependence, "volt_seconds") => {
-                    1e-3 * (1e-4 * range_of(samples) * samples.period).max(*p.value)
-                }
-                (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
-                (Effect::Resonance, "hz") => 1e-5 * *p.value,
-                (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
-                (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
-                (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
-                (Effect::Saturation, "low" | "high") => 1e-5 * span,
-                _ => 1e-5,
+            let step = match p.cause {
+                Cause::SlewLimit => 1e-4 * *p.value,
+                Cause::Effect(effect) => match (effect, p.name.trim_end_matches("_2")) {
+                    (Effect::RateDependence, "volt_seconds") => {
+                        1e-3 * (1e-4 * range_of(samples) * samples.period).max(*p.value)
+                    }
+                    (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
+                    (Effect::Resonance, "hz") => 1e-5 * *p.value,
+                    (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,
+                    (Effect::Saturation, "low") if *p.value < motion.0 - room => 0.0,
+                    (Effect::Saturation, "high") if *p.value > motion.1 + room => 0.0,
+                    (Effect::Saturation, "low" | "high") => 1e-5 * span,
+                    _ => 1e-5,
+                },
+                Cause::ZeroWanders | Cause::GainWanders => 0.0,
             };
             // Downwards where the upper bound is near: beyond it the stage may not exist.
             let step = if *p.value + step > p.upper { -step } else { step };
             *p.value += step;
-            found = Some((step, p.effect));
+            found = Some((step, p.cause));
         }
         i += 1;
     });
-    found.map(|(step, effect)| (moved, step, effect))
+    found.map(|(step, cause)| (moved, step, cause))
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! What a trial assumes besides the rate-independent base.
 
 use crate::base::DragParams;
-use crate::model::{Effect, Effects, Parameter};
+use crate::model::{Effect, Effects};
 
-/// Something that a trial may add to the base: an effect that has a name, or a wandering that has none.
+/// Something that a trial may add to the base: an effect that has a name, or what has none.
 ///
-/// The wanderings are no explanations. They compete with the effects so that what nobody put on the list (a jump, a step of the
-/// gain, a force that was not recorded) finds its place there and draws no wrong name.
+/// Those without a name compete with the effects so that what nobody put on the list (a jump, a step of the gain, a force that was not
+/// recorded, an amplifier at its limit) finds its place there and draws no wrong name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Cause {
     /// An effect of the closed list.
@@ -15,6 +15,8 @@ pub(crate) enum Cause {
     ZeroWanders,
     /// The gain wanders in time.
     GainWanders,
+    /// The drive is not followed where it is steep: an amplifier whose current is limited.
+    SlewLimit,
 }
 
 impl Cause {
@@ -22,7 +24,7 @@ impl Cause {
     pub(crate) fn effect(self) -> Option<Effect> {
         match self {
             Self::Effect(e) => Some(e),
-            Self::ZeroWanders | Self::GainWanders => None,
+            Self::ZeroWanders | Self::GainWanders | Self::SlewLimit => None,
         }
     }
 
@@ -31,6 +33,7 @@ impl Cause {
         match self {
             Self::Effect(e) => e.complexity(),
             Self::ZeroWanders | Self::GainWanders => super::HATS,
+            Self::SlewLimit => 1,
         }
     }
 }
@@ -46,6 +49,17 @@ pub(crate) struct Hypothesis {
     pub(crate) zero_wanders: bool,
     /// Whether the gain wanders.
     pub(crate) gain_wanders: bool,
+    /// Steepest slope that the amplifier follows \[V/s\], if it has one.
+    pub(crate) slew_limit: Option<f64>,
+}
+
+/// A parameter as it is searched, with the cause that it belongs to.
+pub(crate) struct Unknown<'a> {
+    pub(crate) cause: Cause,
+    pub(crate) name: String,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) value: &'a mut f64,
 }
 
 impl Hypothesis {
@@ -64,6 +78,7 @@ impl Hypothesis {
         let mut causes: Vec<Cause> = list.into_iter().map(Cause::Effect).collect();
         causes.extend(self.zero_wanders.then_some(Cause::ZeroWanders));
         causes.extend(self.gain_wanders.then_some(Cause::GainWanders));
+        causes.extend(self.slew_limit.map(|_| Cause::SlewLimit));
         causes
     }
 
@@ -74,6 +89,7 @@ impl Hypothesis {
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
+            Cause::SlewLimit => self.slew_limit.is_none(),
         }
     }
 
@@ -85,18 +101,21 @@ impl Hypothesis {
             Cause::Effect(e) => less.effects = self.effects.without(e),
             Cause::ZeroWanders => less.zero_wanders = false,
             Cause::GainWanders => less.gain_wanders = false,
+            Cause::SlewLimit => less.slew_limit = None,
         }
         less
     }
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
     pub(super) fn changes_the_base(&self) -> bool {
-        self.effects.input_side() != (None, None) || self.drag.is_some()
+        self.effects.input_side() != (None, None) || self.drag.is_some() || self.slew_limit.is_some()
     }
 
     /// Whether the hysteresis is driven, and follows, as in another set.
     pub(super) fn drives_alike(&self, other: &Self) -> bool {
-        self.drag == other.drag && self.effects.input_side() == other.effects.input_side()
+        self.drag == other.drag
+            && self.slew_limit == other.slew_limit
+            && self.effects.input_side() == other.effects.input_side()
     }
 
     /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.
@@ -105,15 +124,22 @@ impl Hypothesis {
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
+    pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Unknown<'_>)) {
+        if let Some(value) = &mut self.slew_limit {
+            let (lower, upper) = (0.0, f64::INFINITY);
+            f(Unknown { cause: Cause::SlewLimit, name: "volts_per_second".into(), lower, upper, value });
+        }
         if let Some(drag) = &mut self.drag {
+            let cause = Cause::Effect(Effect::RateDependence);
             for (name, upper, value) in
                 [("seconds", 1.0, &mut drag.seconds), ("volt_seconds", f64::INFINITY, &mut drag.volt_seconds)]
             {
-                f(Parameter { effect: Effect::RateDependence, name: name.into(), lower: 0.0, upper, value });
+                f(Unknown { cause, name: name.into(), lower: 0.0, upper, value });
             }
         }
-        self.effects.visit_nonlinear(f);
+        self.effects.visit_nonlinear(&mut |p| {
+            f(Unknown { cause: Cause::Effect(p.effect), name: p.name, lower: p.lower, upper: p.upper, value: p.value });
+        });
     }
 
     /// Values and bounds of the nonlinear parameters.

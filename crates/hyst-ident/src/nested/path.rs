@@ -1,5 +1,7 @@
 //! The stages around the hysteresis, over whole columns.
 
+use std::ops::Range;
+
 use hyst_core::{
     Build, Creep, Delay, Env, Error, Invert, Lag, Resonance, Sampling, Saturation, SaturationInverse, Stage,
 };
@@ -12,6 +14,8 @@ use crate::model::capacity::{CREEP, DELAY};
 /// What leads to the hysteresis and what follows it, for one set of causes.
 pub(crate) struct SignalPath<'a> {
     samples: &'a Samples,
+    /// What the amplifier's output changes by in a sample at most \[V\].
+    most: Option<f64>,
     delay: Option<Delay<f64, DELAY>>,
     lag: Option<Lag<f64>>,
     factor: Option<Vec<f64>>,
@@ -43,6 +47,7 @@ impl<'a> SignalPath<'a> {
         });
         Ok(Self {
             samples,
+            most: h.slew_limit.map(|v_per_s| v_per_s * samples.period),
             delay: delay.map(|p| p.build(&cx)).transpose()?,
             lag: lag.map(|p| p.build(&cx)).transpose()?,
             factor,
@@ -55,6 +60,9 @@ impl<'a> SignalPath<'a> {
     /// What the hysteresis is driven with.
     pub(crate) fn input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
+        if let Some(most) = self.most {
+            limit_slope(&mut drive, &self.samples.segments, most);
+        }
         if let Some(delay) = &self.delay {
             self.filter(delay, &mut [&mut drive]);
         }
@@ -141,6 +149,19 @@ impl<'a> SignalPath<'a> {
                     column[k] = stage.step(state, &env, column[k]);
                 }
             }
+        }
+    }
+}
+
+/// Makes of a drive what an amplifier puts out that changes by `most` a sample at most \[V\] and has rested at the first voltage of each
+/// segment.
+pub(crate) fn limit_slope(drive: &mut [f64], segments: &[Range<usize>], most: f64) {
+    for rows in segments {
+        let drive = &mut drive[rows.clone()];
+        let Some(mut now) = drive.first().copied() else { continue };
+        for u in drive {
+            now += (*u - now).clamp(-most, most);
+            *u = now;
         }
     }
 }

@@ -10,7 +10,7 @@ use super::assembly::{Assembly, Point};
 use super::bounds::{box_of, stepped};
 use super::columns::{may_be_kept, passes};
 use super::cross_validation::{cross_validate, folds_interleaved, unpredictable};
-use super::{Hypothesis, Projector, SignalPath};
+use super::{Cause, Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bordered, Bounds, Gram, solve_near};
@@ -159,11 +159,11 @@ impl<'a> Problem<'a> {
         let here = self.thinned(|k| path.stopped(motion[k]).0);
         let reached = range(here.iter().copied());
         let column = |at: usize| -> Result<Vec<f64>, Error> {
-            let Some((moved, step, effect)) = stepped(h, at, self.samples, reached).filter(|(_, step, _)| *step != 0.0)
+            let Some((moved, step, cause)) = stepped(h, at, self.samples, reached).filter(|(_, step, _)| *step != 0.0)
             else {
                 return Ok(vec![0.0; here.len()]);
             };
-            if effect == Effect::Interference {
+            if cause == Cause::Effect(Effect::Interference) {
                 let first = self.layout(h).tone.start;
                 let (sine, cosine) = (solution[first], solution[first + 1]);
                 let tone = h.effects.interference.unwrap_or_default();

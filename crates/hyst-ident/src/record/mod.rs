@@ -135,6 +135,11 @@ impl Record {
         Self::assemble(samples, Printed::EXACT, &origin)
     }
 
+    /// The same with another input, as long as its own.
+    pub(crate) fn driven_by(&self, input: Vec<f64>) -> Self {
+        Self { input: Some(input), ..self.clone() }
+    }
+
     /// Puts together finite columns of equal length.
     fn assemble(samples: Columns, printed: Printed, origin: &Origin<'_>) -> Result<Self, RecordError> {
         let Columns { name, segment, mut time, mut input_column, input, output, temperature, load } = samples;

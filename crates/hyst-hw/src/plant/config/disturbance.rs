@@ -44,4 +44,9 @@ pub enum Disturbance {
         /// The voltage (V).
         at_v: f64,
     },
+    /// The amplifier's current is limited: what it puts out follows the drive no faster than this.
+    SlewLimit {
+        /// Steepest slope (V/s).
+        v_per_s: f64,
+    },
 }
