@@ -39,7 +39,7 @@ impl Own<'_> {
     /// Places a stop that was found where the own base meets it.
     pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
         if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
             self.take(Effect::Saturation, &fit, errors);
             *hypothesis = fit.hypothesis;
@@ -64,7 +64,7 @@ impl Own<'_> {
         seed: u64,
     ) -> Result<(Option<Named>, Option<BasisOf>), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
         let stage = |e| self.stage(e);
         let plain = shape::plain(&problem, hypothesis).map_err(stage)?;
         let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
@@ -74,7 +74,8 @@ impl Own<'_> {
         let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.fit)).transpose()?.flatten();
         let mut bent = Bent { own, anew: None };
         if let Some(basis) = &anew {
-            let behind = Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).beside(&problem);
+            let behind =
+                Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).holding().beside(&problem);
             match shape::plain(&behind, hypothesis).map_err(stage)? {
                 // Other plays alone were missing, no curve.
                 Some(plain) if shape::is_complete(&plain, richest) => return Ok((None, anew)),
@@ -95,7 +96,7 @@ impl Own<'_> {
     /// it has and are no more: those were placed while the effects stood in the record.
     pub(super) fn on_better_plays(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, FINAL_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
         let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
         fit.map(|fit| self.rechosen(&problem, &fit)).transpose().map(Option::flatten)
     }
@@ -117,7 +118,7 @@ impl Own<'_> {
         let clipped = clipped_rows(&self.samples.output, &self.samples.segments);
         let mut fitted = |settling: &[bool]| {
             motion.settling.copy_from_slice(settling);
-            let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
+            let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record).holding();
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
             let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
             let starting = start_up_and(&clipped, &motion, &residual);

@@ -21,6 +21,10 @@ impl Bounds {
         self.lower == self.upper
     }
 
+    pub(crate) fn fixed(value: f64) -> Self {
+        Self { lower: value, upper: value }
+    }
+
     pub(crate) fn above(lower: f64) -> Self {
         Self { lower, ..Self::FREE }
     }

@@ -27,6 +27,8 @@ pub(crate) struct Problem<'a> {
     pub(super) used: Vec<Vec<usize>>,
     /// One zero for each file instead of one for all.
     pub(crate) zero_per_file: bool,
+    /// Whether load, drift and tone are what a hypothesis says, though they could be solved for.
+    holds: bool,
     /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// How many columns the base has.
@@ -89,7 +91,24 @@ impl<'a> Problem<'a> {
         let penalty = basis.penalty(squares / width.max(1) as f64);
         let only_loop = only_loop(samples);
         let unpredictable = OnceLock::new();
-        Self { samples, basis, blocks, used, zero_per_file, raw, width, penalty, only_loop, unpredictable }
+        Self {
+            samples,
+            basis,
+            blocks,
+            used,
+            zero_per_file,
+            holds: false,
+            raw,
+            width,
+            penalty,
+            only_loop,
+            unpredictable,
+        }
+    }
+
+    /// Keeps what load, drift and tone add as a hypothesis says it: solved on a coarse base, they would take up its misfit.
+    pub(crate) fn holding(self) -> Self {
+        Self { holds: true, ..self }
     }
 
     /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
@@ -127,6 +146,21 @@ impl<'a> Problem<'a> {
         bounds.resize(layout.len(), Bounds::FREE);
         // A curve that falls would have no inverse.
         bounds[layout.zones].fill(Bounds::above(-0.9));
+        if self.holds {
+            let e = &h.effects;
+            let load = e.load.iter().map(|p| p.per_newton);
+            let drift = e.drift.iter().map(|p| p.per_second);
+            let tone =
+                e.interference.iter().flat_map(|p| [p.phase.cos(), p.phase.sin()].map(|part| p.amplitude * part));
+            let held = [
+                (layout.load, load.collect::<Vec<f64>>()),
+                (layout.drift, drift.collect()),
+                (layout.tone, tone.collect()),
+            ];
+            for (at, values) in held {
+                bounds[at].iter_mut().zip(values).for_each(|(b, value)| *b = Bounds::fixed(value));
+            }
+        }
         bounds
     }
 

@@ -38,22 +38,70 @@ mod tests {
     use crate::lsq::Blocks;
     use crate::nested::{Hypothesis, Problem};
     use crate::record::{Columns, OutputUnit, Record};
-    use hyst_core::{DriftParams, InterferenceParams};
+    use hyst_core::{DriftParams, InterferenceParams, LoadParams};
 
-    /// A lab clock is seldom at zero when a record begins.
-    #[test]
-    fn motion_is_shown_without_zero_drift_and_tone_whatever_the_clock_says() {
-        let rows = || (0..4000).map(|k| 1e4 + f64::from(k) * 1e-3);
-        let motion = |t: f64| 3.0 * (1.0 - (10.0 * (t - 1e4)).cos());
+    fn rows() -> impl Iterator<Item = f64> {
+        (0..4000).map(|k| 1e4 + f64::from(k) * 1e-3)
+    }
+
+    fn motion(t: f64) -> f64 {
+        3.0 * (1.0 - (10.0 * (t - 1e4)).cos())
+    }
+
+    fn load(t: f64) -> f64 {
+        (0.7 * (t - 1e4)).sin()
+    }
+
+    /// A motion with zero, drift, tone, and what a load adds.
+    fn samples(per_newton: f64) -> Samples {
         let tone = |t: f64| 0.2 * (std::f64::consts::TAU * (20.0 * t).fract() + 0.4).sin();
-        let output = rows().map(|t| motion(t) + 0.05 * (t - 1e4) + tone(t) + 7.0);
+        let output = rows().map(|t| motion(t) + per_newton * load(t) + 0.05 * (t - 1e4) + tone(t) + 7.0);
         let record = Record::from_samples(Columns {
             time: rows().collect(),
             input: Some(rows().map(|t| 10.0 * motion(t)).collect()),
             output: Some((OutputUnit::Micrometre, output.collect())),
+            load: Some(rows().map(load).collect()),
             ..Columns::default()
         });
-        let samples = Samples::from_record(&record.unwrap());
+        Samples::from_record(&record.unwrap())
+    }
+
+    /// Found elsewhere, they are kept, and what the base leaves is what they leave.
+    #[test]
+    fn what_is_held_is_not_solved_for() {
+        let samples = samples(0.3);
+        let basis = PiBasis::for_samples(&samples);
+        let blocks = Blocks::new(&samples, 20, 4000);
+        let solved = Problem::new(&samples, &basis, &blocks, false);
+        let held = Problem::new(&samples, &basis, &blocks, false).holding();
+        let found = Hypothesis::of(Effects {
+            load: Some(LoadParams { per_newton: 0.25 }),
+            drift: Some(DriftParams { per_second: 0.06 }),
+            interference: Some(InterferenceParams { hz: 20.0, amplitude: 0.17, phase: 0.5 }),
+            ..Effects::default()
+        });
+        let solved = solved.fit_linear(&found).unwrap().unwrap().hypothesis.effects;
+        assert!((solved.load.unwrap().per_newton - 0.3).abs() < 1e-4, "{solved:?}");
+        assert!((solved.drift.unwrap().per_second - 0.05).abs() < 1e-4, "{solved:?}");
+        assert!((solved.interference.unwrap().amplitude - 0.2).abs() < 1e-4, "{solved:?}");
+        let kept = held.fit_linear(&found).unwrap().unwrap();
+        let residual = held.residual(&kept).unwrap();
+        let (kept, given) = (&kept.hypothesis.effects, &found.effects);
+        assert!((kept.load.unwrap().per_newton - 0.25).abs() < 1e-12, "{kept:?}");
+        assert!((kept.drift.unwrap().per_second - 0.06).abs() < 1e-12, "{kept:?}");
+        let (kept, given) = (kept.interference.unwrap(), given.interference.unwrap());
+        assert!((kept.amplitude - given.amplitude).abs() + (kept.phase - given.phase).abs() < 1e-12, "{kept:?}");
+        // In the residual stands, of the tone, what was held too small: a correlation with its sine of (0.2 cos 0.4 − 0.17 cos 0.5) / 2.
+        let sine = |t: f64| (std::f64::consts::TAU * (20.0 * t).fract()).sin();
+        let left = rows().zip(&residual).map(|(t, left)| left * sine(t)).sum::<f64>() / residual.len() as f64;
+        let expected = 0.5 * (0.2 * 0.4_f64.cos() - 0.17 * 0.5_f64.cos());
+        assert!((left - expected).abs() < 0.1 * expected, "{left} {expected}");
+    }
+
+    /// A lab clock is seldom at zero when a record begins.
+    #[test]
+    fn motion_is_shown_without_zero_drift_and_tone_whatever_the_clock_says() {
+        let samples = samples(0.0);
         let basis = PiBasis::for_samples(&samples);
         let blocks = Blocks::new(&samples, 20, 4000);
         let problem = Problem::new(&samples, &basis, &blocks, false);
