@@ -41,6 +41,8 @@ const NEAR: f64 = 3.0;
 /// Beside a wandering that explains much, an effect has to explain at least this share of as much (variance): the wandering is not
 /// modelled to the last digit, and what it leaves sounds like anything.
 const BESIDE_WANDERING: f64 = 0.1;
+/// The same beside an amplifier that does not follow: it turns between two samples, where nobody sees it.
+const BESIDE_SLEW_LIMIT: f64 = 1e-3;
 
 /// What is known in the end.
 pub(super) struct Finer {
@@ -59,7 +61,7 @@ pub(super) fn refine(
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
-    beside_wandering(problem, found, already)?;
+    beside_nameless(problem, found, already)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -170,7 +172,7 @@ fn searched_anew(
     let from = coarser.fit(&found.best.fit.hypothesis)?.and_then(|f| Trial::of(&coarser, f));
     let Some(from) = from.filter(|t| t.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()) else { return Ok(None) };
     let mut anew = further(&coarser, from.fit, already, found.noise, seed, progress)?;
-    beside_wandering(&coarser, &mut anew, already)?;
+    beside_nameless(&coarser, &mut anew, already)?;
     // A wandering alone is no news: of what a triangle leaves some is its own, and wanders like anything.
     let news = anew.named.iter().any(|n| !is_named(found, n.effect));
     Ok((news && !may_be_drag(problem, found, &anew)?).then_some(anew))
@@ -200,19 +202,32 @@ fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<b
     Ok(false)
 }
 
-/// Takes back what is small beside a wandering that was found.
-fn beside_wandering(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
+/// Takes back what is small beside a wandering, or an amplifier that does not follow, that was found.
+fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
+    let follows = Hypothesis { slew_limit: None, ..found.best.fit.hypothesis.clone() };
+    // Of what only the sensor shows an amplifier leaves nothing.
+    beside(problem, found, already, &follows, &|e| if e.acts_on_the_motion() { BESIDE_SLEW_LIMIT } else { 0.0 })?;
+    let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
+    beside(problem, found, already, &still, &|_| BESIDE_WANDERING)
+}
+
+/// Takes back what explains less than a share of what was found does beyond `less`, which lacks something without a name.
+fn beside(
+    problem: &Problem<'_>,
+    found: &mut Search,
+    already: &[Cause],
+    less: &Hypothesis,
+    share: &dyn Fn(Effect) -> f64,
+) -> Result<(), Error> {
     let h = &found.best.fit.hypothesis;
-    let mut still = h.clone();
-    (still.zero_wanders, still.gain_wanders) = (false, false);
-    if still == *h {
+    if less == h {
         return Ok(());
     }
-    let Some(without) = problem.fit_linear(&still)?.and_then(|f| Trial::of(problem, f)) else { return Ok(()) };
+    let Some(without) = problem.fit_linear(less)?.and_then(|f| Trial::of(problem, f)) else { return Ok(()) };
     let explained = without.cv_rmse().powi(2) - found.best.cv_rmse().powi(2);
     let mut kept = h.clone();
     found.named.retain(|n| {
-        let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= BESIDE_WANDERING * explained;
+        let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= share(n.effect) * explained;
         if enough {
             return true;
         }
