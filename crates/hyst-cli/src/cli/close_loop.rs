@@ -12,8 +12,8 @@ use super::{Device, JsonArg};
 /// Experiment, fit, diagnose, extend, compensate, measure again, until nothing more is found
 ///
 /// Every turn plays another identification drive, shows how well the model of the turn before predicts it, looks for what that
-/// model lacks on all records together, and follows a reference on the device. It ends when nothing more is found or after the
-/// last turn.
+/// model lacks on all records together, and follows a reference on the device. What an amplifier has not followed is measured anew
+/// with a slower drive, and those records alone count. It ends when nothing more is found or after the last turn.
 #[derive(Debug, Args)]
 #[command(after_help = CLOSE_LOOP)]
 pub(crate) struct CloseLoopArgs {

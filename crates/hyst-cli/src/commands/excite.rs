@@ -77,14 +77,16 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
                 ramp_s: ramp.unwrap_or(usual.ramp_s),
                 seed: *seed,
             };
-            let spec = if *test { spec.for_test() } else { spec };
             let free = |field: &str| match field {
                 "slow_hz" => slow.is_none(),
                 "fast_hz" => fast.is_none(),
                 "band_hz" => band.is_none(),
-                _ => ramp.is_none(),
+                "ramp_s" => ramp.is_none(),
+                _ => false,
             };
-            let spec = spec.within_slew(&limits(common), &free);
+            let within = limits(common);
+            let spec = spec.within_slew(&within, &free);
+            let spec = if *test { spec.for_test_within_slew(&within, &free) } else { spec };
             return Ok(Made { common, drive: spec.drive(&limits(common)), crest_factor: None });
         }
         ExciteKind::Separate(args) => return Err(args),

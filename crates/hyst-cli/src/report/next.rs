@@ -8,7 +8,7 @@ use hyst_ident::record::Record;
 use super::html::Page;
 use super::{Contents, words};
 use crate::input;
-use crate::text::listed;
+use crate::text::{listed, short};
 
 /// Up to so many noise floors of error there is little left to look for.
 const NEAR_THE_FLOOR: f64 = 2.0;
@@ -58,11 +58,10 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
     }
     let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
     let finer = c.model.base.kind() != Kind::Preisach && !drags;
-    if let Some(limit) = f.remainder.slew_limit {
-        let slope = format!(" --slew {:.0}", FOLLOWED * limit);
+    if f.remainder.slew_limit.is_some() {
         advise(
             "A drive that the amplifier follows; fit and diagnose its record instead of this one:",
-            &[identification(c, &slope)],
+            &[identification(c, "")],
         );
     }
     match f.remainder.kind {
@@ -145,11 +144,16 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
         }
         RemainderKind::None => {}
     }
-    if c.test.is_none() && matches!(f.verdict, Verdict::NothingMissing | Verdict::Explained) {
+    if c.test.is_none()
+        && f.remainder.slew_limit.is_none()
+        && matches!(f.verdict, Verdict::NothingMissing | Verdict::Explained)
+    {
         advise("See what the model is worth on a drive that it has not seen:", &[identification(c, " --test")]);
     }
     if let (Some(extended), Verdict::Explained | Verdict::NothingMissing) = (c.extended_file, f.verdict)
         && !words::worse_on_test(f)
+        // Its errors say little as long as the amplifier does not follow.
+        && f.remainder.slew_limit.is_none()
     {
         let command = format!("hystctl compensate --model {} reference.csv -o drive.csv", quoted(extended));
         advise("The drive that makes the actuator follow a reference:", &[command]);
@@ -178,12 +182,19 @@ pub(crate) fn further(words: &[String]) -> String {
     words.iter().map(|word| format!(" {}", quoted(word))).collect()
 }
 
-/// Range and rate of the record's drive.
+/// Range and rate of the record's drive, and the slope that the amplifier follows where it has not followed every one.
 fn limits(c: &Contents<'_>) -> String {
     let rate = 1.0 / c.train.sample_period();
     // Six digits: a period as printed gives a rate that is a whole number but for rounding.
     let digits = |x: f64| format!("{x:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    format!("--low {} --high {} --rate {}", digits(c.model.input.low), digits(c.model.input.high), digits(rate))
+    let slew = c.diagnosis.findings.remainder.slew_limit.map(|limit| format!(" --slew {}", short(FOLLOWED * limit)));
+    format!(
+        "--low {} --high {} --rate {}{}",
+        digits(c.model.input.low),
+        digits(c.model.input.high),
+        digits(rate),
+        slew.unwrap_or_default()
+    )
 }
 
 fn separate(c: &Contents<'_>, one: Effect, other: Effect) -> String {

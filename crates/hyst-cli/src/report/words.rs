@@ -14,7 +14,8 @@ pub(crate) fn verdict(findings: &Findings) -> String {
             names.dedup();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let part = if findings.remainder.kind == RemainderKind::None { "" } else { " in part" };
-            format!("explained{part}: the model lacks {}", listed(&names))
+            let slow = findings.remainder.slew_limit.map_or("", |_| "; the drive is not followed where it is steep");
+            format!("explained{part}: the model lacks {}{slow}", listed(&names))
         }
         (Verdict::NothingMissing, _) => "nothing missing: the model is at the noise floor".to_owned(),
         (Verdict::BaseTooCoarse, Some(Change::Zero)) => {

@@ -1,7 +1,5 @@
 //! Whether a model that was fitted to other data lacks nothing but another zero or another fit.
 
-use std::collections::BTreeMap;
-
 use super::extension::Own;
 use super::findings::{Change, Remainder, RemainderKind};
 use super::remainder::RICHER;
@@ -42,7 +40,7 @@ pub(super) fn told_apart(
         );
         return Ok(Remainder { description: left.description + &seen, ..left });
     }
-    let again = simulate(&own.extended(start, &BTreeMap::new())?, own.train, zero)?;
+    let again = simulate(&own.fitted_anew(start)?, own.train, zero)?;
     let (Some(before), Some(after)) = (&own.before.errors, &again.errors) else { return Ok(left) };
     let above = |mean_square: f64| (mean_square - noise * noise).max(0.0);
     let stood = above(before.rmse * before.rmse);

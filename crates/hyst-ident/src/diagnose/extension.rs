@@ -111,6 +111,20 @@ impl Own<'_> {
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a
     /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again.
     pub(super) fn extended(&self, hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>) -> Result<Model, FitError> {
+        self.refitted(hypothesis, errors, true)
+    }
+
+    /// The model as it is with all solved again that it is linear in.
+    pub(super) fn fitted_anew(&self, hypothesis: &Hypothesis) -> Result<Model, FitError> {
+        self.refitted(hypothesis, &BTreeMap::new(), false)
+    }
+
+    fn refitted(
+        &self,
+        hypothesis: &Hypothesis,
+        errors: &BTreeMap<String, f64>,
+        holds: bool,
+    ) -> Result<Model, FitError> {
         let mut motion = without_sensor_effects(self.samples, &hypothesis.effects);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
@@ -118,7 +132,8 @@ impl Own<'_> {
         let clipped = clipped_rows(&self.samples.output, &self.samples.segments);
         let mut fitted = |settling: &[bool]| {
             motion.settling.copy_from_slice(settling);
-            let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record).holding();
+            let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
+            let problem = if holds { problem.holding() } else { problem };
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
             let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
             let starting = start_up_and(&clipped, &motion, &residual);

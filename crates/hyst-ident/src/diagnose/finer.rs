@@ -41,7 +41,8 @@ const NEAR: f64 = 3.0;
 /// Beside a wandering that explains much, an effect has to explain at least this share of as much (variance): the wandering is not
 /// modelled to the last digit, and what it leaves sounds like anything.
 const BESIDE_WANDERING: f64 = 0.1;
-/// The same beside an amplifier that does not follow: it turns between two samples, where nobody sees it.
+/// The same beside an amplifier that does not follow: it turns between two samples, where nobody sees it. What is late by less than a sample
+/// then is none.
 const BESIDE_SLEW_LIMIT: f64 = 1e-3;
 
 /// What is known in the end.
@@ -204,9 +205,17 @@ fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<b
 
 /// Takes back what is small beside a wandering, or an amplifier that does not follow, that was found.
 fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
-    let follows = Hypothesis { slew_limit: None, ..found.best.fit.hypothesis.clone() };
-    // Of what only the sensor shows an amplifier leaves nothing.
-    beside(problem, found, already, &follows, &|e| if e.acts_on_the_motion() { BESIDE_SLEW_LIMIT } else { 0.0 })?;
+    let h = found.best.fit.hypothesis.clone();
+    let follows = Hypothesis { slew_limit: None, ..h.clone() };
+    let by_less_than_a_sample = |seconds: f64| seconds < problem.samples.period;
+    let share = |effect: Effect| match effect {
+        Effect::Delay if h.effects.delay.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
+        Effect::Lag if h.effects.lag.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
+        // Of what only the sensor shows an amplifier leaves nothing.
+        _ if effect.acts_on_the_motion() => BESIDE_SLEW_LIMIT,
+        _ => 0.0,
+    };
+    beside(problem, found, already, &follows, &share)?;
     let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
     beside(problem, found, already, &still, &|_| BESIDE_WANDERING)
 }
@@ -227,7 +236,7 @@ fn beside(
     let explained = without.cv_rmse().powi(2) - found.best.cv_rmse().powi(2);
     let mut kept = h.clone();
     found.named.retain(|n| {
-        let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= share(n.effect) * explained;
+        let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= share(n.effect) * explained.max(0.0);
         if enough {
             return true;
         }

@@ -199,7 +199,7 @@ pub fn diagnose(
         // What the rich base shows drowns in what this one misses.
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, after, amplified) = (model.clone(), before.clone(), None);
-        hypothesis = Hypothesis { effects: start.effects.clone(), drag: start.drag, ..hypothesis };
+        hypothesis = Hypothesis { slew_limit: hypothesis.slew_limit, ..start.clone() };
     }
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);

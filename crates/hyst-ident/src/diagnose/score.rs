@@ -121,14 +121,8 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
     let samples = problem.samples;
     let e = &trial.fit.hypothesis.effects;
     let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
-    // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit. An amplifier at its
-    // limit turns between two samples.
-    let h = &trial.fit.hypothesis;
-    let least = match (h.slew_limit, h.drag) {
-        (Some(_), _) => 1.0,
-        (None, Some(_)) => 0.3,
-        (None, None) => 0.02,
-    };
+    // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit.
+    let least = if trial.fit.hypothesis.drag.is_some() { 0.3 } else { 0.02 };
     let time = |seconds: f64| seconds > least * samples.period;
     !ends_at_a_bound(&trial.fit.hypothesis, samples)
         && e.delay.is_none_or(|p| time(p.seconds))

@@ -11,7 +11,7 @@ use hyst_core::{
 use super::spectrum::{peaks, tone};
 use crate::base::DragParams;
 use crate::model::{CreepBank, Effect, Effects};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion, steepest};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion, slopes};
 use crate::samples::Samples;
 
 /// Creep elements per decade of time.
@@ -21,8 +21,8 @@ const FOLLOWED: usize = 2;
 /// Frequencies of the coarse scan.
 const SCAN: usize = 48;
 /// Slopes of the coarse scan, and what each is of the one before.
-const SLOPES: usize = 12;
-const LESS_STEEP: f64 = 0.75;
+const SLOPES: usize = 20;
+const LESS_STEEP: f64 = 0.65;
 
 /// Hypotheses to begin at: that of `from`, and `cause`.
 pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Result<Vec<Hypothesis>, Error> {
@@ -128,9 +128,12 @@ fn slew_limits(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<f64>, Error> 
     let motion = problem.motion(&from.hypothesis, &from.solution)?;
     let projector = problem.projector(from)?;
     let mut scored = Vec::new();
-    let mut limit = steepest(problem.samples);
-    for _ in 0..SLOPES {
-        limit *= LESS_STEEP;
+    let (least, steepest) = slopes(problem.samples);
+    let scan = (0..SLOPES).scan(steepest, |limit, _| {
+        *limit *= LESS_STEEP;
+        Some(*limit)
+    });
+    for limit in scan.take_while(|limit| *limit > least) {
         let limited = Hypothesis { slew_limit: Some(limit), ..from.hypothesis.clone() };
         let mut moved = problem.motion(&limited, &from.solution)?;
         moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);

@@ -6,6 +6,8 @@ use super::{
 
 /// Added to the seed of a test record's drive.
 const TEST_SEED: u64 = 1 << 32;
+/// Slope of a test record's drive over that of the other one where that is limited.
+const TEST_SLEW: f64 = 0.8;
 /// Share of a slope limit that is aimed at.
 const AIM: f64 = 0.98;
 /// Rounds in which the drive is slowed down: each field has its own in the end.
@@ -61,7 +63,7 @@ impl Identification {
     }
 
     /// The same, no steeper than the limits allow: what is too steep is slowed down, where `free` says of `slow_hz`, `fast_hz`, `band_hz` or
-    /// `ramp_s` that nobody has fixed it.
+    /// `ramp_s` that nobody has fixed it. Of `duration_s` it says whether as many loops may take longer.
     #[must_use]
     pub fn within_slew(mut self, limits: &Limits, free: &dyn Fn(&str) -> bool) -> Self {
         for _ in 0..ROUNDS {
@@ -81,10 +83,20 @@ impl Identification {
                 "fast_hz" => self.fast_hz *= slower,
                 "band_hz" => self.band_hz *= slower,
                 "ramp_s" => self.ramp_s /= slower,
-                _ => self.slow_hz *= slower,
+                _ => {
+                    self.slow_hz *= slower;
+                    self.duration_s /= if free("duration_s") { slower } else { 1.0 };
+                }
             }
         }
         self
+    }
+
+    /// [`for_test`](Self::for_test) within the slope of the limits, and slower also where it is the slope that says how fast the drive is.
+    #[must_use]
+    pub fn for_test_within_slew(self, limits: &Limits, free: &dyn Fn(&str) -> bool) -> Self {
+        let gentler = Limits { slew_v_per_s: limits.slew_v_per_s.map(|v_per_s| TEST_SLEW * v_per_s), ..*limits };
+        self.for_test().within_slew(&gentler, free)
     }
 
     /// The segments. Of the time without rests the stairs take two fifths and the decaying sine a fifth.

@@ -221,10 +221,14 @@ fn seeds_decide() {
 
 #[test]
 fn a_test_drive_differs_in_every_segment() {
-    for rate_hz in [20.0, 1000.0, 20_000.0] {
-        let limits = Limits { rate_hz, ..LIMITS };
+    for (rate_hz, slew_v_per_s) in
+        [(20.0, None), (1000.0, None), (20_000.0, None), (1000.0, Some(3000.0)), (1000.0, Some(400.0))]
+    {
+        let limits = Limits { rate_hz, slew_v_per_s, ..LIMITS };
         let long = Identification { duration_s: 80.0, ..Identification::at_rate(rate_hz, 1) };
-        let [train, test] = [long, long.for_test()].map(|spec| spec.drive(&limits).unwrap());
+        let long = long.within_slew(&limits, &|_| true);
+        let test = long.for_test_within_slew(&limits, &|_| true);
+        let [train, test] = [long, test].map(|spec| spec.drive(&limits).unwrap());
         assert_eq!(train.shapes(), test.shapes());
         for (a, b) in train.segments().iter().zip(test.segments()) {
             let (a, b) = (&train.voltage()[a.clone()], &test.voltage()[b.clone()]);

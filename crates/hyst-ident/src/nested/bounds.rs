@@ -9,10 +9,9 @@ use crate::model::Effect;
 pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;
     let bounds = match (p.cause, p.name.starts_with("hz")) {
-        // Below the lower bound the amplifier follows next to nothing of the drive, at the upper one all of it.
         (Cause::SlewLimit, _) => {
-            let steepest = steepest(samples);
-            Bounds { lower: LEAST_SLEW * steepest, upper: steepest }
+            let (lower, upper) = slopes(samples);
+            Bounds { lower, upper }
         }
         (Cause::Effect(Effect::Resonance), true) => {
             Bounds { lower: 2.0 / samples.longest_segment(), upper: 0.95 * nyquist }
@@ -51,13 +50,12 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     ends
 }
 
-/// Steepest slope of the drive that a search goes down to, as a share of the drive's own steepest.
-const LEAST_SLEW: f64 = 0.01;
-
-/// Steepest slope of the drive \[V/s\].
-pub(crate) fn steepest(samples: &Samples) -> f64 {
+/// Slopes \[V/s\] of an amplifier that follows next to nothing of the drive, and of one that follows all of it. A single jump may be far
+/// steeper than all else.
+pub(crate) fn slopes(samples: &Samples) -> (f64, f64) {
     let rises = samples.segments.iter().flat_map(|s| samples.input[s.clone()].windows(2));
-    rises.fold(0.0, |most: f64, w| most.max((w[1] - w[0]).abs())) / samples.period
+    let steepest = rises.fold(0.0, |most: f64, w| most.max((w[1] - w[0]).abs())) / samples.period;
+    (f64::min(range_of(samples) / samples.longest_segment(), steepest), steepest)
 }
 
 /// Highest minus lowest input.
