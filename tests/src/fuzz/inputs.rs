@@ -346,9 +346,31 @@ pub(super) fn logs(luck: &mut Luck) {
     }
 }
 
+/// Sections of a plant's file.
+const SECTIONS: &str = "\
+[creep]
+strength = 0.05
+tau_min_s = 0.05
+tau_max_s = 80
+[[mode]]
+hz = 100
+damping = 0.02
+gain = 0.9
+[saturation]
+high_um = 12
+[[disturbance]]
+kind = \"slew-limit\"
+v_per_s = 900
+[[disturbance]]
+kind = \"bursts\"
+um = 0.1
+seconds = 0.2
+every_s = 3
+";
+
 /// Descriptions of simulated plants.
 pub(super) fn plants(luck: &mut Luck) {
-    let mut text = format!("{PLANT}{WARM}[creep]\nshare = 0.05\n").into_bytes();
+    let mut text = format!("{PLANT}{WARM}{SECTIONS}").into_bytes();
     luck.damage(&mut text);
     let Ok(text) = String::from_utf8(text) else { return };
     if let Ok(config) = PlantConfig::from_toml(&text)
@@ -361,6 +383,14 @@ pub(super) fn plants(luck: &mut Luck) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is refused before it is damaged tells little.
+    #[test]
+    fn the_plant_is_sound_before_it_is_damaged() {
+        let config = PlantConfig::from_toml(&format!("{PLANT}{WARM}{SECTIONS}")).unwrap();
+        assert_eq!(config.disturbances.len(), 2);
+        Plant::new(config).unwrap();
+    }
 
     #[test]
     fn a_controller_is_sealed_as_it_was() {
