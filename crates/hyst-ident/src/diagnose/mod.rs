@@ -148,8 +148,13 @@ pub fn diagnose(
 
     progress("asking a finer base whether it needs what was found");
     let problem = Problem::new(&samples, &screening, &blocks, per_record);
-    let finer::Finer { mut hypothesis, mut errors, cv_rmse: richest } =
+    let finer::Finer { mut hypothesis, mut errors, cv_rmse: mut richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
+    // Its parameters are those of the drift alone; the zero wanders beyond it, and that is told.
+    if let Some(least) = found.beside_wandering.filter(|_| hypothesis.effects.drift.is_some()) {
+        hypothesis.zero_wanders = true;
+        richest = richest.min(least);
+    }
     let only_loop = problem.only_loop;
     drop(problem);
 

@@ -46,6 +46,7 @@ pub(super) fn judge(
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     let wanders = match (h.zero_wanders, h.gain_wanders) {
         (true, true) => Some("the zero and the gain wander"),
+        (true, false) if h.effects.drift.is_some() => Some("beyond the drift the zero wanders"),
         (true, false) => Some("the zero wanders"),
         (false, true) => Some("the gain wanders"),
         (false, false) => None,

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use hyst_core::SaturationParams;
 
+use super::spectrum::explained;
 use super::trial::Trial;
 use crate::Samples;
 use crate::nested::{Problem, ends_at_a_bound, shown_motion};
@@ -38,6 +39,13 @@ const SLOWEST_MODE: f64 = 1.0;
 /// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
 const MOST_DAMPING: f64 = 0.35;
 
+/// Frequencies to each side of a tone that it is held against, and how far they are apart, in widths of a line of the longest segment.
+const NEIGHBOURS: usize = 8;
+const APART: f64 = 2.0;
+/// How far a tone stands above them (power), and at least how much it is of what moves at its frequency anyway: a base misses less of that.
+const OVER_NEIGHBOURS: f64 = 20.0;
+const OVER_MOTION: f64 = 0.1;
+
 /// How an effect was judged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judgement {
@@ -51,15 +59,26 @@ pub(crate) struct Judgement {
     pub(crate) over_noise: f64,
     /// Whether its parameters are physically sensible and away from their bounds.
     pub(crate) sensible: bool,
+    /// Whether it is a tone at which neither the drive nor what is left has anything: however little it explains, nothing else does.
+    pub(crate) alone: bool,
 }
 
 impl Judgement {
     pub(crate) fn accepted(&self) -> bool {
-        self.sensible
-            && self.confidence >= CONFIDENCE
-            && self.ratio <= 1.0 - LEAST_FALL
-            && self.over_noise >= LEAST_OVER_NOISE
-            && self.share >= LEAST_SHARE
+        self.is_sure() && (self.alone || self.explains())
+    }
+
+    /// Accepted for what it explains, not for standing alone.
+    pub(crate) fn explains_enough(&self) -> bool {
+        self.is_sure() && self.explains()
+    }
+
+    fn is_sure(&self) -> bool {
+        self.sensible && self.confidence >= CONFIDENCE && self.over_noise >= LEAST_OVER_NOISE
+    }
+
+    fn explains(&self) -> bool {
+        self.ratio <= 1.0 - LEAST_FALL && self.share >= LEAST_SHARE
     }
 }
 
@@ -81,7 +100,27 @@ pub(crate) fn judge(problem: &Problem<'_>, without: &Trial, with: &Trial, noise:
         share: predicted.1.min(fitted.1),
         over_noise: predicted.2.min(fitted.2),
         sensible: sensible(problem, with),
+        alone: without.fit.hypothesis.effects.interference.is_none() && tone_stands_alone(problem, with),
     }
+}
+
+/// Whether a tone stands far above what is left beside it, at a frequency at which nothing moves: a base's misfit has power only where the
+/// motion has more of it.
+fn tone_stands_alone(problem: &Problem<'_>, with: &Trial) -> bool {
+    let fit = &with.fit;
+    let Some(tone) = fit.hypothesis.effects.interference else { return false };
+    let samples = problem.samples;
+    let (Ok(motion), Ok(left)) = (problem.motion(&fit.hypothesis, &fit.solution), problem.residual(fit)) else {
+        return false;
+    };
+    let power = 0.5 * tone.amplitude * tone.amplitude * samples.len() as f64;
+    let apart = APART / samples.longest_segment();
+    let mut beside: Vec<f64> = (1..=NEIGHBOURS)
+        .flat_map(|k| [-1.0, 1.0].map(|side| tone.hz + side * apart * k as f64))
+        .map(|hz| explained(samples, &left, hz))
+        .collect();
+    beside.sort_by(f64::total_cmp);
+    power > OVER_NEIGHBOURS * beside[NEIGHBOURS] && power > OVER_MOTION * explained(samples, &motion, tone.hz)
 }
 
 /// What `with` takes of the error of each block.

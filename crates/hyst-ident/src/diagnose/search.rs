@@ -14,6 +14,10 @@ use crate::noise::{noise_floor, quantisation};
 const BEAM: usize = 2;
 /// Error, over that of what is named, up to which what is late otherwise is alike in one loop.
 const ALIKE: f64 = 1.1;
+/// What a drag beside a creep adds, in noise floors, up to which a faster creep is tried instead.
+const SMALL_DRAG: f64 = 2.0;
+/// Share of what a wandering zero explains that a drift has to explain to be named in its place.
+const EVEN: f64 = 0.9;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -48,6 +52,8 @@ pub(crate) struct Search {
     pub(crate) named: Vec<Named>,
     /// Standard deviation of the white noise \[output unit\].
     pub(crate) noise: f64,
+    /// Where the zero wanders beyond the drift of the best set: the cross-validated error that is left once it may \[output unit\].
+    pub(crate) beside_wandering: Option<f64>,
 }
 
 /// Context that every judgement needs.
@@ -81,6 +87,22 @@ impl Judge<'_> {
         above < (LEAST_OVER_NOISE * self.noise).powi(2)
     }
 
+    /// A set without one cause. A small drag beside a creep may be no more than a creep that goes on faster than the elements of the search.
+    fn without(&self, set: &Trial, cause: Cause, already: &[Cause]) -> Result<Option<Trial>, Error> {
+        let less = set.fit.hypothesis.without(cause);
+        let without = self.refit(&less)?;
+        let is_new = |effect: Effect| !already.contains(&Cause::Effect(effect));
+        let drags = cause == Cause::Effect(Effect::RateDependence) && less.effects.creep.is_some();
+        let is_small = |t: &Trial| self.judge(t, set).over_noise < SMALL_DRAG;
+        match without {
+            Some(plain) if drags && is_new(Effect::Creep) && is_small(&plain) => {
+                let faster = self.refit(&starts::with_faster_creep(self.problem.samples, &plain.fit.hypothesis))?;
+                Ok(Some(faster.filter(|t| t.total() < plain.total()).unwrap_or(plain)))
+            }
+            other => Ok(other),
+        }
+    }
+
     fn judge(&self, without: &Trial, with: &Trial) -> Judgement {
         judge(self.problem, without, with, self.noise, self.seed)
     }
@@ -112,7 +134,7 @@ pub(super) fn further(
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
         let nothing = Trial { blocks: vec![base.squares], fit: base };
-        return Ok(Search { best: nothing, named: Vec::new(), noise });
+        return Ok(Search { best: nothing, named: Vec::new(), noise, beside_wandering: None });
     };
 
     let mut beam = vec![start.clone()];
@@ -177,7 +199,24 @@ pub(super) fn further(
             best = other;
         }
     };
-    Ok(Search { best, named, noise: judge.noise })
+    let noise = judge.noise;
+    if let Some(even) = nearly_even_drift(&judge, &best)? {
+        let (_, named) = swaps(&judge, &even, already, &left)?;
+        return Ok(Search { beside_wandering: Some(best.cv_rmse()), best: even, named, noise });
+    }
+    Ok(Search { best, named, noise, beside_wandering: None })
+}
+
+/// A drift in the place of a zero that wanders, where it takes nearly all of it: one that is not even to the last digit has the name too.
+fn nearly_even_drift(judge: &Judge<'_>, best: &Trial) -> Result<Option<Trial>, Error> {
+    let h = &best.fit.hypothesis;
+    if !h.zero_wanders || h.gain_wanders || h.effects.drift.is_some() {
+        return Ok(None);
+    }
+    let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
+    let Some(even) = judge.trials(&still.fit, Cause::Effect(Effect::Drift))? else { return Ok(None) };
+    let takes_nearly_all = still.total() - even.total() >= EVEN * (still.total() - best.total());
+    Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
 }
 
 /// What may be added to a fit. A curve behind the hysteresis is not among it: this base has one of its own, and whether the user's
@@ -206,7 +245,7 @@ pub(super) fn beyond(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = beyond(&best.fit.hypothesis, already);
     let reduced: Vec<Result<Option<Trial>, Error>> =
-        names.par_iter().map(|e| judge.refit(&best.fit.hypothesis.without(*e))).collect();
+        names.par_iter().map(|e| judge.without(best, *e, already)).collect();
     let mut least: Option<Trial> = None;
     for trial in reduced {
         // Without one effect another may be driven to nonsense: then the first one is needed.
@@ -244,7 +283,8 @@ fn swaps(
         for (other, trial) in others.iter().zip(trials) {
             let Some(trial) = trial? else { continue };
             let judgement = judge.judge(&without, &trial);
-            let accepted = judgement.accepted();
+            // A tone that merely stands alone takes nobody's place.
+            let accepted = judgement.explains_enough();
             // In one loop all that is late is alike.
             let alike = one_loop && is_late(*other) && trial.cv_rmse() < ALIKE * best.cv_rmse();
             let tie = judgement.sensible && (alike || tie(judge, best, &trial));

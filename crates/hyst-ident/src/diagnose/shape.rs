@@ -10,7 +10,7 @@ use super::search::{Instead, Named};
 use super::trial::Trial;
 use super::{score, starts};
 use crate::model::Effect;
-use crate::nested::{Fitted, Hypothesis, Problem};
+use crate::nested::{Fitted, Hypothesis, Problem, dead_zone};
 
 /// Error of the own base over that of the rich one from which on something is missing.
 const MISSING: f64 = 1.1;
@@ -20,6 +20,11 @@ const CLOSED: f64 = 1.7;
 const CLOSED_ANEW: f64 = 1.25;
 /// Share of what stands above the noise floor that it has to take.
 const TAKEN: f64 = 0.9;
+/// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
+/// operators are too coarse for.
+const LOPSIDED: f64 = 0.25;
+/// Points at which the two halves of a curve are compared.
+const POINTS: usize = 64;
 /// Noise floors that count as near the noise.
 const NEAR_NOISE: f64 = 1.5;
 /// Ends of the curve: share of the motion's range beyond the outermost dead zone.
@@ -73,8 +78,10 @@ pub(super) fn shape(
     noise: f64,
     seed: u64,
 ) -> Result<Option<Shape>, Error> {
-    // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave.
-    let least = if found.drag.is_some() { richest.min(NEAR_NOISE * noise) } else { richest };
+    // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave. And what a
+    // wandering leaves is no base's.
+    let is_least = found.drag.is_none() && !found.zero_wanders && !found.gain_wanders;
+    let least = if is_least { richest } else { richest.min(NEAR_NOISE * noise) };
     let own = bent.own.map(|t| (Effect::Asymmetry, t, None));
     let anew = bent.anew.map(|(plain, t)| (Effect::Asymmetry, t, Some(plain)));
     let mut tried: Vec<(Effect, Trial, Option<Trial>)> = own.into_iter().chain(anew).collect();
@@ -91,7 +98,11 @@ pub(super) fn shape(
         .map(|(effect, t, anew)| {
             let (without, closed) = anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
             let judgement = score::judge(problem, without, t, noise, seed);
-            let accepted = judgement.accepted() && judgement.share >= TAKEN && t.cv_rmse() <= closed * least;
+            let curve = t.fit.hypothesis.effects.asymmetry.as_ref().filter(|_| *effect == Effect::Asymmetry);
+            let accepted = judgement.accepted()
+                && judgement.share >= TAKEN
+                && t.cv_rmse() <= closed * least
+                && curve.is_none_or(|p| lopsided(p) >= LOPSIDED);
             (*effect, t, judgement, accepted, anew)
         })
         .collect();
@@ -164,4 +175,63 @@ fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f6
         (0..MAX_DEAD_ZONES).map(|i| low + (high - low) * i as f64 / (MAX_DEAD_ZONES - 1) as f64).collect();
     thresholds.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     Some(AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds })
+}
+
+/// Share of a curve's bend that is even about the middle of what it spans, straight parts left out: 1 where only one half bends or both bend
+/// the same way, 0 where a half turn carries the curve over into itself. The ends are left out: how the curve lies there is the base's.
+fn lopsided(p: &AsymmetryParams<Vec<f64>>) -> f64 {
+    let (low, high) = crate::samples::range(p.thresholds.iter().copied());
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let bend = |v: f64| p.thresholds.iter().zip(&p.weights).map(|(s, c)| c * dead_zone(v, *s)).sum::<f64>();
+    let parts = (1..=POINTS).map(|i| {
+        let d = half * i as f64 / POINTS as f64;
+        let (above, below) = (bend(middle + d), bend(middle - d));
+        (d, 0.5 * (above + below), 0.5 * (above - below))
+    });
+    let parts: Vec<(f64, f64, f64)> = parts.collect();
+    let mean = parts.iter().map(|(_, even, _)| even).sum::<f64>() / POINTS as f64;
+    let dd: f64 = parts.iter().map(|(d, ..)| d * d).sum();
+    let slope = parts.iter().map(|(d, _, odd)| d * odd).sum::<f64>() / dd.max(f64::MIN_POSITIVE);
+    let even: f64 = parts.iter().map(|(_, even, _)| (even - mean).powi(2)).sum();
+    let odd: f64 = parts.iter().map(|(d, _, odd)| (odd - slope * d).powi(2)).sum();
+    even / (even + odd).max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve of these slopes from each threshold to the next.
+    fn curve(thresholds: &[f64], slopes: &[f64]) -> AsymmetryParams<Vec<f64>> {
+        let weights = slopes.windows(2).map(|s| s[1] - s[0]).collect();
+        AsymmetryParams { thresholds: thresholds.to_vec(), weights }
+    }
+
+    #[test]
+    fn a_curve_that_a_half_turn_leaves_as_it_is_is_no_asymmetry() {
+        let thresholds = [10.0, 20.0, 30.0, 40.0, 50.0];
+        assert!(lopsided(&curve(&thresholds, &[1.0, 0.8, 1.1, 1.1, 0.8, 1.0])) < 1e-9);
+        // Of whatever slope on the whole.
+        assert!(lopsided(&curve(&thresholds, &[1.0, 1.3, 1.6, 1.6, 1.3, 1.0])) < 1e-9);
+    }
+
+    #[test]
+    fn a_curve_that_bends_one_way_is_one() {
+        let thresholds = [10.0, 20.0, 30.0, 40.0, 50.0];
+        assert!(lopsided(&curve(&thresholds, &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5])) > 0.99);
+        // Of a bend at one end alone, half is even.
+        let share = lopsided(&curve(&thresholds, &[1.0, 1.0, 1.0, 1.0, 0.7, 0.7]));
+        assert!((0.4..0.95).contains(&share), "{share}");
+        // And a straight line bends nowhere.
+        assert!(lopsided(&curve(&thresholds, &[1.0; 6])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn zero_within_the_curve_changes_nothing() {
+        // The same bends about zero: zones open away from it, the stretch that holds it has the slope 1.
+        let odd = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![0.1, -0.2, -0.2, 0.1] };
+        assert!(lopsided(&odd) < 1e-9);
+        let even = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![-0.1, -0.1, 0.1, 0.1] };
+        assert!(lopsided(&even) > 0.99);
+    }
 }

@@ -81,7 +81,7 @@ pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
 }
 
 /// Σ residual² that a sine and cosine of this frequency take.
-fn explained(samples: &Samples, residual: &[f64], hz: f64) -> f64 {
+pub(super) fn explained(samples: &Samples, residual: &[f64], hz: f64) -> f64 {
     let (mut ss, mut sc, mut cc, mut rs, mut rc) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for segment in &samples.segments {
         // One sine and cosine per segment, then rotation: the grid inside a segment is even.

@@ -16,6 +16,9 @@ use crate::samples::Samples;
 
 /// Creep elements per decade of time.
 const PER_DECADE: f64 = 2.0;
+/// Elements of a faster creep at most, and the samples that one lasts at least.
+const FASTER: u8 = 4;
+const FASTEST: f64 = 4.0;
 /// Modes, and slopes, that are followed up.
 const FOLLOWED: usize = 2;
 /// Frequencies of the coarse scan.
@@ -120,6 +123,22 @@ fn bank(samples: &Samples, share: f64) -> CreepBank {
     let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
     let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
     CreepBank { shares: vec![share; seconds.len()], seconds }
+}
+
+/// The same with elements of a creep that goes on faster still, down to a few samples.
+pub(super) fn with_faster_creep(samples: &Samples, h: &Hypothesis) -> Hypothesis {
+    let mut faster = h.clone();
+    let Some(creep) = &mut faster.effects.creep else { return faster };
+    let first = creep.seconds.iter().copied().fold(f64::INFINITY, f64::min);
+    for i in 1..=FASTER {
+        let seconds = first * 10f64.powf(-f64::from(i) / PER_DECADE);
+        if seconds < FASTEST * samples.period {
+            break;
+        }
+        creep.seconds.insert(0, seconds);
+        creep.shares.insert(0, 0.0);
+    }
+    faster
 }
 
 /// Slopes of the drive from which on it may not be followed, the one that takes most of the residual and a neighbour.

@@ -38,7 +38,7 @@ pub(super) struct Point {
 }
 
 /// What a dead zone of an asymmetry adds for each unit of its weight.
-pub(super) fn dead_zone(v: f64, threshold: f64) -> f64 {
+pub(crate) fn dead_zone(v: f64, threshold: f64) -> f64 {
     if threshold >= 0.0 { (v - threshold).max(0.0) } else { (v - threshold).min(0.0) }
 }
 

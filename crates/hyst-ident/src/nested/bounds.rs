@@ -35,13 +35,22 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
 const INSIDE: f64 = 0.9;
 const GAIN_INSIDE: f64 = 0.99;
 
-/// Whether the search for a slew limit, a delay, a lag, a drag or a mode's gain has run up against its upper bound.
+/// Damping ratio up to which a mode rings: it is seen at its own frequency then, however much too small a coarse base takes the motion there.
+const RINGS: f64 = 0.1;
+
+/// Whether the search for a slew limit, a delay, a lag, a drag or the gain of a mode that does not ring has run up against its upper bound.
 pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     let mut ends = false;
+    let mut dampings = h.effects.resonances.iter().map(|mode| mode.damping);
     h.clone().visit_nonlinear(&mut |p| {
         let inside = match p.cause {
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence) | Cause::SlewLimit => INSIDE,
-            Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => GAIN_INSIDE,
+            Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
+                if dampings.next().is_some_and(|damping| damping < RINGS) {
+                    return;
+                }
+                GAIN_INSIDE
+            }
             _ => return,
         };
         let bounds = box_of(&p, samples);
@@ -150,9 +159,13 @@ mod tests {
         let drag = |seconds: f64| Some(DragParams { seconds, volt_seconds: 0.0 });
         let dragged = |seconds| Hypothesis { drag: drag(seconds), ..Hypothesis::default() };
         assert!(ends_at_a_bound(&dragged(0.19), &samples(2000)) && !ends_at_a_bound(&dragged(0.17), &samples(2000)));
-        let mode = |gain: f64| ResonanceParams { hz: 50.0, damping: 0.02, gain };
-        let rings = |gain: f64| of(Effects { resonances: vec![mode(1.0), mode(gain)], ..Effects::default() });
-        assert!(rings(1.195) && !rings(1.1));
+        let mode = |damping: f64, gain: f64| ResonanceParams { hz: 50.0, damping, gain };
+        let carries = |damping: f64, gain: f64| {
+            of(Effects { resonances: vec![mode(0.02, 1.2), mode(damping, gain)], ..Effects::default() })
+        };
+        assert!(carries(0.2, 1.195) && !carries(0.2, 1.1));
+        // What rings is there, however much it carries.
+        assert!(!carries(0.02, 1.2));
     }
 
     #[test]

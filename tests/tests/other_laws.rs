@@ -1,0 +1,120 @@
+//! Diagnosis of devices whose laws neither the models nor the simulated plant hold: Duhem's loops, a zero that settles, loops that bend alike at both
+//! ends.
+
+use hyst_hw::{Bed, Plant, PlantConfig};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, RemainderKind, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::Kind;
+use hyst_ident::record::{Columns, OutputUnit, Record};
+use hyst_tests::experiment;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A record and its test record, with other outputs: `of` is told time, drive and output of a segment, and answers another output.
+fn with_output(seed: u64, of: impl Fn(&[f64], &[f64], &[f64]) -> Vec<f64>) -> (Record, Record) {
+    let mut plant = Plant::new(PlantConfig::random_on(Bed::Relays, seed, &[]).unwrap()).unwrap();
+    let mut made = |seed: u64, name: &str| {
+        let r = experiment(&mut plant, seed, name);
+        let was = r.output().unwrap();
+        let segment = |s: &std::ops::Range<usize>| of(&r.time()[s.clone()], &r.input()[s.clone()], &was[s.clone()]);
+        let labels = r.segments().iter().zip(r.labels()).flat_map(|(s, label)| vec![*label; s.len()]);
+        Record::from_samples(Columns {
+            name: name.into(),
+            segment: Some(labels.collect()),
+            time: r.time().to_vec(),
+            input: Some(r.input().to_vec()),
+            output: Some((OutputUnit::Micrometre, r.segments().iter().flat_map(segment).collect())),
+            ..Columns::default()
+        })
+        .unwrap()
+    };
+    let train = made(seed, "train");
+    (train, made(seed + 1000, "test"))
+}
+
+fn diagnosed(kind: Kind, (train, test): &(Record, Record)) -> Diagnosis {
+    let model = fit(train, kind, &FitOptions::default()).unwrap();
+    diagnose(train, Some(test), &model, &DiagnoseOptions::default(), &|_| {}).unwrap()
+}
+
+fn names(d: &Diagnosis) -> Vec<&'static str> {
+    d.findings.effects.iter().map(|e| e.name.name()).collect()
+}
+
+/// White noise of 5 nm \[µm\], the same for the same row.
+fn noise(row: usize) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(row as u64);
+    let uniform = || rng.random::<f64>() - 0.5;
+    5e-3 * std::iter::repeat_with(uniform).take(12).sum::<f64>()
+}
+
+/// Lowest and highest drive.
+fn range(u: &[f64]) -> (f64, f64) {
+    u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)))
+}
+
+/// The loops of a Bouc-Wen law \[µm\], which close on no minor loop; the drive is passed in small steps.
+fn bouc_wen(u: &[f64]) -> Vec<f64> {
+    let (mut z, mut from) = (0.0_f64, u[0]);
+    let follow = |(k, to): (usize, &f64)| {
+        const STEPS: u32 = 24;
+        let step = (to - from) / f64::from(STEPS);
+        for _ in 0..STEPS {
+            let closing = if step * z > 0.0 { 1.0 } else { 0.2 };
+            z += step * (1.0 - closing * (z.abs() / 12.0).powf(1.4));
+        }
+        from = *to;
+        0.3 * to - 0.12 * z + noise(k)
+    };
+    u.iter().enumerate().map(follow).collect()
+}
+
+/// A coarse base's misfit has power where the drive has some: a tone beside it is a tone, however much larger the misfit is.
+#[test]
+fn a_tone_is_named_beside_the_misfit_of_the_base() {
+    let hum = |t: f64| 0.05 * (std::f64::consts::TAU * 47.3 * t).sin();
+    let records = with_output(810, |t, u, _| bouc_wen(u).iter().zip(t).map(|(y, t)| y + hum(*t)).collect());
+    let d = diagnosed(Kind::Pi, &records);
+    assert_eq!(names(&d), ["interference"], "{:#?}", d.findings);
+    assert!(d.findings.effects[0].cv_rmse_after > 0.8 * d.findings.effects[0].cv_rmse_before, "{:#?}", d.findings);
+    let plain = diagnosed(Kind::Pi, &with_output(810, |_, u, _| bouc_wen(u)));
+    assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
+}
+
+/// A zero that settles drifts, though not evenly; what it does beyond that is told.
+#[test]
+fn a_drift_that_slows_down_is_a_drift() {
+    let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
+    let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + settles(*t)).collect());
+    let d = diagnosed(Kind::Pi, &records);
+    assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
+    let left = &d.findings.remainder;
+    assert_eq!(left.kind, RemainderKind::Unexplained, "{left:?}");
+    assert!(left.description.contains("beyond the drift the zero wanders"), "{left:?}");
+    // One that comes back is none.
+    let swings = |t: f64| 0.3 * (0.15 * t).cos();
+    let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
+    let d = diagnosed(Kind::Pi, &records);
+    assert!(names(&d).is_empty(), "{:#?}", d.findings);
+}
+
+/// Loops that a half turn carries over into themselves are not asymmetric, however they bend.
+#[test]
+fn a_symmetric_bend_is_no_asymmetry() {
+    let bent = |u: &[f64]| {
+        let (low, high) = range(u);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let mut plays = [low; 8];
+        let follow = |(k, u): (usize, &f64)| {
+            for (p, r) in plays.iter_mut().zip([1.0, 3.0, 5.0, 8.0, 12.0, 17.0, 23.0, 30.0]) {
+                *p = hyst_core::play(*p, *u, 0.01 * r * (high - low));
+            }
+            // What enters bends alike at both ends, and so does the loop.
+            let of = |v: f64| 9.0 * (1.1 * (v - middle) / half).tanh();
+            of(*u) + plays.iter().map(|p| 0.15 * of(*p)).sum::<f64>() + noise(k)
+        };
+        u.iter().enumerate().map(follow).collect::<Vec<f64>>()
+    };
+    let d = diagnosed(Kind::Pi, &with_output(812, |_, u, _| bent(u)));
+    assert!(names(&d).is_empty(), "{:#?}", d.findings);
+}
