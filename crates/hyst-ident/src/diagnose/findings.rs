@@ -221,6 +221,13 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
         100.0 * j.share,
         j.over_noise
     ));
+    if j.alone {
+        evidence.push(
+            "it is there all the time and far above what is left beside it, however little of that it explains: neither the drive nor the \
+             base's misfit makes such a tone"
+                .into(),
+        );
+    }
     Finding {
         name: named.effect,
         parameters: parameters(m, named.effect),

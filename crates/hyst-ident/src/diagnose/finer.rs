@@ -133,7 +133,8 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
             // The others of its set are those of the best, or another rival has been named since.
             let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
                 == other.hypothesis.without(Cause::Effect(other.effect)).causes();
-            let near = other.tie || (other.judgement.accepted() && other.cv_rmse <= NEAR * found.named[n].cv_with);
+            let near =
+                other.tie || (other.judgement.explains_enough() && other.cv_rmse <= NEAR * found.named[n].cv_with);
             // In one loop no base can tell what is late from what is late otherwise.
             if !near || !stands || triangle.only_loop.is_some() {
                 continue;
@@ -141,7 +142,7 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
             let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };
             let named = &mut found.named[n];
             named.instead[i].tie = score::undecided(best, &trial, seed);
-            if other.judgement.accepted() && score::clearly_better(best, &trial, seed) {
+            if other.judgement.explains_enough() && score::clearly_better(best, &trial, seed) {
                 let was = &mut named.instead[i];
                 (was.effect, was.cv_rmse, was.judgement) = (named.effect, named.cv_with, named.judgement);
                 was.hypothesis = best.fit.hypothesis.clone();
@@ -237,7 +238,7 @@ fn beside(
     let mut kept = h.clone();
     found.named.retain(|n| {
         let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= share(n.effect) * explained.max(0.0);
-        if enough {
+        if enough || n.judgement.alone {
             return true;
         }
         // What was judged is the last of two modes; the other stays, and the name with it.

@@ -5,7 +5,7 @@
 //!    own misfit is not taken for an effect: forward with a small beam, then elimination, then swaps.
 //!    Every trial refits the whole nested model.
 //! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,
-//!    and it must matter against the noise floor and against what is left.
+//!    and it must matter against the noise floor and against what is left (a tone of the sensor's own only against the noise floor).
 //! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and what else, and the own base whether it
 //!    lacks a curve.
 //! 4. **Extend** the user's own model with the effects found, all weights refitted.
@@ -21,6 +21,7 @@ mod search;
 mod shape;
 mod spectrum;
 mod starts;
+mod tone;
 mod trial;
 mod uncertainty;
 
@@ -204,7 +205,8 @@ pub fn diagnose(
         // What the rich base shows drowns in what this one misses.
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, after, amplified) = (model.clone(), before.clone(), None);
-        hypothesis = Hypothesis { slew_limit: hypothesis.slew_limit, ..start.clone() };
+        let Hypothesis { slew_limit, zero_wanders, gain_wanders, .. } = hypothesis;
+        hypothesis = Hypothesis { slew_limit, zero_wanders, gain_wanders, ..start.clone() };
     }
     if extended != *model {
         extended.rmse = after.errors.as_ref().map(|errors| errors.rmse);

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use hyst_core::SaturationParams;
 
-use super::spectrum::explained;
+use super::tone::stands_alone;
 use super::trial::Trial;
 use crate::Samples;
 use crate::nested::{Problem, ends_at_a_bound, shown_motion};
@@ -39,13 +39,6 @@ const SLOWEST_MODE: f64 = 1.0;
 /// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
 const MOST_DAMPING: f64 = 0.35;
 
-/// Frequencies to each side of a tone that it is held against, and how far they are apart, in widths of a line of the longest segment.
-const NEIGHBOURS: usize = 8;
-const APART: f64 = 2.0;
-/// How far a tone stands above them (power), and at least how much it is of what moves at its frequency anyway: a base misses less of that.
-const OVER_NEIGHBOURS: f64 = 20.0;
-const OVER_MOTION: f64 = 0.1;
-
 /// How an effect was judged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judgement {
@@ -57,9 +50,9 @@ pub(crate) struct Judgement {
     pub(crate) share: f64,
     /// Root mean square of what it adds, in noise floors.
     pub(crate) over_noise: f64,
-    /// Whether its parameters are physically sensible and away from their bounds.
+    /// Whether its parameters are physically sensible and away from their bounds, but for what a mode that rings carries.
     pub(crate) sensible: bool,
-    /// Whether it is a tone at which neither the drive nor what is left has anything: however little it explains, nothing else does.
+    /// Whether it explains too little, but is a tone that neither the drive nor a misfit makes.
     pub(crate) alone: bool,
 }
 
@@ -94,33 +87,17 @@ pub(crate) fn judge(problem: &Problem<'_>, without: &Trial, with: &Trial, noise:
     };
     let predicted = gain_of(without.total(), with.total());
     let fitted = gain_of(without.fit.squares, with.fit.squares);
-    Judgement {
+    let judged = Judgement {
         confidence: share_above_zero(&differences(without, with), seed),
         ratio: predicted.0.max(fitted.0),
         share: predicted.1.min(fitted.1),
         over_noise: predicted.2.min(fitted.2),
         sensible: sensible(problem, with),
-        alone: without.fit.hypothesis.effects.interference.is_none() && tone_stands_alone(problem, with),
-    }
-}
-
-/// Whether a tone stands far above what is left beside it, at a frequency at which nothing moves: a base's misfit has power only where the
-/// motion has more of it.
-fn tone_stands_alone(problem: &Problem<'_>, with: &Trial) -> bool {
-    let fit = &with.fit;
-    let Some(tone) = fit.hypothesis.effects.interference else { return false };
-    let samples = problem.samples;
-    let (Ok(motion), Ok(left)) = (problem.motion(&fit.hypothesis, &fit.solution), problem.residual(fit)) else {
-        return false;
+        alone: false,
     };
-    let power = 0.5 * tone.amplitude * tone.amplitude * samples.len() as f64;
-    let apart = APART / samples.longest_segment();
-    let mut beside: Vec<f64> = (1..=NEIGHBOURS)
-        .flat_map(|k| [-1.0, 1.0].map(|side| tone.hz + side * apart * k as f64))
-        .map(|hz| explained(samples, &left, hz))
-        .collect();
-    beside.sort_by(f64::total_cmp);
-    power > OVER_NEIGHBOURS * beside[NEIGHBOURS] && power > OVER_MOTION * explained(samples, &motion, tone.hz)
+    let is_new_tone = without.fit.hypothesis.effects.interference.is_none();
+    let alone = is_new_tone && judged.is_sure() && !judged.explains() && stands_alone(problem, with);
+    Judgement { alone, ..judged }
 }
 
 /// What `with` takes of the error of each block.

@@ -18,6 +18,8 @@ const ALIKE: f64 = 1.1;
 const SMALL_DRAG: f64 = 2.0;
 /// Share of what a wandering zero explains that a drift has to explain to be named in its place.
 const EVEN: f64 = 0.9;
+/// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
+const MOST_STEP: f64 = 0.25;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -90,17 +92,16 @@ impl Judge<'_> {
     /// A set without one cause. A small drag beside a creep may be no more than a creep that goes on faster than the elements of the search.
     fn without(&self, set: &Trial, cause: Cause, already: &[Cause]) -> Result<Option<Trial>, Error> {
         let less = set.fit.hypothesis.without(cause);
-        let without = self.refit(&less)?;
-        let is_new = |effect: Effect| !already.contains(&Cause::Effect(effect));
-        let drags = cause == Cause::Effect(Effect::RateDependence) && less.effects.creep.is_some();
-        let is_small = |t: &Trial| self.judge(t, set).over_noise < SMALL_DRAG;
-        match without {
-            Some(plain) if drags && is_new(Effect::Creep) && is_small(&plain) => {
-                let faster = self.refit(&starts::with_faster_creep(self.problem.samples, &plain.fit.hypothesis))?;
-                Ok(Some(faster.filter(|t| t.total() < plain.total()).unwrap_or(plain)))
-            }
-            other => Ok(other),
+        let Some(plain) = self.refit(&less)? else { return Ok(None) };
+        let drags = cause == Cause::Effect(Effect::RateDependence);
+        let creeps = less.effects.creep.is_some() && !already.contains(&Cause::Effect(Effect::Creep));
+        let judged = self.judge(&plain, set);
+        if !drags || !creeps || !judged.accepted() || judged.over_noise >= SMALL_DRAG {
+            return Ok(Some(plain));
         }
+        let faster = self.refit(&starts::with_faster_creep(self.problem.samples, &plain.fit.hypothesis))?;
+        let better = faster.filter(|t| t.total() < plain.total() && score::sensible(self.problem, t));
+        Ok(Some(better.unwrap_or(plain)))
     }
 
     fn judge(&self, without: &Trial, with: &Trial) -> Judgement {
@@ -200,23 +201,39 @@ pub(super) fn further(
         }
     };
     let noise = judge.noise;
-    if let Some(even) = nearly_even_drift(&judge, &best)? {
+    if let Some(even) = nearly_even_drift(&judge, &best, already)? {
         let (_, named) = swaps(&judge, &even, already, &left)?;
         return Ok(Search { beside_wandering: Some(best.cv_rmse()), best: even, named, noise });
     }
     Ok(Search { best, named, noise, beside_wandering: None })
 }
 
-/// A drift in the place of a zero that wanders, where it takes nearly all of it: one that is not even to the last digit has the name too.
-fn nearly_even_drift(judge: &Judge<'_>, best: &Trial) -> Result<Option<Trial>, Error> {
+/// A drift in the place of a zero that wanders, where it takes nearly all of it: one that is not even to the last digit has the name too. Only
+/// where nothing else was found, and where the zero goes smoothly: what goes in steps is a mount that slips.
+fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let h = &best.fit.hypothesis;
-    if !h.zero_wanders || h.gain_wanders || h.effects.drift.is_some() {
+    let wanders_alone = beyond(h, already) == [Cause::ZeroWanders] && h.effects.drift.is_none();
+    if !wanders_alone || !goes_smoothly(judge.problem, &best.fit) {
         return Ok(None);
     }
     let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
     let Some(even) = judge.trials(&still.fit, Cause::Effect(Effect::Drift))? else { return Ok(None) };
     let takes_nearly_all = still.total() - even.total() >= EVEN * (still.total() - best.total());
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
+}
+
+/// Whether a zero that wanders makes no large part of its way at once; over a gap between segments it may make more.
+fn goes_smoothly(problem: &Problem<'_>, fit: &Fitted) -> bool {
+    let heights = &fit.solution.as_slice()[problem.zero_heights(&fit.hypothesis)];
+    let way: f64 = heights.windows(2).map(|h| (h[1] - h[0]).abs()).sum();
+    let last = problem.samples.len().saturating_sub(1);
+    let at = |j: usize| problem.samples.time[j * last / (heights.len() - 1).max(1)];
+    let pairs = heights.len().saturating_sub(2);
+    let usual = 2.0 * (at(heights.len() - 1) - at(0)) / (heights.len() - 1).max(1) as f64;
+    (0..pairs).all(|j| {
+        let longer = ((at(j + 2) - at(j)) / usual).max(1.0);
+        (heights[j + 2] - heights[j]).abs() <= MOST_STEP * longer * way
+    })
 }
 
 /// What may be added to a fit. A curve behind the hysteresis is not among it: this base has one of its own, and whether the user's
@@ -268,7 +285,7 @@ fn swaps(
     let mut named = Vec::new();
     let mut better: Option<Trial> = None;
     for cause in beyond(&best.fit.hypothesis, already) {
-        let Some(without) = judge.refit(&best.fit.hypothesis.without(cause))? else { continue };
+        let Some(without) = judge.without(best, cause, already)? else { continue };
         let mut others = candidates(judge.problem, &without.fit);
         let one_loop = judge.problem.only_loop.is_some() && is_late(cause);
         if one_loop {

@@ -1,5 +1,7 @@
 //! Spectra of residuals: peaks and tones.
 
+use std::ops::Range;
+
 use realfft::RealFftPlanner;
 
 use crate::samples::Samples;
@@ -65,7 +67,7 @@ pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
     let around = |hz: f64, reach: f64, steps: usize| {
         (0..=2 * steps)
             .map(move |i| hz + reach * (i as f64 / steps as f64 - 1.0))
-            .map(|hz| (explained(samples, residual, hz), hz))
+            .map(|hz| (explained(samples, &samples.segments, residual, hz), hz))
             .max_by(|a, b| a.0.total_cmp(&b.0))
     };
     peaks(samples, residual, 3)
@@ -80,10 +82,23 @@ pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
         .map(|(_, hz)| hz)
 }
 
-/// Σ residual² that a sine and cosine of this frequency take.
-pub(super) fn explained(samples: &Samples, residual: &[f64], hz: f64) -> f64 {
+/// Frequency \[Hz\] at which a signal has most power, its mean left out.
+pub(super) fn strongest(samples: &Samples, signal: &[f64]) -> Option<f64> {
+    let (power, step) = power(samples, signal);
+    let line = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+    // Between the lines of the transform too.
+    let near = (-8..=8).map(|i| (line as f64 + f64::from(i) / 8.0) * step);
+    let heights = near.map(|hz| {
+        let of = |s| explained(samples, std::slice::from_ref(s), signal, hz);
+        (samples.segments.iter().map(of).sum::<f64>(), hz)
+    });
+    heights.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hz)| hz)
+}
+
+/// Σ residual² that a sine and cosine of this frequency take in these segments.
+pub(super) fn explained(samples: &Samples, segments: &[Range<usize>], residual: &[f64], hz: f64) -> f64 {
     let (mut ss, mut sc, mut cc, mut rs, mut rc) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for segment in &samples.segments {
+    for segment in segments {
         // One sine and cosine per segment, then rotation: the grid inside a segment is even.
         let angle = |t: f64| 2.0 * std::f64::consts::PI * (hz * t).fract();
         let (mut s, mut c) = angle(samples.time[segment.start]).sin_cos();

@@ -201,3 +201,31 @@ fn modes(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<ResonanceParams>, E
     }
     Ok(chosen)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_faster_creep_ends_at_a_few_samples() {
+        let samples = Samples {
+            period: 4e-3,
+            time: vec![0.0],
+            input: vec![0.0],
+            output: vec![0.0],
+            temperature: None,
+            load: None,
+            segments: std::iter::once(0..1).collect(),
+            file_of_segment: vec![0],
+            settling: vec![false],
+        };
+        let creep = CreepBank { seconds: vec![0.5, 5.0], shares: vec![0.03, 0.02] };
+        let h = Hypothesis::of(Effects { creep: Some(creep), ..Effects::default() });
+        let faster = with_faster_creep(&samples, &h).effects.creep.unwrap();
+        // 0.016 s is four samples; the next would be 0.0158 s.
+        assert_eq!(faster.seconds.len(), 4, "{:?}", faster.seconds);
+        assert!(faster.seconds.is_sorted() && faster.seconds[0] > 0.016);
+        assert_eq!(faster.shares, [0.0, 0.0, 0.03, 0.02]);
+        assert_eq!(with_faster_creep(&samples, &Hypothesis::default()), Hypothesis::default());
+    }
+}

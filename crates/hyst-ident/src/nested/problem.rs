@@ -116,6 +116,11 @@ impl<'a> Problem<'a> {
         Self { unpredictable: OnceLock::from(other.unpredictable().to_vec()), ..self }
     }
 
+    /// Which unknowns are the heights of a zero that wanders, evenly over the record's rows.
+    pub(crate) fn zero_heights(&self, h: &Hypothesis) -> std::ops::Range<usize> {
+        self.layout(h).zero_hats
+    }
+
     fn unpredictable(&self) -> &[bool] {
         if let Some(known) = self.unpredictable.get() {
             return known;
