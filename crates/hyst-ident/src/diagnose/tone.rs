@@ -91,7 +91,7 @@ fn is_harmonic(samples: &Samples, motion: &[f64], hz: f64) -> bool {
     let line = 1.0 / samples.longest_segment();
     let Some(first) = strongest(samples, motion).filter(|first| *first > line) else { return false };
     let order = (hz / first).round();
-    order >= 1.0 && order <= HARMONICS && (hz - order * first).abs() < 1.5 * line && first > 4.0 * line
+    (1.0..=HARMONICS).contains(&order) && (hz - order * first).abs() < 1.5 * line && first > 4.0 * line
 }
 
 #[cfg(test)]
