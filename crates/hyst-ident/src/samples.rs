@@ -87,6 +87,23 @@ impl Samples {
         }
     }
 
+    /// One segment that begins at time 0, without surroundings, all of whose rows count: what unit tests change where they need more.
+    #[cfg(test)]
+    pub(crate) fn of_columns(period: f64, input: Vec<f64>, output: Vec<f64>) -> Self {
+        let rows = input.len();
+        Self {
+            period,
+            time: (0..rows).map(|k| k as f64 * period).collect(),
+            input,
+            output,
+            temperature: None,
+            load: None,
+            segments: std::iter::once(0..rows).collect(),
+            file_of_segment: vec![0],
+            settling: vec![false; rows],
+        }
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time.len()

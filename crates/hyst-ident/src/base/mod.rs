@@ -61,18 +61,9 @@ mod tests {
     fn samples() -> Samples {
         let input: Vec<f64> =
             (0..900).map(|k| f64::from(k) * 0.02).map(|t| 20.0 * t.sqrt() * (1.0 - t.cos())).collect();
-        let rows = input.len();
-        Samples {
-            period: 1e-3,
-            time: (0..900).map(|k| f64::from(k) * 1e-3).collect(),
-            output: input.iter().map(|u| 0.1 * u).collect(),
-            settling: vec![false; rows],
-            temperature: None,
-            load: None,
-            segments: vec![0..500, 500..rows],
-            file_of_segment: vec![0, 0],
-            input,
-        }
+        let output = input.iter().map(|u| 0.1 * u).collect();
+        let segments = vec![0..500, 500..input.len()];
+        Samples { segments, file_of_segment: vec![0, 0], ..Samples::of_columns(1e-3, input, output) }
     }
 
     fn agrees(basis: &dyn Basis, samples: &Samples, drag: &Drag) {

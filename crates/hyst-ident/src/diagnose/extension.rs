@@ -71,7 +71,7 @@ impl Own<'_> {
             return Ok((None, None));
         };
         let own = shape::bent(&problem, hypothesis, &plain.fit).map_err(stage)?;
-        let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.fit)).transpose()?.flatten();
+        let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.trial.fit)).transpose()?.flatten();
         let mut bent = Bent { own, anew: None };
         if let Some(basis) = &anew {
             let behind =

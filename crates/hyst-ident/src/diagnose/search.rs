@@ -225,12 +225,15 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
 /// Whether a zero that wanders makes no large part of its way at once; over a gap between segments it may make more.
 fn goes_smoothly(problem: &Problem<'_>, fit: &Fitted) -> bool {
     let heights = &fit.solution.as_slice()[problem.zero_heights(&fit.hypothesis)];
+    let steps = heights.len().saturating_sub(1);
+    if steps < 2 {
+        return true;
+    }
     let way: f64 = heights.windows(2).map(|h| (h[1] - h[0]).abs()).sum();
     let last = problem.samples.len().saturating_sub(1);
-    let at = |j: usize| problem.samples.time[j * last / (heights.len() - 1).max(1)];
-    let pairs = heights.len().saturating_sub(2);
-    let usual = 2.0 * (at(heights.len() - 1) - at(0)) / (heights.len() - 1).max(1) as f64;
-    (0..pairs).all(|j| {
+    let at = |j: usize| problem.samples.time[j * last / steps];
+    let usual = 2.0 * (at(steps) - at(0)) / steps as f64;
+    (0..steps - 1).all(|j| {
         let longer = ((at(j + 2) - at(j)) / usual).max(1.0);
         (heights[j + 2] - heights[j]).abs() <= MOST_STEP * longer * way
     })

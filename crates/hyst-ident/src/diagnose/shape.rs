@@ -40,10 +40,44 @@ pub(super) struct Shape {
 }
 
 /// The own base with a curve behind it.
+pub(super) struct Curved {
+    pub(super) trial: Trial,
+    /// Whether the curve bends its two halves differently.
+    is_lopsided: bool,
+}
+
+/// The same on the user's plays, and on others.
 pub(super) struct Bent {
-    pub(super) own: Option<Trial>,
-    /// The same on the plays that were chosen behind that curve: without it, where they lack something too, and with it.
-    pub(super) anew: Option<(Trial, Trial)>,
+    pub(super) own: Option<Curved>,
+    /// On the plays that were chosen behind that curve: without it, where they lack something too, and with it.
+    pub(super) anew: Option<(Trial, Curved)>,
+}
+
+/// What the own base may lack.
+struct Tried {
+    effect: Effect,
+    trial: Trial,
+    /// Without the curve, where it stands behind plays that were chosen anew.
+    anew: Option<Trial>,
+    /// Whether it has the form that its name stands for.
+    is_of_its_kind: bool,
+}
+
+impl Tried {
+    fn curve(with: Curved, anew: Option<Trial>) -> Self {
+        Self { effect: Effect::Asymmetry, trial: with.trial, anew, is_of_its_kind: with.is_lopsided }
+    }
+
+    fn stop(trial: Trial) -> Self {
+        Self { effect: Effect::Saturation, trial, anew: None, is_of_its_kind: true }
+    }
+}
+
+/// And what speaks for it.
+struct Judged<'a> {
+    tried: &'a Tried,
+    judgement: score::Judgement,
+    accepted: bool,
 }
 
 /// The own base with what was found; none if it cannot be solved.
@@ -57,14 +91,23 @@ pub(super) fn is_complete(plain: &Trial, richest: f64) -> bool {
 }
 
 /// The same with a curve behind it; none if there is one already.
-pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Option<Trial>, Error> {
+pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Option<Curved>, Error> {
     if found.effects.asymmetry.is_some() {
         return Ok(None);
     }
     let Some(curve) = curve(problem, plain) else { return Ok(None) };
     let mut h = found.clone();
     h.effects.asymmetry = Some(curve);
-    Ok(problem.fit_linear(&h)?.and_then(|f| Trial::of(problem, f)))
+    let Some(fit) = problem.fit_linear(&h)? else { return Ok(None) };
+    // What the curve stretches the operator gives less of: some of its dead zones may lie where nothing comes any more.
+    let is_lopsided = fit
+        .hypothesis
+        .effects
+        .asymmetry
+        .as_ref()
+        .zip(reach(problem, &fit))
+        .is_some_and(|(p, reach)| lopsided(p, reach) >= LOPSIDED);
+    Ok(Trial::of(problem, fit).map(|trial| Curved { trial, is_lopsided }))
 }
 
 /// Looks for a curve behind the own base of `problem`, all that was found before kept. `plain` is that base without one, which
@@ -82,43 +125,40 @@ pub(super) fn shape(
     // wandering leaves is no base's.
     let is_least = found.drag.is_none() && !found.zero_wanders && !found.gain_wanders;
     let least = if is_least { richest } else { richest.min(NEAR_NOISE * noise) };
-    let own = bent.own.map(|t| (Effect::Asymmetry, t, None));
-    let anew = bent.anew.map(|(plain, t)| (Effect::Asymmetry, t, Some(plain)));
-    let mut tried: Vec<(Effect, Trial, Option<Trial>)> = own.into_iter().chain(anew).collect();
+    let own = bent.own.map(|with| Tried::curve(with, None));
+    let anew = bent.anew.map(|(plain, with)| Tried::curve(with, Some(plain)));
+    let mut tried: Vec<Tried> = own.into_iter().chain(anew).collect();
     if found.effects.saturation.is_none() {
         for fitted in stopped(problem, found, &plain.fit)? {
-            tried.extend(Trial::of(problem, fitted).map(|t| (Effect::Saturation, t, None)));
+            tried.extend(Trial::of(problem, fitted).map(Tried::stop));
         }
     }
     // What better plays gain is not the curve's.
-    let on_better_plays = tried.iter().find_map(|(.., anew)| anew.clone()).filter(|p| p.total() < plain.total());
+    let on_better_plays = tried.iter().find_map(|t| t.anew.clone()).filter(|p| p.total() < plain.total());
     let plain = on_better_plays.as_ref().unwrap_or(plain);
-    let judged: Vec<_> = tried
+    let judged: Vec<Judged<'_>> = tried
         .iter()
-        .map(|(effect, t, anew)| {
-            let (without, closed) = anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
-            let judgement = score::judge(problem, without, t, noise, seed);
-            let curve = t.fit.hypothesis.effects.asymmetry.as_ref().filter(|_| *effect == Effect::Asymmetry);
+        .map(|t| {
+            let (without, closed) = t.anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
+            let judgement = score::judge(problem, without, &t.trial, noise, seed);
             let accepted = judgement.accepted()
                 && judgement.share >= TAKEN
-                && t.cv_rmse() <= closed * least
-                && curve.is_none_or(|p| lopsided(p) >= LOPSIDED);
-            (*effect, t, judgement, accepted, anew)
+                && t.trial.cv_rmse() <= closed * least
+                && t.is_of_its_kind;
+            Judged { tried: t, judgement, accepted }
         })
         .collect();
-    let accepted = judged.iter().filter(|(.., accepted, _)| *accepted);
     // A stop has fewer numbers than a curve: where they are as good as each other it is the stop.
-    let best = accepted.min_by(|a, b| {
-        let weight = |effect: Effect| if effect == Effect::Saturation { 0.95 } else { 1.0 };
-        (weight(a.0) * a.1.cv_rmse()).total_cmp(&(weight(b.0) * b.1.cv_rmse()))
-    });
-    Ok(best.map(|(effect, trial, judgement, _, anew)| {
-        let others = judged.iter().filter(|(e, ..)| e != effect).map(|(e, other, judgement, accepted, _)| Instead {
-            effect: *e,
-            cv_rmse: other.cv_rmse(),
-            tie: *accepted && score::undecided(trial, other, seed),
-            hypothesis: other.fit.hypothesis.clone(),
-            judgement: *judgement,
+    let weighted =
+        |j: &Judged<'_>| j.tried.trial.cv_rmse() * if j.tried.effect == Effect::Saturation { 0.95 } else { 1.0 };
+    let best = judged.iter().filter(|j| j.accepted).min_by(|a, b| weighted(a).total_cmp(&weighted(b)));
+    Ok(best.map(|Judged { tried: Tried { effect, trial, anew, .. }, judgement, .. }| {
+        let others = judged.iter().filter(|j| j.tried.effect != *effect).map(|j| Instead {
+            effect: j.tried.effect,
+            cv_rmse: j.tried.trial.cv_rmse(),
+            tie: j.accepted && score::undecided(trial, &j.tried.trial, seed),
+            hypothesis: j.tried.trial.fit.hypothesis.clone(),
+            judgement: j.judgement,
         });
         let mut instead: Vec<Instead> = others.collect();
         instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
@@ -162,15 +202,18 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
     Ok(fits.into_iter().filter(|f| f.squares < plain.squares).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
-/// Dead zones spread evenly over the operator's output, moving away from zero.
-fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f64>>> {
-    let operator = problem.operator_output(plain).ok()?;
+/// Where the operator's output goes in the rows that count, without its ends; none if it stands still.
+fn reach(problem: &Problem<'_>, fit: &Fitted) -> Option<(f64, f64)> {
+    let operator = problem.operator_output(fit).ok()?;
     let settled = operator.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
     let (low, high) = crate::samples::range(settled);
     let (low, high) = (low + MARGIN * (high - low), high - MARGIN * (high - low));
-    if low >= high {
-        return None;
-    }
+    (low < high).then_some((low, high))
+}
+
+/// Dead zones spread evenly over the operator's output, moving away from zero.
+fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f64>>> {
+    let (low, high) = reach(problem, plain)?;
     let mut thresholds: Vec<f64> =
         (0..MAX_DEAD_ZONES).map(|i| low + (high - low) * i as f64 / (MAX_DEAD_ZONES - 1) as f64).collect();
     thresholds.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -178,9 +221,8 @@ fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f6
 }
 
 /// Share of a curve's bend that is even about the middle of what it spans, straight parts left out: 1 where only one half bends or both bend
-/// the same way, 0 where a half turn carries the curve over into itself. The ends are left out: how the curve lies there is the base's.
-fn lopsided(p: &AsymmetryParams<Vec<f64>>) -> f64 {
-    let (low, high) = crate::samples::range(p.thresholds.iter().copied());
+/// the same way, 0 where a half turn carries the curve over into itself.
+fn lopsided(p: &AsymmetryParams<Vec<f64>>, (low, high): (f64, f64)) -> f64 {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let bend = |v: f64| p.thresholds.iter().zip(&p.weights).map(|(s, c)| c * dead_zone(v, *s)).sum::<f64>();
     let parts = (1..=POINTS).map(|i| {
@@ -210,28 +252,35 @@ mod tests {
     #[test]
     fn a_curve_that_a_half_turn_leaves_as_it_is_is_no_asymmetry() {
         let thresholds = [10.0, 20.0, 30.0, 40.0, 50.0];
-        assert!(lopsided(&curve(&thresholds, &[1.0, 0.8, 1.1, 1.1, 0.8, 1.0])) < 1e-9);
+        assert!(lopsided(&curve(&thresholds, &[1.0, 0.8, 1.1, 1.1, 0.8, 1.0]), (10.0, 50.0)) < 1e-9);
         // Of whatever slope on the whole.
-        assert!(lopsided(&curve(&thresholds, &[1.0, 1.3, 1.6, 1.6, 1.3, 1.0])) < 1e-9);
+        assert!(lopsided(&curve(&thresholds, &[1.0, 1.3, 1.6, 1.6, 1.3, 1.0]), (10.0, 50.0)) < 1e-9);
     }
 
     #[test]
     fn a_curve_that_bends_one_way_is_one() {
         let thresholds = [10.0, 20.0, 30.0, 40.0, 50.0];
-        assert!(lopsided(&curve(&thresholds, &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5])) > 0.99);
+        assert!(lopsided(&curve(&thresholds, &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5]), (10.0, 50.0)) > 0.99);
         // Of a bend at one end alone, half is even.
-        let share = lopsided(&curve(&thresholds, &[1.0, 1.0, 1.0, 1.0, 0.7, 0.7]));
+        let share = lopsided(&curve(&thresholds, &[1.0, 1.0, 1.0, 1.0, 0.7, 0.7]), (10.0, 50.0));
         assert!((0.4..0.95).contains(&share), "{share}");
         // And a straight line bends nowhere.
-        assert!(lopsided(&curve(&thresholds, &[1.0; 6])).abs() < 1e-9);
+        assert!(lopsided(&curve(&thresholds, &[1.0; 6]), (10.0, 50.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn zones_that_nothing_reaches_are_no_half_of_a_curve() {
+        let odd = curve(&[10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0], &[1.0, 1.3, 1.6, 1.6, 1.3, 1.0, 1.0, 1.0]);
+        assert!(lopsided(&odd, (10.0, 50.0)) < 1e-9);
+        assert!(lopsided(&odd, (10.0, 70.0)) > LOPSIDED);
     }
 
     #[test]
     fn zero_within_the_curve_changes_nothing() {
         // The same bends about zero: zones open away from it, the stretch that holds it has the slope 1.
         let odd = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![0.1, -0.2, -0.2, 0.1] };
-        assert!(lopsided(&odd) < 1e-9);
+        assert!(lopsided(&odd, (-20.0, 20.0)) < 1e-9);
         let even = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![-0.1, -0.1, 0.1, 0.1] };
-        assert!(lopsided(&even) > 0.99);
+        assert!(lopsided(&even, (-20.0, 20.0)) > 0.99);
     }
 }

@@ -208,17 +208,7 @@ mod tests {
 
     #[test]
     fn a_faster_creep_ends_at_a_few_samples() {
-        let samples = Samples {
-            period: 4e-3,
-            time: vec![0.0],
-            input: vec![0.0],
-            output: vec![0.0],
-            temperature: None,
-            load: None,
-            segments: std::iter::once(0..1).collect(),
-            file_of_segment: vec![0],
-            settling: vec![false],
-        };
+        let samples = Samples::of_columns(4e-3, vec![0.0], vec![0.0]);
         let creep = CreepBank { seconds: vec![0.5, 5.0], shares: vec![0.03, 0.02] };
         let h = Hypothesis::of(Effects { creep: Some(creep), ..Effects::default() });
         let faster = with_faster_creep(&samples, &h).effects.creep.unwrap();

@@ -100,17 +100,7 @@ mod tests {
 
     /// Rows of a millisecond.
     fn samples(rows: usize) -> Samples {
-        Samples {
-            period: 1e-3,
-            time: (0..rows).map(|k| k as f64 * 1e-3).collect(),
-            input: vec![0.0; rows],
-            output: vec![0.0; rows],
-            temperature: None,
-            load: None,
-            segments: std::iter::once(0..rows).collect(),
-            file_of_segment: vec![0],
-            settling: vec![false; rows],
-        }
+        Samples::of_columns(1e-3, vec![0.0; rows], vec![0.0; rows])
     }
 
     fn sine(samples: &Samples, hz: f64) -> Vec<f64> {

@@ -231,17 +231,8 @@ mod tests {
             }));
             segments.push(start..input.len());
         }
-        Samples {
-            period: 1e-4,
-            time: (0..input.len()).map(|k| k as f64 * 1e-4).collect(),
-            output: vec![0.0; input.len()],
-            settling: vec![false; input.len()],
-            temperature: None,
-            load: None,
-            file_of_segment: vec![0; segments.len()],
-            segments,
-            input,
-        }
+        let output = vec![0.0; input.len()];
+        Samples { file_of_segment: vec![0; segments.len()], segments, ..Samples::of_columns(1e-4, input, output) }
     }
 
     fn classical() -> PreisachParams<Vec<f64>> {

@@ -352,17 +352,7 @@ mod tests {
         for (r, w) in plays {
             output.iter_mut().zip(play_column(&input, &segments, *r)).for_each(|(y, p)| *y += w * p);
         }
-        Samples {
-            period: 1e-3,
-            time: (0..rows).map(|k| f64::from(k) * 1e-3).collect(),
-            settling: vec![false; input.len()],
-            temperature: None,
-            load: None,
-            segments,
-            file_of_segment: vec![0],
-            input,
-            output,
-        }
+        Samples::of_columns(1e-3, input, output)
     }
 
     /// What `ask` gets of a bank of plays.

@@ -9,21 +9,6 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::Samples;
 
-fn samples(period: f64, input: Vec<f64>, output: Vec<f64>) -> Samples {
-    let rows = input.len();
-    Samples {
-        period,
-        time: (0..rows).map(|k| k as f64 * period).collect(),
-        input,
-        output,
-        temperature: None,
-        load: None,
-        segments: std::iter::once(0..rows).collect(),
-        file_of_segment: vec![0],
-        settling: vec![false; rows],
-    }
-}
-
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
@@ -48,7 +33,7 @@ fn response_and_coherence_of_noise_through_a_lag() {
     let u: Vec<f64> = (0..200_000).map(|_| normal(&mut rng)).collect();
     // Sensor noise of known power: coherence |H|² / (|H|² + 0.09).
     let y: Vec<f64> = through(&lag(), &u).iter().map(|y| y + 0.3 * normal(&mut rng)).collect();
-    let found = response(&samples(PERIOD, u, y), &WelchOptions { window_s: Some(0.5) }).unwrap();
+    let found = response(&Samples::of_columns(PERIOD, u, y), &WelchOptions { window_s: Some(0.5) }).unwrap();
     let Method::Welch { averages, effective_averages, .. } = found.method else { panic!("{:?}", found.method) };
     assert_eq!(averages, 799);
     let (mut outside, mut beyond) = (0, 0);
@@ -77,7 +62,7 @@ fn a_multisine_gives_its_lines_with_their_scatter() {
         .map(|k| lines.iter().map(|l| (TAU * (*l * k) as f64 / length as f64).sin()).sum::<f64>())
         .collect();
     let y: Vec<f64> = through(&lag(), &u).iter().map(|y| y + 0.1 * normal(&mut rng)).collect();
-    let found = periodic_response(&samples(PERIOD, u.clone(), y.clone()), 1.0).unwrap();
+    let found = periodic_response(&Samples::of_columns(PERIOD, u.clone(), y.clone()), 1.0).unwrap();
     assert!(matches!(found.method, Method::Periodic { periods: 11, unexcited_share, .. } if unexcited_share < 0.6));
     assert_eq!(found.lines.len(), lines.len());
     for (line, k) in found.lines.iter().zip(lines) {
@@ -91,10 +76,13 @@ fn a_multisine_gives_its_lines_with_their_scatter() {
         assert!(line.coherence > 0.98);
     }
     assert!(matches!(
-        periodic_response(&samples(PERIOD, u.clone(), y.clone()), 0.7),
+        periodic_response(&Samples::of_columns(PERIOD, u.clone(), y.clone()), 0.7),
         Err(LinearError::NotPeriodic { .. })
     ));
-    assert!(matches!(periodic_response(&samples(PERIOD, u, y), 0.000_7), Err(LinearError::NotPeriodic { .. })));
+    assert!(matches!(
+        periodic_response(&Samples::of_columns(PERIOD, u, y), 0.000_7),
+        Err(LinearError::NotPeriodic { .. })
+    ));
 }
 
 #[test]
@@ -121,7 +109,7 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
     }
     let mut y = Vec::new();
     segments.iter().for_each(|s: &std::ops::Range<usize>| y.extend(through(&pi, &u[s.clone()])));
-    let record = Samples { segments, file_of_segment: vec![0; 4], ..samples(PERIOD, u, y) };
+    let record = Samples { segments, file_of_segment: vec![0; 4], ..Samples::of_columns(PERIOD, u, y) };
     let points = gain_map(&record, None).unwrap();
     assert_eq!(points.len(), 4, "{points:?}");
     for (point, (amplitude, hz)) in points.iter().zip([(20.0, 2.0), (40.0, 2.0), (40.0, 7.3), (80.0, 7.3)]) {
@@ -139,7 +127,7 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
         })
         .collect();
     let y = through(&pi, &small);
-    let points = gain_map(&samples(PERIOD, small, y), None).unwrap();
+    let points = gain_map(&Samples::of_columns(PERIOD, small, y), None).unwrap();
     let steady = points.iter().max_by_key(|p| p.cycles).unwrap();
     assert!((steady.hz / 5.0 - 1.0).abs() < 2e-3 && (steady.amplitude - 4.0).abs() < 0.01, "{points:?}");
     assert!((steady.bias - 50.0).abs() < 0.05 && (steady.gain - 1.0).abs() < 1e-3, "{steady:?}");
@@ -147,10 +135,13 @@ fn gain_over_amplitude_is_that_of_the_play_operator() {
     let decaying: Vec<f64> =
         (0..4000).map(|k| 80.0 * (1.0 - k as f64 / 4000.0) * (TAU * 5.0 * k as f64 * PERIOD).sin()).collect();
     let y = through(&pi, &decaying);
-    let points = gain_map(&samples(PERIOD, decaying, y), None).unwrap();
+    let points = gain_map(&Samples::of_columns(PERIOD, decaying, y), None).unwrap();
     assert!(points.len() > 15 && points.iter().all(|p| p.cycles == 1), "{}", points.len());
     assert!(points.windows(2).filter(|p| p[1].gain < p[0].gain).count() > 14, "{points:?}");
-    assert!(matches!(gain_map(&samples(PERIOD, vec![0.0; 50], vec![0.0; 50]), None), Err(LinearError::NoSine { .. })));
+    assert!(matches!(
+        gain_map(&Samples::of_columns(PERIOD, vec![0.0; 50], vec![0.0; 50]), None),
+        Err(LinearError::NoSine { .. })
+    ));
 }
 
 #[test]
@@ -192,7 +183,7 @@ fn a_structure_is_identified_from_a_record_that_is_too_fast_for_it() {
         .map(|k| lines.iter().map(|(hz, phase)| (TAU * hz * k as f64 * period + phase).sin()).sum::<f64>())
         .collect();
     let y: Vec<f64> = through(&mode, &u).iter().map(|y| y + 0.2 * normal(&mut rng)).collect();
-    let found = identify_structure(&samples(period, u, y), &StructureOptions::default()).unwrap();
+    let found = identify_structure(&Samples::of_columns(period, u, y), &StructureOptions::default()).unwrap();
     assert!((55.0..70.0).contains(&found.band_hz) && found.factor > 15, "{} {}", found.band_hz, found.factor);
     let near = found.modes.iter().min_by(|a, b| (a.hz - 35.0).abs().total_cmp(&(b.hz - 35.0).abs())).unwrap();
     assert!((near.hz / 35.0 - 1.0).abs() < 0.01 && (near.damping / 0.03 - 1.0).abs() < 0.1, "{near:?}");

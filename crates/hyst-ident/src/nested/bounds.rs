@@ -35,7 +35,7 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
 const INSIDE: f64 = 0.9;
 const GAIN_INSIDE: f64 = 0.99;
 
-/// Damping ratio up to which a mode rings: it is seen at its own frequency then, however much too small a coarse base takes the motion there.
+/// Damping ratio below which a mode rings: it is seen at its own frequency then, however much too small a coarse base takes the motion there.
 const RINGS: f64 = 0.1;
 
 /// Whether the search for a slew limit, a delay, a lag, a drag or the gain of a mode that does not ring has run up against its upper bound.
@@ -128,17 +128,8 @@ mod tests {
     /// Rows of a millisecond, the drive from 0 to 1, the output from 100 to 110.
     fn samples(rows: usize) -> Samples {
         let share = |k: usize| k as f64 / (rows - 1) as f64;
-        Samples {
-            period: 1e-3,
-            time: (0..rows).map(|k| k as f64 * 1e-3).collect(),
-            input: (0..rows).map(share).collect(),
-            output: (0..rows).map(|k| 100.0 + 10.0 * share(k)).collect(),
-            temperature: None,
-            load: None,
-            segments: std::iter::once(0..rows).collect(),
-            file_of_segment: vec![0],
-            settling: vec![false; rows],
-        }
+        let output = (0..rows).map(|k| 100.0 + 10.0 * share(k)).collect();
+        Samples::of_columns(1e-3, (0..rows).map(share).collect(), output)
     }
 
     #[test]

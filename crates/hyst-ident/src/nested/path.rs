@@ -177,15 +177,10 @@ mod tests {
         let rows = 500;
         let signal = |c: usize| (0..rows).map(|k| (0.05 * (c + 1) as f64 * k as f64).sin()).collect::<Vec<f64>>();
         let samples = Samples {
-            period: 1e-3,
-            time: (0..rows).map(|k| k as f64 * 1e-3).collect(),
-            input: signal(0),
-            output: signal(1),
             temperature: Some((0..rows).map(|k| 23.0 + 0.01 * k as f64).collect()),
-            load: None,
             segments: vec![0..1, 1..200, 200..rows],
             file_of_segment: vec![0, 0, 0],
-            settling: vec![false; rows],
+            ..Samples::of_columns(1e-3, signal(0), signal(1))
         };
         let mode = |hz| ResonanceParams { hz, damping: 0.05, gain: 0.8 };
         let h = Hypothesis::of(Effects {

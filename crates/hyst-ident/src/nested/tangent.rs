@@ -84,17 +84,9 @@ mod tests {
         let time: Vec<f64> = (0..rows).map(|k| f64::from(k) * 1e-3).collect();
         let input: Vec<f64> = time.iter().map(|t| 10.0 * t * (1.0 - (15.0 * t).cos())).collect();
         let output = input.iter().map(|u| 0.1 * u - 0.4 * (0.1 * u).sin()).collect();
-        let whole = 0..input.len();
         Samples {
-            period: 1e-3,
-            settling: vec![false; input.len()],
             temperature: Some(time.iter().map(|t| 23.0 + t).collect()),
-            load: None,
-            segments: Vec::from([whole]),
-            file_of_segment: vec![0],
-            time,
-            input,
-            output,
+            ..Samples::of_columns(1e-3, input, output)
         }
     }
 

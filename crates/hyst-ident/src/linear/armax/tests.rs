@@ -14,21 +14,6 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-fn samples(period: f64, input: Vec<f64>, output: Vec<f64>) -> Samples {
-    let rows = input.len();
-    Samples {
-        period,
-        time: (0..rows).map(|k| k as f64 * period).collect(),
-        input,
-        output,
-        temperature: None,
-        load: None,
-        segments: std::iter::once(0..rows).collect(),
-        file_of_segment: vec![0],
-        settling: vec![false; rows],
-    }
-}
-
 /// A sum of three modes driven by a band-limited random voltage that is linear between rows; noise of the sensor in
 /// percent of the output's deviation.
 fn structure(rate: f64, rows: usize, noise_percent: f64, delay: usize) -> Samples {
@@ -61,7 +46,7 @@ fn structure(rate: f64, rows: usize, noise_percent: f64, delay: usize) -> Sample
     let mean = clean.iter().sum::<f64>() / rows as f64;
     let deviation = (clean.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / rows as f64).sqrt();
     let y = clean.iter().map(|y| y + 0.01 * noise_percent * deviation * normal(&mut rng)).collect();
-    samples(1.0 / rate, u, y)
+    Samples::of_columns(1.0 / rate, u, y)
 }
 
 fn assert_modes(model: &Armax) {
@@ -106,7 +91,7 @@ fn standard_errors_are_the_scatter_of_repeated_fits() {
         .map(|seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let output = clean.output.iter().map(|y| y + 2.0 * normal(&mut rng)).collect();
-            let record = samples(clean.period, clean.input.clone(), output);
+            let record = Samples::of_columns(clean.period, clean.input.clone(), output);
             fit_armax(&record, &ArmaxOptions { order: 6, delay: Delay::Rows(0) }).unwrap().modes().unwrap()[0]
         })
         .collect();
@@ -157,7 +142,7 @@ fn coloured_disturbance_goes_into_c_and_not_into_the_modes() {
     for t in 2..rows {
         y[t] = -a[0] * y[t - 1] - a[1] * y[t - 2] + b[1] * u[t - 1] + b[2] * u[t - 2] + e[t] + c[0] * e[t - 1];
     }
-    let model = fit_armax(&samples(0.01, u, y), &ArmaxOptions { order: 2, delay: Delay::Rows(0) }).unwrap();
+    let model = fit_armax(&Samples::of_columns(0.01, u, y), &ArmaxOptions { order: 2, delay: Delay::Rows(0) }).unwrap();
     let near = |found: &[f64], wanted: &[f64], by: f64| found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < by);
     assert!(near(&model.a, &a, 0.01) && near(&model.b, &b, 0.01) && near(&model.c, &c, 0.03), "{model:?}");
     assert!((model.noise / 0.3 - 1.0).abs() < 0.02, "{model:?}");
@@ -172,7 +157,7 @@ fn what_cannot_be_fitted_is_told() {
     let fit = |record: &Samples, order| fit_armax(record, &ArmaxOptions { order, delay: Delay::Rows(0) });
     assert!(matches!(fit(&record, 0), Err(LinearError::Field { field: "order", .. })));
     assert!(matches!(fit(&record, 12), Err(LinearError::TooShort { needed: 380, found: 300, .. })));
-    let still = samples(1e-3, vec![3.0; 300], record.output.clone());
+    let still = Samples::of_columns(1e-3, vec![3.0; 300], record.output.clone());
     assert!(matches!(fit(&still, 2), Err(LinearError::Constant { column: "input" })));
     let model = fit(&record, 2).unwrap();
     assert!(matches!(model.simulate(&Samples { period: 2e-3, ..record }), Err(LinearError::Field { .. })));
