@@ -213,7 +213,7 @@ pub(super) fn further(
 fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let h = &best.fit.hypothesis;
     let wanders_alone = beyond(h, already) == [Cause::ZeroWanders] && h.effects.drift.is_none();
-    if !wanders_alone || !goes_smoothly(judge.problem, &best.fit) {
+    if !wanders_alone || !goes_smoothly(&judge.problem.wandered_zero(&best.fit)) {
         return Ok(None);
     }
     let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
@@ -222,20 +222,15 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
 }
 
-/// Whether a zero that wanders makes no large part of its way at once; over a gap between segments it may make more.
-fn goes_smoothly(problem: &Problem<'_>, fit: &Fitted) -> bool {
-    let heights = &fit.solution.as_slice()[problem.zero_heights(&fit.hypothesis)];
-    let steps = heights.len().saturating_sub(1);
-    if steps < 2 {
-        return true;
-    }
-    let way: f64 = heights.windows(2).map(|h| (h[1] - h[0]).abs()).sum();
-    let last = problem.samples.len().saturating_sub(1);
-    let at = |j: usize| problem.samples.time[j * last / steps];
-    let usual = 2.0 * (at(steps) - at(0)) / steps as f64;
-    (0..steps - 1).all(|j| {
-        let longer = ((at(j + 2) - at(j)) / usual).max(1.0);
-        (heights[j + 2] - heights[j]).abs() <= MOST_STEP * longer * way
+/// Whether a zero that wanders through these times and heights makes no large part of its way at once; over a gap between segments it may make
+/// more.
+fn goes_smoothly(zero: &[(f64, f64)]) -> bool {
+    let [first, _, .., last] = zero else { return true };
+    let way: f64 = zero.windows(2).map(|z| (z[1].1 - z[0].1).abs()).sum();
+    let usual = 2.0 * (last.0 - first.0) / (zero.len() - 1) as f64;
+    zero.windows(3).all(|z| {
+        let longer = ((z[2].0 - z[0].0) / usual).max(1.0);
+        (z[2].1 - z[0].1).abs() <= MOST_STEP * longer * way
     })
 }
 
@@ -352,6 +347,38 @@ mod tests {
     use super::*;
     use crate::model::Effects;
     use hyst_core::{LagParams, ResonanceParams};
+
+    /// A zero at these times, of these heights.
+    fn zero(times: impl Iterator<Item = f64>, height: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        times.map(|t| (t, height(t))).collect()
+    }
+
+    #[test]
+    fn a_zero_that_settles_goes_smoothly_and_one_that_slips_does_not() {
+        let evenly = || (0..17).map(|k| 2.0 * f64::from(k));
+        assert!(goes_smoothly(&zero(evenly(), |t| 0.1 * t)));
+        assert!(goes_smoothly(&zero(evenly(), |t| 1.0 - (-t / 20.0).exp())));
+        let slips = |t: f64| [9.0, 17.0, 25.0].into_iter().filter(|at| t > *at).count() as f64;
+        assert!(!goes_smoothly(&zero(evenly(), slips)));
+    }
+
+    #[test]
+    fn over_a_pause_a_zero_may_go_further() {
+        let paused = || (0..17).map(|k| 2.0 * f64::from(k) + if k > 8 { 60.0 } else { 0.0 });
+        assert!(goes_smoothly(&zero(paused(), |t| 0.1 * t)));
+        assert!(!goes_smoothly(&zero((0..17).map(|k| 2.0 * f64::from(k)), |t| if t > 16.0 {
+            0.1 * t + 6.0
+        } else {
+            0.1 * t
+        })));
+    }
+
+    #[test]
+    fn what_has_hardly_a_height_goes_smoothly() {
+        assert!(goes_smoothly(&[]));
+        assert!(goes_smoothly(&[(0.0, 1.0)]));
+        assert!(goes_smoothly(&[(0.0, 1.0), (2.0, 9.0)]));
+    }
 
     #[test]
     fn of_two_modes_one_may_have_been_there() {

@@ -116,9 +116,11 @@ impl<'a> Problem<'a> {
         Self { unpredictable: OnceLock::from(other.unpredictable().to_vec()), ..self }
     }
 
-    /// Which unknowns are the heights of a zero that wanders, evenly over the record's rows.
-    pub(crate) fn zero_heights(&self, h: &Hypothesis) -> std::ops::Range<usize> {
-        self.layout(h).zero_hats
+    /// Where a zero that wanders goes: times \[s\], evenly over the record's rows, and heights \[y\].
+    pub(crate) fn wandered_zero(&self, fit: &Fitted) -> Vec<(f64, f64)> {
+        let heights = &fit.solution.as_slice()[self.layout(&fit.hypothesis).zero_hats];
+        let (steps, last) = (heights.len().saturating_sub(1).max(1), self.samples.len().saturating_sub(1));
+        heights.iter().enumerate().map(|(j, height)| (self.samples.time[j * last / steps], *height)).collect()
     }
 
     fn unpredictable(&self) -> &[bool] {
