@@ -124,7 +124,12 @@ fn effects() -> Vec<(&'static str, Effects)> {
         resonances: [Some(mode(1.5)), Some(mode(4.5))],
         saturation: Some(SaturationParams { low: 1.5, high: 2.5, knee: 3.5 }),
         drift: Some(DriftParams { per_second: 1.5 }),
-        interference: Some(InterferenceParams { hz: 1.5, amplitude: 2.5, phase: 3.5 }),
+        interference: Some(InterferenceParams {
+            hz: 1.5,
+            amplitude: 2.5,
+            phase: 3.5,
+            harmonics: [4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 10.5, 11.5],
+        }),
     };
     // Taken apart by name: a stage that is added has to be added here.
     let Effects { delay, lag, asymmetry, temperature, creep, load, resonances, saturation, drift, interference } =
@@ -220,7 +225,7 @@ fn a_block_of_an_older_version_is_refused_by_its_number() {
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
     let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
     assert_eq!(error, BlockError::Version { version: 1 });
-    assert!(error.to_string().contains("block version 1, this build reads 2: export the model anew"), "{error}");
+    assert!(error.to_string().contains("block version 1, this build reads 3: export the model anew"), "{error}");
 }
 
 /// The head of a block as `hyst_core::read_block` documents it.

@@ -268,7 +268,9 @@ mod tests {
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
             .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01 }))
-            .and_then(|c| c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3 }))
+            .and_then(|c| {
+                c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3, harmonics: [0.01; 8] })
+            })
             .unwrap()
     }
 

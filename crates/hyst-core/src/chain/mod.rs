@@ -23,7 +23,7 @@ pub use creep::{Creep, CreepInverse, CreepInverseState, CreepParams, CreepSideBy
 pub use delay::{Delay, DelayParams, DelayState};
 pub use drift::{Drift, DriftParams};
 pub(crate) use first_order::FirstOrder;
-pub use interference::{Interference, InterferenceParams};
+pub use interference::{HARMONIC_PARTS, Interference, InterferenceParams};
 pub use lag::{Lag, LagParams, LagState};
 pub use load::{Load, LoadParams};
 pub use preview::{Preview, PreviewState};

@@ -14,8 +14,9 @@ use super::ChainParams;
 
 /// Version of the blocks that this version of the library writes and reads.
 ///
-/// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays.
-pub const BLOCK_VERSION: u8 = 2;
+/// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays. 3: the rate stage behind the lag, what settles
+/// behind the rate of a drift, harmonics behind the phase of a tone.
+pub const BLOCK_VERSION: u8 = 3;
 
 /// A list of at most `N` numbers without heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;

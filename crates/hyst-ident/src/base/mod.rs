@@ -5,6 +5,7 @@ mod fixed;
 mod pi;
 mod preisach;
 mod screening;
+mod travel;
 
 pub(crate) use drag::{Drag, DragParams};
 pub(crate) use fixed::FixedBasis;
@@ -40,6 +41,11 @@ pub(crate) trait Basis: Sync {
     /// Whether there is a drag: a rate-dependent form of the operator.
     fn drags(&self) -> bool {
         true
+    }
+    /// Whether a half turn of the drive about its middle turns the output about its middle, whatever the weights: such a base cannot bend
+    /// one end of a loop, and an asymmetry is an effect that it lacks. Any other base bends by its own weights.
+    fn is_odd(&self) -> bool {
+        false
     }
     /// Bounds of the weights.
     fn bounds(&self) -> Vec<Bounds>;

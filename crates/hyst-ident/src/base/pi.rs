@@ -85,6 +85,10 @@ impl Basis for PiBasis {
         identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect()
     }
 
+    fn is_odd(&self) -> bool {
+        true
+    }
+
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.thresholds.len() + 1];
         bounds[0] = Bounds::above(self.floor);

@@ -2,8 +2,10 @@
 //!
 //! Every Preisach operator is `∫ ψ_r(play_r(u)) dr` with one curve ψ_r per threshold; a
 //! Prandtl-Ishlinskii operator is the case of straight lines. Here ψ_r is a polynomial of degree 3:
-//! enough that what is left of a fit is not the base's own shape, which would otherwise be taken for
-//! an effect. An operator that is kept as it is stands beside them: it may ring, lag or follow the temperature by itself.
+//! enough that the residual of a fit is not the base's own shape, which would otherwise be taken for
+//! an effect. A bank that relaxes with the travel of the drive ([`travel`](super::travel)) is added for hysteresis that is no superposition of
+//! relays: an effect is named only for what no rate-independent memory takes as well. An operator that is not refitted is a further column:
+//! it may ring, lag or follow the temperature by itself.
 
 use std::ops::Range;
 
@@ -11,17 +13,19 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::pi::plays;
+use super::travel::TravelBank;
 use super::{BESIDE, Basis, Drag, FixedBasis, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
 
-/// Plays with quadratic and cubic curves.
+/// Plays with quadratic and cubic curves, and a bank that relaxes with travel.
 #[derive(Clone, Debug)]
 pub(crate) struct ScreeningBasis {
     linear: PiBasis,
     curved: Vec<f64>,
     middle: f64,
     half: f64,
+    travel: TravelBank,
     drags: bool,
     kept: Option<Box<FixedBasis>>,
 }
@@ -34,11 +38,16 @@ impl ScreeningBasis {
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();
-        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), drags, kept }
+        let travel = TravelBank::new(low, high);
+        Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), travel, drags, kept }
     }
-}
 
-impl ScreeningBasis {
+    /// Columns of the plays, and where those of the bank end.
+    fn ends(&self) -> (usize, usize) {
+        let plays = self.linear.len() + 2 * self.curved.len();
+        (plays, plays + self.travel.len())
+    }
+
     /// Square and cubic of a play's output, zero at its zero.
     #[inline]
     fn curves(&self, p: f64) -> [f64; 2] {
@@ -51,9 +60,9 @@ impl ScreeningBasis {
 
 impl Basis for ScreeningBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
-        let (curved, kept) = (self.linear.len(), self.linear.len() + 2 * self.curved.len());
+        let (curved, (played, kept)) = (self.linear.len(), self.ends());
         let mut columns = self.linear.columns(of.start.min(curved)..of.end.min(curved), drive, segments, drag);
-        let of_curved = of.start.max(curved).min(kept)..of.end.max(curved).min(kept);
+        let of_curved = of.start.max(curved).min(played)..of.end.max(curved).min(played);
         // A square and a cubic of each play.
         let first = (of_curved.start - curved) / 2;
         let thresholds = &self.curved[first..(of_curved.end - curved).div_ceil(2).max(first)];
@@ -64,6 +73,8 @@ impl Basis for ScreeningBasis {
             let (p, which) = (plays[(c - curved) / 2 - first].iter(), (c - curved) % 2);
             p.map(|p| self.curves(*p)[which]).collect()
         }));
+        let of_travel = of.start.max(played).min(kept) - played..of.end.max(played).min(kept) - played;
+        columns.extend(self.travel.columns(of_travel, drive, segments));
         if let Some(own) = self.kept.as_ref().filter(|_| of.end > kept) {
             // In volts like the others, whatever its unit: one penalty is for all.
             let size = |column: &[f64]| column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
@@ -82,7 +93,8 @@ impl Basis for ScreeningBasis {
         if self.kept.is_some() {
             return None;
         }
-        let (straight, bent) = weights.split_at(self.linear.len());
+        let (of_plays, of_travel) = weights.split_at(self.ends().0);
+        let (straight, bent) = of_plays.split_at(self.linear.len());
         let curves: Vec<(f64, [f64; 2])> =
             self.curved.iter().copied().zip(bent.chunks(2).map(|w| [w[0], w[1]])).collect();
         // Of each threshold its line; the identity has the threshold 0 and no drag.
@@ -107,6 +119,8 @@ impl Basis for ScreeningBasis {
         let mut v = vec![0.0; drive.len()];
         add(&mut v, drive, straight[0], bend(0.0));
         parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
+        let relaxed = self.travel.columns(0..self.travel.len(), drive, segments);
+        relaxed.iter().zip(of_travel).for_each(|(e, w)| v.iter_mut().zip(e).for_each(|(v, e)| *v += w * e));
         Some(v)
     }
 
@@ -115,7 +129,7 @@ impl Basis for ScreeningBasis {
     }
 
     fn bounds(&self) -> Vec<Bounds> {
-        vec![Bounds::FREE; self.linear.len() + 2 * self.curved.len() + usize::from(self.kept.is_some())]
+        vec![Bounds::FREE; self.ends().1 + usize::from(self.kept.is_some())]
     }
 
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {

@@ -173,6 +173,18 @@ impl Own<'_> {
         errs_less(&|_| true) || errs_less(&|k| !after.settling[k])
     }
 
+    /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does
+    /// worse there is not handed out.
+    pub(super) fn transfers(&self, start: &Hypothesis, found: &Hypothesis) -> Result<bool, FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
+        // A wandering is no part of the model.
+        let model_of = |h: &Hypothesis| Hypothesis { zero_wanders: false, gain_wanders: false, ..h.clone() };
+        let solved = |h: &Hypothesis| problem.fit_linear(&model_of(h)).map_err(|e| self.stage(e));
+        let (Some(before), Some(after)) = (solved(start)?, solved(found)?) else { return Ok(true) };
+        Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))
+    }
+
     /// The record with what an amplifier makes of its drive that follows no steeper slope than this \[V/s\].
     pub(super) fn amplified(&self, v_per_s: f64) -> Record {
         let mut drive = self.train.input().to_vec();

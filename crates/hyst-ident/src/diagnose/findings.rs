@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::{AsymmetryParams, ViscousPiParams};
+use hyst_core::{AsymmetryParams, InterferenceParams, ViscousPiParams};
 use serde::{Deserialize, Serialize};
 
 use super::search::Named;
@@ -307,14 +307,28 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         }
         Effect::Interference => {
             let p = e.interference?;
+            let also: Vec<String> = harmonics(&p)
+                .map(|(order, amplitude)| {
+                    format!("{} {} at {:.1} Hz", short(amplitude), symbol(m), f64::from(order) * p.hz)
+                })
+                .collect();
+            let also = if also.is_empty() { String::new() } else { format!(", with harmonics of {}", also.join(", ")) };
             format!(
-                "a tone of {} {} at {:.3} Hz stands in the sensor, whatever the drive",
+                "the sensor shows a tone of {} {} at {:.3} Hz{also}, whatever the drive",
                 short(p.amplitude),
                 symbol(m),
                 p.hz
             )
         }
     })
+}
+
+/// Orders and amplitudes \[y\] of the harmonics that a tone has.
+fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
+    (2..)
+        .zip(tone.harmonics.chunks_exact(2))
+        .map(|(order, parts)| (order, parts[0].hypot(parts[1])))
+        .filter(|(_, a)| *a > 0.0)
 }
 
 /// The longest time for which the drive stands still \[s\]; the longest segment where it never does.
@@ -403,6 +417,9 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             put("interference", "hz", p.hz, "Hz");
             put("interference", "amplitude", p.amplitude, y);
             put("interference", "phase", p.phase, "rad");
+            for (order, amplitude) in harmonics(p) {
+                put("interference", &format!("harmonic_{order}"), amplitude, y);
+            }
         }),
     }
     list

@@ -175,7 +175,8 @@ pub fn diagnose(
         let Some(better) = better else { break };
         basis = Some(better);
     }
-    if only_loop.is_none() {
+    // A base that is not odd bends by its own weights: what a curve behind it took would be its misfit.
+    if only_loop.is_none() && own.as_ref().is_odd() {
         progress("asking whether the model's own base lacks a curve");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         let (curve, behind) = asked.shape(&mut hypothesis, &mut errors, richest, found.noise, options.seed)?;
@@ -201,8 +202,9 @@ pub fn diagnose(
         amplified = Some((simulate(model, &record, options.zero)?, simulate(&extended, &record, options.zero)?));
     }
     let (without, with) = amplified.as_ref().map_or((&before, &after), |(without, with)| (without, with));
-    if !found.named.is_empty() && !asked.is_helped(without, with) {
-        // What the rich base shows drowns in what this one misses.
+    let helps = || Ok::<_, FitError>(asked.is_helped(without, with) && asked.transfers(&start, &hypothesis)?);
+    if !found.named.is_empty() && !helps()? {
+        // What the rich base shows is hidden by what this one misses.
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, after, amplified) = (model.clone(), before.clone(), None);
         let Hypothesis { slew_limit, zero_wanders, gain_wanders, .. } = hypothesis;

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::trial::Trial;
+use super::uncertainty::undetermined;
 use super::{starts, visible};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
@@ -256,16 +257,20 @@ pub(super) fn beyond(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
     names
 }
 
-/// Drops the effect that is needed least, if there is one that is not needed.
+/// Drops the effect that is needed least, if there is one that is not needed or whose law the record does not determine.
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = beyond(&best.fit.hypothesis, already);
+    let loose = undetermined(&best.fit);
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.without(best, *e, already)).collect();
     let mut least: Option<Trial> = None;
-    for trial in reduced {
+    for (cause, trial) in names.iter().zip(reduced) {
         // Without one effect another may be driven to nonsense: then the first one is needed.
         let Some(trial) = trial?.filter(|t| score::sensible(judge.problem, t)) else { continue };
-        if !judge.judge(&trial, best).accepted() && least.as_ref().is_none_or(|l| trial.total() < l.total()) {
+        let is_loose = cause.effect().is_some_and(|effect| loose.contains(&effect));
+        if (is_loose || !judge.judge(&trial, best).accepted())
+            && least.as_ref().is_none_or(|l| trial.total() < l.total())
+        {
             least = Some(trial);
         }
     }

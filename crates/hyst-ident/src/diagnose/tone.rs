@@ -34,8 +34,7 @@ pub(super) fn stands_alone(problem: &Problem<'_>, with: &Trial) -> bool {
         return false;
     };
     let samples = problem.samples;
-    let turn = |t: f64| (std::f64::consts::TAU * (tone.hz * t).fract() + tone.phase).sin();
-    let wave: Vec<f64> = samples.time.iter().map(|t| tone.amplitude * turn(*t)).collect();
+    let wave: Vec<f64> = samples.time.iter().map(|t| tone.at(*t)).collect();
     let power: f64 = wave.iter().map(|w| w * w).sum();
     is_there_throughout(&left, &wave)
         && stands_out(samples, &left, tone.hz, power)

@@ -8,6 +8,37 @@ use crate::lsq::Gram;
 use crate::model::Effect;
 use crate::nested::{Fitted, Layout};
 
+/// Standard errors by which a parameter has to differ from the value at which its effect vanishes.
+const MIN_STD_ERRORS: f64 = 2.0;
+
+/// Effects whose law this record does not determine: a parameter that cannot be told from the value at which its effect is absent (or, for
+/// the damping of a mode, from zero) says nothing, however much lower the error is with it.
+pub(super) fn undetermined(fit: &Fitted) -> Vec<Effect> {
+    let errors = standard_errors(fit, 0.0);
+    let e = &fit.hypothesis.effects;
+    // A parameter at a bound has no error: the bounds are judged elsewhere.
+    let unsure = |key: &str, value: f64| errors.get(key).is_some_and(|error| value.abs() < MIN_STD_ERRORS * error);
+    let modes = e.resonances.iter().zip(["resonance", "resonance_2"]);
+    let mut loose_mode = modes.map(|(mode, stage)| {
+        [("hz", mode.hz), ("damping", mode.damping), ("gain", mode.gain)]
+            .into_iter()
+            .any(|(name, value)| unsure(&format!("{stage}.{name}"), value))
+    });
+    let mut of = |effect: Effect| match effect {
+        Effect::Delay => e.delay.is_some_and(|p| unsure("delay.seconds", p.seconds)),
+        Effect::Lag => e.lag.is_some_and(|p| unsure("lag.seconds", p.seconds)),
+        Effect::Temperature => e.temperature.is_some_and(|p| unsure("temperature.per_kelvin", p.per_kelvin)),
+        Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
+        Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
+        Effect::Resonance => loose_mode.any(|loose| loose),
+        Effect::Drift => e.drift.is_some_and(|p| unsure("drift.per_second", p.per_second)),
+        Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
+        // A stop acts or does not; a curve and a drag have several parameters of which one may be idle.
+        Effect::Saturation | Effect::Asymmetry | Effect::RateDependence => false,
+    };
+    Effect::ALL.into_iter().filter(|effect| of(*effect)).collect()
+}
+
 /// Standard error of every effect's parameters, by `stage.parameter`.
 ///
 /// Jackknife over blocks: each block b is left out of the normal equations once, and the solution moves by

@@ -72,7 +72,10 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
             "y = u but within knee (high - low) of low and high, where it nears them as k + (L - k) tanh((u - k) / (L - k))",
         ],
         "drift" => &["y = u + per_second t, t the lab's clock"],
-        "interference" => &["y = u + amplitude sin(2 pi hz t + phase), t the lab's clock"],
+        "interference" => &[
+            "y = u + amplitude sin(2 pi hz t + phase) + sum of a_k sin(2 pi k hz t) + b_k cos(2 pi k hz t), k = 2 to 5, t the lab's clock",
+            "harmonics: a_2, b_2, a_3, b_3, a_4, b_4, a_5, b_5",
+        ],
         _ => &[],
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hyst_core::Error;
+use hyst_core::{Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
@@ -254,8 +254,10 @@ impl Problem<'_> {
         }
         if let Some(tone) = &h.effects.interference {
             let angle = |t: &f64| 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
-            columns.push(s.time.iter().map(|t| angle(t).sin()).collect());
-            columns.push(s.time.iter().map(|t| angle(t).cos()).collect());
+            for order in (1..=1 + HARMONIC_PARTS / 2).map(|order| order as f64) {
+                columns.push(s.time.iter().map(|t| (order * angle(t)).sin()).collect());
+                columns.push(s.time.iter().map(|t| (order * angle(t)).cos()).collect());
+            }
         }
         columns
     }

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::Fitted;
+use crate::Samples;
 use crate::lsq::{Blocks, Gram, solve_near};
 
 /// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
@@ -15,6 +16,20 @@ pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>
         .map(|f| (0..n).filter(|b| fold(*b) == f).collect())
         .filter(|f: &Vec<usize>| !f.is_empty())
         .collect()
+}
+
+/// Whole experiments left out, one fold each: the segments of a record, or `parts` stretches of one that has a single segment. What helps
+/// only where it was fitted does not transfer.
+pub(crate) fn folds_by_experiment(blocks: &Blocks, samples: &Samples, parts: usize) -> Vec<Vec<usize>> {
+    let n = blocks.rows.len();
+    let experiment = |b: usize| match samples.segments.len() {
+        0 | 1 => b * parts / n.max(1),
+        _ => samples.segments.iter().position(|s| s.contains(&blocks.rows[b].start)).unwrap_or(0),
+    };
+    let mut folds: Vec<Vec<usize>> = vec![Vec::new(); samples.segments.len().max(parts)];
+    (0..n).for_each(|b| folds[experiment(b)].push(b));
+    folds.retain(|fold| !fold.is_empty());
+    folds
 }
 
 /// Mean variance of a block's prediction by the other folds, in variances of a row, beyond which they say nothing about it.

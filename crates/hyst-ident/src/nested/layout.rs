@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use hyst_core::HARMONIC_PARTS;
+
 use super::Hypothesis;
 
 /// Hats of a wandering over a record.
@@ -13,7 +15,7 @@ pub(crate) struct Layout {
     pub(crate) weights: Range<usize>,
     pub(crate) zeros: Range<usize>,
     pub(crate) drift: Range<usize>,
-    /// Sine and cosine.
+    /// Sine and cosine, then those of the harmonics.
     pub(crate) tone: Range<usize>,
     pub(crate) load: Range<usize>,
     /// Dead zones of the asymmetry.
@@ -35,7 +37,7 @@ impl Layout {
             weights: next(weights),
             zeros: next(zeros),
             drift: next(some(e.drift.is_some(), 1)),
-            tone: next(some(e.interference.is_some(), 2)),
+            tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
             zones: next(e.asymmetry.as_ref().map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),

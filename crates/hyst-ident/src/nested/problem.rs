@@ -2,14 +2,14 @@
 
 use std::sync::OnceLock;
 
-use hyst_core::Error;
+use hyst_core::{Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::assembly::{Assembly, Point};
 use super::bounds::{box_of, stepped};
 use super::columns::{may_be_kept, passes};
-use super::cross_validation::{cross_validate, folds_interleaved, unpredictable};
+use super::cross_validation::{cross_validate, folds_by_experiment, folds_interleaved, unpredictable};
 use super::{Cause, Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
@@ -42,6 +42,13 @@ pub(crate) struct Problem<'a> {
 
 /// Folds of the cross-validation.
 const FOLDS: usize = 8;
+/// Stretches of a record that has a single segment, each left out once where whole experiments are.
+const STRETCHES: usize = 4;
+
+/// Highest frequency of a harmonic, in sample rates.
+const HIGHEST_TONE: f64 = 0.475;
+/// Standard deviations of white noise that both parts of a harmonic together have to exceed.
+const MIN_HARMONIC: f64 = 4.0;
 
 /// A fit that has converged.
 #[derive(Clone)]
@@ -129,13 +136,26 @@ impl<'a> Problem<'a> {
         }
         // The same for all that are compared: what moves the base depends little on the effects. Found outside of the cell: a thread that
         // waits for others in here may come by again with another job.
-        let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
-        let folds = folds_interleaved(self.blocks, FOLDS);
-        let found = base.map_or_else(
-            || vec![false; self.blocks.rows.len()],
-            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), &folds),
-        );
+        let found = self.unpredictable_in(&folds_interleaved(self.blocks, FOLDS));
         self.unpredictable.get_or_init(|| found)
+    }
+
+    /// Blocks that move the base where no block of another fold does.
+    fn unpredictable_in(&self, folds: &[Vec<usize>]) -> Vec<bool> {
+        let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
+        base.map_or_else(
+            || vec![false; self.blocks.rows.len()],
+            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), folds),
+        )
+    }
+
+    /// Σ residual² of the whole record, each experiment predicted by a fit to the others, for two fits of this problem. `None` if the
+    /// equations cannot be solved, or if nothing is predictable.
+    pub(crate) fn transferred(&self, fits: [&Fitted; 2]) -> Option<[f64; 2]> {
+        let folds = folds_by_experiment(self.blocks, self.samples, STRETCHES);
+        let unpredictable = self.unpredictable_in(&folds);
+        let [first, second] = fits.map(|fit| cross_validate(fit, &folds, &unpredictable));
+        Some([first?.iter().sum(), second?.iter().sum()])
     }
 
     /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
@@ -153,12 +173,22 @@ impl<'a> Problem<'a> {
         bounds.resize(layout.len(), Bounds::FREE);
         // A curve that falls would have no inverse.
         bounds[layout.zones].fill(Bounds::above(-0.9));
+        if let Some(tone) = &h.effects.interference {
+            // What lies beyond half the sample rate would appear as another tone.
+            for (i, bound) in bounds[layout.tone.clone()].iter_mut().enumerate() {
+                let order = 1 + i / 2;
+                if order > 1 && order as f64 * tone.hz > HIGHEST_TONE / self.samples.period {
+                    *bound = Bounds::fixed(0.0);
+                }
+            }
+        }
         if self.holds {
             let e = &h.effects;
             let load = e.load.iter().map(|p| p.per_newton);
             let drift = e.drift.iter().map(|p| p.per_second);
-            let tone =
-                e.interference.iter().flat_map(|p| [p.phase.cos(), p.phase.sin()].map(|part| p.amplitude * part));
+            let tone = e.interference.iter().flat_map(|p| {
+                [p.phase.cos(), p.phase.sin()].map(|part| p.amplitude * part).into_iter().chain(p.harmonics)
+            });
             let held = [
                 (layout.load, load.collect::<Vec<f64>>()),
                 (layout.drift, drift.collect()),
@@ -206,13 +236,17 @@ impl<'a> Problem<'a> {
             };
             if cause == Cause::Effect(Effect::Interference) {
                 let first = self.layout(h).tone.start;
-                let (sine, cosine) = (solution[first], solution[first + 1]);
+                let parts = &solution.as_slice()[first..first + 2 + HARMONIC_PARTS];
                 let tone = h.effects.interference.unwrap_or_default();
                 let slope = |t: f64| {
                     let angle = 2.0 * std::f64::consts::PI * (tone.hz * t).fract();
-                    2.0 * std::f64::consts::PI
-                        * (t - self.samples.time[0])
-                        * (sine * angle.cos() - cosine * angle.sin())
+                    let of = |(i, parts): (usize, &[f64])| {
+                        let order = (i + 1) as f64;
+                        let (sine, cosine) = (order * angle).sin_cos();
+                        order * (parts[0] * cosine - parts[1] * sine)
+                    };
+                    let turned: f64 = parts.chunks_exact(2).enumerate().map(of).sum();
+                    2.0 * std::f64::consts::PI * (t - self.samples.time[0]) * turned
                 };
                 return Ok(self.thinned(|k| slope(self.samples.time[k])));
             }
@@ -335,6 +369,13 @@ impl<'a> Problem<'a> {
             let (sine, cosine) = (z[layout.tone.start], z[layout.tone.start + 1]);
             tone.amplitude = sine.hypot(cosine);
             tone.phase = cosine.atan2(sine);
+            // A harmonic that noise alone could make is none.
+            let rows = at.total.rows.max(1) as f64;
+            let least = MIN_HARMONIC * (2.0 * at.total.error(&at.solution)).sqrt() / rows;
+            let parts = &z[layout.tone.start + 2..layout.tone.end];
+            for (kept, found) in tone.harmonics.chunks_exact_mut(2).zip(parts.chunks_exact(2)) {
+                kept.copy_from_slice(if found[0].hypot(found[1]) < least { &[0.0; 2] } else { found });
+            }
         }
         if let Some(load) = &mut h.effects.load {
             load.per_newton = z[layout.load.start];

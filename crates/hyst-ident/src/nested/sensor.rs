@@ -12,7 +12,7 @@ pub(crate) fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Sa
             *y -= drift.per_second * t;
         }
         if let Some(tone) = effects.interference {
-            *y -= tone.amplitude * (2.0 * std::f64::consts::PI * (tone.hz * t).fract() + tone.phase).sin();
+            *y -= tone.at(*t);
         }
     }
     motion
@@ -77,7 +77,7 @@ mod tests {
         let found = Hypothesis::of(Effects {
             load: Some(LoadParams { per_newton: 0.25 }),
             drift: Some(DriftParams { per_second: 0.06 }),
-            interference: Some(InterferenceParams { hz: 20.0, amplitude: 0.17, phase: 0.5 }),
+            interference: Some(InterferenceParams { hz: 20.0, amplitude: 0.17, phase: 0.5, ..Default::default() }),
             ..Effects::default()
         });
         let solved = solved.fit_linear(&found).unwrap().unwrap().hypothesis.effects;

@@ -148,7 +148,7 @@ models! {
     inverse: refused(IN_THE_SENSOR),
     needs: [time],
 
-    /// Tone in the sensor ``y = u + amplitude·sin(2π·hz·t + phase)`` on the lab's clock.
+    /// Tone in the sensor ``y = u + amplitude·sin(2π·hz·t + phase)`` on the lab's clock, without harmonics.
     class Interference {
         /// Frequency [Hz].
         hz: f64,
@@ -157,7 +157,7 @@ models! {
         /// Phase at t = 0 [rad].
         phase: f64 = 0.0,
     }
-    params: |p| Ok(InterferenceParams { hz: p.hz, amplitude: p.amplitude, phase: p.phase }),
+    params: |p| Ok(InterferenceParams { hz: p.hz, amplitude: p.amplitude, phase: p.phase, ..Default::default() }),
     stage: hyst_core::Interference<f64>,
     inverse: refused(IN_THE_SENSOR),
     needs: [time],

@@ -31,7 +31,12 @@ pub(crate) const GAINS: PidParams = PidParams {
     high: 120.0,
 };
 pub(crate) const DRIFT: DriftParams = DriftParams { per_second: 0.01 };
-pub(crate) const MAINS: InterferenceParams = InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3 };
+pub(crate) const MAINS: InterferenceParams = InterferenceParams {
+    hz: 50.0,
+    amplitude: 0.05,
+    phase: 0.3,
+    harmonics: [0.0, 0.0, 0.015, -0.005, 0.0, 0.0, 0.004, 0.0],
+};
 pub(crate) const OPTIONS: CompensatorOptions = CompensatorOptions { bandwidth_hz: None };
 
 pub(crate) fn pi<T: Real, const N: usize>() -> Result<Pi<T, N>, Error> {

@@ -283,7 +283,7 @@ fn drift_and_tone_show_on_the_clock() {
     level(&mean[1], NOISE);
     along(&mean[0], &mean[2], NOISE);
 
-    let interference = Some(InterferenceParams { hz: 49.9, amplitude: 0.05, phase: 1.0 });
+    let interference = Some(InterferenceParams { hz: 49.9, amplitude: 0.05, phase: 1.0, ..Default::default() });
     let found =
         evidence(&actuator(Base::Pi(pi()), Effects { interference, ..Effects::default() }), Effect::Interference);
     let spectrum = curves(&found, Effect::Interference, "Spectrum of the residual");

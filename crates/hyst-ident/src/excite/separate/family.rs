@@ -101,7 +101,8 @@ impl Family {
                 (column(ramp.clone()) * DRIFT, linear(vec![ramp]))
             }
             Effect::Interference => {
-                let tone = InterferenceParams { hz: typical.tone_hz, amplitude: TONE, phase: 0.7 };
+                let tone =
+                    InterferenceParams { hz: typical.tone_hz, amplitude: TONE, phase: 0.7, ..Default::default() };
                 let mark = rig.added(0.0, &Effects { interference: Some(tone), ..Effects::default() });
                 // What it can imitate depends on the frequencies of the other's mark.
                 (mark.unwrap_or_else(|| DVector::zeros(rig.rows())), Vec::new())
