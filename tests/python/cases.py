@@ -180,6 +180,8 @@ case("delay", "Delay", dict(seconds=3.4e-3, period=PERIOD), SWING, lambda u: lin
 case("delay of nothing", "Delay", dict(seconds=0.0, period=PERIOD), SWING, lambda u: u, inverse={})
 case("lag", "Lag", dict(seconds=4e-3, period=PERIOD), SWING + 5, lambda u: linear.lag(u, 4e-3, PERIOD),
      inverse=dict(bandwidth_hz=40.0), finds="band")  # fmt: skip
+case("rate", "Rate", dict(volts=1.5, exponent=0.4, reference_rate=100.0, period=PERIOD), SWING + 5,
+     lambda u: linear.rate(u, 1.5, 0.4, 100.0, PERIOD))  # fmt: skip
 case(
     "creep", "Creep", dict(seconds=TAU, shares=SHARES, period=PERIOD), SWING + 5,
     lambda u: linear.creep(u, TAU, SHARES, PERIOD), inverse={},
@@ -196,6 +198,10 @@ case(
 )  # fmt: skip
 TIME = 17.0 + PERIOD * np.arange(N)
 case("drift", "Drift", dict(per_second=0.02), SWING, lambda u: u + 0.02 * TIME, surroundings=dict(time=TIME))
+case(
+    "drift that settles", "Drift", dict(per_second=0.02, settling=0.7, seconds=0.8, since_s=17.0), SWING,
+    lambda u: u + 0.02 * TIME + 0.7 * (1 - np.exp(-(TIME - 17.0) / 0.8)), surroundings=dict(time=TIME),
+)  # fmt: skip
 case(
     "interference", "Interference", dict(hz=50.0, amplitude=0.3, phase=0.4), SWING,
     lambda u: u + 0.3 * np.sin(2 * np.pi * 50.0 * TIME + 0.4), surroundings=dict(time=TIME),

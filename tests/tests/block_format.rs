@@ -17,7 +17,7 @@ use hyst_core::{
     ActivationParams, AsymmetryParams, BLOCK_VERSION, BlockError, BoucWenOscillatorParams, BoucWenParams, ChainParams,
     CreepParams, Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
     InterferenceParams, Kind, LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams,
-    PiParams, PreisachParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams, TdPiParams,
+    PiParams, PreisachParams, RateParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams, TdPiParams,
     TemperatureParams, ViscousPiParams, read_block, write_block,
 };
 use hyst_tests::root;
@@ -117,13 +117,14 @@ fn effects() -> Vec<(&'static str, Effects)> {
     let all = Effects {
         delay: Some(DelayParams { seconds: 1.5 }),
         lag: Some(LagParams { seconds: 2.5 }),
+        rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, holds: true }),
         asymmetry: Some(AsymmetryParams { thresholds: vec![1.5, 2.5], weights: vec![3.5, 4.5] }),
         temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5 }),
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),
         load: Some(LoadParams { per_newton: 1.5 }),
         resonances: [Some(mode(1.5)), Some(mode(4.5))],
         saturation: Some(SaturationParams { low: 1.5, high: 2.5, knee: 3.5 }),
-        drift: Some(DriftParams { per_second: 1.5 }),
+        drift: Some(DriftParams { per_second: 1.5, settling: 2.5, seconds: 3.5, since_s: 4.5 }),
         interference: Some(InterferenceParams {
             hz: 1.5,
             amplitude: 2.5,
@@ -132,11 +133,12 @@ fn effects() -> Vec<(&'static str, Effects)> {
         }),
     };
     // Taken apart by name: a stage that is added has to be added here.
-    let Effects { delay, lag, asymmetry, temperature, creep, load, resonances, saturation, drift, interference } =
+    let Effects { delay, lag, rate, asymmetry, temperature, creep, load, resonances, saturation, drift, interference } =
         all.clone();
     vec![
         ("delay", Effects { delay, ..none() }),
         ("lag", Effects { lag, ..none() }),
+        ("rate", Effects { rate, ..none() }),
         ("asymmetry", Effects { asymmetry, ..none() }),
         ("temperature", Effects { temperature, ..none() }),
         ("creep", Effects { creep, ..none() }),

@@ -163,7 +163,7 @@ impl Task {
 
 /// What a model has found in the sensor, not in the motion: drift and tone \[output unit\].
 fn in_the_sensor(model: &Model, time_s: f64) -> f64 {
-    let drift = model.effects.drift.map_or(0.0, |d| d.per_second * time_s);
+    let drift = model.effects.drift.map_or(0.0, |drift| drift.at(time_s));
     let tone = model.effects.interference.map_or(0.0, |tone| tone.at(time_s));
     drift + tone
 }

@@ -3,7 +3,7 @@
 //! An actuator is a chain of named stages,
 //!
 //! ```text
-//! u [V] → delay → lag → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift → +interference → y
+//! u [V] → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift → +interference → y
 //! ```
 //!
 //! and every stage but the hysteresis is *identity plus a correction*: leave it out and the chain is

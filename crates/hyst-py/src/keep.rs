@@ -3,8 +3,8 @@
 use hyst_core::{
     ActivationKind, ActivationParams, AsymmetryParams, BoucWenClassicParams, BoucWenOscillatorParams, BoucWenParams,
     CreepParams, DelayParams, DpmParams, DriftParams, GpiParams, IfmParams, InterferenceParams, LagParams, LfdmParams,
-    LoadParams, MaxwellSlipParams, PiParams, PreisachParams, ResonanceParams, SaturationParams, TdEmParams, TdPiParams,
-    TemperatureParams, ViscousPiParams,
+    LoadParams, MaxwellSlipParams, PiParams, PreisachParams, RateParams, ResonanceParams, SaturationParams, TdEmParams,
+    TdPiParams, TemperatureParams, ViscousPiParams,
 };
 use hyst_ident::model::{Base, Effects};
 
@@ -87,6 +87,7 @@ macro_rules! stages {
 stages! {
     DelayParams => delay: Some,
     LagParams => lag: Some,
+    RateParams => rate: Some,
     AsymmetryParams<Vec<f64>> => asymmetry: Some,
     TemperatureParams => temperature: Some,
     CreepParams<Vec<f64>> => creep: Some,

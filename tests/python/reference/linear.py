@@ -24,6 +24,16 @@ def lag(u, seconds, period):
     return settled([[-1 / seconds]], [1 / seconds], [1.0], 0.0, u, period)
 
 
+def rate(u, volts, exponent, reference_rate, period):
+    over = volts * (np.abs(np.diff(u, prepend=u[0])) / (reference_rate * period)) ** exponent
+    out = np.empty_like(u)
+    last = u[0]
+    for k in range(len(u)):
+        last = max(u[k] - over[k], min(u[k] + over[k], last))
+        out[k] = last
+    return out
+
+
 def creep(u, seconds, shares, period):
     tau = np.asarray(seconds, dtype=float)
     return settled(np.diag(-1 / tau), 1 / tau, shares, 1.0, u, period)

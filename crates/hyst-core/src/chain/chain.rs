@@ -3,9 +3,9 @@
 use crate::stage::{hold, rest};
 use crate::{
     Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift,
-    DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Real,
-    Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams, Stage, Temperature,
-    TemperatureParams,
+    DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Rate,
+    RateParams, RateState, Real, Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams,
+    Stage, Temperature, TemperatureParams,
 };
 
 /// Structural modes that one chain can hold.
@@ -14,7 +14,7 @@ pub const MAX_RESONANCES: usize = 2;
 /// Dead zones that the asymmetry of one chain can hold.
 pub const MAX_DEAD_ZONES: usize = 8;
 
-/// `u → delay → lag → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
+/// `u → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
 /// +interference → + zero → y`, every stage but the hysteresis optional.
 ///
 /// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
@@ -24,6 +24,8 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub delay: Option<Delay<T, D>>,
     /// Lag of the amplifier.
     pub lag: Option<Lag<T>>,
+    /// Loops that widen with the rate of the drive.
+    pub rate: Option<Rate<T>>,
     /// The memory operator.
     pub hysteresis: H,
     /// Curve behind the memory operator.
@@ -54,6 +56,7 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     load: T,
     delay: DelayState<T, D>,
     lag: LagState<T>,
+    rate: RateState<T>,
     hysteresis: S,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],
@@ -65,6 +68,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Self {
             delay: None,
             lag: None,
+            rate: None,
             hysteresis,
             asymmetry: None,
             temperature: None,
@@ -93,6 +97,15 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// As [`LagParams::build`].
     pub fn with_lag(mut self, p: &LagParams, cx: &Sampling) -> Result<Self, Error> {
         self.lag = Some(p.build(cx)?);
+        Ok(self)
+    }
+
+    /// Adds a dependence on the rate of the drive.
+    ///
+    /// # Errors
+    /// As [`RateParams::build`].
+    pub fn with_rate(mut self, p: &RateParams, cx: &Sampling) -> Result<Self, Error> {
+        self.rate = Some(p.build(cx)?);
         Ok(self)
     }
 
@@ -200,6 +213,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
             load: T::ZERO,
             delay: DelayState::new(),
             lag: LagState::default(),
+            rate: RateState::default(),
             hysteresis: self.hysteresis.state(),
             creep: CreepState::new(),
             resonances: [ResonanceState::default(); MAX_RESONANCES],
@@ -214,6 +228,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let u0 = rest(&mut s.input, u0);
         let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
+        x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.reset(&mut (), e, x));
@@ -235,6 +250,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let u = hold(&mut s.input, u);
         let mut x = through(&self.delay, u, |g, x| g.step(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
+        x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.step(&mut (), e, x));
@@ -261,13 +277,17 @@ mod tests {
             .with_zero(-1.5)
             .with_delay(&DelayParams { seconds: 2.3e-3 }, &cx)
             .and_then(|c| c.with_lag(&LagParams { seconds: 2e-3 }, &cx))
+            .and_then(|c| {
+                let rate = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, holds: true };
+                c.with_rate(&rate, &cx)
+            })
             .and_then(|c| c.with_temperature(&TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0 }))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [3.0, -2.0], weights: [0.1, -0.05] }))
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
-            .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01 }))
+            .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 }))
             .and_then(|c| {
                 c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3, harmonics: [0.01; 8] })
             })

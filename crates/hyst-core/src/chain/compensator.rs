@@ -4,7 +4,7 @@ use super::preview::{Preview, PreviewState};
 use crate::stage::{hold, rest};
 use crate::{
     AsymmetryInverse, Build, Chain, Complex, CreepInverse, CreepInverseState, Delay, DelayParams, DelayState, Env,
-    Error, Invert, Load, MAX_DEAD_ZONES, Real, Sampling, SaturationInverse, Stage, Temperature,
+    Error, Invert, Load, MAX_DEAD_ZONES, RateInverse, RateState, Real, Sampling, SaturationInverse, Stage, Temperature,
 };
 
 /// How the dynamic stages are inverted.
@@ -18,9 +18,9 @@ pub struct CompensatorOptions {
 
 /// The inverse chain, stage by stage from the output back to the input:
 ///
-/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹ → (lag, delay)⁻¹ → u`.
+/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
 ///
-/// All but resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached). Resonances, lag and delay are inverted in
+/// All but rate, resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached); of the rate see [`RateInverse`]. Resonances, lag and delay are inverted in
 /// a band with [`lead`](Self::lead) samples of preview; [`error`](Self::error) states how well. Drift
 /// and interference are in the sensor, not in the motion: the drive does not follow them.
 ///
@@ -36,6 +36,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     temperature: Option<Temperature<T>>,
     asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     hysteresis: HI,
+    rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
     /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
     whole_samples: usize,
@@ -59,6 +60,7 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     creep: CreepInverseState<T, C>,
     temperature: DelayState<T, N>,
     hysteresis: S,
+    rate: RateState<T>,
     input_side: PreviewState<T, N>,
 }
 
@@ -147,6 +149,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             hysteresis_lead: hysteresis.lead,
             hysteresis_band: hysteresis.band,
             hysteresis: hysteresis.inverse,
+            rate: self.rate.as_ref().map(Invert::invert).transpose()?,
             input_side,
             sample_rate: 1.0 / h,
         })
@@ -209,6 +212,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             creep: CreepInverseState::new(),
             temperature: DelayState::new(),
             hysteresis: self.hysteresis.state(),
+            rate: RateState::default(),
             input_side: PreviewState::new(),
         }
     }
@@ -240,6 +244,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = asymmetry.reset(&mut (), e, x);
         }
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
+        if let Some(rate) = &self.rate {
+            x = rate.reset(&mut s.rate, e, x);
+        }
         if let Some(filter) = &self.input_side {
             filter.reset(&mut s.input_side, e, x);
         }
@@ -277,6 +284,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = asymmetry.step(&mut (), e, x);
         }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        if let Some(rate) = &self.rate {
+            x = rate.step(&mut s.rate, e, x);
+        }
         match &self.input_side {
             Some(filter) => filter.step(&mut s.input_side, e, x),
             None => x,

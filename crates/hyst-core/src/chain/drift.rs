@@ -1,22 +1,40 @@
-//! Drift of the sensor: `y = v + ρ t` on the lab's clock.
+//! Drift of the sensor: `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))` on the lab's clock.
 
-use crate::error::coefficient;
+use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
-/// Parameters of `y = v + ρ t`, t the lab's clock. Zero is no drift.
+/// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab's clock; before t₀ nothing has settled yet. ρ = A = 0 is no drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 pub struct DriftParams {
     /// Rate ρ \[output unit per s\].
     pub per_second: f64,
+    /// Height A that is settled in the end \[output unit\].
+    pub settling: f64,
+    /// Time constant τ of the settling \[s\]; zero where nothing settles.
+    pub seconds: f64,
+    /// Instant t₀ on the clock \[s\]; a convention, not identified.
+    pub since_s: f64,
+}
+
+impl DriftParams {
+    /// What the drift adds at an instant of the lab's clock \[output unit\].
+    pub fn at(&self, time_s: f64) -> f64 {
+        self.per_second * time_s + self.settling * self.settled(time_s)
+    }
+
+    /// Share of the settling that is over at an instant of the lab's clock.
+    pub fn settled(&self, time_s: f64) -> f64 {
+        if self.seconds > 0.0 { -libm::expm1(-((time_s - self.since_s) / self.seconds).at_least(0.0)) } else { 0.0 }
+    }
 }
 
 impl Params for DriftParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
-        f(
-            &Meta { name: "per_second", unit: "y/s", lower: f64::NEG_INFINITY, upper: f64::INFINITY },
-            &mut self.per_second,
-        );
+        const INF: f64 = f64::INFINITY;
+        f(&Meta { name: "per_second", unit: "y/s", lower: -INF, upper: INF }, &mut self.per_second);
+        f(&Meta { name: "settling", unit: "y", lower: -INF, upper: INF }, &mut self.settling);
+        f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: INF }, &mut self.seconds);
     }
 }
 
@@ -24,12 +42,35 @@ impl Params for DriftParams {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift<T> {
     per_second: T,
+    settling: T,
+    /// 1/τ; zero where nothing settles.
+    rate: T,
+    since: T,
 }
 
 impl<T: Real> Build<Drift<T>> for DriftParams {
     type Context = ();
     fn build(&self, (): &()) -> Result<Drift<T>, Error> {
-        Ok(Drift { per_second: coefficient("drift.per_second", self.per_second)? })
+        within("drift.seconds", self.seconds, self.seconds >= 0.0, "zero or positive")?;
+        let rate = if self.seconds > 0.0 { 1.0 / self.seconds } else { 0.0 };
+        Ok(Drift {
+            per_second: coefficient("drift.per_second", self.per_second)?,
+            settling: coefficient("drift.settling", self.settling)?,
+            rate: coefficient("drift.seconds", rate)?,
+            since: coefficient("drift.since_s", self.since_s)?,
+        })
+    }
+}
+
+impl<T: Real> Drift<T> {
+    #[inline]
+    fn at(&self, env: &Env<T>) -> T {
+        let line = self.per_second * env.time;
+        if self.settling == T::ZERO {
+            return line;
+        }
+        let passed = ((env.time - self.since) * self.rate).at_least(T::ZERO);
+        line - self.settling * (-passed).exp_m1()
     }
 }
 
@@ -38,10 +79,34 @@ impl<T: Real> Stage<T> for Drift<T> {
     fn state(&self) {}
     #[inline]
     fn reset(&self, (): &mut (), env: &Env<T>, u0: T) -> T {
-        u0 + self.per_second * env.time
+        u0 + self.at(env)
     }
     #[inline]
     fn step(&self, (): &mut (), env: &Env<T>, u: T) -> T {
-        u + self.per_second * env.time
+        u + self.at(env)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_settles_begins_at_its_instant_and_ends_at_its_height() {
+        let p = DriftParams { per_second: 0.01, settling: 0.5, seconds: 20.0, since_s: 1000.0 };
+        let stage: Drift<f64> = p.build(&()).unwrap();
+        let at = |time: f64| stage.step(&mut (), &Env { time, ..Env::default() }, 2.0) - 2.0;
+        for (time, share) in [(0.0, 0.0), (1000.0, 0.0), (1020.0, 1.0 - libm::exp(-1.0)), (9000.0, 1.0)] {
+            assert!((at(time) - 0.01 * time - 0.5 * share).abs() < 1e-9, "{time}");
+            assert!((at(time) - p.at(time)).abs() < 1e-12, "{time}");
+        }
+    }
+
+    #[test]
+    fn a_line_alone_settles_nothing() {
+        let stage: Drift<f32> = DriftParams { per_second: 0.5, ..DriftParams::default() }.build(&()).unwrap();
+        assert_eq!(stage.step(&mut (), &Env { time: 4.0, ..Env::default() }, 1.0), 3.0);
+        let refused: Result<Drift<f64>, _> = DriftParams { seconds: -1.0, ..DriftParams::default() }.build(&());
+        assert!(matches!(refused, Err(Error::OutOfRange { name: "drift.seconds", .. })));
     }
 }

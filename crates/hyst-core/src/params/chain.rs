@@ -3,7 +3,7 @@
 use super::OperatorParams;
 use crate::{
     AsymmetryParams, Chain, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams,
-    MAX_RESONANCES, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams,
+    MAX_RESONANCES, RateParams, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams,
 };
 
 /// The optional stages of a chain, in its order. `L` is any list of numbers.
@@ -14,6 +14,8 @@ pub struct EffectParams<L> {
     pub delay: Option<DelayParams>,
     /// Lag of the amplifier.
     pub lag: Option<LagParams>,
+    /// Loops that widen with the rate of the drive.
+    pub rate: Option<RateParams>,
     /// Curve behind the hysteresis.
     pub asymmetry: Option<AsymmetryParams<L>>,
     /// Gain over temperature.
@@ -48,6 +50,9 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
         }
         if let Some(p) = &self.lag {
             chain = chain.with_lag(p, cx)?;
+        }
+        if let Some(p) = &self.rate {
+            chain = chain.with_rate(p, cx)?;
         }
         if let Some(p) = &self.asymmetry {
             chain = chain.with_asymmetry(p)?;

@@ -48,7 +48,7 @@ impl TravelBank {
             // An element is at most 1/rate away from zero.
             match read_out {
                 0 => {}
-                1 => column.iter_mut().for_each(|e| *e *= rate * *e),
+                1 => column.iter_mut().for_each(|e| *e = rate * *e * *e),
                 _ => column.iter_mut().zip(drive).for_each(|(e, u)| *e *= x(*u)),
             }
             column

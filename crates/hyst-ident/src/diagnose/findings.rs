@@ -267,6 +267,15 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                 "the curve behind the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
             )
         }
+        Effect::RateDependence if e.rate.is_some() => {
+            let p = e.rate?;
+            format!(
+                "loops widen with the rate to the power of {:.2}: at {} {input}/s the hysteresis sees the drive {} {input} late",
+                p.exponent,
+                short(p.reference_rate),
+                short(p.volts)
+            )
+        }
         Effect::RateDependence => match rate_dependence(m.extended) {
             Some(p) if p.volt_seconds > 0.0 => format!(
                 "loops widen with the rate: at 100 {input}/s a sliding play is {:.3} {input} behind",
@@ -298,11 +307,23 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             format!("a mode rings at {:.1} Hz with damping ratio {:.4}", r.hz, r.damping)
         }
         Effect::Drift => {
-            let seconds = m.samples.time.last()? - m.samples.time.first()?;
+            let (first, last) = (*m.samples.time.first()?, *m.samples.time.last()?);
+            let p = e.drift?;
+            let settles = if p.seconds > 0.0 {
+                format!(
+                    ", {} {} of it settles with a time constant of {} s",
+                    signed(p.settling),
+                    symbol(m),
+                    short(p.seconds)
+                )
+            } else {
+                String::new()
+            };
             format!(
-                "the zero moves by {} {} over the record's {seconds:.0} s",
-                signed(e.drift?.per_second * seconds),
-                symbol(m)
+                "the zero moves by {} {} over the {:.0} s of the record{settles}",
+                signed(p.at(last) - p.at(first)),
+                symbol(m),
+                last - first
             )
         }
         Effect::Interference => {
@@ -382,6 +403,11 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
                 put("asymmetry", &format!("weights[{i}]"), *c, "1");
             }
         }),
+        Effect::RateDependence if e.rate.is_some() => e.rate.iter().for_each(|p| {
+            put("rate-dependence", "volts", p.volts, input);
+            put("rate-dependence", "exponent", p.exponent, "1");
+            put("rate-dependence", "reference_rate", p.reference_rate, &format!("{input}/s"));
+        }),
         Effect::RateDependence => rate_dependence(m.extended).iter().for_each(|p| {
             put("rate-dependence", "seconds", p.seconds, "s");
             put("rate-dependence", "volt_seconds", p.volt_seconds, &format!("{input} s"));
@@ -412,7 +438,13 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
                 put(stage, "gain", p.gain, "1");
             }
         }
-        Effect::Drift => e.drift.iter().for_each(|p| put("drift", "per_second", p.per_second, &format!("{y}/s"))),
+        Effect::Drift => e.drift.iter().for_each(|p| {
+            put("drift", "per_second", p.per_second, &format!("{y}/s"));
+            if p.seconds > 0.0 {
+                put("drift", "settling", p.settling, y);
+                put("drift", "seconds", p.seconds, "s");
+            }
+        }),
         Effect::Interference => e.interference.iter().for_each(|p| {
             put("interference", "hz", p.hz, "Hz");
             put("interference", "amplitude", p.amplitude, y);

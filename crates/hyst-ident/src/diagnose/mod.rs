@@ -272,12 +272,10 @@ fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
     match cause {
         Cause::Effect(Effect::Temperature) => varies(&problem.samples.temperature, 0.5),
         Cause::Effect(Effect::Load) => varies(&problem.samples.load, 0.0),
-        Cause::Effect(Effect::RateDependence) => problem.basis.drags() && problem.only_loop.is_none(),
         // What changes one loop's shape may as well be a hysteresis of that shape. That the output turns after the drive does is none:
         // of what is late, the simplest stands for all.
-        Cause::Effect(Effect::Resonance | Effect::Saturation | Effect::Asymmetry) | Cause::SlewLimit => {
-            problem.only_loop.is_none()
-        }
+        Cause::Effect(Effect::RateDependence | Effect::Resonance | Effect::Saturation | Effect::Asymmetry)
+        | Cause::SlewLimit => problem.only_loop.is_none(),
         _ => true,
     }
 }

@@ -143,6 +143,7 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
     !ends_at_a_bound(&trial.fit.hypothesis, samples)
         && e.delay.is_none_or(|p| time(p.seconds))
         && e.lag.is_none_or(|p| time(p.seconds))
+        && e.rate.is_none_or(|p| p.volts > 0.0)
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
         && e.saturation.is_none_or(|p| stops_something(samples, trial, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)

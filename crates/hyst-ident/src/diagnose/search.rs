@@ -70,10 +70,16 @@ impl Judge<'_> {
     fn trials(&self, from: &Fitted, cause: Cause) -> Result<Option<Trial>, Error> {
         let starts = starts::starts(self.problem, from, cause)?;
         let trials: Vec<Result<Option<Trial>, Error>> = starts.par_iter().map(|start| self.refit(start)).collect();
+        let mut fitted: Vec<Trial> = trials.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
+        fitted.sort_by_key(|trial| trial.fit.solution.len());
         let mut best: Option<Trial> = None;
-        for trial in trials {
-            let Some(trial) = trial? else { continue };
-            if best.as_ref().is_none_or(|b| trial.total() < b.total()) {
+        for trial in fitted {
+            let better = best.as_ref().is_none_or(|best| {
+                let is_simple = trial.fit.solution.len() == best.fit.solution.len();
+                trial.total() < best.total() && (is_simple || score::clearly_better(best, &trial, self.seed))
+            });
+            if better {
                 best = Some(trial);
             }
         }
@@ -293,8 +299,7 @@ fn swaps(
         let one_loop = judge.problem.only_loop.is_some() && is_late(cause);
         if one_loop {
             let also = [Effect::RateDependence, Effect::Resonance].map(Cause::Effect);
-            let drags = |c: &Cause| *c != Cause::Effect(Effect::RateDependence) || judge.problem.basis.drags();
-            others.extend(also.into_iter().filter(|c| without.fit.hypothesis.has_room(*c) && drags(c)));
+            others.extend(also.into_iter().filter(|c| without.fit.hypothesis.has_room(*c)));
         }
         others.retain(|c| *c != cause);
         let trials: Vec<Result<Option<Trial>, Error>> =

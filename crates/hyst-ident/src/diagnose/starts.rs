@@ -4,8 +4,8 @@
 //! the whole band first, by how much of the residual a first-order change would take.
 
 use hyst_core::{
-    DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, ResonanceParams, SaturationParams,
-    TemperatureParams,
+    DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, RateParams, ResonanceParams,
+    SaturationParams, TemperatureParams,
 };
 
 use super::spectrum::{peaks, tone};
@@ -53,7 +53,16 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
             let (low, high) = samples.input_range();
             let linear = DragParams { seconds: samples.period, volt_seconds: 0.0 };
             let root = DragParams { seconds: 0.0, volt_seconds: 1e-3 * (high - low) * samples.period };
-            [linear, root].map(|drag| also(&|h| h.drag = Some(drag))).into()
+            let mut starts: Vec<Hypothesis> = [linear, root].map(|drag| also(&|h| h.drag = Some(drag))).into();
+            if !problem.basis.drags() {
+                starts.clear();
+            }
+            // And one on the whole drive, for any base: the range in a second is the reference rate.
+            starts.extend([true, false].map(|holds| {
+                let rate = RateParams { volts: 0.01 * (high - low), exponent: 0.5, reference_rate: high - low, holds };
+                with(&|e| e.rate = Some(rate))
+            }));
+            starts
         }
         // It is looked for on the user's base.
         Effect::Asymmetry => Vec::new(),
@@ -68,7 +77,14 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         }
         // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
         Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
-        Effect::Drift => vec![with(&|e| e.drift = Some(DriftParams { per_second: 0.0 }))],
+        Effect::Drift => {
+            // A line; and one that settles, in a quarter of the record or faster.
+            let since_s = samples.time[0];
+            let whole = samples.time[samples.len() - 1] - since_s;
+            let times = [0.0, 0.25 * whole, 0.06 * whole];
+            let drift = |seconds: f64| DriftParams { seconds, since_s, ..DriftParams::default() };
+            times.map(|seconds| with(&|e| e.drift = Some(drift(seconds)))).into()
+        }
         Effect::Interference => {
             let residual = problem.residual(from)?;
             let found = tone(samples, &residual);

@@ -31,10 +31,14 @@ pub(super) fn undetermined(fit: &Fitted) -> Vec<Effect> {
         Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
         Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
         Effect::Resonance => loose_mode.any(|loose| loose),
-        Effect::Drift => e.drift.is_some_and(|p| unsure("drift.per_second", p.per_second)),
+        // One that settles need not go on.
+        Effect::Drift => e.drift.is_some_and(|p| {
+            unsure("drift.per_second", p.per_second) && (p.seconds == 0.0 || unsure("drift.settling", p.settling))
+        }),
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
-        // A stop acts or does not; a curve and a drag have several parameters of which one may be idle.
-        Effect::Saturation | Effect::Asymmetry | Effect::RateDependence => false,
+        Effect::RateDependence => e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts)),
+        // A stop acts or does not; a curve has several parameters of which one may be idle.
+        Effect::Saturation | Effect::Asymmetry => false,
     };
     Effect::ALL.into_iter().filter(|effect| of(*effect)).collect()
 }
@@ -115,6 +119,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         }
     };
     put("drift.per_second".into(), layout.drift.clone().next());
+    put("drift.settling".into(), layout.drift.clone().nth(1));
     put("load.per_newton".into(), layout.load.clone().next());
     for (i, unknown) in layout.zones.clone().enumerate() {
         put(format!("asymmetry.weights[{i}]"), Some(unknown));

@@ -4,6 +4,9 @@
 pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
     match name {
         "delay" => &["y(t) = u(t - seconds)"],
+        "rate" => &[
+            "v = u - o sgn(du/dt), o = volts (|du/dt| / reference_rate)^exponent; holds: v = max(u - o, min(u + o, v))",
+        ],
         "lag" => &["seconds dy/dt + y = u"],
         "pi" => &[
             "y = gain u + sum over i of weights[i] play[i]",
@@ -71,7 +74,9 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "saturation" => &[
             "y = u but within knee (high - low) of low and high, where it nears them as k + (L - k) tanh((u - k) / (L - k))",
         ],
-        "drift" => &["y = u + per_second t, t the lab's clock"],
+        "drift" => &[
+            "y = u + per_second t + settling (1 - exp(-(t - since_s) / seconds)) from since_s on, t the lab's clock; seconds 0: none",
+        ],
         "interference" => &[
             "y = u + amplitude sin(2 pi hz t + phase) + sum of a_k sin(2 pi k hz t) + b_k cos(2 pi k hz t), k = 2 to 5, t the lab's clock",
             "harmonics: a_2, b_2, a_3, b_3, a_4, b_4, a_5, b_5",

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use hyst_core::{
     AsymmetryParams, CreepParams, DelayParams, DriftParams, EffectParams, InterferenceParams, LagParams, LoadParams,
-    MAX_RESONANCES, Meta, Params, ResonanceParams, SaturationParams, TemperatureParams,
+    MAX_RESONANCES, Meta, Params, RateParams, ResonanceParams, SaturationParams, TemperatureParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -113,6 +113,8 @@ pub struct Effects {
     pub delay: Option<DelayParams>,
     /// Lag.
     pub lag: Option<LagParams>,
+    /// Loops that widen with the rate of the drive, whatever the base; `pi` also has plays with drag.
+    pub rate: Option<RateParams>,
     /// Gain over temperature.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
@@ -152,6 +154,7 @@ impl Effects {
         push(self.delay.is_some(), Effect::Delay);
         push(self.lag.is_some(), Effect::Lag);
         push(self.asymmetry.is_some(), Effect::Asymmetry);
+        push(self.rate.is_some(), Effect::RateDependence);
         push(self.temperature.is_some(), Effect::Temperature);
         push(self.creep.is_some(), Effect::Creep);
         push(self.load.is_some(), Effect::Load);
@@ -170,6 +173,7 @@ impl Effects {
         EffectParams {
             delay: self.delay,
             lag: self.lag,
+            rate: self.rate,
             asymmetry: self.asymmetry.clone(),
             temperature: self.temperature,
             creep: self.creep.clone(),
@@ -199,8 +203,7 @@ impl Effects {
             Effect::Delay => less.delay = None,
             Effect::Lag => less.lag = None,
             Effect::Asymmetry => less.asymmetry = None,
-            // It is the base's.
-            Effect::RateDependence => {}
+            Effect::RateDependence => less.rate = None,
             Effect::Temperature => less.temperature = None,
             Effect::Creep => less.creep = None,
             Effect::Load => less.load = None,
@@ -215,12 +218,13 @@ impl Effects {
     }
 
     /// The stages that act before the hysteresis, in their order.
-    pub(crate) fn input_side(&self) -> (Option<DelayParams>, Option<LagParams>) {
-        (self.delay, self.lag)
+    pub(crate) fn input_side(&self) -> (Option<DelayParams>, Option<LagParams>, Option<RateParams>) {
+        (self.delay, self.lag, self.rate)
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// Drift, load, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are not among them.
+    /// The rate and the height of a drift, load, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are
+    /// not among them.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
             params.visit(&mut |meta, value| {
@@ -238,6 +242,9 @@ impl Effects {
         }
         if let Some(p) = &mut self.lag {
             pass(Effect::Lag, "", p, f);
+        }
+        if let Some(p) = &mut self.rate {
+            pass(Effect::RateDependence, "", p, f);
         }
         if let Some(p) = &mut self.temperature {
             pass(Effect::Temperature, "", p, f);
@@ -257,6 +264,13 @@ impl Effects {
         }
         if let Some(p) = &mut self.saturation {
             pass(Effect::Saturation, "", p, f);
+        }
+        if let Some(p) = self.drift.as_mut().filter(|p| p.seconds > 0.0) {
+            pass(Effect::Drift, "", p, &mut |parameter| {
+                if parameter.name == "seconds" {
+                    f(parameter);
+                }
+            });
         }
         if let Some(p) = &mut self.interference {
             pass(Effect::Interference, "", p, &mut |parameter| {

@@ -140,7 +140,8 @@ mod tests {
 
     #[test]
     fn the_output_range_is_that_of_rest_and_without_the_sensors_drift() {
-        let effects = Effects { drift: Some(DriftParams { per_second: 3.0 }), ..Effects::default() };
+        let effects =
+            Effects { drift: Some(DriftParams { per_second: 3.0, ..DriftParams::default() }), ..Effects::default() };
         let model = Model::from_parameters(pi(0.1), effects, &ends()).unwrap();
         assert_eq!((model.output.low, model.output.high), (-2.0 - 0.5, 12.0 + 5.5));
         assert_eq!((model.input.unit.as_str(), model.output.unit.as_str()), ("V", "um"));

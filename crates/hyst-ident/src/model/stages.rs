@@ -80,6 +80,9 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
     if let Some(p) = &mut e.lag {
         push("lag", "lag", value(p), p);
     }
+    if let Some(p) = &mut e.rate {
+        push("rate", "rate-dependence", value(p), p);
+    }
     match &mut model.base.clone() {
         Base::ViscousPi(p) => {
             push("pi", "pi", value(&p.pi), &mut p.pi);
@@ -196,6 +199,10 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
                 "rate-dependence" => only(&mut drag, name, value)?,
                 "delay" => only(&mut effects.delay, name, value)?,
                 "lag" => only(&mut effects.lag, name, value)?,
+                "rate" => {
+                    key = "rate-dependence";
+                    only(&mut effects.rate, name, value)?;
+                }
                 "asymmetry" => only(&mut effects.asymmetry, name, value)?,
                 "temperature" => only(&mut effects.temperature, name, value)?,
                 "creep" => only(&mut effects.creep, name, value)?,

@@ -31,6 +31,8 @@ fn unit(unit: &str, input: &str, output: &str) -> String {
 fn of_given(field: &str) -> Option<&'static str> {
     Some(match field {
         "reference_degc" => "degC",
+        "reference_rate" => "u/s",
+        "since_s" => "s",
         "per_metre" => "y/m",
         "cells" | "plays" | "rates" | "changes" => "",
         _ => return None,

@@ -249,8 +249,11 @@ impl Problem<'_> {
             let column = &mut columns[if self.zero_per_file { *file } else { 0 }];
             column[segment.clone()].fill(1.0);
         }
-        if h.effects.drift.is_some() {
+        if let Some(drift) = &h.effects.drift {
             columns.push(s.time.iter().map(|t| t - s.time[0]).collect());
+            if drift.seconds > 0.0 {
+                columns.push(s.time.iter().map(|t| drift.settled(*t)).collect());
+            }
         }
         if let Some(tone) = &h.effects.interference {
             let angle = |t: &f64| 2.0 * std::f64::consts::PI * (tone.hz * t).fract();

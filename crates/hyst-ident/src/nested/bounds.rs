@@ -5,6 +5,9 @@ use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::Effect;
 
+/// Largest overdrive at the reference rate, in ranges of the input: beyond it a loop is all rate and no hysteresis.
+const LARGEST_OVERDRIVE: f64 = 0.3;
+
 /// Bounds of a nonlinear parameter for this record.
 pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;
@@ -19,6 +22,15 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
         (Cause::Effect(Effect::Interference), true) => {
             Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist }
         }
+        (Cause::Effect(Effect::Drift), _) => {
+            // Faster is a creep of each step, slower a line.
+            let whole = samples.time.last().zip(samples.time.first()).map_or(0.0, |(last, first)| last - first);
+            Bounds { lower: 0.02 * whole, upper: 2.0 * whole }
+        }
+        (Cause::Effect(Effect::RateDependence), _) if p.name == "volts" => {
+            Bounds { lower: 0.0, upper: LARGEST_OVERDRIVE * range_of(samples) }
+        }
+        (Cause::Effect(Effect::RateDependence), _) if p.name == "exponent" => Bounds { lower: p.lower, upper: p.upper },
         (Cause::Effect(Effect::RateDependence), _) if p.name == "volt_seconds" => {
             Bounds { lower: 0.0, upper: range_of(samples) * 0.1 * samples.longest_segment() }
         }
@@ -44,6 +56,8 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     let mut dampings = h.effects.resonances.iter().map(|mode| mode.damping);
     h.clone().visit_nonlinear(&mut |p| {
         let inside = match p.cause {
+            // An exponent of one is a law like any other.
+            Cause::Effect(Effect::RateDependence) if p.name == "exponent" => return,
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence) | Cause::SlewLimit => INSIDE,
             Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
                 if dampings.next().is_some_and(|damping| damping < RINGS) {
@@ -98,6 +112,8 @@ pub(super) fn stepped(
                     (Effect::RateDependence, "volt_seconds") => {
                         1e-3 * (1e-4 * range_of(samples) * samples.period).max(*p.value)
                     }
+                    (Effect::RateDependence, "volts") => 1e-3 * (1e-3 * range_of(samples)).max(*p.value),
+                    (Effect::RateDependence, "exponent") => 1e-3,
                     (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                     (Effect::Resonance, "hz") => 1e-5 * *p.value,
                     (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,

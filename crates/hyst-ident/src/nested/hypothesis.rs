@@ -71,7 +71,7 @@ impl Hypothesis {
     /// Causes that are present, in the chain's order; a second mode counts once more.
     pub(crate) fn causes(&self) -> Vec<Cause> {
         let mut list: Vec<Effect> = self.effects.names();
-        if self.drag.is_some() {
+        if self.drag.is_some() && self.effects.rate.is_none() {
             list.push(Effect::RateDependence);
             list.sort();
         }
@@ -85,7 +85,7 @@ impl Hypothesis {
     /// Whether there is room for (another) one.
     pub(crate) fn has_room(&self, cause: Cause) -> bool {
         match cause {
-            Cause::Effect(Effect::RateDependence) => self.drag.is_none(),
+            Cause::Effect(Effect::RateDependence) => self.drag.is_none() && self.effects.rate.is_none(),
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
@@ -97,7 +97,7 @@ impl Hypothesis {
     pub(crate) fn without(&self, cause: Cause) -> Self {
         let mut less = self.clone();
         match cause {
-            Cause::Effect(Effect::RateDependence) => less.drag = None,
+            Cause::Effect(Effect::RateDependence) => (less.drag, less.effects.rate) = (None, None),
             Cause::Effect(e) => less.effects = self.effects.without(e),
             Cause::ZeroWanders => less.zero_wanders = false,
             Cause::GainWanders => less.gain_wanders = false,
@@ -108,7 +108,7 @@ impl Hypothesis {
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
     pub(super) fn changes_the_base(&self) -> bool {
-        self.effects.input_side() != (None, None) || self.drag.is_some() || self.slew_limit.is_some()
+        self.effects.input_side() != (None, None, None) || self.drag.is_some() || self.slew_limit.is_some()
     }
 
     /// Whether the hysteresis is driven, and follows, as in another set.

@@ -14,6 +14,7 @@ pub(crate) const HATS: usize = 32;
 pub(crate) struct Layout {
     pub(crate) weights: Range<usize>,
     pub(crate) zeros: Range<usize>,
+    /// A line, then what settles.
     pub(crate) drift: Range<usize>,
     /// Sine and cosine, then those of the harmonics.
     pub(crate) tone: Range<usize>,
@@ -36,7 +37,7 @@ impl Layout {
         Self {
             weights: next(weights),
             zeros: next(zeros),
-            drift: next(some(e.drift.is_some(), 1)),
+            drift: next(e.drift.map_or(0, |p| if p.seconds > 0.0 { 2 } else { 1 })),
             tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
             zones: next(e.asymmetry.as_ref().map_or(0, |a| a.thresholds.len())),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use hyst_core::{
-    Build, Creep, Delay, Env, Error, Invert, Lag, Resonance, Sampling, Saturation, SaturationInverse, Stage,
+    Build, Creep, Delay, Env, Error, Invert, Lag, Rate, Resonance, Sampling, Saturation, SaturationInverse, Stage,
 };
 
 use super::Hypothesis;
@@ -18,6 +18,7 @@ pub(crate) struct SignalPath<'a> {
     most: Option<f64>,
     delay: Option<Delay<f64, DELAY>>,
     lag: Option<Lag<f64>>,
+    rate: Option<Rate<f64>>,
     factor: Option<Vec<f64>>,
     creep: Option<Creep<f64, CREEP>>,
     resonances: Vec<Resonance<f64>>,
@@ -36,7 +37,7 @@ impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let cx = Sampling { period: samples.period };
         let effects = &h.effects;
-        let (delay, lag) = effects.input_side();
+        let (delay, lag, rate) = effects.input_side();
         let factor = match (&effects.temperature, &samples.temperature) {
             (Some(p), Some(t)) => Some(t.iter().map(|t| 1.0 + p.per_kelvin * (t - p.reference_degc)).collect()),
             _ => None,
@@ -50,6 +51,7 @@ impl<'a> SignalPath<'a> {
             most: h.slew_limit.map(|v_per_s| v_per_s * samples.period),
             delay: delay.map(|p| p.build(&cx)).transpose()?,
             lag: lag.map(|p| p.build(&cx)).transpose()?,
+            rate: rate.map(|p| p.build(&cx)).transpose()?,
             factor,
             creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
             resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
@@ -68,6 +70,9 @@ impl<'a> SignalPath<'a> {
         }
         if let Some(lag) = &self.lag {
             self.filter(lag, &mut [&mut drive]);
+        }
+        if let Some(rate) = &self.rate {
+            self.filter(rate, &mut [&mut drive]);
         }
         drive
     }

@@ -185,7 +185,7 @@ impl<'a> Problem<'a> {
         if self.holds {
             let e = &h.effects;
             let load = e.load.iter().map(|p| p.per_newton);
-            let drift = e.drift.iter().map(|p| p.per_second);
+            let drift = e.drift.iter().flat_map(|p| [p.per_second, p.settling]);
             let tone = e.interference.iter().flat_map(|p| {
                 [p.phase.cos(), p.phase.sin()].map(|part| p.amplitude * part).into_iter().chain(p.harmonics)
             });
@@ -234,6 +234,12 @@ impl<'a> Problem<'a> {
             else {
                 return Ok(vec![0.0; here.len()]);
             };
+            if cause == Cause::Effect(Effect::Drift) {
+                let drift = h.effects.drift.unwrap_or_default();
+                let height = solution[self.layout(h).drift.start + 1];
+                let passed = |k: usize| ((self.samples.time[k] - drift.since_s) / drift.seconds).max(0.0);
+                return Ok(self.thinned(|k| -height * passed(k) / drift.seconds * (-passed(k)).exp()));
+            }
             if cause == Cause::Effect(Effect::Interference) {
                 let first = self.layout(h).tone.start;
                 let parts = &solution.as_slice()[first..first + 2 + HARMONIC_PARTS];
@@ -362,6 +368,7 @@ impl<'a> Problem<'a> {
         let mut zeros = z[layout.zeros.clone()].to_vec();
         if let Some(drift) = &mut h.effects.drift {
             drift.per_second = z[layout.drift.start];
+            drift.settling = z[layout.drift.clone()].get(1).copied().unwrap_or(0.0);
             // The column started at the record's first instant, the stage's clock is the lab's.
             zeros.iter_mut().for_each(|x| *x -= z[layout.drift.start] * self.samples.time[0]);
         }

@@ -9,7 +9,7 @@ pub(crate) fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Sa
     let mut motion = samples.clone();
     for (y, t) in motion.output.iter_mut().zip(&samples.time) {
         if let Some(drift) = effects.drift {
-            *y -= drift.per_second * t;
+            *y -= drift.at(*t);
         }
         if let Some(tone) = effects.interference {
             *y -= tone.at(*t);
@@ -76,7 +76,7 @@ mod tests {
         let held = Problem::new(&samples, &basis, &blocks, false).holding();
         let found = Hypothesis::of(Effects {
             load: Some(LoadParams { per_newton: 0.25 }),
-            drift: Some(DriftParams { per_second: 0.06 }),
+            drift: Some(DriftParams { per_second: 0.06, ..DriftParams::default() }),
             interference: Some(InterferenceParams { hz: 20.0, amplitude: 0.17, phase: 0.5, ..Default::default() }),
             ..Effects::default()
         });

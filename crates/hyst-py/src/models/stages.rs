@@ -2,7 +2,7 @@
 
 use hyst_core::{
     AsymmetryParams, CreepParams, DelayParams, DriftParams, Env, InterferenceParams, Invert, LagParams, LoadParams,
-    ResonanceParams, SaturationParams, Stage, TemperatureParams,
+    RateParams, ResonanceParams, SaturationParams, Stage, TemperatureParams,
 };
 use pyo3::prelude::*;
 
@@ -63,6 +63,23 @@ models! {
     params: |p| Ok(AsymmetryParams { thresholds: p.thresholds.clone(), weights: p.weights.clone() }),
     stage: hyst_core::Asymmetry<f64, { hyst_core::MAX_DEAD_ZONES }>,
     inverse: closed,
+    needs: [],
+
+    /// Loops that widen with the rate of the drive: ``v = u − o(u̇)``, ``o = volts·|u̇/reference_rate|^exponent·sgn u̇``.
+    class Rate {
+        /// Overdrive at the reference rate [u].
+        volts: f64,
+        /// Exponent, 0.05 to 1.
+        exponent: f64,
+        /// Reference rate [u/s].
+        reference_rate: f64,
+        /// Sample period [s].
+        period: f64,
+    }
+    params: |p| Ok(RateParams { volts: p.volts, exponent: p.exponent, reference_rate: p.reference_rate, holds: true }),
+    stage: hyst_core::Rate<f64>,
+    period: |p| p.period,
+    inverse: compensator,
     needs: [],
 
     /// Gain over temperature ``y = u·(1 + per_kelvin·(T − reference_degc))``.
@@ -138,12 +155,18 @@ models! {
     inverse: within_the_limits,
     needs: [],
 
-    /// Drift of the sensor ``y = u + per_second·t`` on the lab's clock.
+    /// Drift of the sensor ``y = u + per_second·t + settling·(1 − exp(−(t − since_s)/seconds))`` on the lab's clock.
     class Drift {
         /// Rate [y/s].
         per_second: f64,
+        /// Height that is settled in the end [y].
+        settling: f64 = 0.0,
+        /// Time constant of the settling [s]; 0 where nothing settles.
+        seconds: f64 = 0.0,
+        /// Instant at which the settling begins [s].
+        since_s: f64 = 0.0,
     }
-    params: |p| Ok(DriftParams { per_second: p.per_second }),
+    params: |p| Ok(DriftParams { per_second: p.per_second, settling: p.settling, seconds: p.seconds, since_s: p.since_s }),
     stage: hyst_core::Drift<f64>,
     inverse: refused(IN_THE_SENSOR),
     needs: [time],

@@ -61,14 +61,13 @@ fn after_steps(scene: &Scene<'_>, found: &[Hold], bins: &Bins, view: &View) -> (
 
 /// The sensor's zero over lab time.
 pub(super) fn drift(model: &Model, scene: &Scene<'_>) -> Picture {
-    let caption = "Means over a second or more, on the lab's clock, rests between segments included. Drift goes on at one rate \
-        whatever the drive does: without it the residual lies on a slope, with it it stays level.";
+    let caption = "Mean residual over a second or more, on the lab's clock, rests between segments included: without the drift and with it.";
     let mut picture = over_time(scene, Some(Effect::Drift), "Mean over time", caption);
     if let (Some(p), Some(shown)) = (model.effects.drift, picture.curves.first()) {
         let x = shown.x.clone();
         // Files that follow each other here have each their own clock.
         if scene.samples.files() == 1 {
-            let y: Vec<f64> = x.iter().map(|t| p.per_second * t).collect();
+            let y: Vec<f64> = x.iter().map(|t| p.at(*t)).collect();
             picture.line(Role::Reference, NAMED, &x, &y);
         }
     }

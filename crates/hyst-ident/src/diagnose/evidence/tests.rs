@@ -276,7 +276,7 @@ fn a_curve_bends_both_branches_alike() {
 
 #[test]
 fn drift_and_tone_show_on_the_clock() {
-    let drift = Some(DriftParams { per_second: 0.01 });
+    let drift = Some(DriftParams { per_second: 0.01, ..DriftParams::default() });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { drift, ..Effects::default() }), Effect::Drift);
     let mean = curves(&found, Effect::Drift, "Mean over time");
     close(slope(&mean[0]), 0.01, 0.02);
@@ -299,7 +299,7 @@ fn drift_and_tone_show_on_the_clock() {
 
 #[test]
 fn pictures_of_the_whole_and_where_it_lives() {
-    let drift = Some(DriftParams { per_second: 0.01 });
+    let drift = Some(DriftParams { per_second: 0.01, ..DriftParams::default() });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { drift, ..Effects::default() }), Effect::Drift);
     let general: Vec<&str> = found.pictures.iter().filter(|p| p.effect.is_none()).map(|p| p.title.as_str()).collect();
     assert_eq!(
