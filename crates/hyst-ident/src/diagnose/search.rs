@@ -317,7 +317,9 @@ fn swaps(
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
             // What has no name has to be worth its many numbers: not where an effect leaves it next to nothing to take.
             let nameless = || cause.effect().is_none() && !judge.judge(&trial, best).accepted();
-            let simpler = accepted && other.complexity() < cause.complexity() && (tie || nameless());
+            let numbers = |trial: &Trial, cause: Cause| trial.fit.hypothesis.complexity(cause);
+            let is_smaller = numbers(&trial, *other) < numbers(best, cause);
+            let simpler = accepted && is_smaller && (tie || nameless());
             let clearly = accepted && !tie && trial.total() < best.total();
             let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {

@@ -74,8 +74,8 @@ impl Effect {
     /// fewer is the simpler explanation.
     pub(crate) fn complexity(self) -> usize {
         match self {
-            Self::Delay | Self::Lag | Self::RateDependence | Self::Temperature | Self::Load | Self::Drift => 1,
-            Self::Saturation => 2,
+            Self::Delay | Self::Lag | Self::Temperature | Self::Load | Self::Drift => 1,
+            Self::RateDependence | Self::Saturation => 2,
             Self::Resonance | Self::Interference => 3,
             Self::Creep => 4,
             Self::Asymmetry => 5,

@@ -27,15 +27,6 @@ impl Cause {
             Self::ZeroWanders | Self::GainWanders | Self::SlewLimit => None,
         }
     }
-
-    /// Numbers that it brings: between two that a record cannot tell apart, the one with fewer is the simpler.
-    pub(crate) fn complexity(self) -> usize {
-        match self {
-            Self::Effect(e) => e.complexity(),
-            Self::ZeroWanders | Self::GainWanders => super::HATS,
-            Self::SlewLimit => 1,
-        }
-    }
 }
 
 /// A set of causes with their parameters.
@@ -104,6 +95,19 @@ impl Hypothesis {
             Cause::SlewLimit => less.slew_limit = None,
         }
         less
+    }
+
+    /// Numbers that a cause brings here: of two that a record cannot tell apart, the one with fewer is the simpler.
+    pub(crate) fn complexity(&self, cause: Cause) -> usize {
+        match cause {
+            // A curve of time is free of the drive and imitates all that happens once in a record; a creep is tied to the drive.
+            Cause::Effect(Effect::Drift) if self.effects.drift.is_some_and(|p| p.seconds > 0.0) => {
+                Effect::Creep.complexity() + 1
+            }
+            Cause::Effect(e) => e.complexity(),
+            Cause::ZeroWanders | Cause::GainWanders => super::HATS,
+            Cause::SlewLimit => 1,
+        }
     }
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
