@@ -17,6 +17,7 @@ use super::travel::TravelBank;
 use super::{BESIDE, Basis, Drag, FixedBasis, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
+use crate::repetition::only_loop;
 
 /// Plays with quadratic and cubic curves, and a bank that relaxes with travel.
 #[derive(Clone, Debug)]
@@ -38,7 +39,7 @@ impl ScreeningBasis {
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();
-        let travel = TravelBank::new(low, high);
+        let travel = if only_loop(samples).is_some() { TravelBank::none() } else { TravelBank::new(low, high) };
         Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), travel, drags, kept }
     }
 

@@ -33,6 +33,11 @@ impl TravelBank {
         Self { rates, middle: 0.5 * (low + high), half: 0.5 * range }
     }
 
+    /// No element: for a record that repeats one loop, in which travel grows with time and neither can be told from the other.
+    pub(super) fn none() -> Self {
+        Self { rates: Vec::new(), middle: 0.0, half: 1.0 }
+    }
+
     /// How many columns there are.
     pub(super) fn len(&self) -> usize {
         READ_OUTS * self.rates.len()
