@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use hyst_core::SaturationParams;
+use hyst_core::{ResonanceParams, SaturationParams};
 
 use super::tone::stands_alone;
 use super::trial::Trial;
@@ -149,12 +149,15 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
         && e.resonances.iter().all(|p| {
-            p.gain > 1e-3
-                && p.damping < MOST_DAMPING
-                && p.hz > f64::max(2.5 / longest, SLOWEST_MODE)
-                && p.hz < 0.9 * nyquist
+            rings(p) && p.damping < MOST_DAMPING && p.hz > f64::max(2.5 / longest, SLOWEST_MODE) && p.hz < 0.9 * nyquist
         })
         && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE) && !is_harmonic(problem, p.hz))
+}
+
+/// Whether a mode's own part at its frequency, g/(2ζ), exceeds the part of the motion that does not go through it, 1 − g: what only ripples the
+/// motion there is the misfit of another law as well.
+fn rings(mode: &ResonanceParams) -> bool {
+    mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping && mode.gain > 0.0
 }
 
 /// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
@@ -174,4 +177,17 @@ fn stops_something(samples: &Samples, trial: &Trial, p: &SaturationParams) -> bo
     let near = NEAR_LIMIT * (high - low);
     let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
     p.knee < 0.2 && touched as f64 > TOUCHED * shown.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ripple_of_the_motion_is_no_mode() {
+        let mode = |damping: f64, gain: f64| ResonanceParams { hz: 48.0, damping, gain };
+        assert!(!rings(&mode(0.062, 0.02)) && !rings(&mode(0.1, 0.004)) && !rings(&mode(0.0, 0.0)));
+        // Lightly damped modes that carry little, a mode beside a stiff part, and one that carries all and hardly rings.
+        assert!(rings(&mode(0.01, 0.05)) && rings(&mode(0.05, 0.4)) && rings(&mode(0.3, 1.0)));
+    }
 }
