@@ -70,21 +70,21 @@ fn a_tone_is_named_beside_the_misfit_of_the_base() {
     let records = with_output(810, |t, u, _| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + hum(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
     assert_eq!(names(&d), ["interference"], "{:#?}", d.findings);
-    assert!(d.findings.effects[0].cv_rmse_after > 0.8 * d.findings.effects[0].cv_rmse_before, "{:#?}", d.findings);
+    assert!(d.findings.effects[0].cv_rmse_after > 0.5 * d.findings.effects[0].cv_rmse_before, "{:#?}", d.findings);
     let plain = diagnosed(Kind::Pi, &with_output(810, |t, u, _| bouc_wen(t, u)));
     assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
 }
 
-/// A zero that settles drifts, though not evenly; what it does beyond that is told.
+/// A zero that settles drifts, and its law is found; one that swings or slips is no drift.
 #[test]
 fn a_drift_that_slows_down_is_a_drift() {
     let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + settles(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);
     assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
-    let left = &d.findings.remainder;
-    assert_eq!(left.kind, RemainderKind::Unexplained, "{left:?}");
-    assert!(left.description.contains("beyond the drift the zero wanders"), "{left:?}");
+    let drift = d.extended.effects.drift.unwrap();
+    let moved = |t: f64| drift.at(t) - drift.at(0.0);
+    assert!([5.0, 15.0, 30.0].iter().all(|t| (moved(*t) / settles(*t) - 1.0).abs() < 0.05), "{drift:?}");
     // One that comes back is none.
     let swings = |t: f64| 0.3 * (0.15 * t).cos();
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
