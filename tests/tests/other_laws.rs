@@ -84,7 +84,9 @@ fn a_drift_that_slows_down_is_a_drift() {
     assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
     let drift = d.extended.effects.drift.unwrap();
     let moved = |t: f64| drift.at(t) - drift.at(0.0);
-    assert!([5.0, 15.0, 30.0].iter().all(|t| (moved(*t) / settles(*t) - 1.0).abs() < 0.05), "{drift:?}");
+    // A line and a slower settling may stand for each other: their sum is what the record determines.
+    let misses = |t: f64| (moved(t) - settles(t)).abs() / settles(30.0);
+    assert!([5.0, 15.0, 30.0].into_iter().all(|t| misses(t) < 0.05), "{drift:?}");
     // One that comes back is none.
     let swings = |t: f64| 0.3 * (0.15 * t).cos();
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
