@@ -75,7 +75,7 @@ fn a_tone_is_named_beside_the_misfit_of_the_base() {
     assert!(names(&plain).is_empty(), "{:#?}", plain.findings);
 }
 
-/// A zero that settles drifts, and its law is found.
+/// A zero that settles drifts, and its law is found; one that swings or slips is no drift.
 #[test]
 fn a_drift_that_slows_down_is_a_drift() {
     let settles = |t: f64| 2.0 * (1.0 - (-t / 25.0).exp());
@@ -83,16 +83,8 @@ fn a_drift_that_slows_down_is_a_drift() {
     let d = diagnosed(Kind::Pi, &records);
     assert_eq!(names(&d), ["drift"], "{:#?}", d.findings);
     let drift = d.extended.effects.drift.unwrap();
-    let moved = |t: f64| drift.at(t) - drift.at(0.0);
-    // A line and a slower settling may stand for each other: their sum is what the record determines.
-    let misses = |t: f64| (moved(t) - settles(t)).abs() / settles(30.0);
-    assert!([5.0, 15.0, 30.0].into_iter().all(|t| misses(t) < 0.05), "{drift:?}");
-}
-
-/// A zero that comes back, and one that goes in steps, is no drift.
-#[test]
-#[ignore = "fails: a zero that swings once within the record gets a name since a drift may settle"]
-fn a_zero_that_swings_or_slips_is_no_drift() {
+    assert!((drift.settling / 2.0 - 1.0).abs() < 0.1 && (drift.seconds / 25.0 - 1.0).abs() < 0.1, "{drift:?}");
+    // One that comes back is none.
     let swings = |t: f64| 0.3 * (0.15 * t).cos();
     let records = with_output(811, |t, _, y| y.iter().zip(t).map(|(y, t)| y + swings(*t)).collect());
     let d = diagnosed(Kind::Pi, &records);

@@ -5,15 +5,18 @@ use crate::{Build, Env, Error, Meta, Params, Real, Stage};
 
 /// Parameters of `y = v + ρ t + A (1 − e^(−(t − t₀)/τ))`, t the lab's clock; before t₀ nothing has settled yet. ρ = A = 0 is no drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriftParams {
     /// Rate ρ \[output unit per s\].
     pub per_second: f64,
     /// Height A that is settled in the end \[output unit\].
+    #[cfg_attr(feature = "serde", serde(default))]
     pub settling: f64,
     /// Time constant τ of the settling \[s\]; zero where nothing settles.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub seconds: f64,
     /// Instant t₀ on the clock \[s\]; a convention, not identified.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub since_s: f64,
 }
 

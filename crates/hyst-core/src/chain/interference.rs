@@ -28,7 +28,11 @@ impl InterferenceParams {
     /// What the tone adds at an instant of the lab's clock \[output unit\].
     pub fn at(&self, time_s: f64) -> f64 {
         let cycles = self.hz * time_s;
-        let angle = 2.0 * core::f64::consts::PI * (cycles - libm::floor(cycles));
+        self.at_angle(2.0 * core::f64::consts::PI * (cycles - libm::floor(cycles)))
+    }
+
+    /// What it adds at an angle of the fundamental \[rad\], counted from the clock's zero \[output unit\].
+    pub fn at_angle(&self, angle: f64) -> f64 {
         let fundamental = self.amplitude * libm::sin(angle + self.phase);
         let orders = self.harmonics.chunks_exact(2).zip(2u8..);
         orders.fold(fundamental, |y, (parts, order)| match parts {

@@ -310,12 +310,7 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             let (first, last) = (*m.samples.time.first()?, *m.samples.time.last()?);
             let p = e.drift?;
             let settles = if p.seconds > 0.0 {
-                format!(
-                    ", {} {} of it settles with a time constant of {} s",
-                    signed(p.settling),
-                    symbol(m),
-                    short(p.seconds)
-                )
+                format!(" and settles with a time constant of {} s", short(p.seconds))
             } else {
                 String::new()
             };
@@ -439,8 +434,9 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             }
         }
         Effect::Drift => e.drift.iter().for_each(|p| {
-            put("drift", "per_second", p.per_second, &format!("{y}/s"));
-            if p.seconds > 0.0 {
+            if p.seconds == 0.0 {
+                put("drift", "per_second", p.per_second, &format!("{y}/s"));
+            } else {
                 put("drift", "settling", p.settling, y);
                 put("drift", "seconds", p.seconds, "s");
             }

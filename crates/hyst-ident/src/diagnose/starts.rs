@@ -78,7 +78,7 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
         Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
         Effect::Drift => {
-            // A line; and one that settles, in a quarter of the record or faster.
+            // A line; or one that settles, in a quarter of the record or faster.
             let since_s = samples.time[0];
             let whole = samples.time[samples.len() - 1] - since_s;
             let times = [0.0, 0.25 * whole, 0.06 * whole];

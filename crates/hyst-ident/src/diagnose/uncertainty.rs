@@ -31,8 +31,10 @@ pub(super) fn undetermined(fit: &Fitted) -> Vec<Effect> {
         Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
         Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
         Effect::Resonance => loose_mode.any(|loose| loose),
-        // Line and settling may stand for each other: then neither is determined, and what they add together is.
-        Effect::Drift => e.drift.is_some_and(|p| p.seconds == 0.0 && unsure("drift.per_second", p.per_second)),
+        Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
+            true => unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds),
+            false => unsure("drift.per_second", p.per_second),
+        }),
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
         Effect::RateDependence => e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts)),
         // A stop acts or does not; a curve has several parameters of which one may be idle.

@@ -58,7 +58,10 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
         let inside = match p.cause {
             // An exponent of one is a law like any other.
             Cause::Effect(Effect::RateDependence) if p.name == "exponent" => return,
-            Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence) | Cause::SlewLimit => INSIDE,
+            // Slower than the bound, a settling drift is a line or a bend, and its time constant means nothing.
+            Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence | Effect::Drift) | Cause::SlewLimit => {
+                INSIDE
+            }
             Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
                 if dampings.next().is_some_and(|damping| damping < RINGS) {
                     return;

@@ -173,6 +173,10 @@ impl<'a> Problem<'a> {
         bounds.resize(layout.len(), Bounds::FREE);
         // A curve that falls would have no inverse.
         bounds[layout.zones].fill(Bounds::above(-0.9));
+        if h.effects.drift.is_some_and(|p| p.seconds > 0.0) {
+            // A line beside it would only bend what settles: neither would be determined.
+            bounds[layout.drift.start] = Bounds::fixed(0.0);
+        }
         if let Some(tone) = &h.effects.interference {
             // What lies beyond half the sample rate would appear as another tone.
             for (i, bound) in bounds[layout.tone.clone()].iter_mut().enumerate() {

@@ -241,7 +241,7 @@ pub(super) fn folded(scene: &Scene<'_>, tone: &InterferenceParams) -> Option<Pic
         picture.points(role, name, bins.means(scene.rows().map(|k| (phase(k), view.residual[k] - mean))));
     }
     let degrees: Vec<f64> = (0..=90).map(|k| 4.0 * f64::from(k)).collect();
-    let named: Vec<f64> = degrees.iter().map(|d| tone.at(d / (360.0 * tone.hz))).collect();
+    let named: Vec<f64> = degrees.iter().map(|d| tone.at_angle(d.to_radians())).collect();
     picture.line(Role::Reference, NAMED, &degrees, &named);
     Some(picture)
 }
