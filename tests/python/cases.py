@@ -30,6 +30,7 @@ class Case:
     # "reference": the output, by another drive where branches fold or the drive jumps where the reference turns.
     # "band": an output in its band, to the error that it states.
     # "preview": an output to its own tolerance, looking ahead.
+    # "nearly": an output that stays within a tolerance.
     # "part": the output where its condition holds, which this drive leaves.
     finds: str = "drive"
     # Of the span of input and output; in a band, of the output's size and beside the stated error.
@@ -180,8 +181,11 @@ case("delay", "Delay", dict(seconds=3.4e-3, period=PERIOD), SWING, lambda u: lin
 case("delay of nothing", "Delay", dict(seconds=0.0, period=PERIOD), SWING, lambda u: u, inverse={})
 case("lag", "Lag", dict(seconds=4e-3, period=PERIOD), SWING + 5, lambda u: linear.lag(u, 4e-3, PERIOD),
      inverse=dict(bandwidth_hz=40.0), finds="band")  # fmt: skip
+# Of first order in the overdrive where the rate changes.
 case("rate", "Rate", dict(volts=1.5, exponent=0.4, reference_rate=100.0, period=PERIOD), SWING + 5,
-     lambda u: linear.rate(u, 1.5, 0.4, 100.0, PERIOD))  # fmt: skip
+     lambda u: linear.rate(u, 1.5, 0.4, 100.0, PERIOD), inverse={}, finds="nearly", inverse_tolerance=0.01)  # fmt: skip
+case("rate that relaxes", "Rate", dict(volts=1.5, exponent=0.4, reference_rate=100.0, period=PERIOD, relaxes=True), SWING + 5,
+     lambda u: linear.relaxing_rate(u, 1.5, 0.4, 100.0, PERIOD), inverse={})  # fmt: skip
 case(
     "creep", "Creep", dict(seconds=TAU, shares=SHARES, period=PERIOD), SWING + 5,
     lambda u: linear.creep(u, TAU, SHARES, PERIOD), inverse={},

@@ -91,6 +91,14 @@ def test_the_inverse_recovers_the_drive(case):
     assert np.max(np.abs(u - case.u)) <= case.inverse_tolerance * span(case.u)
 
 
+@each_inverse("nearly")
+def test_the_inverse_comes_near_the_reference(case):
+    model = case.model()
+    y = model.simulate(case.u, **case.surroundings)
+    reached = model.simulate(model.compensate(y, **case.surroundings, **case.inverse), **case.surroundings)
+    assert np.max(np.abs(reached - y)) <= case.inverse_tolerance * span(y)
+
+
 @each_inverse("band")
 def test_dynamics_are_inverted_in_a_band(case):
     model, hz = case.model(), case.inverse["bandwidth_hz"]
@@ -161,7 +169,7 @@ def test_what_steps_has_no_inverse(label, way_out):
 
 
 def test_every_inverse_is_tried():
-    assert {c.finds for c in CASES} == {"drive", "reference", "band", "preview", "part"}
+    assert {c.finds for c in CASES} == {"drive", "reference", "band", "preview", "nearly", "part"}
     assert {c.name for c in CASES if c.finds == "preview"} == set(activation.FUNCTIONS)
 
 

@@ -17,8 +17,8 @@ use hyst_core::{
     ActivationParams, AsymmetryParams, BLOCK_VERSION, BlockError, BoucWenOscillatorParams, BoucWenParams, ChainParams,
     CreepParams, Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
     InterferenceParams, Kind, LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams,
-    PiParams, PreisachParams, RateParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams, TdPiParams,
-    TemperatureParams, ViscousPiParams, read_block, write_block,
+    PiParams, PreisachParams, RateLaw, RateParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams,
+    TdPiParams, TemperatureParams, ViscousPiParams, read_block, write_block,
 };
 use hyst_tests::root;
 
@@ -117,7 +117,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
     let all = Effects {
         delay: Some(DelayParams { seconds: 1.5 }),
         lag: Some(LagParams { seconds: 2.5 }),
-        rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, holds: true }),
+        rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, law: RateLaw::Holds }),
         asymmetry: Some(AsymmetryParams { thresholds: vec![1.5, 2.5], weights: vec![3.5, 4.5] }),
         temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5 }),
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),

@@ -182,7 +182,6 @@ fn what_is_hidden_by_the_misfit_of_a_smooth_base_is_found_on_a_triangle() {
 
 /// Viscous walls between relays in clumps take their time, which a triangle cannot: it must not call that late.
 #[test]
-#[ignore = "fails: a triangle with a lag and a creep follows walls that relax better than the rate stage does, which has no relaxation"]
 fn relays_in_clumps_that_take_their_time_get_no_wrong_name() {
     let slow = run(&draw_on(Bed::Clumps, 33, 29));
     assert_eq!((slow.truth.as_slice(), slow.wrong()), ([Effect::RateDependence].as_slice(), Vec::new()));

@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from scipy.signal import StateSpace, lsim
 
 from .plays import plays, stops
@@ -30,6 +31,17 @@ def rate(u, volts, exponent, reference_rate, period):
     last = u[0]
     for k in range(len(u)):
         last = max(u[k] - over[k], min(u[k] + over[k], last))
+        out[k] = last
+    return out
+
+
+def relaxing_rate(u, volts, exponent, reference_rate, period):
+    """Each implicit step by bracketing its root."""
+    out = np.empty_like(u)
+    out[0] = last = u[0]
+    for k in range(1, len(u)):
+        way, d = np.sign(u[k] - last), abs(u[k] - last)
+        last += way * brentq(lambda x, d=d: x + volts * (x / (reference_rate * period)) ** exponent - d, 0.0, d, xtol=1e-14)
         out[k] = last
     return out
 

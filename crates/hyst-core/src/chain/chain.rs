@@ -278,7 +278,7 @@ mod tests {
             .with_delay(&DelayParams { seconds: 2.3e-3 }, &cx)
             .and_then(|c| c.with_lag(&LagParams { seconds: 2e-3 }, &cx))
             .and_then(|c| {
-                let rate = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, holds: true };
+                let rate = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: crate::RateLaw::Holds };
                 c.with_rate(&rate, &cx)
             })
             .and_then(|c| c.with_temperature(&TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0 }))

@@ -28,7 +28,7 @@ pub use interference::{HARMONIC_PARTS, Interference, InterferenceParams};
 pub use lag::{Lag, LagParams, LagState};
 pub use load::{Load, LoadParams};
 pub use preview::{Preview, PreviewState};
-pub use rate::{Rate, RateInverse, RateParams, RateState};
+pub use rate::{Rate, RateInverse, RateLaw, RateParams, RateState};
 pub use resonance::{Resonance, ResonanceParams, ResonanceState};
 pub use saturation::{Saturation, SaturationInverse, SaturationParams};
 pub use temperature::{Temperature, TemperatureParams};

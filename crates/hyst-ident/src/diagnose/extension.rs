@@ -178,8 +178,13 @@ impl Own<'_> {
     pub(super) fn transfers(&self, start: &Hypothesis, found: &Hypothesis) -> Result<bool, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
-        // A wandering is no part of the model.
-        let model_of = |h: &Hypothesis| Hypothesis { zero_wanders: false, gain_wanders: false, ..h.clone() };
+        // A wandering is no part of the model; the amplifier is the same for both.
+        let model_of = |h: &Hypothesis| Hypothesis {
+            zero_wanders: false,
+            gain_wanders: false,
+            slew_limit: found.slew_limit,
+            ..h.clone()
+        };
         let solved = |h: &Hypothesis| problem.fit_linear(&model_of(h)).map_err(|e| self.stage(e));
         let (Some(before), Some(after)) = (solved(start)?, solved(found)?) else { return Ok(true) };
         Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))

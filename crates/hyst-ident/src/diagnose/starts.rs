@@ -4,7 +4,7 @@
 //! the whole band first, by how much of the residual a first-order change would take.
 
 use hyst_core::{
-    DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, RateParams, ResonanceParams,
+    DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams, RateLaw, RateParams, ResonanceParams,
     SaturationParams, TemperatureParams,
 };
 
@@ -53,16 +53,13 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
             let (low, high) = samples.input_range();
             let linear = DragParams { seconds: samples.period, volt_seconds: 0.0 };
             let root = DragParams { seconds: 0.0, volt_seconds: 1e-3 * (high - low) * samples.period };
-            let mut starts: Vec<Hypothesis> = [linear, root].map(|drag| also(&|h| h.drag = Some(drag))).into();
-            if !problem.basis.drags() {
-                starts.clear();
-            }
+            let in_the_plays = [linear, root].map(|drag| also(&|h| h.drag = Some(drag)));
             // And one on the whole drive, for any base: the range in a second is the reference rate.
-            starts.extend([true, false].map(|holds| {
-                let rate = RateParams { volts: 0.01 * (high - low), exponent: 0.5, reference_rate: high - low, holds };
+            let on_the_drive = RateLaw::ALL.map(|law| {
+                let rate = RateParams { volts: 0.01 * (high - low), exponent: 0.5, reference_rate: high - low, law };
                 with(&|e| e.rate = Some(rate))
-            }));
-            starts
+            });
+            in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).collect()
         }
         // It is looked for on the user's base.
         Effect::Asymmetry => Vec::new(),

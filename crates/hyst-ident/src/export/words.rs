@@ -5,7 +5,8 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
     match name {
         "delay" => &["y(t) = u(t - seconds)"],
         "rate" => &[
-            "v = u - o sgn(du/dt), o = volts (|du/dt| / reference_rate)^exponent; holds: v = max(u - o, min(u + o, v))",
+            "o(x) = volts (|x| / reference_rate)^exponent sgn(x); law follows: v = u - o(du/dt)",
+            "holds: v <- max(u - |o(du/dt)|, min(u + |o(du/dt)|, v)); relaxes: u - v = o(dv/dt), an implicit Euler step a sample",
         ],
         "lag" => &["seconds dy/dt + y = u"],
         "pi" => &[

@@ -2,7 +2,7 @@
 
 use hyst_core::{
     AsymmetryParams, CreepParams, DelayParams, DriftParams, Env, InterferenceParams, Invert, LagParams, LoadParams,
-    RateParams, ResonanceParams, SaturationParams, Stage, TemperatureParams,
+    RateLaw, RateParams, ResonanceParams, SaturationParams, Stage, TemperatureParams,
 };
 use pyo3::prelude::*;
 
@@ -65,7 +65,8 @@ models! {
     inverse: closed,
     needs: [],
 
-    /// Loops that widen with the rate of the drive: ``v = u − o(u̇)``, ``o = volts·|u̇/reference_rate|^exponent·sgn u̇``.
+    /// Loops that widen with the rate of the drive, by ``o(x) = volts·|x/reference_rate|^exponent·sgn x``: a play whose width is
+    /// ``o(u̇)``, or with ``relaxes`` the lag ``u − v = o(v̇)``, which has an exact inverse.
     class Rate {
         /// Overdrive at the reference rate [u].
         volts: f64,
@@ -75,8 +76,15 @@ models! {
         reference_rate: f64,
         /// Sample period [s].
         period: f64,
+        /// Whether it goes on while the drive rests.
+        relaxes: bool = false,
     }
-    params: |p| Ok(RateParams { volts: p.volts, exponent: p.exponent, reference_rate: p.reference_rate, holds: true }),
+    params: |p| Ok(RateParams {
+        volts: p.volts,
+        exponent: p.exponent,
+        reference_rate: p.reference_rate,
+        law: if p.relaxes { RateLaw::Relaxes } else { RateLaw::Holds },
+    }),
     stage: hyst_core::Rate<f64>,
     period: |p| p.period,
     inverse: compensator,

@@ -31,7 +31,8 @@ pub(crate) const GAINS: PidParams = PidParams {
     high: 120.0,
 };
 pub(crate) const DRIFT: DriftParams = DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 };
-pub(crate) const WIDENING: RateParams = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, holds: true };
+pub(crate) const WIDENING: RateParams =
+    RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: RateLaw::Relaxes };
 pub(crate) const MAINS: InterferenceParams = InterferenceParams {
     hz: 50.0,
     amplitude: 0.05,
