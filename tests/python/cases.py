@@ -200,6 +200,13 @@ case(
     "temperature", "Temperature", dict(per_kelvin=0.005, reference_degc=23.0), SWING,
     lambda u: u * (1 + 0.005 * (TEMPERATURE - 23.0)), surroundings=dict(temperature=TEMPERATURE), inverse={},
 )  # fmt: skip
+case(
+    "temperature with expansion behind a thermal lag", "Temperature",
+    dict(per_kelvin=0.005, reference_degc=23.0, expansion=0.2, seconds=0.3, period=PERIOD), SWING,
+    lambda u: u * (1 + 0.005 * linear.lag(TEMPERATURE - 23.0, 0.3, PERIOD))
+    + 0.2 * linear.lag(TEMPERATURE - 23.0, 0.3, PERIOD),
+    surroundings=dict(temperature=TEMPERATURE), inverse={},
+)  # fmt: skip
 TIME = 17.0 + PERIOD * np.arange(N)
 case("drift", "Drift", dict(per_second=0.02), SWING, lambda u: u + 0.02 * TIME, surroundings=dict(time=TIME))
 case(

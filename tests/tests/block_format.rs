@@ -119,7 +119,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
         lag: Some(LagParams { seconds: 2.5 }),
         rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, law: RateLaw::Holds }),
         asymmetry: Some(AsymmetryParams { thresholds: vec![1.5, 2.5], weights: vec![3.5, 4.5] }),
-        temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5 }),
+        temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5, expansion: 3.25, seconds: 4.25 }),
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),
         load: Some(LoadParams { per_newton: 1.5 }),
         resonances: [Some(mode(1.5)), Some(mode(4.5))],

@@ -27,13 +27,23 @@ fn a_lag_is_found_named_and_added() {
         ran.stdout
     );
     let findings: Value = serde_json::from_str(&lab.read("findings.json")).unwrap();
-    assert_eq!(findings["schema"], "hyst.findings/1");
+    assert_eq!(findings["schema"], "hyst.findings/2");
     assert_eq!(findings["verdict"], "explained");
     assert_eq!(findings["effects"].as_array().unwrap().len(), 1);
     let lag = &findings["effects"][0];
     assert_eq!(lag["name"], "lag");
     let seconds = lag["parameters"]["seconds"]["value"].as_f64().unwrap();
     assert!((seconds - 0.01).abs() < 2e-4, "{seconds}");
+    assert_eq!((&lag["kind"], &lag["law"]), (&"linear-dynamics".into(), &"first-order".into()));
+    assert!((0.9..=1.0).contains(&lag["probability"].as_f64().unwrap()), "{lag}");
+    // Of each other effect either the size that would have been seen, or why none would.
+    let limits = findings["limits"].as_object().unwrap();
+    assert!(!limits.contains_key("lag") && limits["load"]["not_visible"].is_string(), "{limits:?}");
+    assert!(limits["drift"]["size"].as_f64().unwrap() > 0.0 && limits["drift"]["unit"] == "um", "{limits:?}");
+    let rows = &findings["rows"];
+    let left: u64 = rows["left_out"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
+    let all = lab.read("train.csv").lines().count() as u64 - 1;
+    assert_eq!(rows["used"].as_u64().unwrap() + left, all, "{rows}");
 
     // Before and after are what simulations of the same files give.
     for (model, when) in [("model.json", "before"), ("extended.json", "after")] {
@@ -56,7 +66,7 @@ fn a_lag_is_found_named_and_added() {
 fn files_that_mislead_are_told() {
     let lab = lab();
     let ran = lab.ok("diagnose test.csv --model model.json --json");
-    assert_eq!(ran.json()["schema"], "hyst.findings/1");
+    assert_eq!(ran.json()["schema"], "hyst.findings/2");
     assert!(ran.stderr.contains("was not fitted to test.csv"), "{}", ran.stderr);
     let ran = lab.ok("diagnose train.csv --test train.csv --model model.json");
     assert!(ran.stderr.contains("say nothing about new data"), "{}", ran.stderr);
@@ -167,4 +177,21 @@ fn practice_records_show_their_effect() {
     let findings = lab.ok(&format!("diagnose {train} --test {test} --model model.json --json")).json();
     assert_eq!(findings["effects"][0]["name"], "lag", "{findings}");
     assert!(findings["after"]["test"]["nrmse_percent"].as_f64().unwrap() < 0.2, "{findings}");
+}
+
+/// The kind of model may be left to the program.
+#[test]
+fn auto_takes_the_kind_that_explains_the_record() {
+    let lab = lab();
+    let ran = lab.ok("diagnose train.csv --test test.csv --model auto -o auto.json --json");
+    let findings = ran.json();
+    assert_eq!(findings["effects"][0]["name"], "lag", "{findings}");
+    // Once it is preisach there is nothing better to advise; of pi there was.
+    let of_pi = lab.ok("diagnose train.csv --test test.csv --model model.json --json").json();
+    let advised = &of_pi["base_advice"];
+    let expected = advised["model"].as_str().unwrap_or("pi");
+    assert_eq!(findings["base"], expected, "{advised}");
+    let error = |f: &Value| f["after"]["test"]["rmse"].as_f64().unwrap();
+    assert!(error(&findings) <= error(&of_pi), "{findings}");
+    assert!(lab.read("auto.json").contains("\"lag\""));
 }

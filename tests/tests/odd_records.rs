@@ -5,6 +5,8 @@ use hyst_ident::fit::{FitError, FitOptions, fit};
 use hyst_ident::model::Kind;
 use hyst_ident::record::{Columns, OutputUnit, Record};
 use hyst_ident::simulate::{Zero, simulate};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// A play with gain over `segments` segments of `rows` rows.
 fn record(segments: usize, rows: usize, rate_hz: f64, unit: OutputUnit, scale: f64) -> Record {
@@ -130,6 +132,46 @@ fn a_quantised_output_is_not_unexplained() {
     let model = fit(&record, Kind::Pi, &FitOptions::default()).unwrap();
     let d = diagnose(&record, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap();
     assert!(d.findings.effects.is_empty() && d.findings.noise_floor > 0.004, "{:?}", d.findings);
+}
+
+/// Spikes in every twentieth row hide neither the device nor what it lacks: they are found, counted and left out.
+#[test]
+fn spikes_are_told_and_hide_nothing() {
+    let made = |spikes: bool| {
+        let (mut p, mut late, mut rng) = (0.0, 0.0, ChaCha8Rng::seed_from_u64(9));
+        let (mut time, mut input, mut output) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..12_000_u32 {
+            let t = f64::from(k) * 1e-3;
+            let u = 50.0 - 30.0 * (4.0 * t).cos() - 20.0 * (37.0 * t).cos();
+            late += (u - late) / 8.0;
+            p = hyst_core::play(p, late, 8.0);
+            let noise = 2e-3 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
+            let (hit, size) = (rng.random::<f64>() < 0.05, 0.2 + 2.0 * rng.random::<f64>());
+            let spike = if hit && spikes { size } else { 0.0 };
+            time.push(t);
+            input.push(u);
+            output.push(0.1 * late + 0.05 * p + noise + spike);
+        }
+        let (input, output) = (Some(input), Some((OutputUnit::Micrometre, output)));
+        Record::from_samples(Columns { name: "spiked".into(), time, input, output, ..Columns::default() }).unwrap()
+    };
+    let found = |spikes: bool| {
+        let record = made(spikes);
+        let model = fit(&record, Kind::Pi, &FitOptions::default()).unwrap();
+        diagnose(&record, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap()
+    };
+    let (clean, spiked) = (found(false).findings, found(true).findings);
+    assert_eq!((clean.rows.left_out.spikes, clean.rows.spikes.len()), (0, 0), "{:?}", clean.rows);
+    // About 600 of them.
+    assert!((450..650).contains(&spiked.rows.left_out.spikes), "{:?}", spiked.rows);
+    assert!(spiked.rows.left_out.start_up < 600, "{:?}", spiked.rows);
+    for findings in [&clean, &spiked] {
+        assert_eq!(findings.effects.len(), 1, "{findings:#?}");
+        let seconds = findings.effects[0].parameters["seconds"].value;
+        assert!((seconds / 8e-3 - 1.0).abs() < 0.1, "{seconds}");
+    }
+    let error = |f: &hyst_ident::diagnose::Findings| f.after.train.unwrap().rmse;
+    assert!(error(&spiked) < 1.5 * error(&clean), "{} {}", error(&spiked), error(&clean));
 }
 
 /// A change of the output's unit changes no finding: creep is found at any scale, with either base.

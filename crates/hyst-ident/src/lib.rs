@@ -36,6 +36,7 @@ mod repetition;
 mod samples;
 mod settle;
 pub mod simulate;
+mod spikes;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};

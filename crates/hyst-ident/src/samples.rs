@@ -6,6 +6,7 @@ use hyst_core::Env;
 
 use crate::clipping::clipped_rows;
 use crate::record::Record;
+use crate::spikes::spiked_rows;
 
 /// Columns of one or more records with the same units and sample period.
 #[derive(Clone, Debug)]
@@ -26,14 +27,16 @@ pub struct Samples {
     pub segments: Vec<Range<usize>>,
     /// File that each segment came from.
     pub file_of_segment: Vec<usize>,
-    /// Rows that are left out of fits and of the settled error: clipped ones, and a start-up transient once it is found.
+    /// Rows that are left out of fits and of the settled error: those that show no motion, and a start-up transient once it is found.
     pub settling: Vec<bool>,
+    /// Rows in which the sensor shows no motion: it stands at the end of its range, or spikes.
+    pub(crate) blind: Vec<bool>,
 }
 
 impl Samples {
     /// The columns of a record; start-up rows are not looked for yet.
     pub fn from_record(record: &Record) -> Self {
-        let clipped = |y| clipped_rows(y, record.segments());
+        let blind = record.output().map_or_else(|| vec![false; record.rows()], |y| blind_rows(record, y));
         Self {
             period: record.sample_period(),
             time: record.time().to_vec(),
@@ -43,7 +46,8 @@ impl Samples {
             load: record.load().map(<[f64]>::to_vec),
             segments: record.segments().to_vec(),
             file_of_segment: record.file_of_segment().to_vec(),
-            settling: record.output().map_or_else(|| vec![false; record.rows()], clipped),
+            settling: blind.clone(),
+            blind,
         }
     }
 
@@ -84,6 +88,7 @@ impl Samples {
             load: self.load.as_deref().map(column),
             file_of_segment: keep.iter().map(|s| self.file_of_segment[*s]).collect(),
             settling: keep.iter().flat_map(|s| self.settling[self.segments[*s].clone()].iter().copied()).collect(),
+            blind: keep.iter().flat_map(|s| self.blind[self.segments[*s].clone()].iter().copied()).collect(),
         }
     }
 
@@ -101,6 +106,7 @@ impl Samples {
             segments: std::iter::once(0..rows).collect(),
             file_of_segment: vec![0],
             settling: vec![false; rows],
+            blind: vec![false; rows],
         }
     }
 
@@ -145,6 +151,17 @@ impl Samples {
     pub fn longest_segment(&self) -> f64 {
         self.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0) as f64 * self.period
     }
+}
+
+/// Rows in which the sensor stands at the end of its range, or spikes.
+fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
+    let mut blind = clipped_rows(output, record.segments());
+    // A reference has no drive that a spike could be held against.
+    if record.input().len() == output.len() {
+        let spiked = spiked_rows(record.input(), output, record.segments());
+        blind.iter_mut().zip(spiked).for_each(|(blind, spiked)| *blind |= spiked);
+    }
+    blind
 }
 
 /// Smallest and largest value; (∞, −∞) of nothing.

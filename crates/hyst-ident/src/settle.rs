@@ -5,7 +5,6 @@
 //! its range; until then a misfit says nothing about the model.
 
 use crate::Samples;
-use crate::clipping::clipped_rows;
 use crate::nested::Fitted;
 use crate::samples::range;
 
@@ -35,25 +34,20 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
-/// Marks the start-up rows and those in which the sensor is clipped, given measured minus predicted output.
+/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    start_up_and(&clipped_rows(&samples.output, &samples.segments), samples, residual)
-}
-
-/// Marks the start-up rows besides those that are known to be clipped: an output that was cleaned of a drift shows them no longer.
-pub(crate) fn start_up_and(clipped: &[bool], samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let windows = windows(samples);
-    let centred = centre(samples, residual, &windows, clipped);
+    let (windows, blind) = (windows(samples), &samples.blind);
+    let centred = centre(samples, residual, &windows, blind);
     let outside = || {
         let rows = samples.segments.iter().zip(&windows).flat_map(|(s, w)| s.start + w..s.end);
-        rows.filter(|k| !clipped[*k]).map(|k| centred[k])
+        rows.filter(|k| !blind[*k]).map(|k| centred[k])
     };
     let n = outside().count().max(1) as f64;
     let rms = (outside().map(|r| r * r).sum::<f64>() / n).sqrt();
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
-    let mut settling = clipped.to_vec();
+    let mut settling = blind.clone();
     for (s, window) in samples.segments.iter().zip(&windows) {
-        let rows: Vec<f64> = (s.start..s.start + window).map(|k| if clipped[k] { 0.0 } else { centred[k] }).collect();
+        let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
         }
@@ -88,27 +82,27 @@ impl Settled {
 /// What is known, or, if it takes rows for a start-up, a fit that begins with all of them: if at most half of those are a start-up then,
 /// and it errs no more. A model that misses what acts at the beginning takes that for a transient.
 pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fits<'_, E>) -> Result<Settled, E> {
-    let clipped = clipped_rows(&samples.output, &samples.segments);
-    let start_up = |rows: &[bool]| rows.iter().zip(&clipped).filter(|(starts, clipped)| **starts && !**clipped).count();
+    let blind = &samples.blind;
+    let start_up = |rows: &[bool]| rows.iter().zip(blind).filter(|(starts, blind)| **starts && !**blind).count();
     if start_up(&known.settling) == 0 {
         return Ok(known);
     }
     let floor = EXACT * samples.output_span();
     let errs_no_more = |all: &Settled| all.fit.rmse() <= NO_MORE * known.fit.rmse().max(floor);
-    let Some(all) = Settled::from(clipped.clone(), fit)? else { return Ok(known) };
+    let Some(all) = Settled::from(blind.clone(), fit)? else { return Ok(known) };
     let followed = 2 * start_up(&all.settling) <= start_up(&known.settling);
     Ok(if followed && errs_no_more(&all) { all } else { known })
 }
 
 /// Residual minus each file's mean outside the windows: another sensor zero is no transient.
-fn centre(samples: &Samples, residual: &[f64], windows: &[usize], clipped: &[bool]) -> Vec<f64> {
+fn centre(samples: &Samples, residual: &[f64], windows: &[usize], blind: &[bool]) -> Vec<f64> {
     let mut centred = residual.to_vec();
     for file in 0..samples.files() {
         let own =
             || samples.segments.iter().zip(windows).zip(&samples.file_of_segment).filter(move |(_, f)| **f == file);
         let (mut sum, mut n) = (0.0, 0usize);
         for ((s, w), _) in own() {
-            for k in (s.start + w..s.end).filter(|k| !clipped[*k]) {
+            for k in (s.start + w..s.end).filter(|k| !blind[*k]) {
                 sum += residual[k];
                 n += 1;
             }

@@ -235,7 +235,7 @@ pub(crate) struct DiagnoseArgs {
     /// Record to show the errors on, never fitted
     #[arg(long)]
     pub(crate) test: Option<PathBuf>,
-    /// Model file
+    /// Model file; `auto` fits pi or preisach to the records, whichever explains them better
     #[arg(long)]
     pub(crate) model: PathBuf,
     /// Model file to write, with the effects that were found; - for stdout

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hyst_hw::{Daq, RecordOptions};
 use hyst_ident::atomic_file::write_atomic;
-use hyst_ident::diagnose::{DiagnoseOptions, RemainderKind, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, RemainderKind, diagnose};
 use hyst_ident::excite::{Drive, Identification, Limits};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
@@ -20,7 +20,6 @@ use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::{self, Report};
 use crate::progress::Progress;
-use crate::report::next::FOLLOWED;
 use crate::tracking::{Files, Run, Task};
 use crate::{recording, text};
 

@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
-use hyst_ident::model::Model;
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{Need, Record};
+use hyst_ident::simulate::Zero;
 use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
-use crate::exit::CommandResult;
+use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
 use crate::report::{self, Contents, next};
@@ -19,20 +21,27 @@ mod summary;
 /// Runs the command.
 pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
     let mut read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
-    read.push(&args.model);
+    let is_auto = args.model == Path::new(AUTO);
+    if !is_auto {
+        read.push(&args.model);
+    }
     read.extend(args.test.as_deref());
     let written: Vec<&Target> = args.output.iter().chain(&args.findings).chain(&args.report).collect();
     output::check(&read, &written)?;
     let said_as = Report::new(args.json.json, &written)?;
-    let (model, model_text) = input::model(&args.model)?;
+    let given = if is_auto { None } else { Some(input::model(&args.model)?) };
     let train = input::training(&args.train, &args.map.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
-    warn(&model, &train, test.as_ref());
-
-    let progress = Progress::spinner("diagnosing");
     let options = DiagnoseOptions { zero: args.zero.get(), seed: args.seed };
-    let diagnosis = diagnose(&train, test.as_ref(), &model, &options, &|doing| progress.say(doing))?;
-    drop(progress);
+    let (model, model_text, diagnosis) = match given {
+        Some((model, text)) => {
+            warn(&model, &train, test.as_ref());
+            let progress = Progress::spinner("diagnosing");
+            let diagnosis = diagnose(&train, test.as_ref(), &model, &options, &|doing| progress.say(doing))?;
+            (model, text, diagnosis)
+        }
+        None => fitted(&train, test.as_ref(), &options)?,
+    };
 
     let findings = &diagnosis.findings;
     if let Some(target) = &args.output {
@@ -68,6 +77,31 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         }
     }
     said_as.print(&said, findings)
+}
+
+/// Name that stands for a model that is fitted here.
+const AUTO: &str = "auto";
+
+/// A model of the kind that explains the records best, its file's text, and its diagnosis. Another kind is fitted once the diagnosis of the first
+/// says that it explains the record better with the same effects.
+fn fitted(
+    train: &Record,
+    test: Option<&Record>,
+    options: &DiagnoseOptions,
+) -> CommandResult<(Model, String, Diagnosis)> {
+    let fitting = FitOptions { zero_per_record: options.zero == Zero::PerRecord, ..FitOptions::default() };
+    let of = |kind: Kind| {
+        let progress = Progress::spinner(&format!("fitting and diagnosing {kind}"));
+        let model = fit(train, kind, &fitting)?;
+        let diagnosis = diagnose(train, test, &model, options, &|doing| progress.say(doing))?;
+        let text = model.to_json();
+        Ok::<_, CommandError>((model, text, diagnosis))
+    };
+    let first = of(Kind::Pi)?;
+    match &first.2.findings.base_advice {
+        Some(advice) => of(advice.model),
+        None => Ok(first),
+    }
 }
 
 /// Warns where the files are not what they should be for the figures to mean something.

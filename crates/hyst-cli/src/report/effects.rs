@@ -14,6 +14,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     let effects = &c.diagnosis.findings.effects;
     if effects.is_empty() {
         page.paragraph("", "No effect was named: none of them explains what is left well enough");
+        not_named(page, c);
         return;
     }
     page.paragraph(
@@ -27,6 +28,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     );
     for (i, finding) in effects.iter().enumerate() {
         page.raw(&format!("<h3 class=\"effect\">{}</h3>", escaped(finding.name)));
+        page.paragraph("", &format!("Probability that the name is right: {}", words::probability(finding.probability)));
         page.list(&finding.evidence);
         page.raw("<div class=\"side\">");
         page.table(&parameters(finding));
@@ -43,6 +45,25 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         if i == 0 || effects[i - 1].name != finding.name {
             figures::write(page, &figures::of(&c.diagnosis.pictures, Some(finding.name)));
         }
+    }
+    not_named(page, c);
+}
+
+/// What may act too, and what this record would have shown.
+fn not_named(page: &mut Page, c: &Contents<'_>) {
+    let findings = &c.diagnosis.findings;
+    let suspects = words::suspects(findings);
+    if !suspects.is_empty() {
+        page.raw("<h3>Suspects</h3>");
+        page.list(&suspects);
+    }
+    let limits = words::limits(findings);
+    if !limits.is_empty() {
+        page.raw("<h3>What this record would have shown</h3>");
+        page.paragraph("soft", "Sizes from which on each effect that was not named would have been");
+        let mut table = Table::new("Limits of detection").words("effect").numbers("size").words("of what");
+        limits.iter().for_each(|(name, size, of)| table.row(&[name, size, of]));
+        page.table(&table);
     }
 }
 

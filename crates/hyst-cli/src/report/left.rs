@@ -14,6 +14,9 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     page.paragraph("verdict", &format!("{}, {share} of the output's variance", words::kind(remainder)));
     page.paragraph("", &remainder.description);
     page.list(&remainder.places);
+    for line in words::base_advice(&c.diagnosis.findings).iter().chain(&words::rows(&c.diagnosis.findings)) {
+        page.paragraph("", line);
+    }
     if remainder.kind != RemainderKind::None {
         let missing = not_measured(c);
         if !missing.is_empty() {

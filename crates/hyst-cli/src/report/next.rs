@@ -1,6 +1,6 @@
 //! The experiment or the fit that would tell more, as a command.
 
-use hyst_ident::diagnose::{Change, RemainderKind, Verdict};
+use hyst_ident::diagnose::{Change, RemainderKind, Verdict, drive_options};
 use hyst_ident::model::{Effect, Kind};
 
 use hyst_ident::record::Record;
@@ -8,13 +8,10 @@ use hyst_ident::record::Record;
 use super::html::Page;
 use super::{Contents, words};
 use crate::input;
-use crate::text::{listed, short};
+use crate::text::listed;
 
 /// Up to so many noise floors of error there is little left to look for.
 const NEAR_THE_FLOOR: f64 = 2.0;
-
-/// Share of the slope at which an amplifier has been seen to fall behind that a drive may have.
-pub(crate) const FOLLOWED: f64 = 0.8;
 
 /// What to do next, and why.
 #[derive(Debug)]
@@ -182,19 +179,8 @@ pub(crate) fn further(words: &[String]) -> String {
     words.iter().map(|word| format!(" {}", quoted(word))).collect()
 }
 
-/// Range and rate of the record's drive, and the slope that the amplifier follows where it has not followed every one.
 fn limits(c: &Contents<'_>) -> String {
-    let rate = 1.0 / c.train.sample_period();
-    // Six digits: a period as printed gives a rate that is a whole number but for rounding.
-    let digits = |x: f64| format!("{x:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    let slew = c.diagnosis.findings.remainder.slew_limit.map(|limit| format!(" --slew {}", short(FOLLOWED * limit)));
-    format!(
-        "--low {} --high {} --rate {}{}",
-        digits(c.model.input.low),
-        digits(c.model.input.high),
-        digits(rate),
-        slew.unwrap_or_default()
-    )
+    drive_options(c.model, c.train.sample_period(), c.diagnosis.findings.remainder.slew_limit)
 }
 
 fn separate(c: &Contents<'_>, one: Effect, other: Effect) -> String {

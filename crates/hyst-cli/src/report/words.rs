@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use hyst_ident::diagnose::{Change, Finding, Findings, Found, Remainder, RemainderKind, Verdict};
+use hyst_ident::diagnose::{
+    BaseAdvice, Change, Finding, Findings, Found, LeftOut, Limit, Remainder, RemainderKind, Suspect, Verdict,
+};
+use hyst_ident::model::Effect;
 
-use crate::text::{count, listed, symbol, with_error};
+use crate::text::{count, listed, short, symbol, with_error};
 
 /// The diagnosis in a sentence.
 pub(crate) fn verdict(findings: &Findings) -> String {
@@ -68,6 +71,73 @@ pub(crate) fn plays_placed_anew(findings: &Findings) -> Option<String> {
         )
     };
     findings.plays_placed_anew.map(of)
+}
+
+/// A probability; the last digits of one that is nearly certain say nothing.
+pub(crate) fn probability(p: f64) -> String {
+    if p > 0.995 { "above 0.99".into() } else { format!("{p:.2}") }
+}
+
+/// What may act too, and how to find out.
+pub(crate) fn suspects(findings: &Findings) -> Vec<String> {
+    let of = |s: &Suspect| {
+        let p = probability(s.probability);
+        format!("{}, probability {p}; the record that would decide: {}", s.name, s.command)
+    };
+    findings.suspects.iter().map(of).collect()
+}
+
+/// That another kind of model explains the record better.
+pub(crate) fn base_advice(findings: &Findings) -> Option<String> {
+    let unit = symbol(&findings.unit);
+    let of = |a: &BaseAdvice| {
+        let (better, own) = (short(a.cv_rmse), short(a.own_cv_rmse));
+        format!(
+            "with the same effects {} explains the record better than {}: cross-validated RMSE {better} {unit} instead of {own} {unit}",
+            a.model, findings.base
+        )
+    };
+    findings.base_advice.as_ref().map(of)
+}
+
+/// Name, size and meaning of the limit of each effect that was not named.
+pub(crate) fn limits(findings: &Findings) -> Vec<(String, String, String)> {
+    let of = |(effect, limit): (&Effect, &Limit)| match limit {
+        Limit::Size { size, unit: of, meaning } => {
+            (effect.to_string(), format!("{} {}", short(*size), unit(of)).trim_end().to_owned(), meaning.clone())
+        }
+        Limit::NotVisible { not_visible } => (effect.to_string(), "not visible".to_owned(), not_visible.clone()),
+    };
+    findings.limits.iter().map(of).collect()
+}
+
+/// Which rows were left out, if some were.
+pub(crate) fn rows(findings: &Findings) -> Option<String> {
+    let rows = &findings.rows;
+    let LeftOut { gaps, spikes, start_up, saturated } = rows.left_out;
+    let mut left: Vec<String> = [
+        (spikes, "spike"),
+        (start_up, "row of a start-up transient"),
+        (saturated, "row at the end of the sensor's range"),
+    ]
+    .into_iter()
+    .filter(|(n, _)| *n > 0)
+    .map(|(n, what)| match what.split_once(' ') {
+        Some((first, rest)) => format!("{} {rest}", count(n, first)),
+        None => count(n, what),
+    })
+    .collect();
+    if !rows.spikes.is_empty() {
+        const TOLD: usize = 8;
+        let told: Vec<String> = rows.spikes.iter().take(TOLD).map(usize::to_string).collect();
+        let more = if rows.spikes.len() > TOLD { ", …" } else { "" };
+        left[0] += &format!(" (rows {}{more})", told.join(", "));
+    }
+    if gaps > 0 {
+        left.push(count(gaps, "gap"));
+    }
+    let left: Vec<&str> = left.iter().map(String::as_str).collect();
+    (!left.is_empty()).then(|| format!("{} used; left out: {}", count(rows.used, "row"), listed(&left)))
 }
 
 /// Name and value of every parameter, the elements of a creep bank in their order.

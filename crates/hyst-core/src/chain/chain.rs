@@ -5,7 +5,7 @@ use crate::{
     Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift,
     DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Rate,
     RateParams, RateState, Real, Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams,
-    Stage, Temperature, TemperatureParams,
+    Stage, Temperature, TemperatureParams, TemperatureState,
 };
 
 /// Structural modes that one chain can hold.
@@ -30,7 +30,7 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub hysteresis: H,
     /// Curve behind the memory operator.
     pub asymmetry: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
-    /// Gain over temperature.
+    /// Gain and expansion over temperature.
     pub temperature: Option<Temperature<T>>,
     /// Creep bank.
     pub creep: Option<Creep<T, C>>,
@@ -58,6 +58,7 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     lag: LagState<T>,
     rate: RateState<T>,
     hysteresis: S,
+    felt: TemperatureState<T>,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],
 }
@@ -140,8 +141,8 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     ///
     /// # Errors
     /// As [`TemperatureParams::build`].
-    pub fn with_temperature(mut self, p: &TemperatureParams) -> Result<Self, Error> {
-        self.temperature = Some(p.build(&())?);
+    pub fn with_temperature(mut self, p: &TemperatureParams, cx: &Sampling) -> Result<Self, Error> {
+        self.temperature = Some(p.build(cx)?);
         Ok(self)
     }
 
@@ -215,6 +216,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
             lag: LagState::default(),
             rate: RateState::default(),
             hysteresis: self.hysteresis.state(),
+            felt: TemperatureState::default(),
             creep: CreepState::new(),
             resonances: [ResonanceState::default(); MAX_RESONANCES],
         }
@@ -231,7 +233,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.reset(&mut (), e, x));
+        x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
         x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -253,7 +255,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.step(&mut (), e, x));
+        x = through(&self.temperature, x, |g, x| g.step(&mut s.felt, e, x));
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));
         x = through(&self.load, x, |g, x| g.step(&mut (), e, x));
         for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
@@ -281,7 +283,7 @@ mod tests {
                 let rate = RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: crate::RateLaw::Holds };
                 c.with_rate(&rate, &cx)
             })
-            .and_then(|c| c.with_temperature(&TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0 }))
+            .and_then(|c| c.with_temperature(&warm(), &cx))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
             .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [3.0, -2.0], weights: [0.1, -0.05] }))
@@ -292,6 +294,10 @@ mod tests {
                 c.with_interference(&InterferenceParams { hz: 50.0, amplitude: 0.05, phase: 0.3, harmonics: [0.01; 8] })
             })
             .unwrap()
+    }
+
+    fn warm() -> TemperatureParams {
+        TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0, expansion: 0.05, seconds: 1.5 }
     }
 
     fn run<T: Real>(rows: usize) -> Vec<f64> {

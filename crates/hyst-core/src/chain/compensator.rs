@@ -5,6 +5,7 @@ use crate::stage::{hold, rest};
 use crate::{
     AsymmetryInverse, Build, Chain, Complex, CreepInverse, CreepInverseState, Delay, DelayParams, DelayState, Env,
     Error, Invert, Load, MAX_DEAD_ZONES, RateInverse, RateState, Real, Sampling, SaturationInverse, Stage, Temperature,
+    TemperatureState,
 };
 
 /// How the dynamic stages are inverted.
@@ -59,6 +60,7 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     load: DelayState<T, N>,
     creep: CreepInverseState<T, C>,
     temperature: DelayState<T, N>,
+    felt: TemperatureState<T>,
     hysteresis: S,
     rate: RateState<T>,
     input_side: PreviewState<T, N>,
@@ -211,6 +213,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             load: DelayState::new(),
             creep: CreepInverseState::new(),
             temperature: DelayState::new(),
+            felt: TemperatureState::default(),
             hysteresis: self.hysteresis.state(),
             rate: RateState::default(),
             input_side: PreviewState::new(),
@@ -238,7 +241,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = creep.reset(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            x = x / usable(&mut s.factor, temperature.factor(e));
+            let (factor, shift) = temperature.reset_felt(&mut s.felt, e);
+            x = (x - shift) / usable(&mut s.factor, factor);
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.reset(&mut (), e, x);
@@ -278,7 +282,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = creep.step(&mut s.creep, e, x);
         }
         if let Some(temperature) = &self.temperature {
-            x = x / usable(&mut s.factor, temperature.factor(e));
+            let (factor, shift) = temperature.step_felt(&mut s.felt, e);
+            x = (x - shift) / usable(&mut s.factor, factor);
         }
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
@@ -363,9 +368,10 @@ mod tests {
 
     #[test]
     fn all_but_the_dynamic_stages_is_inverted_exactly() {
+        let warm = TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0, expansion: 0.1, seconds: 2.0 };
         let chain = Plain::new(pi())
             .with_zero(4.0)
-            .with_temperature(&TemperatureParams { per_kelvin: 0.006, reference_degc: 23.0 })
+            .with_temperature(&warm, &PERIOD)
             .and_then(|c| {
                 c.with_creep(&CreepParams { seconds: &[0.05, 0.5, 5.0], shares: &[0.02, 0.02, 0.02] }, &PERIOD)
             })

@@ -31,4 +31,4 @@ pub use preview::{Preview, PreviewState};
 pub use rate::{Rate, RateInverse, RateLaw, RateParams, RateState};
 pub use resonance::{Resonance, ResonanceParams, ResonanceState};
 pub use saturation::{Saturation, SaturationInverse, SaturationParams};
-pub use temperature::{Temperature, TemperatureParams};
+pub use temperature::{Temperature, TemperatureParams, TemperatureState};

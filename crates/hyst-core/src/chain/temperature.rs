@@ -1,9 +1,13 @@
-//! Gain that depends on temperature: `y = v (1 + α (T − T₀))`.
+//! Gain and zero that depend on temperature: `y = v (1 + α ΔT) + ε ΔT`, where `τ dΔT/dt + ΔT = T − T₀`.
+//!
+//! ε is the thermal expansion of what carries the actuator, τ the time that the heat takes from the place of the thermometer to the actuator.
 
+use crate::chain::FirstOrder;
 use crate::error::coefficient;
-use crate::{Build, Env, Error, Meta, Params, Real, Stage};
+use crate::stage::finite_or;
+use crate::{Build, Env, Error, Meta, Params, Real, Sampling, Stage};
 
-/// Parameters of `y = v (1 + α (T − T₀))`. α = 0 is no dependence.
+/// Parameters of `y = v (1 + α ΔT) + ε ΔT`, `τ dΔT/dt + ΔT = T − T₀`. α = ε = 0 is no dependence, τ = 0 one that follows at once.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TemperatureParams {
@@ -12,53 +16,135 @@ pub struct TemperatureParams {
     /// Temperature T₀ at which the gain is that of the hysteresis stage \[°C\]; a convention, not
     /// identified.
     pub reference_degc: f64,
+    /// Thermal expansion ε \[y/K\].
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub expansion: f64,
+    /// Thermal time constant τ \[s\].
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub seconds: f64,
 }
 
 impl Params for TemperatureParams {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
+        let any = f64::INFINITY;
         f(&Meta { name: "per_kelvin", unit: "1/K", lower: -0.05, upper: 0.05 }, &mut self.per_kelvin);
+        f(&Meta { name: "expansion", unit: "y/K", lower: -any, upper: any }, &mut self.expansion);
+        f(&Meta { name: "seconds", unit: "s", lower: 0.0, upper: 1e4 }, &mut self.seconds);
     }
 }
 
-/// Coefficients of the temperature stage.
+/// Coefficients of the temperature stage at one sample period; the thermal lag is exact for a temperature that is linear between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Temperature<T> {
     per_kelvin: T,
     reference: T,
+    expansion: T,
+    element: FirstOrder<T>,
 }
 
 impl<T: Real> Build<Temperature<T>> for TemperatureParams {
-    type Context = ();
-    fn build(&self, (): &()) -> Result<Temperature<T>, Error> {
+    type Context = Sampling;
+    fn build(&self, cx: &Sampling) -> Result<Temperature<T>, Error> {
         Ok(Temperature {
             per_kelvin: coefficient("temperature.per_kelvin", self.per_kelvin)?,
             reference: coefficient("temperature.reference_degc", self.reference_degc)?,
+            expansion: coefficient("temperature.expansion", self.expansion)?,
+            element: FirstOrder::new("temperature.seconds", cx.checked()?, self.seconds)?,
         })
     }
 }
 
+/// History of the temperature stage: the last measured temperature, and that of the actuator \[K above T₀\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TemperatureState<T> {
+    measured: T,
+    felt: T,
+}
+
 impl<T: Real> Temperature<T> {
-    /// Temperature T₀ at which the factor is one \[°C\].
+    /// Temperature T₀ at which the gain is that of the hysteresis stage \[°C\].
     pub fn reference(&self) -> T {
         self.reference
     }
 
-    /// The factor `1 + α (T − T₀)`.
+    /// The factor `1 + α ΔT` and the shift `ε ΔT` for an actuator that has had the measured temperature for long.
     #[inline]
-    pub fn factor(&self, env: &Env<T>) -> T {
-        T::ONE + self.per_kelvin * (env.temperature - self.reference)
+    pub fn reset_felt(&self, s: &mut TemperatureState<T>, env: &Env<T>) -> (T, T) {
+        let measured = finite_or(env.temperature - self.reference, T::ZERO);
+        *s = TemperatureState { measured, felt: measured };
+        self.at(measured)
+    }
+
+    /// The factor `1 + α ΔT` and the shift `ε ΔT` one sample period later.
+    #[inline]
+    pub fn step_felt(&self, s: &mut TemperatureState<T>, env: &Env<T>) -> (T, T) {
+        let measured = finite_or(env.temperature - self.reference, s.measured);
+        s.felt = self.element.step(s.felt, s.measured, measured);
+        s.measured = measured;
+        self.at(s.felt)
+    }
+
+    #[inline]
+    fn at(&self, kelvin: T) -> (T, T) {
+        (T::ONE + self.per_kelvin * kelvin, self.expansion * kelvin)
     }
 }
 
 impl<T: Real> Stage<T> for Temperature<T> {
-    type State = ();
-    fn state(&self) {}
-    #[inline]
-    fn reset(&self, (): &mut (), env: &Env<T>, u0: T) -> T {
-        u0 * self.factor(env)
+    type State = TemperatureState<T>;
+    fn state(&self) -> TemperatureState<T> {
+        TemperatureState::default()
     }
     #[inline]
-    fn step(&self, (): &mut (), env: &Env<T>, u: T) -> T {
-        u * self.factor(env)
+    fn reset(&self, s: &mut TemperatureState<T>, env: &Env<T>, u0: T) -> T {
+        let (factor, shift) = self.reset_felt(s, env);
+        u0 * factor + shift
+    }
+    #[inline]
+    fn step(&self, s: &mut TemperatureState<T>, env: &Env<T>, u: T) -> T {
+        let (factor, shift) = self.step_felt(s, env);
+        u * factor + shift
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(p: TemperatureParams) -> Temperature<f64> {
+        p.build(&Sampling { period: 0.1 }).unwrap()
+    }
+
+    fn at(temperature: f64) -> Env<f64> {
+        Env { temperature, ..Env::default() }
+    }
+
+    #[test]
+    fn without_a_time_constant_it_follows_the_thermometer() {
+        let stage = built(TemperatureParams { per_kelvin: 0.01, reference_degc: 20.0, expansion: 0.2, seconds: 0.0 });
+        let mut s = stage.state();
+        assert_eq!(stage.reset(&mut s, &at(20.0), 5.0), 5.0);
+        assert!((stage.step(&mut s, &at(23.0), 10.0) - (10.3 + 0.6)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn behind_a_thermal_lag_it_follows_as_its_equation_says() {
+        let stage = built(TemperatureParams { expansion: 1.0, seconds: 2.0, ..TemperatureParams::default() });
+        let mut s = stage.state();
+        stage.reset(&mut s, &at(0.0), 0.0);
+        // A ramp of 1 K/s: T − τ (1 − exp(−t/τ)).
+        for k in 1..=100 {
+            let t = 0.1 * f64::from(k);
+            let seen = stage.step(&mut s, &at(t), 0.0);
+            assert!((seen - (t - 2.0 * (1.0 - libm::exp(-t / 2.0)))).abs() < 1e-12, "{seen} at {t}");
+        }
+    }
+
+    #[test]
+    fn a_thermometer_that_drops_out_is_held() {
+        let stage = built(TemperatureParams { expansion: 1.0, ..TemperatureParams::default() });
+        let mut s = stage.state();
+        stage.reset(&mut s, &at(2.0), 0.0);
+        assert_eq!(stage.step(&mut s, &at(f64::NAN), 0.0), 2.0);
     }
 }

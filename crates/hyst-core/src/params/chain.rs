@@ -18,7 +18,7 @@ pub struct EffectParams<L> {
     pub rate: Option<RateParams>,
     /// Curve behind the hysteresis.
     pub asymmetry: Option<AsymmetryParams<L>>,
-    /// Gain over temperature.
+    /// Gain and expansion over temperature.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
     pub creep: Option<CreepParams<L>>,
@@ -58,7 +58,7 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
             chain = chain.with_asymmetry(p)?;
         }
         if let Some(p) = &self.temperature {
-            chain = chain.with_temperature(p)?;
+            chain = chain.with_temperature(p, cx)?;
         }
         if let Some(p) = &self.creep {
             chain = chain.with_creep(p, cx)?;

@@ -6,14 +6,13 @@ use super::search::Named;
 use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
 use crate::base::Drag;
-use crate::clipping::clipped_rows;
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
 use crate::nested::{Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_and, unless_followed};
+use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::Simulation;
 
 /// A model and the record that it is extended on.
@@ -129,14 +128,13 @@ impl Own<'_> {
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
         (moving.effects.drift, moving.effects.interference) = (None, None);
         let blocks = Blocks::new(&motion, BLOCKS, FINAL_ROWS);
-        let clipped = clipped_rows(&self.samples.output, &self.samples.segments);
         let mut fitted = |settling: &[bool]| {
             motion.settling.copy_from_slice(settling);
             let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
             let problem = if holds { problem.holding() } else { problem };
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
             let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
-            let starting = start_up_and(&clipped, &motion, &residual);
+            let starting = start_up_rows(&motion, &residual);
             Ok::<_, FitError>(Some((fit, starting)))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.

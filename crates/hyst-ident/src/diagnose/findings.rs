@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::{AsymmetryParams, InterferenceParams, ViscousPiParams};
+use hyst_core::{AsymmetryParams, InterferenceParams, RateLaw, ViscousPiParams};
 use serde::{Deserialize, Serialize};
 
+use super::limits::Limit;
 use super::search::Named;
 use crate::digits::{short, signed};
 pub use crate::metrics::Errors;
@@ -14,7 +15,7 @@ use crate::samples::Samples;
 use crate::simulate::{Simulation, Zero};
 
 /// Schema of the findings that this version writes.
-const SCHEMA: &str = "hyst.findings/1";
+const SCHEMA: &str = "hyst.findings/2";
 
 /// The diagnosis in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,11 +96,109 @@ pub struct Alternative {
     pub indistinguishable: bool,
 }
 
+/// What kind of thing an effect is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EffectKind {
+    /// Loops that change with the rate of the drive.
+    Rate,
+    /// The output goes on after the drive has stopped.
+    SlowMemory,
+    /// The output is filtered: late, smooth or ringing.
+    LinearDynamics,
+    /// A curve without memory behind the hysteresis.
+    OutputShape,
+    /// It follows the measured temperature.
+    Temperature,
+    /// It follows the measured load.
+    Load,
+    /// The zero moves with time, whatever the drive does.
+    Time,
+    /// A periodic signal in the sensor.
+    Tone,
+}
+
+impl EffectKind {
+    /// The kind of an effect.
+    pub fn of(effect: Effect) -> Self {
+        match effect {
+            Effect::RateDependence => Self::Rate,
+            Effect::Creep => Self::SlowMemory,
+            Effect::Delay | Effect::Lag | Effect::Resonance => Self::LinearDynamics,
+            Effect::Asymmetry | Effect::Saturation => Self::OutputShape,
+            Effect::Temperature => Self::Temperature,
+            Effect::Load => Self::Load,
+            Effect::Drift => Self::Time,
+            Effect::Interference => Self::Tone,
+        }
+    }
+}
+
+/// An effect that helps but is not sure enough to be named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Suspect {
+    /// Name.
+    pub name: Effect,
+    /// What kind of thing it is.
+    pub kind: EffectKind,
+    /// Probability that it acts.
+    pub probability: f64,
+    /// Cross-validated RMSE with it \[output unit\].
+    pub cv_rmse: f64,
+    /// The command that makes the record that would decide.
+    pub command: String,
+}
+
+/// Another kind of model that explains the record better.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BaseAdvice {
+    /// The kind.
+    pub model: Kind,
+    /// Its cross-validated RMSE with all that was found \[output unit\].
+    pub cv_rmse: f64,
+    /// That of the model's own kind.
+    pub own_cv_rmse: f64,
+}
+
+/// Rows that a diagnosis used, and why it did not use the others.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rows {
+    /// Rows that were used.
+    pub used: usize,
+    /// Rows that were not, by what is the matter with them.
+    pub left_out: LeftOut,
+    /// Numbers of the rows that spike, from 1 for the first row of data; the first [`MOST_LISTED`] of them.
+    pub spikes: Vec<usize>,
+}
+
+/// Rows that were left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub struct LeftOut {
+    /// Holes in time, where a log has lost samples.
+    pub gaps: usize,
+    /// The sensor shows for a moment what no device does.
+    pub spikes: usize,
+    /// A transient from before the record.
+    pub start_up: usize,
+    /// The sensor stands at the end of its range.
+    pub saturated: usize,
+}
+
+/// Spikes that are listed at most.
+pub const MOST_LISTED: usize = 100;
+
 /// A named effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Name.
     pub name: Effect,
+    /// What kind of thing it is.
+    pub kind: EffectKind,
+    /// Which law it follows; none where a flexible form extends the model, which is more than its parameters say.
+    pub law: Option<String>,
+    /// Probability that the name is right, as calibrated on simulated actuators of several hysteresis laws.
+    pub probability: f64,
     /// Parameters.
     pub parameters: BTreeMap<String, Found>,
     /// Why it was named, in sentences.
@@ -125,7 +224,7 @@ pub struct OnRecords {
 /// What a diagnosis found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// `hyst.findings/1`
+    /// `hyst.findings/2`
     pub schema: String,
     /// Base model.
     pub base: Kind,
@@ -145,6 +244,14 @@ pub struct Findings {
     /// model were placed while the effects stood in the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plays_placed_anew: Option<usize>,
+    /// Effects that help but are not sure enough to be named, the most probable first.
+    pub suspects: Vec<Suspect>,
+    /// What this record would have shown of each effect that is not named.
+    pub limits: BTreeMap<Effect, Limit>,
+    /// Another kind of model that explains the record better, if one does.
+    pub base_advice: Option<BaseAdvice>,
+    /// Which rows were used.
+    pub rows: Rows,
     /// What is left.
     pub remainder: Remainder,
     /// Errors of the extended model.
@@ -163,6 +270,12 @@ pub(super) struct Material<'a> {
     pub(super) remainder: Remainder,
     pub(super) zero: Zero,
     pub(super) samples: &'a Samples,
+    /// Error that is left in the end, in noise floors.
+    pub(super) left: f64,
+    pub(super) suspects: Vec<Suspect>,
+    pub(super) limits: BTreeMap<Effect, Limit>,
+    pub(super) base_advice: Option<BaseAdvice>,
+    pub(super) rows: Rows,
 }
 
 /// Thresholds of a base of plays.
@@ -198,6 +311,10 @@ pub(super) fn collect(m: &Material<'_>) -> Findings {
         verdict,
         before: on(m.before, m.tests.map(|t| &t.0)),
         effects,
+        suspects: m.suspects.clone(),
+        limits: m.limits.clone(),
+        base_advice: m.base_advice.clone(),
+        rows: m.rows.clone(),
         remainder: m.remainder.clone(),
         after: on(m.after, m.tests.map(|t| &t.1)),
     }
@@ -230,6 +347,9 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
     }
     Finding {
         name: named.effect,
+        kind: EffectKind::of(named.effect),
+        law: law(m.extended, named.effect).map(str::to_owned),
+        probability: named.evidence(m.left).probability(),
         parameters: parameters(m, named.effect),
         evidence,
         alternatives: named
@@ -240,6 +360,40 @@ fn finding(m: &Material<'_>, named: &Named) -> Finding {
         cv_rmse_before: named.cv_without,
         cv_rmse_after: after,
     }
+}
+
+/// The law that an effect follows in a model; none of a flexible form.
+fn law(model: &Model, effect: Effect) -> Option<&'static str> {
+    let e = &model.effects;
+    Some(match effect {
+        Effect::Delay => "dead-time",
+        Effect::Lag => "first-order",
+        Effect::RateDependence if e.rate.is_none() => "viscous-plays",
+        Effect::RateDependence => match e.rate?.law {
+            RateLaw::Follows => "power-follows",
+            RateLaw::Holds => "power-holds",
+            RateLaw::Relaxes => "power-relaxes",
+        },
+        Effect::Temperature => match e.temperature? {
+            p if p.expansion != 0.0 && p.seconds > 0.0 => "gain-and-expansion-behind-a-thermal-lag",
+            p if p.expansion != 0.0 => "gain-and-expansion",
+            p if p.seconds > 0.0 => "gain-behind-a-thermal-lag",
+            _ => "gain",
+        },
+        Effect::Load => "compliance",
+        Effect::Resonance => "second-order",
+        Effect::Saturation => "knee",
+        Effect::Drift => match e.drift?.seconds > 0.0 {
+            true => "exponential",
+            false => "line",
+        },
+        Effect::Interference => match harmonics(&e.interference?).next() {
+            Some(_) => "sine-with-harmonics",
+            None => "sine",
+        },
+        // A bank of relaxations, a curve of straight pieces.
+        Effect::Creep | Effect::Asymmetry => return None,
+    })
 }
 
 /// The output's unit as a person writes it.
@@ -292,7 +446,20 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             let (name, limit) = limit(m)?;
             format!("the output stops at {} {} at its {name} end while the drive goes on", short(limit), symbol(m))
         }
-        Effect::Temperature => format!("the gain changes by {:+.2} % per K", 100.0 * e.temperature?.per_kelvin),
+        Effect::Temperature => {
+            let p = e.temperature?;
+            let expands = match p.expansion {
+                0.0 => String::new(),
+                expansion => format!(", and the zero moves by {} {} per K", signed(expansion), symbol(m)),
+            };
+            let late = match p.seconds {
+                0.0 => String::new(),
+                seconds => {
+                    format!("; the actuator follows the thermometer with a time constant of {} s", short(seconds))
+                }
+            };
+            format!("the gain changes by {:+.2} % per K{expands}{late}", 100.0 * p.per_kelvin)
+        }
         Effect::Creep => {
             let (p, hold) = (e.creep.as_ref()?, longest_hold(m.samples));
             let shares = p.seconds.iter().zip(&p.shares);
@@ -418,6 +585,12 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
         Effect::Temperature => e.temperature.iter().for_each(|p| {
             put("temperature", "per_kelvin", p.per_kelvin, "1/K");
             put("temperature", "reference_degc", p.reference_degc, "degC");
+            if p.expansion != 0.0 {
+                put("temperature", "expansion", p.expansion, &format!("{y}/K"));
+            }
+            if p.seconds > 0.0 {
+                put("temperature", "seconds", p.seconds, "s");
+            }
         }),
         Effect::Creep => e.creep.iter().for_each(|p| {
             for (tau, share) in p.seconds.iter().zip(&p.shares).filter(|(_, share)| **share > 0.0) {

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use hyst_core::Error;
 
+use super::scan::Scan;
 use super::score;
 use super::search::{Search, beyond, further};
 use super::starts::starts;
@@ -100,7 +101,8 @@ pub(super) fn refine(
         let loose = undetermined(&best.fit);
         for cause in beyond(&best.fit.hypothesis, already) {
             let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
-            let is_loose = cause.effect().is_some_and(|effect| loose.contains(&effect));
+            let is_loose =
+                cause.effect().is_some_and(|effect| loose.contains(&effect)) && !score::is_far_better(&without, &best);
             if (is_loose || !score::judge(&triangle, &without, &best, found.noise, seed).accepted())
                 && least.as_ref().is_none_or(|l| without.total() < l.total())
             {
@@ -198,7 +200,7 @@ fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<b
     let with = &anew.best.fit.hypothesis;
     let without = late.iter().fold(with.clone(), |h, e| h.without(Cause::Effect(*e)));
     let (Some(as_found), Some(from)) = (squares(with)?, dragging.fit_linear(&without)?) else { return Ok(false) };
-    for start in starts(&dragging, &from, Cause::Effect(Effect::RateDependence))? {
+    for start in starts(&Scan::new(&dragging, &from, 0.0)?, Cause::Effect(Effect::RateDependence))? {
         if squares(&start)?.is_some_and(|dragged| dragged < as_found) {
             return Ok(true);
         }

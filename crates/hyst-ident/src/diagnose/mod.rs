@@ -10,25 +10,35 @@
 //!    lacks a curve.
 //! 4. **Extend** the user's own model with the effects found, all weights refitted.
 
+mod advice;
 mod changed;
 mod evidence;
 mod extension;
 mod findings;
 mod finer;
+mod limits;
+mod probability;
 mod remainder;
+mod rows;
+mod scan;
 mod score;
 mod search;
 mod shape;
 mod spectrum;
 mod starts;
+mod suspects;
 mod tone;
 mod trial;
 mod uncertainty;
 
 pub use evidence::{Axis, Breakdown, Curve, MOST_POINTS, Mark, Part, Picture, Role, Style};
 pub use findings::{
-    Alternative, Change, Errors as FoundErrors, Finding, Findings, Found, OnRecords, Remainder, RemainderKind, Verdict,
+    Alternative, BaseAdvice, Change, EffectKind, Errors as FoundErrors, Finding, Findings, Found, LeftOut, MOST_LISTED,
+    OnRecords, Remainder, RemainderKind, Rows, Suspect, Verdict,
 };
+pub use limits::Limit;
+pub use probability::Weighed;
+pub use suspects::{FOLLOWED, drive_options};
 
 use extension::Own;
 
@@ -41,6 +51,7 @@ use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Zero, simulate};
+use trial::Trial;
 
 /// What a diagnosis may be told.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +79,8 @@ pub struct Diagnosis {
     pub pictures: Vec<Picture>,
     /// Where what is left lives.
     pub breakdowns: Vec<Breakdown>,
+    /// Each name that was given, or that might have been, with what its probability was computed from.
+    pub weighed: Vec<Weighed>,
 }
 
 /// Rows that the search needs for each unknown of its base: with fewer, noise looks like an effect.
@@ -157,6 +170,13 @@ pub fn diagnose(
         richest = richest.min(least);
     }
     let only_loop = problem.only_loop;
+    progress("computing what this record would have shown");
+    let units = (model.input.symbol(), model.output.unit.as_str());
+    let with_found = problem.fit_linear(&hypothesis).map_err(stage)?.and_then(|f| Trial::of(&problem, f));
+    let mut limits = with_found
+        .map(|found_here| limits::limits(&problem, &found_here, found.noise, units).map_err(stage))
+        .transpose()?
+        .unwrap_or_default();
     drop(problem);
 
     let effects = |h: &Hypothesis| h.causes().iter().filter_map(|c| c.effect()).collect::<Vec<_>>();
@@ -236,7 +256,23 @@ pub fn diagnose(
         zero: options.zero,
         noise: found.noise,
     })?;
+    limits.retain(|effect, _| !named.contains(effect));
+    let left = after.errors.as_ref().map_or(1.0, |e| e.rmse / found.noise.max(f64::MIN_POSITIVE));
+    let near = suspects::near(&found, &named, left);
+    let suspects = suspects::suspects(&near, model, &samples, remainder.slew_limit);
+    let given = found.named.iter().map(|n| Weighed::of(n.effect, true, &n.evidence(left)));
+    let weighed = given.chain(near.iter().map(|n| Weighed::of(n.effect, false, &n.evidence))).collect();
+    let base_advice = match remainder.kind {
+        RemainderKind::None => None,
+        _ => advice::base_advice(&samples, (model.base.kind(), asked.basis.as_ref()), &hypothesis, per_record)
+            .map_err(stage)?,
+    };
     let findings = findings::collect(&findings::Material {
+        left,
+        suspects,
+        limits,
+        base_advice,
+        rows: rows::rows(train, &samples),
         model,
         extended: &extended,
         named: &found.named,
@@ -249,7 +285,7 @@ pub fn diagnose(
         zero: options.zero,
         samples: &samples,
     });
-    Ok(Diagnosis { extended, findings, pictures, breakdowns })
+    Ok(Diagnosis { extended, findings, pictures, breakdowns, weighed })
 }
 
 /// What a model already holds.

@@ -66,13 +66,31 @@ impl Judgement {
         self.is_sure() && self.explains()
     }
 
-    fn is_sure(&self) -> bool {
+    /// Whether it helps in nearly every part of the record and stands above the noise, however little of what is left it explains.
+    pub(crate) fn is_sure(&self) -> bool {
         self.sensible && self.confidence >= CONFIDENCE && self.over_noise >= LEAST_OVER_NOISE
     }
 
     fn explains(&self) -> bool {
         self.ratio <= 1.0 - LEAST_FALL && self.share >= LEAST_SHARE
     }
+}
+
+/// Gain in Σ residual² from which on an effect is accepted that leaves this much of it over `rows` rows: what the thresholds of
+/// [`Judgement`] come to.
+pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
+    let floor = rows * noise * noise;
+    let of_fall = left * (1.0 / (1.0 - LEAST_FALL).powi(2) - 1.0);
+    let of_share = (left - floor).max(0.0) * LEAST_SHARE / (1.0 - LEAST_SHARE);
+    (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall).max(of_share)
+}
+
+/// Gain from which on an effect may be accepted beside a fit that leaves this much of Σ residual² without it.
+pub(super) fn least_gain_from(rows: f64, before: f64, noise: f64) -> f64 {
+    let floor = rows * noise * noise;
+    let of_fall = before * (1.0 - (1.0 - LEAST_FALL).powi(2));
+    let of_share = (before - floor).max(0.0) * LEAST_SHARE;
+    (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall.min(of_share))
 }
 
 /// How `with` stands against `without`, by the weaker of what it predicts and what it fits: where a part of the record shows what no
@@ -108,6 +126,16 @@ fn differences(without: &Trial, with: &Trial) -> Vec<f64> {
 /// Whether the second predicts clearly better than the first: in nearly every bootstrap draw.
 pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
     share_above_zero(&differences(first, second), seed) >= CLEARLY
+}
+
+/// Whether the second predicts better by as much as an effect has to.
+pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
+    second.cv_rmse() <= (1.0 - LEAST_FALL) * first.cv_rmse()
+}
+
+/// Whether the second predicts so much better that it is needed, however little its parameters are known.
+pub(super) fn is_far_better(first: &Trial, second: &Trial) -> bool {
+    first.cv_rmse() > MOST_APART * second.cv_rmse()
 }
 
 /// Whether neither predicts clearly better than the other.

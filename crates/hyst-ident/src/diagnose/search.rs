@@ -1,8 +1,12 @@
 //! Which effects: forward with a beam, then elimination, then swaps.
 
+use std::sync::Mutex;
+
 use hyst_core::Error;
 use rayon::prelude::*;
 
+use super::probability::Evidence;
+use super::scan::Scan;
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::trial::Trial;
 use super::uncertainty::undetermined;
@@ -11,8 +15,8 @@ use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
 
-/// Sets of effects carried from one round to the next.
-const BEAM: usize = 2;
+/// Σ residual², over that of the best set, beyond which a second one is not carried on beside it.
+const BEAM_WITHIN: f64 = 3.0;
 /// Error, over that of what is named, up to which what is late otherwise is alike in one loop.
 const ALIKE: f64 = 1.1;
 /// What a drag beside a creep adds, in noise floors, up to which a faster creep is tried instead.
@@ -36,6 +40,15 @@ pub(crate) struct Named {
     pub(crate) judgement: Judgement,
 }
 
+impl Named {
+    /// What is known of it where this error is left in the end, in noise floors.
+    pub(crate) fn evidence(&self, left: f64) -> Evidence {
+        let others = self.instead.iter().filter(|i| i.judgement.sensible).map(|i| i.cv_rmse);
+        let next_best = others.fold(self.cv_without, f64::min) / self.cv_with.max(f64::MIN_POSITIVE);
+        Evidence { judgement: self.judgement, next_best, left }
+    }
+}
+
 /// Another effect in the place of a named one.
 #[derive(Clone)]
 pub(crate) struct Instead {
@@ -55,8 +68,18 @@ pub(crate) struct Search {
     pub(crate) named: Vec<Named>,
     /// Standard deviation of the white noise \[output unit\].
     pub(crate) noise: f64,
+    /// What helps what was found in every part of the record, but by too little to be named: effect, cross-validated error with it \[output unit\],
+    /// judgement.
+    pub(crate) near: Vec<(Effect, f64, Judgement)>,
     /// Where the zero wanders beyond the drift of the best set: the cross-validated error that is left once it may \[output unit\].
     pub(crate) beside_wandering: Option<f64>,
+}
+
+const DRIFT: Cause = Cause::Effect(Effect::Drift);
+
+/// Thermal expansion of a set \[y/K\].
+fn expansion(trial: &Trial) -> f64 {
+    trial.fit.hypothesis.effects.temperature.map_or(0.0, |p| p.expansion)
 }
 
 /// Context that every judgement needs.
@@ -64,16 +87,41 @@ struct Judge<'a> {
     problem: &'a Problem<'a>,
     noise: f64,
     seed: u64,
+    /// What came of adding a cause to a set.
+    known: Mutex<Vec<(Hypothesis, Cause, Option<Hypothesis>)>>,
 }
 
 impl Judge<'_> {
-    fn trials(&self, from: &Fitted, cause: Cause) -> Result<Option<Trial>, Error> {
-        let starts = starts::starts(self.problem, from, cause)?;
+    /// Scans a fit for what may be added to it.
+    fn scan<'b>(&'b self, from: &'b Fitted) -> Result<Scan<'b>, Error> {
+        Scan::new(self.problem, from, score::least_gain_from(from.rows as f64, from.squares, self.noise))
+    }
+
+    fn trials(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
+        let from = &scan.from.hypothesis;
+        // The same fit may be asked for again when effects are swapped.
+        let known = self.known.lock().ok().and_then(|known| {
+            let same = known.iter().find(|(parent, of, _)| *of == cause && parent == from);
+            same.map(|(.., found)| found.clone())
+        });
+        if let Some(found) = known {
+            return found.map_or(Ok(None), |found| self.refit(&found));
+        }
+        let found = self.searched(scan, cause)?;
+        if let Ok(mut known) = self.known.lock() {
+            known.push((from.clone(), cause, found.as_ref().map(|t| t.fit.hypothesis.clone())));
+        }
+        Ok(found)
+    }
+
+    fn searched(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
+        let starts = starts::starts(scan, cause)?;
         let trials: Vec<Result<Option<Trial>, Error>> = starts.par_iter().map(|start| self.refit(start)).collect();
         let mut fitted: Vec<Trial> = trials.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
         // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());
         let mut best: Option<Trial> = None;
+        let plainer = fitted.clone();
         for trial in fitted {
             let better = best.as_ref().is_none_or(|best| {
                 let is_simple = trial.fit.solution.len() == best.fit.solution.len();
@@ -83,7 +131,13 @@ impl Judge<'_> {
                 best = Some(trial);
             }
         }
-        Ok(best)
+        let Some(expands) = best.as_ref().filter(|t| expansion(t) != 0.0) else { return Ok(best) };
+        // A zero that rises with a temperature that rises steadily may as well drift.
+        let still = plainer.into_iter().filter(|t| expansion(t) == 0.0).min_by(|a, b| a.total().total_cmp(&b.total()));
+        let Some(still) = still.filter(|t| t.fit.hypothesis.has_room(DRIFT)) else { return Ok(best) };
+        let drifts = self.trials(&self.scan(&still.fit)?, DRIFT)?;
+        let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, expands, self.seed));
+        Ok(if decided { best } else { Some(still) })
     }
 
     fn refit(&self, effects: &Hypothesis) -> Result<Option<Trial>, Error> {
@@ -138,34 +192,46 @@ pub(super) fn further(
 ) -> Result<Search, Error> {
     let steps = quantisation(&problem.samples.output);
     let noise = noise_floor(&problem.residual(&base)?, &problem.samples.segments).min(known).max(steps);
-    let mut judge = Judge { problem, noise, seed };
+    let mut judge = Judge { problem, noise, seed, known: Mutex::default() };
     let Some(start) = Trial::of(problem, base.clone()) else {
         // Without cross-validation nothing can be named.
         let nothing = Trial { blocks: vec![base.squares], fit: base };
-        return Ok(Search { best: nothing, named: Vec::new(), noise, beside_wandering: None });
+        return Ok(Search { best: nothing, named: Vec::new(), noise, near: Vec::new(), beside_wandering: None });
     };
 
     let mut beam = vec![start.clone()];
     let mut best = start;
+    let mut near = Vec::new();
     for round in 1..=MOST {
         if judge.nothing_to_gain(&best) {
             break;
         }
         progress(&format!("searching for effects, round {round}"));
-        let jobs: Vec<(&Trial, Cause)> =
-            beam.iter().flat_map(|t| candidates(problem, &t.fit).into_iter().map(move |c| (t, c))).collect();
+        let scans: Vec<Scan<'_>> = beam.iter().map(|t| judge.scan(&t.fit)).collect::<Result<_, _>>()?;
+        let parents = || beam.iter().zip(&scans);
+        let jobs: Vec<(&Trial, &Scan<'_>, Cause)> = parents()
+            .flat_map(|(t, scan)| candidates(problem, &t.fit).into_iter().map(move |c| (t, scan, c)))
+            .collect();
         // Each trial is computed alone and collected in order: threads change nothing.
-        let trials: Vec<Result<Option<Trial>, Error>> = jobs
+        let trials: Vec<Result<Option<(Trial, Judgement)>, Error>> = jobs
             .par_iter()
-            .map(|(parent, e)| {
-                // A set that is worse than a smaller one found before leads nowhere.
-                let promising = |t: &Trial| t.total() < best.total() && judge.judge(parent, t).accepted();
-                Ok(judge.trials(&parent.fit, *e)?.filter(promising))
+            .map(|(parent, scan, e)| {
+                let trial = judge.trials(scan, *e)?;
+                Ok(trial.map(|t| {
+                    let judgement = judge.judge(parent, &t);
+                    (t, judgement)
+                }))
             })
             .collect();
         let mut next: Vec<Trial> = Vec::new();
-        for trial in trials {
-            let Some(trial) = trial? else { continue };
+        near.clear();
+        for (trial, (_, _, cause)) in trials.into_iter().zip(&jobs) {
+            let Some((trial, judgement)) = trial? else { continue };
+            // A set that is worse than a smaller one found before leads nowhere.
+            if trial.total() >= best.total() || !judgement.accepted() {
+                near.extend(cause.effect().filter(|_| judgement.is_sure()).map(|e| (e, trial.cv_rmse(), judgement)));
+                continue;
+            }
             // Two ways to the same set of effects: keep the better.
             let names = trial.fit.hypothesis.causes();
             match next.iter_mut().find(|t| t.fit.hypothesis.causes() == names) {
@@ -178,8 +244,18 @@ pub(super) fn further(
             break;
         }
         next.sort_by(|a, b| a.total().total_cmp(&b.total()));
-        next.truncate(BEAM);
         best = next[0].clone();
+        // What has no name takes nearly anything with its many numbers, and may not put an end to the search among names.
+        let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.effect().is_none());
+        let far = BEAM_WITHIN * best.total();
+        let beside = |t: &Trial| t.total() <= far || (nameless(&best) && !nameless(t));
+        let first = next.iter().skip(1).position(|t| beside(t) && nameless(&best) != nameless(t));
+        let first = first.or_else(|| next.iter().skip(1).position(beside));
+        let mut at = 0;
+        next.retain(|_| {
+            at += 1;
+            at == 1 || first.is_some_and(|first| at == first + 2)
+        });
         // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
         judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments)).max(steps);
         beam = next;
@@ -210,9 +286,9 @@ pub(super) fn further(
     let noise = judge.noise;
     if let Some(even) = nearly_even_drift(&judge, &best, already)? {
         let (_, named) = swaps(&judge, &even, already, &left)?;
-        return Ok(Search { beside_wandering: Some(best.cv_rmse()), best: even, named, noise });
+        return Ok(Search { beside_wandering: Some(best.cv_rmse()), best: even, named, noise, near });
     }
-    Ok(Search { best, named, noise, beside_wandering: None })
+    Ok(Search { best, named, noise, near, beside_wandering: None })
 }
 
 /// A drift in the place of a zero that wanders, where it takes nearly all of it: one that is not even to the last digit has the name too. Only
@@ -224,7 +300,7 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
         return Ok(None);
     }
     let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
-    let Some(even) = judge.trials(&still.fit, Cause::Effect(Effect::Drift))? else { return Ok(None) };
+    let Some(even) = judge.trials(&judge.scan(&still.fit)?, DRIFT)? else { return Ok(None) };
     let takes_nearly_all = still.total() - even.total() >= EVEN * (still.total() - best.total());
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
 }
@@ -273,7 +349,8 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Optio
     for (cause, trial) in names.iter().zip(reduced) {
         // Without one effect another may be driven to nonsense: then the first one is needed.
         let Some(trial) = trial?.filter(|t| score::sensible(judge.problem, t)) else { continue };
-        let is_loose = cause.effect().is_some_and(|effect| loose.contains(&effect));
+        let is_loose =
+            cause.effect().is_some_and(|effect| loose.contains(&effect)) && !score::is_far_better(&trial, best);
         if (is_loose || !judge.judge(&trial, best).accepted())
             && least.as_ref().is_none_or(|l| trial.total() < l.total())
         {
@@ -302,8 +379,8 @@ fn swaps(
             others.extend(also.into_iter().filter(|c| without.fit.hypothesis.has_room(*c)));
         }
         others.retain(|c| *c != cause);
-        let trials: Vec<Result<Option<Trial>, Error>> =
-            others.par_iter().map(|e| judge.trials(&without.fit, *e)).collect();
+        let scan = judge.scan(&without.fit)?;
+        let trials: Vec<Result<Option<Trial>, Error>> = others.par_iter().map(|e| judge.trials(&scan, *e)).collect();
         let mut instead = Vec::new();
         for (other, trial) in others.iter().zip(trials) {
             let Some(trial) = trial? else { continue };
@@ -319,8 +396,11 @@ fn swaps(
             let nameless = || cause.effect().is_none() && !judge.judge(&trial, best).accepted();
             let numbers = |trial: &Trial, cause: Cause| trial.fit.hypothesis.complexity(cause);
             let is_smaller = numbers(&trial, *other) < numbers(best, cause);
-            let simpler = accepted && is_smaller && (tie || nameless());
-            let clearly = accepted && !tie && trial.total() < best.total();
+            // More numbers have to be worth as much as an effect: a law of several takes more of the base's misfit than one of one.
+            let is_larger = numbers(&trial, *other) > numbers(best, cause);
+            let simpler = accepted && is_smaller && (tie || nameless() || !score::is_worth(&trial, best));
+            let clearly =
+                accepted && !tie && trial.total() < best.total() && (!is_larger || score::is_worth(best, &trial));
             let fresh = !left.contains(&trial.fit.hypothesis.causes());
             if fresh && (simpler || clearly) && better.as_ref().is_none_or(|b| trial.total() < b.total()) {
                 better = Some(trial);

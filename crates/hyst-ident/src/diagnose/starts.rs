@@ -8,14 +8,15 @@ use hyst_core::{
     SaturationParams, TemperatureParams,
 };
 
+use super::scan::Scan;
 use super::spectrum::{peaks, tone};
 use crate::base::DragParams;
 use crate::model::{CreepBank, Effect, Effects};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem, shown_motion, slopes};
+use crate::nested::{Cause, Fitted, Hypothesis, shown_motion, slopes};
 use crate::samples::Samples;
 
 /// Creep elements per decade of time.
-const PER_DECADE: f64 = 2.0;
+pub(super) const PER_DECADE: f64 = 2.0;
 /// Elements of a faster creep at most, and the samples that one lasts at least.
 const FASTER: u8 = 4;
 const FASTEST: f64 = 4.0;
@@ -23,12 +24,19 @@ const FASTEST: f64 = 4.0;
 const FOLLOWED: usize = 2;
 /// Frequencies of the coarse scan.
 const SCAN: usize = 48;
+/// Exponents of the rate that are tried, and the overdrive at the reference rate, as a share of the range.
+const EXPONENTS: [f64; 4] = [0.15, 0.4, 0.7, 1.0];
+const TRIED_OVERDRIVE: f64 = 0.005;
 /// Slopes of the coarse scan, and what each is of the one before.
 const SLOPES: usize = 20;
 const LESS_STEEP: f64 = 0.65;
 
-/// Hypotheses to begin at: that of `from`, and `cause`.
-pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Result<Vec<Hypothesis>, Error> {
+/// Hypotheses to begin at: that of the scanned fit, and `cause`; none where it would take next to nothing.
+pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, Error> {
+    if !scan.is_promising(cause)? {
+        return Ok(Vec::new());
+    }
+    let Scan { problem, from, .. } = scan;
     let samples = problem.samples;
     let also = |change: &dyn Fn(&mut Hypothesis)| {
         let mut h = from.hypothesis.clone();
@@ -41,7 +49,7 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         Cause::ZeroWanders => return Ok(vec![also(&|h| h.zero_wanders = true)]),
         Cause::GainWanders => return Ok(vec![also(&|h| h.gain_wanders = true)]),
         Cause::SlewLimit => {
-            let limits = slew_limits(problem, from)?;
+            let limits = slew_limits(scan)?;
             return Ok(limits.into_iter().map(|v_per_s| also(&|h| h.slew_limit = Some(v_per_s))).collect());
         }
     };
@@ -54,11 +62,8 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
             let linear = DragParams { seconds: samples.period, volt_seconds: 0.0 };
             let root = DragParams { seconds: 0.0, volt_seconds: 1e-3 * (high - low) * samples.period };
             let in_the_plays = [linear, root].map(|drag| also(&|h| h.drag = Some(drag)));
-            // And one on the whole drive, for any base: the range in a second is the reference rate.
-            let on_the_drive = RateLaw::ALL.map(|law| {
-                let rate = RateParams { volts: 0.01 * (high - low), exponent: 0.5, reference_rate: high - low, law };
-                with(&|e| e.rate = Some(rate))
-            });
+            // And one on the whole drive, for any base.
+            let on_the_drive = widenings(scan)?.into_iter().map(|rate| with(&|e| e.rate = Some(rate)));
             in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).collect()
         }
         // It is looked for on the user's base.
@@ -70,7 +75,13 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
         }
         Effect::Temperature => {
             let reference_degc = starting_temperature(samples);
-            vec![with(&|e| e.temperature = Some(TemperatureParams { per_kelvin: 0.0, reference_degc }))]
+            // The gain alone, or with an expansion, each at once or behind a thermal lag. An expansion of zero would be none.
+            let whole = samples.time[samples.len() - 1] - samples.time[0];
+            let lags = [0.0, 0.02 * whole, 0.15 * whole];
+            let laws =
+                lags.into_iter().flat_map(|seconds| [0.0, f64::MIN_POSITIVE].map(|expansion| (seconds, expansion)));
+            let of = |(seconds, expansion)| TemperatureParams { per_kelvin: 0.0, reference_degc, expansion, seconds };
+            laws.map(|law| with(&|e| e.temperature = Some(of(law)))).collect()
         }
         // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
         Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
@@ -83,15 +94,14 @@ pub(super) fn starts(problem: &Problem<'_>, from: &Fitted, cause: Cause) -> Resu
             times.map(|seconds| with(&|e| e.drift = Some(drift(seconds)))).into()
         }
         Effect::Interference => {
-            let residual = problem.residual(from)?;
-            let found = tone(samples, &residual);
+            let found = tone(samples, &scan.residual);
             found
                 .map(|hz| with(&|e| e.interference = Some(InterferenceParams { hz, ..Default::default() })))
                 .into_iter()
                 .collect()
         }
         Effect::Resonance => {
-            let found = modes(problem, from)?;
+            let found = modes(scan)?;
             found.into_iter().map(|mode| with(&|e| e.resonances.push(mode))).collect()
         }
     })
@@ -121,7 +131,7 @@ pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> Option<[Satu
 const FAR_STOP: f64 = 3.0;
 
 /// Temperature at which the gain counts as 1: where the record began, to a tenth of a degree.
-fn starting_temperature(samples: &Samples) -> f64 {
+pub(super) fn starting_temperature(samples: &Samples) -> f64 {
     let Some(t) = &samples.temperature else { return 0.0 };
     let rows = ((1.0 / samples.period) as usize).clamp(1, t.len());
     let mean = t[..rows].iter().sum::<f64>() / rows as f64;
@@ -130,7 +140,7 @@ fn starting_temperature(samples: &Samples) -> f64 {
 
 /// Time constants from 30 samples (but not below a 400th of the longest segment) to three times the
 /// longest segment.
-fn bank(samples: &Samples, share: f64) -> CreepBank {
+pub(super) fn bank(samples: &Samples, share: f64) -> CreepBank {
     let longest = samples.longest_segment();
     let (first, last) = ((30.0 * samples.period).max(longest / 400.0), 3.0 * longest);
     let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
@@ -154,49 +164,61 @@ pub(super) fn with_faster_creep(samples: &Samples, h: &Hypothesis) -> Hypothesis
     faster
 }
 
-/// Slopes of the drive from which on it may not be followed, the one that takes most of the residual and a neighbour.
-fn slew_limits(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<f64>, Error> {
-    let residual = problem.residual(from)?;
-    let motion = problem.motion(&from.hypothesis, &from.solution)?;
-    let projector = problem.projector(from)?;
+/// Laws of the rate whose first-order change takes most of the residual: the best two that differ in more than the exponent. The range in a
+/// second is their reference rate.
+fn widenings(scan: &Scan<'_>) -> Result<Vec<RateParams>, Error> {
+    let (low, high) = scan.problem.samples.input_range();
+    let range = high - low;
     let mut scored = Vec::new();
-    let (least, steepest) = slopes(problem.samples);
-    let scan = (0..SLOPES).scan(steepest, |limit, _| {
+    for law in RateLaw::ALL {
+        for exponent in EXPONENTS {
+            let rate = RateParams { volts: TRIED_OVERDRIVE * range, exponent, reference_rate: range, law };
+            let mut h = scan.from.hypothesis.clone();
+            h.effects.rate = Some(rate);
+            if let Some((gain, amplitude)) = scan.gain(&scan.moved(&h)?) {
+                let volts = rate.volts * amplitude.clamp(0.1, 10.0);
+                scored.push((gain, RateParams { volts, ..rate }));
+            }
+        }
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<RateParams> = Vec::new();
+    for (_, rate) in scored {
+        if chosen.len() < FOLLOWED && chosen.iter().all(|c| c.law != rate.law) {
+            chosen.push(rate);
+        }
+    }
+    Ok(chosen)
+}
+
+/// Slopes of the drive from which on it may not be followed, the one that takes most of the residual and a neighbour.
+fn slew_limits(scan: &Scan<'_>) -> Result<Vec<f64>, Error> {
+    let mut scored = Vec::new();
+    let (least, steepest) = slopes(scan.problem.samples);
+    let limits = (0..SLOPES).scan(steepest, |limit, _| {
         *limit *= LESS_STEEP;
         Some(*limit)
     });
-    for limit in scan.take_while(|limit| *limit > least) {
-        let limited = Hypothesis { slew_limit: Some(limit), ..from.hypothesis.clone() };
-        let mut moved = problem.motion(&limited, &from.solution)?;
-        moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);
-        let (gain, amplitude) = projector.gain(&moved, &residual);
-        if amplitude > 0.0 {
-            scored.push((gain, limit));
-        }
+    for limit in limits.take_while(|limit| *limit > least) {
+        let limited = Hypothesis { slew_limit: Some(limit), ..scan.from.hypothesis.clone() };
+        scored.extend(scan.gain(&scan.moved(&limited)?).map(|(gain, _)| (gain, limit)));
     }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     Ok(scored.into_iter().take(FOLLOWED).map(|(_, limit)| limit).collect())
 }
 
 /// Modes whose first-order change takes most of the residual.
-fn modes(problem: &Problem<'_>, from: &Fitted) -> Result<Vec<ResonanceParams>, Error> {
-    let samples = problem.samples;
-    let residual = problem.residual(from)?;
+fn modes(scan: &Scan<'_>) -> Result<Vec<ResonanceParams>, Error> {
+    let samples = scan.problem.samples;
     let (low, high) = (3.0 / samples.longest_segment(), 0.45 / samples.period);
     let mut grid: Vec<f64> = (0..SCAN).map(|i| low * (high / low).powf(i as f64 / (SCAN - 1) as f64)).collect();
-    grid.extend(peaks(samples, &residual, 4).into_iter().filter(|hz| *hz > low && *hz < high));
-    let motion = problem.motion(&from.hypothesis, &from.solution)?;
-    let projector = problem.projector(from)?;
+    grid.extend(peaks(samples, &scan.residual, 4).into_iter().filter(|hz| *hz > low && *hz < high));
     let mut scored = Vec::new();
     for hz in grid {
         for damping in [0.02, 0.15] {
             let mode = ResonanceParams { hz, damping, gain: 1.0 };
-            let mut moved = motion.clone();
-            let only = Effects { resonances: vec![mode], ..Effects::default() };
-            crate::nested::SignalPath::new(samples, &Hypothesis::of(only))?.output_side(&mut moved);
-            moved.iter_mut().zip(&motion).for_each(|(a, b)| *a -= b);
-            let (gain, amplitude) = projector.gain(&moved, &residual);
-            if amplitude > 0.0 {
+            let moved = scan.behind(Effects { resonances: vec![mode], ..Effects::default() })?;
+            if let Some((gain, amplitude)) = scan.gain(&moved) {
                 scored.push((gain, ResonanceParams { gain: amplitude.clamp(0.05, 1.1), ..mode }));
             }
         }

@@ -27,7 +27,10 @@ pub(super) fn undetermined(fit: &Fitted) -> Vec<Effect> {
     let mut of = |effect: Effect| match effect {
         Effect::Delay => e.delay.is_some_and(|p| unsure("delay.seconds", p.seconds)),
         Effect::Lag => e.lag.is_some_and(|p| unsure("lag.seconds", p.seconds)),
-        Effect::Temperature => e.temperature.is_some_and(|p| unsure("temperature.per_kelvin", p.per_kelvin)),
+        Effect::Temperature => e.temperature.is_some_and(|p| {
+            let expands = p.expansion != 0.0 && !unsure("temperature.expansion", p.expansion);
+            unsure("temperature.per_kelvin", p.per_kelvin) && !expands
+        }),
         Effect::Creep => e.creep.as_ref().is_some_and(|p| unsure("creep.total", p.total())),
         Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
         Effect::Resonance => loose_mode.any(|loose| loose),
@@ -121,6 +124,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     put("drift.per_second".into(), layout.drift.clone().next());
     put("drift.settling".into(), layout.drift.clone().nth(1));
     put("load.per_newton".into(), layout.load.clone().next());
+    put("temperature.expansion".into(), layout.expansion.clone().next());
     for (i, unknown) in layout.zones.clone().enumerate() {
         put(format!("asymmetry.weights[{i}]"), Some(unknown));
     }

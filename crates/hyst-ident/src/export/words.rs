@@ -68,7 +68,9 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "asymmetry" => &[
             "y = u + sum over j of weights[j] d[j]: of thresholds[j] >= 0, d = max(u - thresholds[j], 0); below, min(u - thresholds[j], 0)",
         ],
-        "temperature" => &["y = u (1 + per_kelvin (T - reference_degc))"],
+        "temperature" => &[
+            "y = u (1 + per_kelvin x) + expansion x, seconds dx/dt = T - reference_degc - x, T the measured temperature",
+        ],
         "creep" => &["y = u + sum over i of shares[i] x[i], seconds[i] dx[i]/dt = u - x[i], x[i] = u at rest"],
         "load" => &["y = u + per_newton F, F the measured load"],
         "resonance" => &["y = (1 - gain) u + gain x, x'' = w^2 (u - x) - 2 damping w x', w = 2 pi hz"],

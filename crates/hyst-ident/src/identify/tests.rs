@@ -36,6 +36,7 @@ fn record(
         segments: Vec::new(),
         file_of_segment: Vec::new(),
         settling: Vec::new(),
+        blind: Vec::new(),
     };
     for t in degc {
         let start = samples.time.len();
@@ -56,6 +57,7 @@ fn record(
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     samples.output = y.iter().map(|y| y + sigma * noise(&mut rng)).collect();
     samples.settling = vec![false; samples.len()];
+    samples.blind = samples.settling.clone();
     (samples, sigma)
 }
 
@@ -471,6 +473,7 @@ fn rows_that_repeat_others_add_nothing() {
             temperature: samples.temperature.as_deref().map(again),
             segments: std::slice::from_ref(&(0..rows)).to_vec(),
             settling: vec![false; rows],
+            blind: vec![false; rows],
             ..samples.clone()
         }
     };

@@ -46,6 +46,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
         segments: Vec::new(),
         file_of_segment: samples.file_of_segment.clone(),
         settling: Vec::new(),
+        blind: Vec::new(),
     };
     for s in &samples.segments {
         let first = kept.time.len();
@@ -58,6 +59,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
             kept.input.push(filtered(&samples.input));
             kept.output.push(filtered(&samples.output));
             kept.settling.push(samples.settling[t]);
+            kept.blind.push(samples.blind[t]);
         }
         kept.segments.push(first..kept.time.len());
     }

@@ -21,7 +21,7 @@ pub enum Effect {
     Asymmetry,
     /// Loops that widen with the rate of the drive.
     RateDependence,
-    /// Gain that follows temperature.
+    /// Gain and zero that follow temperature.
     Temperature,
     /// Slow relaxation after the drive has stopped.
     Creep,
@@ -115,7 +115,7 @@ pub struct Effects {
     pub lag: Option<LagParams>,
     /// Loops that widen with the rate of the drive, whatever the base; `pi` also has plays with drag.
     pub rate: Option<RateParams>,
-    /// Gain over temperature.
+    /// Gain and expansion over temperature.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
     pub creep: Option<CreepBank>,
@@ -223,7 +223,7 @@ impl Effects {
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// The rate and the height of a drift, load, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are
+    /// The rate and the height of a drift, load, a thermal expansion, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are
     /// not among them.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
@@ -247,7 +247,12 @@ impl Effects {
             pass(Effect::RateDependence, "", p, f);
         }
         if let Some(p) = &mut self.temperature {
-            pass(Effect::Temperature, "", p, f);
+            let lags = p.seconds > 0.0;
+            pass(Effect::Temperature, "", p, &mut |parameter| {
+                if parameter.name == "per_kelvin" || (parameter.name == "seconds" && lags) {
+                    f(parameter);
+                }
+            });
         }
         if let Some(bank) = &mut self.creep {
             let taus = bank.seconds.clone();

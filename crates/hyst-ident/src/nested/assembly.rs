@@ -126,6 +126,9 @@ impl Problem<'_> {
             path.structure(&mut deflection);
             motion.iter_mut().zip(&deflection).for_each(|(m, d)| *m += c * d);
         }
+        if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
+            motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
+        }
         Point { operator, motion, solution: DVector::from_column_slice(z) }
     }
 
@@ -180,6 +183,9 @@ impl Problem<'_> {
         if let (Some(c), Some(mut load)) = (layout.load.clone().next(), self.samples.load.clone()) {
             path.structure(&mut load);
             put(c, slowed(&load));
+        }
+        if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
+            put(c, slowed(&shift));
         }
         if let (Some(p), Some(point)) = (&h.effects.asymmetry, &point) {
             let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();

@@ -24,8 +24,10 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
         }
         (Cause::Effect(Effect::Drift), _) => {
             // Faster is a creep of each step, slower a line.
-            let whole = samples.time.last().zip(samples.time.first()).map_or(0.0, |(last, first)| last - first);
-            Bounds { lower: 0.02 * whole, upper: 2.0 * whole }
+            Bounds { lower: 0.02 * whole(samples), upper: 2.0 * whole(samples) }
+        }
+        (Cause::Effect(Effect::Temperature), _) if p.name == "seconds" => {
+            Bounds { lower: samples.period, upper: 0.5 * whole(samples) }
         }
         (Cause::Effect(Effect::RateDependence), _) if p.name == "volts" => {
             Bounds { lower: 0.0, upper: LARGEST_OVERDRIVE * range_of(samples) }
@@ -41,6 +43,11 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     };
     // Segments of a few rows leave no room between the two.
     Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
+}
+
+/// Time from the first to the last row \[s\].
+fn whole(samples: &Samples) -> f64 {
+    samples.time.last().zip(samples.time.first()).map_or(0.0, |(last, first)| last - first)
 }
 
 /// Shares of their upper bounds up to which a time and the gain of a mode count as found, not as stopped by the bound.
@@ -62,6 +69,8 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence | Effect::Drift) | Cause::SlewLimit => {
                 INSIDE
             }
+            // As a thermal lag that is slower.
+            Cause::Effect(Effect::Temperature) if p.name == "seconds" => INSIDE,
             Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
                 if dampings.next().is_some_and(|damping| damping < RINGS) {
                     return;
@@ -117,6 +126,7 @@ pub(super) fn stepped(
                     }
                     (Effect::RateDependence, "volts") => 1e-3 * (1e-3 * range_of(samples)).max(*p.value),
                     (Effect::RateDependence, "exponent") => 1e-3,
+                    (Effect::Temperature, "seconds") => 1e-3 * *p.value,
                     (Effect::Delay | Effect::Lag | Effect::RateDependence, _) => 1e-3 * samples.period.max(*p.value),
                     (Effect::Resonance, "hz") => 1e-5 * *p.value,
                     (Effect::Resonance, "damping") => 1e-3 * *p.value + 1e-7,

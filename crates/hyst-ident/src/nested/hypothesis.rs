@@ -1,5 +1,7 @@
 //! What a trial assumes besides the rate-independent base.
 
+use hyst_core::TemperatureParams;
+
 use crate::base::DragParams;
 use crate::model::{Effect, Effects};
 
@@ -103,6 +105,10 @@ impl Hypothesis {
             // A curve of time is free of the drive and imitates all that happens once in a record; a creep is tied to the drive.
             Cause::Effect(Effect::Drift) if self.effects.drift.is_some_and(|p| p.seconds > 0.0) => {
                 Effect::Creep.complexity() + 1
+            }
+            Cause::Effect(Effect::Temperature) => {
+                let more = |p: TemperatureParams| usize::from(p.expansion != 0.0) + usize::from(p.seconds > 0.0);
+                Effect::Temperature.complexity() + self.effects.temperature.map_or(0, more)
             }
             Cause::Effect(e) => e.complexity(),
             Cause::ZeroWanders | Cause::GainWanders => super::HATS,

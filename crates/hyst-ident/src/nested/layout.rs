@@ -19,6 +19,8 @@ pub(crate) struct Layout {
     /// Sine and cosine, then those of the harmonics.
     pub(crate) tone: Range<usize>,
     pub(crate) load: Range<usize>,
+    /// Thermal expansion.
+    pub(crate) expansion: Range<usize>,
     /// Dead zones of the asymmetry.
     pub(crate) zones: Range<usize>,
     pub(crate) zero_hats: Range<usize>,
@@ -40,6 +42,7 @@ impl Layout {
             drift: next(e.drift.map_or(0, |p| if p.seconds > 0.0 { 2 } else { 1 })),
             tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
+            expansion: next(some(e.temperature.is_some_and(|p| p.expansion != 0.0), 1)),
             zones: next(e.asymmetry.as_ref().map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),

@@ -23,7 +23,7 @@ pub(crate) use cross_validation::folds_interleaved;
 use hypothesis::Unknown;
 pub(crate) use hypothesis::{Cause, Hypothesis};
 pub(crate) use layout::{HATS, Layout};
-pub(crate) use path::{SignalPath, limit_slope};
+pub(crate) use path::{SignalPath, limit_slope, warmth};
 pub(crate) use problem::{Fitted, Problem};
 pub(crate) use projector::Projector;
 pub(crate) use sensor::{shown_motion, without_sensor_effects};

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use hyst_core::{
     Build, Creep, Delay, Env, Error, Invert, Lag, Rate, Resonance, Sampling, Saturation, SaturationInverse, Stage,
+    Temperature, TemperatureParams,
 };
 
 use super::Hypothesis;
@@ -19,7 +20,8 @@ pub(crate) struct SignalPath<'a> {
     delay: Option<Delay<f64, DELAY>>,
     lag: Option<Lag<f64>>,
     rate: Option<Rate<f64>>,
-    factor: Option<Vec<f64>>,
+    /// Of each row the gain, and how much warmer than the reference the actuator is \[K\].
+    warmth: Option<(Vec<f64>, Vec<f64>)>,
     creep: Option<Creep<f64, CREEP>>,
     resonances: Vec<Resonance<f64>>,
     stop: Option<Stop>,
@@ -38,10 +40,7 @@ impl<'a> SignalPath<'a> {
         let cx = Sampling { period: samples.period };
         let effects = &h.effects;
         let (delay, lag, rate) = effects.input_side();
-        let factor = match (&effects.temperature, &samples.temperature) {
-            (Some(p), Some(t)) => Some(t.iter().map(|t| 1.0 + p.per_kelvin * (t - p.reference_degc)).collect()),
-            _ => None,
-        };
+        let warmth = effects.temperature.as_ref().map(|p| warmth(samples, p)).transpose()?;
         let stop = effects.saturation.as_ref().map(|p| {
             let forward: Saturation<f64> = p.build(&())?;
             Ok(Stop { forward, inverse: forward.invert()?, step: 1e-6 * (p.high - p.low) })
@@ -52,7 +51,7 @@ impl<'a> SignalPath<'a> {
             delay: delay.map(|p| p.build(&cx)).transpose()?,
             lag: lag.map(|p| p.build(&cx)).transpose()?,
             rate: rate.map(|p| p.build(&cx)).transpose()?,
-            factor,
+            warmth: warmth.flatten(),
             creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
             resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
             stop: stop.transpose()?,
@@ -95,7 +94,7 @@ impl<'a> SignalPath<'a> {
     }
 
     fn carry<const N: usize>(&self, mut columns: [&mut [f64]; N]) {
-        if let Some(factor) = &self.factor {
+        if let Some((factor, _)) = &self.warmth {
             for v in &mut columns {
                 v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
             }
@@ -104,6 +103,16 @@ impl<'a> SignalPath<'a> {
             self.creep(creep, &mut columns);
         }
         self.modes(&mut columns);
+    }
+
+    /// What a thermal expansion of one unit per kelvin adds to the motion.
+    pub(crate) fn expansion(&self) -> Option<Vec<f64>> {
+        let mut shift = self.warmth.as_ref()?.1.clone();
+        if let Some(creep) = &self.creep {
+            self.creep(creep, &mut [&mut shift]);
+        }
+        self.modes(&mut [&mut shift]);
+        Some(shift)
     }
 
     /// Carries a deflection through the modes, in place.
@@ -158,6 +167,23 @@ impl<'a> SignalPath<'a> {
     }
 }
 
+/// Of each row the gain, and how much warmer than the reference the actuator is \[K\]; `None` where no temperature was recorded. Each segment
+/// begins as after a long time at its first temperature.
+pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<(Vec<f64>, Vec<f64>)>, Error> {
+    if samples.temperature.is_none() {
+        return Ok(None);
+    }
+    let stage: Temperature<f64> =
+        TemperatureParams { expansion: 1.0, ..*p }.build(&Sampling { period: samples.period })?;
+    let mut state = stage.state();
+    let rows = samples.segments.iter().flat_map(|s| s.clone().map(move |k| (k == s.start, k)));
+    let warmth = rows.map(|(first, k)| match first {
+        true => stage.reset_felt(&mut state, &samples.env(k)),
+        false => stage.step_felt(&mut state, &samples.env(k)),
+    });
+    Ok(Some(warmth.unzip()))
+}
+
 /// Makes of a drive what an amplifier puts out that changes by `most` a sample at most \[V\] and has rested at the first voltage of each
 /// segment.
 pub(crate) fn limit_slope(drive: &mut [f64], segments: &[Range<usize>], most: f64) {
@@ -175,7 +201,7 @@ pub(crate) fn limit_slope(drive: &mut [f64], segments: &[Range<usize>], most: f6
 mod tests {
     use super::*;
     use crate::model::Effects;
-    use hyst_core::{CreepParams, ResonanceParams, TemperatureParams};
+    use hyst_core::{CreepParams, ResonanceParams};
 
     #[test]
     fn columns_side_by_side_are_each_as_alone() {
@@ -189,7 +215,12 @@ mod tests {
         };
         let mode = |hz| ResonanceParams { hz, damping: 0.05, gain: 0.8 };
         let h = Hypothesis::of(Effects {
-            temperature: Some(TemperatureParams { per_kelvin: 0.01, reference_degc: 23.0 }),
+            temperature: Some(TemperatureParams {
+                per_kelvin: 0.01,
+                reference_degc: 23.0,
+                seconds: 0.4,
+                ..Default::default()
+            }),
             creep: Some(CreepParams { seconds: vec![0.02, 0.3], shares: vec![0.05, 0.02] }),
             resonances: vec![mode(60.0), mode(140.0)],
             ..Effects::default()

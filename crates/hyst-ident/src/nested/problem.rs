@@ -195,6 +195,7 @@ impl<'a> Problem<'a> {
             });
             let held = [
                 (layout.load, load.collect::<Vec<f64>>()),
+                (layout.expansion, e.temperature.iter().map(|p| p.expansion).collect()),
                 (layout.drift, drift.collect()),
                 (layout.tone, tone.collect()),
             ];
@@ -391,6 +392,10 @@ impl<'a> Problem<'a> {
         if let Some(load) = &mut h.effects.load {
             load.per_newton = z[layout.load.start];
         }
+        if let (Some(temperature), [expansion]) = (&mut h.effects.temperature, &z[layout.expansion.clone()]) {
+            // Nothing but zero is none.
+            temperature.expansion = if *expansion == 0.0 { f64::MIN_POSITIVE } else { *expansion };
+        }
         if let Some(curve) = &mut h.effects.asymmetry {
             curve.weights = z[layout.zones.clone()].to_vec();
         }
@@ -421,9 +426,17 @@ impl<'a> Problem<'a> {
         Ok(Some(self.finish(h.clone(), &here, &columns)))
     }
 
-    /// What separates a new column from those that a fit already has.
+    /// What separates a new column from all that a fit has, its nonlinear parameters too.
     pub(crate) fn projector(&self, fit: &Fitted) -> Result<Projector<'_>, Error> {
-        let blocks = self.assemble(&fit.hypothesis, None)?.map(|a| a.blocks).unwrap_or_default();
+        let Some(at) = self.assemble(&fit.hypothesis, None)? else { return Ok(Projector::new(self, Vec::new())) };
+        let jacobian = self.jacobian(&fit.hypothesis, &at.solution)?;
+        let beside = |(x, j): (&DMatrix<f64>, DMatrix<f64>)| {
+            let (linear, slopes) = (x.ncols() - 1, j.ncols());
+            let mut all = x.clone().insert_columns(linear, slopes, 0.0);
+            all.columns_mut(linear, slopes).copy_from(&j);
+            all
+        };
+        let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside).collect();
         Ok(Projector::new(self, blocks))
     }
 

@@ -20,9 +20,24 @@ impl<'a> Projector<'a> {
             h += own.tr_mul(&own);
         }
         for i in 0..n {
-            h[(i, i)] *= 1.0 + 1e-9;
+            // A column of zeros takes nothing.
+            h[(i, i)] = if h[(i, i)] > 0.0 { h[(i, i)] * (1.0 + 1e-9) } else { 1.0 };
         }
         Self { problem, blocks, factor: h.cholesky() }
+    }
+
+    /// Σ squares of what the fit cannot imitate of a column.
+    pub(crate) fn left(&self, column: &[f64]) -> f64 {
+        let Some(factor) = &self.factor else { return 0.0 };
+        let mut cross = DVector::zeros(factor.l_dirty().ncols());
+        let mut own = 0.0;
+        for (rows, x) in self.problem.used.iter().zip(&self.blocks) {
+            let part = DVector::from_iterator(x.nrows(), rows.iter().map(|k| column[*k]));
+            own += part.norm_squared();
+            cross += x.columns(0, cross.len()).tr_mul(&part);
+        }
+        let left = own - cross.dot(&factor.solve(&cross));
+        if left <= 1e-9 * own { 0.0 } else { left }
     }
 
     /// How much of Σ residual² a column would take, all linear unknowns refitted, and the factor at

@@ -98,7 +98,12 @@ mod tests {
             delay: Some(DelayParams { seconds: 0.0023 }),
             lag: Some(LagParams { seconds: 0.01 }),
             creep: Some(CreepParams { seconds: vec![0.3, 2.0], shares: vec![0.05, 0.03] }),
-            temperature: Some(TemperatureParams { per_kelvin: 0.01, reference_degc: 23.0 }),
+            temperature: Some(TemperatureParams {
+                per_kelvin: 0.01,
+                reference_degc: 23.0,
+                seconds: 0.4,
+                ..Default::default()
+            }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
             saturation: Some(SaturationParams { low: 0.3, high: 4.5, knee: 0.05 }),
             ..Effects::default()
@@ -141,7 +146,12 @@ mod tests {
         let effects = Effects {
             lag: Some(LagParams { seconds: 0.01 }),
             creep: Some(CreepParams { seconds: vec![0.3], shares: vec![0.05] }),
-            temperature: Some(TemperatureParams { per_kelvin: 0.01, reference_degc: 23.0 }),
+            temperature: Some(TemperatureParams {
+                per_kelvin: 0.01,
+                reference_degc: 23.0,
+                seconds: 0.4,
+                ..Default::default()
+            }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
             asymmetry: Some(AsymmetryParams { thresholds: vec![1.0, 2.5, -0.1], weights: vec![0.1, 0.2, 0.1] }),
             saturation: Some(SaturationParams { low: -9.0, high: 4.5, knee: 0.05 }),

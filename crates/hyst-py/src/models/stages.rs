@@ -90,15 +90,27 @@ models! {
     inverse: compensator,
     needs: [],
 
-    /// Gain over temperature ``y = u·(1 + per_kelvin·(T − reference_degc))``.
+    /// Gain and expansion over temperature ``y = u·(1 + per_kelvin·ΔT) + expansion·ΔT`` with ``seconds·dΔT/dt + ΔT = T − reference_degc``.
     class Temperature {
         /// Relative change of gain [1/K].
         per_kelvin: f64,
         /// Temperature at which the gain is 1 [°C].
         reference_degc: f64,
+        /// Thermal expansion [y/K].
+        expansion: f64 = 0.0,
+        /// Thermal time constant [s].
+        seconds: f64 = 0.0,
+        /// Sample period [s]; of no account without a thermal time constant.
+        period: f64 = 1.0,
     }
-    params: |p| Ok(TemperatureParams { per_kelvin: p.per_kelvin, reference_degc: p.reference_degc }),
+    params: |p| Ok(TemperatureParams {
+        per_kelvin: p.per_kelvin,
+        reference_degc: p.reference_degc,
+        expansion: p.expansion,
+        seconds: p.seconds,
+    }),
     stage: hyst_core::Temperature<f64>,
+    period: |p| p.period,
     inverse: compensator,
     needs: [temperature],
 

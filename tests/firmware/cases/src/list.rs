@@ -51,7 +51,7 @@ macro_rules! all_cases {
             creep_4: Creep<T, 4>, 0.0..20.0 => given(CREEP).build(&PERIOD);
             creep_4_inverse: CreepInverse<T, 4>, 0.0..20.0 => Build::<Creep<T, 4>>::build(&given(CREEP), &PERIOD)?.invert();
             resonance: Resonance<T>, 0.0..20.0 => given(MODE).build(&PERIOD);
-            temperature: Temperature<T>, 0.0..20.0 => given(WARMTH).build(&());
+            temperature: Temperature<T>, 0.0..20.0 => given(WARMTH).build(&PERIOD);
             asymmetry: Asymmetry<T, MAX_DEAD_ZONES>, -20.0..20.0 => given(BENT).build(&());
             asymmetry_inverse: AsymmetryInverse<T, MAX_DEAD_ZONES>, -20.0..20.0 => Build::<Asymmetry<T, MAX_DEAD_ZONES>>::build(&given(BENT), &())?.invert();
             load: Load<T>, 0.0..20.0 => given(COMPLIANCE).build(&());

@@ -9,7 +9,8 @@ pub(crate) const LAG: LagParams = LagParams { seconds: 2e-3 };
 pub(crate) const CREEP: CreepParams<[f64; 4]> =
     CreepParams { seconds: [0.02, 0.2, 2.0, 20.0], shares: [0.02, 0.015, 0.01, 0.02] };
 pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.03, gain: 0.9 };
-pub(crate) const WARMTH: TemperatureParams = TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0 };
+pub(crate) const WARMTH: TemperatureParams =
+    TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0, expansion: 0.02, seconds: 3.0 };
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
 /// Xie et al., tanh at 50 Hz but for γ, which is small enough here to bend.
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
@@ -80,7 +81,7 @@ pub(crate) fn chain<T: Real>() -> Result<Chain<T, Pi<T, 10>, 16, 4>, Error> {
         .with_zero(given(-1.5))
         .with_delay(&given(DEAD_TIME), &PERIOD)?
         .with_lag(&given(LAG), &PERIOD)?
-        .with_temperature(&given(WARMTH))?
+        .with_temperature(&given(WARMTH), &PERIOD)?
         .with_creep(&given(CREEP), &PERIOD)?
         .with_resonance(&given(MODE), &PERIOD)?
         .with_drift(&given(DRIFT))?

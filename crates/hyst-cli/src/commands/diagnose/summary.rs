@@ -25,12 +25,28 @@ pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
     for effect in &findings.effects {
         let _ = write!(text, "\n{}", finding(effect, unit));
     }
+    for suspect in words::suspects(findings) {
+        let _ = writeln!(text, "\nsuspect: {suspect}");
+    }
     let remainder = &findings.remainder;
     let kind = words::kind(remainder);
     let share = percent(100.0 * remainder.variance_share);
     let _ = writeln!(text, "\nremainder: {kind}, {share} of the output's variance\n  {}", remainder.description);
     for place in &remainder.places {
         let _ = writeln!(text, "  - {place}");
+    }
+    if let Some(advice) = words::base_advice(findings) {
+        let _ = writeln!(text, "\n{advice}");
+    }
+    let limits = words::limits(findings);
+    if !limits.is_empty() {
+        let _ = writeln!(text, "\nnot named; this record would have shown it from this size on:");
+        let rows: Vec<Vec<String>> =
+            limits.into_iter().map(|(name, size, of)| vec![format!("  {name}"), size, of]).collect();
+        text.push_str(&table(&rows));
+    }
+    if let Some(rows) = words::rows(findings) {
+        let _ = writeln!(text, "\n{rows}");
     }
     for Advice { text: advice, commands } in next {
         let _ = writeln!(text, "\nnext: {advice}");
@@ -60,8 +76,9 @@ fn errors(findings: &Findings, unit: &str) -> String {
 
 fn finding(effect: &Finding, unit: &str) -> String {
     let mut text = format!(
-        "{} (cross-validated RMSE {} {unit} without it, {} {unit} with it)\n",
+        "{}, probability {} (cross-validated RMSE {} {unit} without it, {} {unit} with it)\n",
         effect.name,
+        words::probability(effect.probability),
         short(effect.cv_rmse_before),
         short(effect.cv_rmse_after)
     );

@@ -4,6 +4,7 @@ use super::bins::Bins;
 use super::drive::{Branch, branches, rates};
 use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
 use crate::model::{Effect, Model};
+use crate::nested::warmth;
 
 /// Points over a quantity's range.
 const POINTS: usize = 12;
@@ -25,13 +26,24 @@ fn named(picture: &mut Picture, of: impl Fn(f64) -> f64) {
     }
 }
 
+/// The temperature that acts in each row \[°C\], behind its thermal lag where the model has one, and what its axis is called.
+fn acting_temperature(model: &Model, scene: &Scene<'_>) -> Option<(Vec<f64>, Axis)> {
+    let measured = scene.samples.temperature.as_ref()?;
+    let Some(p) = model.effects.temperature.filter(|p| p.seconds > 0.0) else {
+        return Some((measured.clone(), Axis::new("temperature", "°C")));
+    };
+    let (_, kelvin) = warmth(&scene.samples, &p).ok()??;
+    let degc = kelvin.into_iter().map(|kelvin| p.reference_degc + kelvin).collect();
+    Some((degc, Axis::new("temperature behind its thermal lag", "°C")))
+}
+
 /// By how much the measured motion is larger than the predicted one, over temperature.
 ///
 /// In each stretch of temperature the slope of the residual over the motion: the sensor's zero has no part in it.
 pub(super) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
-    let degc = scene.samples.temperature.as_deref()?;
+    let (degc, x) = acting_temperature(model, scene)?;
     let bins = Bins::over(scene.rows().map(|k| degc[k]), POINTS)?;
-    let (x, y) = (Axis::new("temperature", "°C"), Axis::new("gain, measured over predicted, less 1", "%"));
+    let y = Axis::new("gain, measured over predicted, less 1", "%");
     let caption = "Slope of the residual over the motion, at each temperature. A gain that follows temperature lies along a straight \
         line without it, and about zero with it; what both share is the base's own misfit.";
     let mut picture = Picture::new(Some(Effect::Temperature), "Gain over temperature", x, y, caption);
@@ -42,6 +54,22 @@ pub(super) fn gain_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<
     if let Some(p) = model.effects.temperature {
         named(&mut picture, |t| 100.0 * p.per_kelvin * (t - p.reference_degc));
     }
+    Some(picture)
+}
+
+/// The residual over temperature, where the model expands.
+pub(super) fn expansion_over_temperature(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
+    let p = model.effects.temperature.filter(|p| p.expansion != 0.0)?;
+    let (degc, x) = acting_temperature(model, scene)?;
+    let bins = Bins::over(scene.rows().map(|k| degc[k]), POINTS)?;
+    let caption = "Means at each temperature. What expands lies along a straight line without it, whose slope is the expansion, and level \
+        with it; what both share is the base's own misfit.";
+    let title = "Expansion over temperature";
+    let mut picture = Picture::new(Some(Effect::Temperature), title, x, scene.residual_axis(), caption);
+    for (role, name, view) in both(scene) {
+        picture.points(role, name, bins.means(scene.rows().map(|k| (degc[k], view.residual[k]))));
+    }
+    named(&mut picture, |t| p.expansion * (t - p.reference_degc));
     Some(picture)
 }
 

@@ -136,7 +136,10 @@ fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
             pictures
         }
         Effect::Asymmetry => map::curve(scene).into_iter().collect(),
-        Effect::Temperature => map::gain_over_temperature(model, scene).into_iter().collect(),
+        Effect::Temperature => {
+            let pictures = [map::gain_over_temperature(model, scene), map::expansion_over_temperature(model, scene)];
+            pictures.into_iter().flatten().collect()
+        }
         Effect::Creep => vec![slow::creep(scene)],
         Effect::Load => map::over_load(model, scene).into_iter().collect(),
         Effect::Resonance => {

@@ -23,6 +23,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
         segments: Vec::new(),
         file_of_segment: vec![0; segments.len()],
         settling: Vec::new(),
+        blind: Vec::new(),
     };
     let mut start = 0.0;
     for segment in segments {
@@ -34,6 +35,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
     }
     samples.output = vec![0.0; samples.input.len()];
     samples.settling = vec![false; samples.input.len()];
+    samples.blind = samples.settling.clone();
     samples
 }
 
@@ -186,7 +188,7 @@ fn loops_that_widen_with_the_rate_trail_more_at_higher_rates() {
 #[test]
 fn gain_follows_temperature() {
     let per_kelvin = 0.006;
-    let temperature = Some(TemperatureParams { per_kelvin, reference_degc: 23.0 });
+    let temperature = Some(TemperatureParams { per_kelvin, reference_degc: 23.0, ..TemperatureParams::default() });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { temperature, ..Effects::default() }), Effect::Temperature);
     let gain = curves(&found, Effect::Temperature, "Gain over temperature");
     close(slope(&gain[0]), 100.0 * per_kelvin, 0.03);

@@ -1,0 +1,278 @@
+//! Limits of detection: how large an effect that is not named would have to be for this record to show it.
+//!
+//! An effect of a given size changes the output by a column of numbers. What the base and all that was found cannot imitate of that column is
+//! what the search would have gained, and the search accepts from a known gain on ([`score::least_gain`]). So the size follows from linear
+//! algebra, without a search; where an effect does not grow in proportion to its parameter, the column is made anew at the size found.
+
+use std::collections::BTreeMap;
+
+use hyst_core::{DelayParams, Error, LagParams, RateLaw, RateParams, ResonanceParams, TemperatureParams};
+use serde::{Deserialize, Serialize};
+
+use super::score::least_gain;
+use super::trial::Trial;
+use super::{starts, visible};
+use crate::digits::short;
+use crate::model::{Effect, Effects};
+use crate::nested::{Cause, Hypothesis, Problem, Projector, SignalPath};
+use crate::samples::range;
+
+/// Above the gain from which on the search accepts: noise may take some of it.
+const MARGIN: f64 = 1.25;
+/// Rounds in which a column is made anew at the size found.
+const ROUNDS: usize = 4;
+/// Damping of the mode whose limit is told, the frequencies at which it is tried, and the least share of the motion that a mode may carry.
+const DAMPING: f64 = 0.02;
+const FREQUENCIES: usize = 10;
+const LEAST_MODE: f64 = 0.06;
+/// Frequency of the tone whose limit is told \[Hz\]; a tenth of the sample rate where that is no frequency of the record.
+const MAINS: f64 = 50.0;
+/// How much deeper each stop is than the one before that is tried.
+const DEEPER: f64 = 1.3;
+/// Least depth of a stop, as a share of the stroke.
+const SHALLOWEST: f64 = 1e-3;
+
+/// What a record would have shown of an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Limit {
+    /// From this size on it would have been named.
+    Size {
+        /// Size.
+        size: f64,
+        /// Its unit.
+        unit: String,
+        /// What the size is of.
+        meaning: String,
+    },
+    /// It cannot be seen, however large it is.
+    NotVisible {
+        /// Why.
+        not_visible: String,
+    },
+}
+
+impl Limit {
+    fn hidden(why: &str) -> Self {
+        Self::NotVisible { not_visible: why.into() }
+    }
+
+    fn of(size: Option<f64>, unit: &str, meaning: String) -> Self {
+        match size.filter(|s| s.is_finite() && *s > 0.0) {
+            Some(size) => Self::Size { size, unit: unit.into(), meaning },
+            None => Self::hidden("what it does is imitated by the base or by what was found"),
+        }
+    }
+}
+
+/// What all limits need.
+struct Limits<'a> {
+    problem: &'a Problem<'a>,
+    found: &'a Trial,
+    projector: Projector<'a>,
+    motion: Vec<f64>,
+    /// Gain from which on an effect is accepted, and from which on a tone is.
+    least: f64,
+    least_tone: f64,
+}
+
+/// The limit of each effect that was not found, on the base of the search.
+pub(super) fn limits(
+    problem: &Problem<'_>,
+    found: &Trial,
+    noise: f64,
+    units: (&str, &str),
+) -> Result<BTreeMap<Effect, Limit>, Error> {
+    let h = &found.fit.hypothesis;
+    let (rows, left) = (found.fit.rows as f64, found.total());
+    let all = Limits {
+        problem,
+        found,
+        projector: problem.projector(&found.fit)?,
+        motion: problem.motion(h, &found.fit.solution)?,
+        least: MARGIN * least_gain(rows, left, noise).max(f64::MIN_POSITIVE),
+        least_tone: MARGIN * least_gain(rows, rows * noise * noise, noise).max(f64::MIN_POSITIVE),
+    };
+    let mut limits = BTreeMap::new();
+    for effect in Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry) {
+        let cause = Cause::Effect(effect);
+        if !h.has_room(cause) || h.causes().contains(&cause) {
+            continue;
+        }
+        limits.insert(effect, if visible(cause, problem) { all.of(effect, units)? } else { hidden(effect, problem) });
+    }
+    Ok(limits)
+}
+
+/// Why a record cannot show an effect at all.
+fn hidden(effect: Effect, problem: &Problem<'_>) -> Limit {
+    Limit::hidden(match effect {
+        Effect::Temperature if problem.samples.temperature.is_none() => "the temperature was not recorded",
+        Effect::Temperature => "the temperature did not change by half a kelvin",
+        Effect::Load if problem.samples.load.is_none() => "the load was not recorded",
+        Effect::Load => "the load did not change",
+        _ => "the record repeats one loop, whose shape may as well be the hysteresis",
+    })
+}
+
+impl Limits<'_> {
+    /// The size at which what nothing else imitates of an effect is `least`; `change` is what the effect of a size adds to the output.
+    fn size(
+        &self,
+        first: f64,
+        most: f64,
+        least: f64,
+        change: &dyn Fn(f64) -> Result<Vec<f64>, Error>,
+    ) -> Result<Option<f64>, Error> {
+        let mut size = first;
+        for _ in 0..ROUNDS {
+            let left = self.projector.left(&change(size)?);
+            if !(left > 0.0) {
+                return Ok(None);
+            }
+            let next = size * (least / left).sqrt();
+            if (next / size - 1.0).abs() < 0.02 {
+                return Ok(Some(next));
+            }
+            size = next.min(most);
+        }
+        // At the bound of what an effect can be it is not seen.
+        let left = self.projector.left(&change(size)?);
+        Ok((size < most || left >= least).then_some(size))
+    }
+
+    /// What the motion changes by with another hypothesis.
+    fn moved(&self, change: &dyn Fn(&mut Effects)) -> Result<Vec<f64>, Error> {
+        let mut h = self.found.fit.hypothesis.clone();
+        change(&mut h.effects);
+        let mut moved = self.problem.motion(&h, &self.found.fit.solution)?;
+        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
+        Ok(moved)
+    }
+
+    /// What one stage behind the motion changes it by.
+    fn behind(&self, effects: Effects) -> Result<Vec<f64>, Error> {
+        let mut moved = self.motion.clone();
+        SignalPath::new(self.problem.samples, &Hypothesis::of(effects))?.output_side(&mut moved);
+        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
+        Ok(moved)
+    }
+
+    fn of(&self, effect: Effect, (u, y): (&str, &str)) -> Result<Limit, Error> {
+        let s = self.problem.samples;
+        let (low, high) = s.input_range();
+        let longest = s.longest_segment();
+        Ok(match effect {
+            Effect::Delay => {
+                let size = self.size(s.period, 0.1 * longest, self.least, &|seconds| {
+                    self.moved(&|e| e.delay = Some(DelayParams { seconds }))
+                })?;
+                Limit::of(size, "s", "time by which the output comes late at every frequency".into())
+            }
+            Effect::Lag => {
+                let size = self.size(s.period, 0.1 * longest, self.least, &|seconds| {
+                    self.moved(&|e| e.lag = Some(LagParams { seconds }))
+                })?;
+                Limit::of(size, "s", "time constant of a first-order lag".into())
+            }
+            Effect::RateDependence => {
+                let reference_rate = high - low;
+                let size = self.size(1e-3 * reference_rate, 0.3 * reference_rate, self.least, &|volts| {
+                    let rate = RateParams { volts, exponent: 0.5, reference_rate, law: RateLaw::Holds };
+                    self.moved(&|e| e.rate = Some(rate))
+                })?;
+                let at = short(reference_rate);
+                Limit::of(
+                    size,
+                    u,
+                    format!("by how much a drive of {at} {u}/s is trailed, growing with the root of the rate"),
+                )
+            }
+            Effect::Temperature => {
+                let reference_degc = starts::starting_temperature(s);
+                let size = self.size(1e-3, 0.05, self.least, &|per_kelvin| {
+                    let p = TemperatureParams { per_kelvin, reference_degc, ..TemperatureParams::default() };
+                    self.behind(Effects { temperature: Some(p), ..Effects::default() })
+                })?;
+                Limit::of(size, "1/K", "relative change of the gain for each kelvin".into())
+            }
+            Effect::Creep => {
+                let size = self.size(1e-3, 1.0, self.least, &|decade| {
+                    let bank = starts::bank(s, decade / starts::PER_DECADE);
+                    self.behind(Effects { creep: Some(bank), ..Effects::default() })
+                })?;
+                Limit::of(size, "1", "share of a step by which the output goes on in each decade of time".into())
+            }
+            Effect::Load => {
+                let Some(load) = &s.load else { return Ok(Limit::hidden("the load was not recorded")) };
+                let path = SignalPath::new(s, &self.found.fit.hypothesis)?;
+                let size = self.size(1.0, f64::INFINITY, self.least, &|per_newton| {
+                    let mut column: Vec<f64> = load.iter().map(|f| per_newton * f).collect();
+                    path.structure(&mut column);
+                    Ok(column)
+                })?;
+                Limit::of(size, &format!("{y}/N"), "by how much the output yields for each newton".into())
+            }
+            Effect::Resonance => self.mode()?,
+            Effect::Saturation => self.stop(y),
+            Effect::Drift => {
+                let whole = s.time[s.len() - 1] - s.time[0];
+                let size = self.size(1.0, f64::INFINITY, self.least, &|way| {
+                    Ok(s.time.iter().map(|t| way * (t - s.time[0]) / whole).collect())
+                })?;
+                Limit::of(size, y, "by how much the zero moves steadily over the record".into())
+            }
+            Effect::Interference => {
+                let rate = 1.0 / s.period;
+                let hz = if MAINS < 0.4 * rate && MAINS > 3.0 / longest { MAINS } else { 0.1 * rate };
+                let turn = |t: &f64| std::f64::consts::TAU * (hz * t).fract();
+                let size = self.size(1.0, f64::INFINITY, self.least_tone, &|amplitude| {
+                    Ok(s.time.iter().map(|t| amplitude * turn(t).sin()).collect())
+                })?;
+                Limit::of(size, y, format!("amplitude of a tone at {} Hz in the sensor", short(hz)))
+            }
+            Effect::Asymmetry => Limit::hidden("it is looked for on the own base"),
+        })
+    }
+
+    /// The mode that is seen best: how much of the motion it has to carry.
+    fn mode(&self) -> Result<Limit, Error> {
+        let s = self.problem.samples;
+        let (first, last) = (f64::max(4.0 / s.longest_segment(), 1.0), 0.3 / s.period);
+        let mut best: Option<(f64, f64)> = None;
+        for i in 0..FREQUENCIES {
+            let hz = first * (last / first).powf(i as f64 / (FREQUENCIES - 1) as f64);
+            let size = self.size(0.2, 1.0, self.least, &|gain| {
+                let mode = ResonanceParams { hz, damping: DAMPING, gain };
+                self.behind(Effects { resonances: vec![mode], ..Effects::default() })
+            })?;
+            if let Some(size) = size.filter(|size| best.is_none_or(|(least, _)| *size < least)) {
+                best = Some((size, hz));
+            }
+        }
+        let Some((size, hz)) = best else {
+            return Ok(Limit::hidden("the drive excites no mode enough to be seen"));
+        };
+        let meaning =
+            format!("share of the motion that goes through a mode at {} Hz with damping ratio {DAMPING}", short(hz));
+        Ok(Limit::of(Some(size.max(LEAST_MODE)), "1", meaning))
+    }
+
+    /// How much of the stroke a stop at the upper end has to take.
+    fn stop(&self, y: &str) -> Limit {
+        let (low, high) = range(self.motion.iter().copied());
+        let mut depth = SHALLOWEST * (high - low);
+        while depth < high - low {
+            let ends: Vec<f64> = self.motion.iter().map(|m| (high - depth - m).min(0.0)).collect();
+            if self.projector.left(&ends) >= self.least {
+                return Limit::of(
+                    Some(depth),
+                    y,
+                    "by how much of the stroke a stop at its upper end falls short".into(),
+                );
+            }
+            depth *= DEEPER;
+        }
+        Limit::hidden("what it does is imitated by the base or by what was found")
+    }
+}

@@ -1,0 +1,132 @@
+//! Which causes are worth a fit: group score tests.
+//!
+//! To first order a cause adds some columns to the output. What a fit cannot imitate of them says how much of Σ residual² they would take, by
+//! linear algebra alone. A cause that would take next to nothing is not fitted: no refinement of its parameters makes that much.
+
+use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
+
+use super::starts::{PER_DECADE, bank, starting_temperature, stops};
+use crate::model::{Effect, Effects};
+use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, Projector, SignalPath};
+use crate::samples::range;
+
+/// Share of the gain that an effect needs from which on a first-order gain is followed up.
+const PROMISING: f64 = 0.05;
+/// Depths at which a stop is tried, in strokes.
+const DEPTHS: [f64; 3] = [0.01, 0.04, 0.15];
+
+/// A fit, and what separates a new column from it.
+pub(super) struct Scan<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) from: &'a Fitted,
+    pub(super) residual: Vec<f64>,
+    pub(super) motion: Vec<f64>,
+    projector: Projector<'a>,
+    promising: f64,
+}
+
+impl<'a> Scan<'a> {
+    /// Of a fit to which something is to be added that gains at least `least` of Σ residual².
+    pub(super) fn new(problem: &'a Problem<'a>, from: &'a Fitted, least: f64) -> Result<Self, Error> {
+        Ok(Self {
+            residual: problem.residual(from)?,
+            motion: problem.motion(&from.hypothesis, &from.solution)?,
+            projector: problem.projector(from)?,
+            promising: PROMISING * least,
+            problem,
+            from,
+        })
+    }
+
+    /// Gain of a column and the factor at which it does, where that is promising and the factor positive.
+    pub(super) fn gain(&self, column: &[f64]) -> Option<(f64, f64)> {
+        let (gain, amplitude) = self.projector.gain(column, &self.residual);
+        (amplitude > 0.0 && gain >= self.promising).then_some((gain, amplitude))
+    }
+
+    /// What the motion changes by with another hypothesis.
+    pub(super) fn moved(&self, h: &Hypothesis) -> Result<Vec<f64>, Error> {
+        let mut moved = self.problem.motion(h, &self.from.solution)?;
+        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
+        Ok(moved)
+    }
+
+    /// What stages behind the motion change it by.
+    pub(super) fn behind(&self, effects: Effects) -> Result<Vec<f64>, Error> {
+        let mut moved = self.motion.clone();
+        SignalPath::new(self.problem.samples, &Hypothesis::of(effects))?.output_side(&mut moved);
+        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
+        Ok(moved)
+    }
+
+    /// Whether a cause would take enough to be worth a fit. Those whose place is looked for first (a mode, a slope, a law of the rate, a tone) are
+    /// tested there.
+    pub(super) fn is_promising(&self, cause: Cause) -> Result<bool, Error> {
+        let columns = match cause {
+            Cause::Effect(effect) => self.columns(effect)?,
+            Cause::ZeroWanders => Some(self.hats(&|_| 1.0)),
+            Cause::GainWanders => Some(self.hats(&|k| self.motion[k])),
+            Cause::SlewLimit => None,
+        };
+        // Of either sign: a fit may begin at the other.
+        let takes = |column: &Vec<f64>| self.projector.gain(column, &self.residual).0;
+        Ok(columns.is_none_or(|columns| columns.iter().map(takes).sum::<f64>() >= self.promising))
+    }
+
+    /// First-order columns of an effect; none where its place is looked for first.
+    fn columns(&self, effect: Effect) -> Result<Option<Vec<Vec<f64>>>, Error> {
+        let s = self.problem.samples;
+        let with = |change: &dyn Fn(&mut Effects)| {
+            let mut h = self.from.hypothesis.clone();
+            change(&mut h.effects);
+            self.moved(&h)
+        };
+        let whole = s.time[s.len() - 1] - s.time[0];
+        Ok(Some(match effect {
+            Effect::Delay => vec![with(&|e| e.delay = Some(DelayParams { seconds: s.period }))?],
+            Effect::Lag => vec![with(&|e| e.lag = Some(LagParams { seconds: s.period }))?],
+            Effect::Temperature => {
+                let reference_degc = starting_temperature(s);
+                let gain = TemperatureParams { per_kelvin: 1e-3, reference_degc, ..TemperatureParams::default() };
+                let kelvin = s.temperature.iter().flatten().map(|t| t - reference_degc).collect();
+                let late = TemperatureParams { seconds: 0.15 * whole, ..gain };
+                let of = |p| self.behind(Effects { temperature: Some(p), ..Effects::default() });
+                vec![of(gain)?, of(late)?, kelvin]
+            }
+            Effect::Creep => {
+                // Each element by itself: the search may take any of them.
+                let all = bank(s, 0.01 / PER_DECADE);
+                let one = |i: usize| {
+                    let shares = (0..all.shares.len()).map(|j| if i == j { all.shares[j] } else { 0.0 }).collect();
+                    let creep = Some(hyst_core::CreepParams { shares, seconds: all.seconds.clone() });
+                    self.behind(Effects { creep, ..Effects::default() })
+                };
+                (0..all.shares.len()).step_by(2).map(one).collect::<Result<_, _>>()?
+            }
+            Effect::Load => s.load.iter().cloned().collect(),
+            Effect::Drift => {
+                let passed = |t: &f64| (t - s.time[0]) / whole;
+                let settles = |times: f64| s.time.iter().map(|t| 1.0 - (-times * passed(t)).exp()).collect();
+                vec![s.time.iter().map(passed).collect(), settles(4.0), settles(16.0)]
+            }
+            Effect::Saturation => {
+                let (low, high) = range(self.motion.iter().copied());
+                let beyond = |share: f64| {
+                    let depth = share * (high - low);
+                    let upper = self.motion.iter().map(|m| (high - depth - m).min(0.0)).collect();
+                    let lower = self.motion.iter().map(|m| (low + depth - m).max(0.0)).collect();
+                    [upper, lower]
+                };
+                if stops(s, self.from).is_none() { Vec::new() } else { DEPTHS.into_iter().flat_map(beyond).collect() }
+            }
+            Effect::RateDependence | Effect::Resonance | Effect::Interference | Effect::Asymmetry => return Ok(None),
+        }))
+    }
+
+    /// The hats of something that wanders over the record.
+    fn hats(&self, of: &dyn Fn(usize) -> f64) -> Vec<Vec<f64>> {
+        let rows = self.problem.samples.len();
+        let at = |k: usize| k as f64 / rows.max(2) as f64 * (HATS - 1) as f64;
+        (0..HATS).map(|j| (0..rows).map(|k| (1.0 - (at(k) - j as f64).abs()).max(0.0) * of(k)).collect()).collect()
+    }
+}

@@ -1,0 +1,109 @@
+//! Rows in which the sensor shows for a moment what no device does: spikes.
+//!
+//! A spike stands out of the rows on both sides of it by far more than the output goes from row to row around it, and by more than the drive has
+//! gone in a row shortly before. What turns, rings, or jumps and stays is none.
+
+use std::ops::Range;
+
+/// Rows to each side whose median a row is held against: a spike of up to three rows stands out of it, what rises or falls does not.
+const BESIDE: usize = 3;
+/// Rows to each side whose steps are the usual ones.
+const AROUND: usize = 32;
+/// Rows before a spike in which a step of the drive may have caused it.
+const BEFORE: usize = 64;
+/// Share of the steps that are usual: those into and out of spikes may be among the others.
+const USUAL: f64 = 0.7;
+/// How many usual steps a spike stands out: of white noise that is seven deviations.
+const STANDS_OUT: f64 = 5.0;
+/// How many steps of the drive it stands out, each as a share of its own span.
+const MORE_THAN_THE_DRIVE: f64 = 2.0;
+/// Share of the rows beyond which what stands out is no fault but the record.
+const MOST: f64 = 0.1;
+
+/// Marks the spikes of an output.
+pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
+    let mut spiked = vec![false; output.len()];
+    let digit = crate::noise::quantisation(output) * 12f64.sqrt();
+    let span = |x: &[f64]| {
+        let (low, high) = crate::samples::range(x.iter().copied());
+        (high - low).max(f64::MIN_POSITIVE)
+    };
+    // A spike itself widens the output's span.
+    let per_input = MORE_THAN_THE_DRIVE * span(output) / span(input);
+    let (mut beside, mut steps) = (Vec::new(), Vec::new());
+    for s in segments {
+        // At an end of a segment what rises has no rows on the other side.
+        for k in s.start + BESIDE..s.end.saturating_sub(BESIDE).max(s.start + BESIDE) {
+            let own = output[k];
+            beside.clear();
+            beside.extend_from_slice(&output[k - BESIDE..=k + BESIDE]);
+            let out = (own - quantile(&mut beside, 0.5)).abs();
+            if out <= STANDS_OUT * digit {
+                continue;
+            }
+            let before = k.saturating_sub(BEFORE).max(s.start)..=k + BESIDE;
+            let driven = input[before].windows(2).fold(0.0, |m: f64, u| m.max((u[1] - u[0]).abs()));
+            if out <= per_input * driven {
+                continue;
+            }
+            let around = k.saturating_sub(AROUND).max(s.start)..(k + AROUND + 1).min(s.end);
+            steps.clear();
+            steps.extend(output[around].windows(2).map(|y| (y[1] - y[0]).abs()));
+            spiked[k] = out > STANDS_OUT * quantile(&mut steps, USUAL);
+        }
+    }
+    if spiked.iter().filter(|s| **s).count() as f64 > MOST * output.len() as f64 {
+        spiked.fill(false);
+    }
+    spiked
+}
+
+/// The number below which a share of some lies, whose order changes; zero of none.
+fn quantile(x: &mut [f64], share: f64) -> f64 {
+    if x.is_empty() {
+        return 0.0;
+    }
+    let at = (share * (x.len() - 1) as f64) as usize;
+    *x.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// Which rows of an output are spikes, where the drive is its smooth part.
+    fn found(rows: usize, drive: impl Fn(f64) -> f64, add: impl Fn(usize) -> f64) -> Vec<usize> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut noise = || 1e-3 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
+        let input: Vec<f64> = (0..rows).map(|k| 100.0 * drive(k as f64)).collect();
+        let output: Vec<f64> = (0..rows).map(|k| drive((k as f64 - 4.0).max(0.0)) + noise() + add(k)).collect();
+        let marked = spiked_rows(&input, &output, &[Range { start: 0, end: rows }]);
+        (0..rows).filter(|k| marked[*k]).collect()
+    }
+
+    fn triangle(t: f64) -> f64 {
+        let share = (t / 200.0).fract();
+        2.0 * share.min(1.0 - share)
+    }
+
+    #[test]
+    fn spikes_are_found_where_they_are() {
+        let at = |k: usize| k % 20 == 7;
+        let found = found(4000, |t| (0.01 * t).sin(), |k| if at(k) { 0.3 } else { 0.0 });
+        assert_eq!(found, (0..4000).filter(|k| at(*k)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn turns_jumps_and_ringing_are_none() {
+        assert!(found(4000, triangle, |_| 0.0).is_empty());
+        assert!(found(4000, |t| (0.01 * t).sin(), |k| if k > 1500 { 0.3 } else { 0.0 }).is_empty());
+        let steps = |t: f64| (t / 100.0).floor() / 40.0;
+        assert!(found(4000, steps, |k| 0.02 * (-((k % 100) as f64) / 20.0).exp() * (k as f64).sin()).is_empty());
+    }
+
+    #[test]
+    fn noise_alone_has_none() {
+        assert!(found(40_000, |_| 0.0, |_| 0.0).is_empty());
+    }
+}

@@ -1,0 +1,174 @@
+//! Whether the probability of a name is what it says, on actuators of seven hysteresis laws:
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--fit] [--svg FILE]`.
+//!
+//! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to what came out, which is then training
+//! data; without it the calibration error of those that are in use is told, and `--svg` draws the reliability diagram.
+
+use std::time::Instant;
+
+use hyst_ident::diagnose::{DiagnoseOptions, Weighed, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::Effect;
+use hyst_ident::record::Record;
+use hyst_ident::simulate::{Zero, simulate};
+use hyst_tests::other_physics::Actuator;
+use plotters::prelude::*;
+use rayon::prelude::*;
+
+/// Bins of the diagram.
+const BINS: usize = 10;
+
+struct Outcome {
+    actuator: Actuator,
+    named: Vec<Effect>,
+    weighed: Vec<Weighed>,
+    ratio: f64,
+    seconds: f64,
+}
+
+impl Outcome {
+    /// What indistinguishable alternatives allow counts as named.
+    fn exact(&self) -> bool {
+        self.named == self.actuator.effects
+    }
+}
+
+fn run(seed: u64, number: u64) -> Outcome {
+    let actuator = Actuator::draw(seed, number);
+    let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).expect("a fit");
+    let bare = actuator.bare();
+    let clean = simulate(&fitted(&bare.record(0, "train")), &bare.record(1, "test"), Zero::None);
+    let clean = clean.ok().and_then(|s| s.errors).map_or(f64::NAN, |e| e.rmse);
+    let (train, test) = (actuator.record(0, "train"), actuator.record(1, "test"));
+    let model = fitted(&train);
+    let started = Instant::now();
+    let found = diagnose(&train, Some(&test), &model, &DiagnoseOptions::default(), &|_| {}).expect("a diagnosis");
+    let seconds = started.elapsed().as_secs_f64();
+    let mut named: Vec<Effect> = Vec::new();
+    for finding in &found.findings.effects {
+        // A tie that is declared is right with either name.
+        let tie = finding.alternatives.iter().find(|a| a.indistinguishable && actuator.effects.contains(&a.name));
+        let is_right = actuator.effects.contains(&finding.name);
+        named.push(if is_right { finding.name } else { tie.map_or(finding.name, |a| a.name) });
+    }
+    named.sort();
+    named.dedup();
+    let after = found.findings.after.test.map_or(f64::NAN, |e| e.rmse);
+    Outcome { actuator, named, weighed: found.weighed, ratio: after / clean, seconds }
+}
+
+fn names(list: &[Effect]) -> String {
+    if list.is_empty() { "nothing".into() } else { list.iter().map(|e| e.name()).collect::<Vec<_>>().join("+") }
+}
+
+/// Features of every name that was weighed, and whether it acts.
+fn samples(outcomes: &[Outcome]) -> Vec<(Weighed, bool)> {
+    outcomes.iter().flat_map(|o| o.weighed.iter().map(|w| (*w, o.actuator.effects.contains(&w.effect)))).collect()
+}
+
+/// Logistic regression by Newton's method, with a little weight decay.
+fn regression(samples: &[(Weighed, bool)]) -> [f64; 5] {
+    let mut beta = nalgebra::SVector::<f64, 5>::zeros();
+    for _ in 0..50 {
+        let mut gradient = -1e-1 * beta;
+        let mut hessian = nalgebra::SMatrix::<f64, 5, 5>::identity() * 1e-1;
+        for (w, right) in samples {
+            let [a, b, c, d] = w.features;
+            let x = nalgebra::SVector::<f64, 5>::from([1.0, a, b, c, d]);
+            let p = 1.0 / (1.0 + (-beta.dot(&x)).exp());
+            gradient += (f64::from(u8::from(*right)) - p) * x;
+            hessian += p * (1.0 - p) * x * x.transpose();
+        }
+        let Some(step) = hessian.cholesky().map(|c| c.solve(&gradient)) else { break };
+        beta += step;
+    }
+    beta.into()
+}
+
+/// Mean probability, share that is right and count of each bin.
+fn bins(samples: &[(Weighed, bool)]) -> Vec<(f64, f64, usize)> {
+    let of = |i: usize| {
+        let inside = |w: &Weighed| ((w.probability * BINS as f64) as usize).min(BINS - 1) == i;
+        let own: Vec<&(Weighed, bool)> = samples.iter().filter(|(w, _)| inside(w)).collect();
+        let n = own.len().max(1) as f64;
+        let mean = own.iter().map(|(w, _)| w.probability).sum::<f64>() / n;
+        (mean, own.iter().filter(|(_, right)| *right).count() as f64 / n, own.len())
+    };
+    (0..BINS).map(of).collect()
+}
+
+fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dyn std::error::Error>> {
+    let root = SVGBackend::new(path, (520, 480)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(16)
+        .x_label_area_size(44)
+        .y_label_area_size(52)
+        .caption(format!("calibration error {:.1} %", 100.0 * error), ("sans-serif", 16))
+        .build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
+    chart.configure_mesh().x_desc("probability that was told").y_desc("share that was right").draw()?;
+    chart.draw_series(LineSeries::new([(0.0, 0.0), (1.0, 1.0)], BLACK.mix(0.4)))?;
+    let most = bins.iter().map(|b| b.2).max().unwrap_or(1) as f64;
+    chart.draw_series(bins.iter().filter(|b| b.2 > 0).map(|(told, right, n)| {
+        Circle::new((*told, *right), 3 + (9.0 * (*n as f64 / most).sqrt()) as i32, BLUE.mix(0.6).filled())
+    }))?;
+    root.present()?;
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
+    let (count, seed) = (number(0, 500), number(1, 1));
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    let numbers: Vec<u64> = (0..count).collect();
+    for some in numbers.chunks(8) {
+        let done: Vec<Outcome> = some.par_iter().map(|i| run(seed, *i)).collect();
+        for (i, o) in some.iter().zip(&done) {
+            let told: Vec<String> = o
+                .weighed
+                .iter()
+                .map(|w| format!("{}{} {:.2}", if w.named { "" } else { "(not) " }, w.effect, w.probability))
+                .collect();
+            println!(
+                "{i:4} {} {:?} {}: {} → {}; error {:.2} × that without, {:.1} s [{}]",
+                if o.exact() { "   " } else { "NOT" },
+                o.actuator.law,
+                o.actuator.kind.name(),
+                names(&o.actuator.effects),
+                names(&o.named),
+                o.ratio,
+                o.seconds,
+                told.join(", ")
+            );
+        }
+        outcomes.extend(done);
+    }
+    let rate = |what: &str, good: usize, of: usize| {
+        println!("{what}: {good} of {of} ({:.1} %)", 100.0 * good as f64 / of.max(1) as f64);
+    };
+    rate("exact set of names", outcomes.iter().filter(|o| o.exact()).count(), outcomes.len());
+    let wrong = |o: &&Outcome| o.named.iter().any(|e| !o.actuator.effects.contains(e));
+    rate("with a wrong name", outcomes.iter().filter(wrong).count(), outcomes.len());
+    let free: Vec<&Outcome> = outcomes.iter().filter(|o| o.actuator.effects.is_empty()).collect();
+    rate("false alarms", free.iter().filter(|o| !o.named.is_empty()).count(), free.len());
+    let mut ratios: Vec<f64> = outcomes.iter().map(|o| o.ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share) as usize];
+    println!("error over that without the effects: median {:.2}, 90 % {:.2}", at(0.5), at(0.9));
+    let weighed = samples(&outcomes);
+    if words.iter().any(|w| w == "--fit") {
+        println!("fitted to {} names: {:.3?}", weighed.len(), regression(&weighed));
+    }
+    let bins = bins(&weighed);
+    for (told, right, n) in bins.iter().filter(|b| b.2 > 0) {
+        println!("told {:5.1} %, right {:5.1} %, {n} names", 100.0 * told, 100.0 * right);
+    }
+    let all = weighed.len().max(1) as f64;
+    let error: f64 = bins.iter().map(|(told, right, n)| (told - right).abs() * *n as f64 / all).sum();
+    println!("expected calibration error: {:.1} % over {} names", 100.0 * error, weighed.len());
+    if let Some(at) = words.iter().position(|w| w == "--svg") {
+        draw(words.get(at + 1).ok_or("--svg needs a file")?, &bins, error)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,386 @@
+//! Actuators of seven hysteresis laws, most of which neither the models nor the simulated plant have, under the experiments that people record.
+//!
+//! Nothing here is shared with the crates but the record that comes out: the laws are differential equations or relays passed in small steps,
+//! creep is a sum of relaxations at other times than a model's, a mode is integrated, a delay interpolates.
+
+use hyst_ident::model::{Effect, Kind};
+use hyst_ident::record::{Columns, OutputUnit, Record};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A hysteresis law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Law {
+    /// Plays with random widths and weights.
+    Plays,
+    /// Relays that switch at scattered places.
+    Relays,
+    /// Relays whose edges are ramps (Krasnosel'skii and Pokrovskii).
+    Ramps,
+    /// Coleman and Hodgdon's differential equation.
+    ColemanHodgdon,
+    /// Bouc and Wen's.
+    BoucWen,
+    /// Jiles and Atherton's.
+    JilesAtherton,
+    /// Elements of Dahl's friction.
+    Dahl,
+}
+
+impl Law {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Plays, Self::Relays, Self::Ramps, Self::ColemanHodgdon, Self::BoucWen, Self::JilesAtherton, Self::Dahl];
+
+    /// The memory's output for a drive between −1 and 1, passed from −1 on.
+    fn follow(self, x: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+        let small_steps = |mut rate: Box<dyn FnMut(f64, f64, f64) -> f64>, start: f64| -> Vec<f64> {
+            const STEPS: u32 = 12;
+            let (mut z, mut from) = (start, -1.0);
+            let follow = |to: &f64| {
+                let step = (to - from) / f64::from(STEPS);
+                for i in 0..STEPS {
+                    z += rate(from + step * (f64::from(i) + 0.5), z, step);
+                }
+                from = *to;
+                z
+            };
+            x.iter().map(follow).collect()
+        };
+        match self {
+            Self::Plays => {
+                let elements: Vec<(f64, f64)> = (0..14).map(|_| (draw(0.01, 0.8), draw(0.0, 1.0) / 7.0)).collect();
+                let mut at = vec![-1.0_f64; elements.len()];
+                let pass = |x: &f64| {
+                    let moved = at.iter_mut().zip(&elements).map(|(p, (r, w))| {
+                        *p = f64::clamp(*p, x - r, x + r);
+                        w * *p
+                    });
+                    moved.sum()
+                };
+                x.iter().map(pass).collect()
+            }
+            Self::Relays | Self::Ramps => {
+                let width = if self == Self::Ramps { draw(0.1, 0.3) } else { 0.0 };
+                let count = if self == Self::Ramps { 400 } else { 3000 };
+                let relays: Vec<(f64, f64)> = (0..count)
+                    .map(|_| {
+                        let (middle, half) = (draw(-1.0, 1.0) * draw(0.5, 1.0), draw(0.0, 0.5) * draw(0.2, 1.0));
+                        (middle - half, middle + half)
+                    })
+                    .collect();
+                let mut at = vec![-1.0; relays.len()];
+                let ramp = |x: f64| match width > 0.0 {
+                    true => (2.0 * x / width).clamp(-1.0, 1.0),
+                    false => 1f64.copysign(x),
+                };
+                let pass = |x: &f64| {
+                    let moved = at.iter_mut().zip(&relays).map(|(s, (down, up))| {
+                        *s = f64::max(*s, ramp(x - up)).min(f64::max(ramp(x - up), ramp(x - down)));
+                        *s
+                    });
+                    moved.sum::<f64>() / count as f64
+                };
+                x.iter().map(pass).collect()
+            }
+            Self::ColemanHodgdon => {
+                let (a, b, c) = (draw(1.0, 4.0), draw(0.8, 1.2), draw(0.2, 0.5));
+                small_steps(Box::new(move |x, z, dx| a * dx.abs() * (b * x - z) + c * dx), -b)
+            }
+            Self::BoucWen => {
+                let (n, closing, scale) = (draw(1.0, 2.0), draw(0.1, 0.6), draw(0.15, 0.5));
+                let law = move |_: f64, z: f64, dx: f64| {
+                    let share = if dx * z > 0.0 { 1.0 } else { closing };
+                    dx * (1.0 - share * (z.abs() / scale).powf(n))
+                };
+                small_steps(Box::new(law), 0.0)
+            }
+            Self::JilesAtherton => {
+                let (k, a, c) = (draw(0.1, 0.3), draw(0.2, 0.5), draw(0.05, 0.3));
+                let flat = move |x: f64| {
+                    if x.abs() < 1e-4 { x / (3.0 * a) } else { (a / x).mul_add(-1.0, 1.0 / (x / a).tanh()) }
+                };
+                let law = move |x: f64, m: f64, dx: f64| {
+                    let gap = flat(x) - m;
+                    let slope = if gap * dx > 0.0 { gap / k * dx.signum() } else { 0.0 };
+                    let reversible = c * (flat(x + 1e-5) - flat(x - 1e-5)) / 2e-5;
+                    ((1.0 - c) * slope + reversible) * dx
+                };
+                small_steps(Box::new(law), -0.5)
+            }
+            Self::Dahl => {
+                let mut total = vec![0.0; x.len()];
+                for _ in 0..3 {
+                    let (reach, n, weight) = (draw(0.05, 0.5), draw(0.6, 1.4), draw(0.1, 0.4));
+                    let law = move |_: f64, f: f64, dx: f64| {
+                        let left = 1.0 - f * dx.signum();
+                        dx / reach * left.abs().powf(n).copysign(left)
+                    };
+                    let part = small_steps(Box::new(law), -1.0);
+                    total.iter_mut().zip(part).for_each(|(sum, f)| *sum += weight * f.clamp(-1.5, 1.5));
+                }
+                total
+            }
+        }
+    }
+}
+
+/// An actuator with its effects, and what it is fitted with.
+#[derive(Clone, Debug)]
+pub struct Actuator {
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// Its hysteresis.
+    pub law: Law,
+    /// Its effects, in the chain's order.
+    pub effects: Vec<Effect>,
+    /// Model that is fitted.
+    pub kind: Kind,
+}
+
+/// Effects that are drawn; an asymmetry is the shape of a loop, and a law of its own has one or not.
+const DRAWN: [Effect; 9] = [
+    Effect::Delay,
+    Effect::Lag,
+    Effect::RateDependence,
+    Effect::Temperature,
+    Effect::Creep,
+    Effect::Load,
+    Effect::Resonance,
+    Effect::Drift,
+    Effect::Interference,
+];
+
+impl Actuator {
+    /// The actuator with a number: about one in six has no effect, one in three two.
+    pub fn draw(seed: u64, number: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(number));
+        let law = Law::ALL[rng.random_range(0..Law::ALL.len())];
+        let mut effects: Vec<Effect> = Vec::new();
+        let count = [0, 1, 1, 1, 2, 2][rng.random_range(0..6)];
+        while effects.len() < count {
+            let effect = DRAWN[rng.random_range(0..DRAWN.len())];
+            // What is late in two ways is one thing to a record.
+            let late = [Effect::Delay, Effect::Lag];
+            let alike = late.contains(&effect) && effects.iter().any(|e| late.contains(e));
+            if !effects.contains(&effect) && !alike {
+                effects.push(effect);
+            }
+        }
+        effects.sort();
+        let kind = if rng.random::<f64>() < 0.5 { Kind::Pi } else { Kind::Preisach };
+        Self { seed: seed.wrapping_mul(7919).wrapping_add(number), law, effects, kind }
+    }
+
+    /// The same without its effects.
+    pub fn bare(&self) -> Self {
+        Self { effects: Vec::new(), ..self.clone() }
+    }
+
+    /// A record of the actuator; `experiment` 0 is the training record, any other another run of the same kind of experiment.
+    ///
+    /// # Panics
+    /// Never: what is made here is a sound record.
+    pub fn record(&self, experiment: u64, name: &str) -> Record {
+        // Of the device.
+        let mut own = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut draw = |low: f64, high: f64| low + (high - low) * own.random::<f64>();
+        let rate = [500.0, 1000.0, 2000.0, 5000.0][(4.0 * draw(0.0, 0.999)) as usize];
+        let (volts, stroke) = (draw(60.0, 160.0), draw(5.0, 40.0));
+        let (linear, memory, noise) = (draw(0.4, 0.8), draw(0.15, 0.4), stroke * 10f64.powf(draw(-3.6, -2.9)));
+        let style = (4.0 * draw(0.0, 0.999)) as usize;
+        let sizes: Vec<f64> = (0..40).map(|_| draw(0.0, 1.0)).collect();
+        let size = |at: usize, low: f64, high: f64| low * f64::powf(high / low, sizes[at]);
+        let has = |effect| self.effects.contains(&effect);
+        // Of the experiment.
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ (0x9E37_79B9 + experiment));
+        let h = 1.0 / rate;
+        let segments = drives(style, rate, &mut rng);
+        let rows: usize = segments.iter().map(Vec::len).sum();
+        let time: Vec<f64> = (0..rows).map(|k| k as f64 * h).collect();
+        let swing = |rng: &mut ChaCha8Rng, size: f64| {
+            let (a, b, c) = (rng.random::<f64>() * 6.3, 0.5 + rng.random::<f64>(), 2.0 + rng.random::<f64>());
+            let whole = rows as f64 * h;
+            let at = move |t: f64| size * ((b * 6.0 * t / whole + a).sin() + 0.5 * (c * 6.0 * t / whole).sin());
+            time.iter().map(|t| at(*t)).collect::<Vec<f64>>()
+        };
+        let degc: Vec<f64> = swing(&mut rng, 4.0).iter().map(|t| 22.0 + t).collect();
+        let newtons: Vec<f64> = swing(&mut rng, 20.0);
+        let thermometer = has(Effect::Temperature) || sizes[30] < 0.2;
+        let load_cell = has(Effect::Load) || sizes[31] < 0.2;
+
+        let (mut input, mut output, mut labels) = (Vec::new(), Vec::new(), Vec::new());
+        for (label, x) in (0_i64..).zip(&segments) {
+            let first = output.len();
+            // What drives the memory.
+            let mut driven = x.clone();
+            if has(Effect::Delay) {
+                let late = size(0, 1.2, 6.0);
+                driven = (0..x.len())
+                    .map(|k| {
+                        let at = (k as f64 - late).max(0.0);
+                        let (k, part) = (at.floor() as usize, at.fract());
+                        x[k] * (1.0 - part) + x[(k + 1).min(x.len() - 1)] * part
+                    })
+                    .collect();
+            }
+            if has(Effect::Lag) {
+                let share = 1.0 - (-1.0 / size(1, 1.5, 8.0)).exp();
+                let mut y = driven[0];
+                driven.iter_mut().for_each(|u| {
+                    y += share * (*u - y);
+                    *u = y;
+                });
+            }
+            if has(Effect::RateDependence) {
+                // Walls that a viscous drag holds back, by a power of their speed.
+                let fastest = fastest(&segments, h);
+                let (most, power) = (size(2, 0.03, 0.10), 0.25 + 0.75 * sizes[3]);
+                let mut v = driven[0];
+                driven.iter_mut().for_each(|u| {
+                    for _ in 0..8 {
+                        let gap = *u - v;
+                        let speed = fastest * (gap.abs() / most).powf(1.0 / power);
+                        v += (speed * h / 8.0).min(gap.abs()).copysign(gap);
+                    }
+                    *u = v;
+                });
+            }
+            let mut law = ChaCha8Rng::seed_from_u64(self.seed + 1);
+            let z = self.law.follow(&driven, &mut law);
+            let mut y: Vec<f64> =
+                driven.iter().zip(&z).map(|(x, z)| stroke * (linear * 0.5 * x + memory * z)).collect();
+            let rest = y[0];
+            y.iter_mut().for_each(|y| *y -= rest);
+            if has(Effect::Temperature) {
+                let per_k = size(4, 0.002, 0.01);
+                y.iter_mut().enumerate().for_each(|(k, y)| *y *= 1.0 + per_k * (degc[first + k] - 22.0));
+            }
+            if has(Effect::Creep) {
+                let whole = size(5, 0.01, 0.03);
+                let taus: Vec<f64> = (0..9).map(|i| 0.013 * f64::powf(3.7, f64::from(i))).collect();
+                let mut states = vec![y[0]; taus.len()];
+                y.iter_mut().for_each(|y| {
+                    let mut slow = 0.0;
+                    for (state, tau) in states.iter_mut().zip(&taus) {
+                        *state += (*y - *state) * (1.0 - (-h / tau).exp());
+                        slow += *state;
+                    }
+                    *y += whole * 0.57 * slow;
+                });
+            }
+            if has(Effect::Load) {
+                let per_newton = stroke * size(6, 0.0005, 0.003);
+                y.iter_mut().enumerate().for_each(|(k, y)| *y += per_newton * newtons[first + k]);
+            }
+            if has(Effect::Resonance) {
+                let (hz, damping) = (rate * size(7, 0.03, 0.12), size(8, 0.01, 0.08));
+                let (omega, mut at, mut speed, mut before) = (std::f64::consts::TAU * hz, y[0], 0.0, y[0]);
+                const STEPS: u32 = 40;
+                y.iter_mut().for_each(|y| {
+                    for i in 1..=STEPS {
+                        let u = before + (*y - before) * f64::from(i) / f64::from(STEPS);
+                        speed += h / f64::from(STEPS) * (omega * omega * (u - at) - 2.0 * damping * omega * speed);
+                        at += h / f64::from(STEPS) * speed;
+                    }
+                    before = *y;
+                    *y = at;
+                });
+            }
+            input.extend(x.iter().map(|x| 0.5 * volts * (x + 1.0)));
+            output.extend(y);
+            labels.extend(std::iter::repeat_n(label, x.len()));
+        }
+        let whole = rows as f64 * h;
+        let (way, settles) = (stroke * size(9, 0.01, 0.05), sizes[10] < 0.5);
+        let (hum, hz) = (stroke * size(11, 0.003, 0.01), if rate > 600.0 { 50.0 } else { 50.0 + 30.0 * sizes[12] });
+        let mut slow = 0.0;
+        for (y, t) in output.iter_mut().zip(&time) {
+            if has(Effect::Drift) {
+                *y += way * if settles { 1.0 - (-4.0 * t / whole).exp() } else { t / whole };
+            }
+            if has(Effect::Interference) {
+                *y += hum * (std::f64::consts::TAU * hz * t + 1.0).sin();
+            }
+            // White noise, and a little that is red.
+            let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+            slow += 0.02 * (0.1 * normal() - slow);
+            *y += noise * (normal() + slow);
+        }
+        Record::from_samples(Columns {
+            name: name.into(),
+            segment: Some(labels),
+            time,
+            input: Some(input),
+            output: Some((OutputUnit::Micrometre, output)),
+            temperature: thermometer.then_some(degc),
+            load: load_cell.then_some(newtons),
+            ..Columns::default()
+        })
+        .expect("what is made here is a sound record")
+    }
+}
+
+/// The steepest slope of some drives.
+fn fastest(segments: &[Vec<f64>], h: f64) -> f64 {
+    let slopes = segments.iter().flat_map(|s| s.windows(2)).map(|w| (w[1] - w[0]).abs() / h);
+    let mut slopes: Vec<f64> = slopes.collect();
+    slopes.sort_by(f64::total_cmp);
+    slopes[(0.98 * slopes.len() as f64) as usize]
+}
+
+/// Segments of a drive between −1 and 1, each from −1, about 14,000 rows together: sines of several rates and swings, triangles of a scanner,
+/// stairs with a chirp, or a random walk with holds.
+fn drives(style: usize, rate: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+    let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+    let rows = 3500;
+    let wave = |share: f64, swing: f64, triangle: bool| {
+        let hz = share * rate;
+        let phase = |k: usize| (hz * k as f64 / rate).fract();
+        let of = |phase: f64| match triangle {
+            true => 2.0 * phase.min(1.0 - phase),
+            false => 0.5 - 0.5 * (std::f64::consts::TAU * phase).cos(),
+        };
+        (0..rows).map(|k| -1.0 + 2.0 * swing * of(phase(k))).collect::<Vec<f64>>()
+    };
+    match style {
+        0 | 1 => {
+            let of = [(0.0006, 1.0), (0.002, 0.7), (0.01, 0.9), (0.03, 0.4)];
+            of.into_iter()
+                .map(|(share, swing)| wave(share * draw(0.8, 1.3), swing * draw(0.9, 1.0), style == 1))
+                .collect()
+        }
+        2 => {
+            let mut stairs = Vec::with_capacity(2 * rows);
+            let mut at: f64 = -1.0;
+            for step in 0..14 {
+                stairs.extend(std::iter::repeat_n(at, 2 * rows / 14));
+                at = if step == 0 { 1.0 } else { draw(-1.0, 1.0) };
+            }
+            let (mut phase, mut chirp) = (0.0, Vec::with_capacity(2 * rows));
+            for k in 0..2 * rows {
+                phase += 0.0006 * f64::powf(80.0, k as f64 / (2 * rows) as f64);
+                chirp.push(-(std::f64::consts::TAU * phase).cos());
+            }
+            vec![wave(0.0006, 1.0, true), stairs, chirp]
+        }
+        _ => {
+            let mut walk = Vec::with_capacity(3 * rows);
+            let (mut at, mut to, mut step, mut held): (f64, f64, f64, usize) = (-1.0, 1.0, 0.002, 0);
+            while walk.len() < 3 * rows {
+                if held > 0 {
+                    held -= 1;
+                } else if (to - at).abs() < step {
+                    at = to;
+                    (to, step) = (draw(-1.0, 1.0), 10f64.powf(draw(-3.0, -1.3)));
+                    held = if draw(0.0, 1.0) < 0.3 { 300 } else { 0 };
+                } else {
+                    at += step.copysign(to - at);
+                }
+                walk.push(at);
+            }
+            vec![wave(0.0006, 1.0, false), walk]
+        }
+    }
+}
