@@ -54,11 +54,12 @@ impl<T: Real> Build<Temperature<T>> for TemperatureParams {
     }
 }
 
-/// History of the temperature stage: the last measured temperature, and that of the actuator \[K above T₀\].
+/// History of the temperature stage: the last measured temperature and that of the actuator \[K above T₀\], and the last input.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TemperatureState<T> {
     measured: T,
     felt: T,
+    u: T,
 }
 
 impl<T: Real> Temperature<T> {
@@ -71,7 +72,7 @@ impl<T: Real> Temperature<T> {
     #[inline]
     pub fn reset_felt(&self, s: &mut TemperatureState<T>, env: &Env<T>) -> (T, T) {
         let measured = finite_or(env.temperature - self.reference, T::ZERO);
-        *s = TemperatureState { measured, felt: measured };
+        (s.measured, s.felt) = (measured, measured);
         self.at(measured)
     }
 
@@ -98,12 +99,14 @@ impl<T: Real> Stage<T> for Temperature<T> {
     #[inline]
     fn reset(&self, s: &mut TemperatureState<T>, env: &Env<T>, u0: T) -> T {
         let (factor, shift) = self.reset_felt(s, env);
-        u0 * factor + shift
+        s.u = finite_or(u0, T::ZERO);
+        s.u * factor + shift
     }
     #[inline]
     fn step(&self, s: &mut TemperatureState<T>, env: &Env<T>, u: T) -> T {
         let (factor, shift) = self.step_felt(s, env);
-        u * factor + shift
+        s.u = finite_or(u, s.u);
+        s.u * factor + shift
     }
 }
 

@@ -270,7 +270,7 @@ pub(super) struct Material<'a> {
     pub(super) remainder: Remainder,
     pub(super) zero: Zero,
     pub(super) samples: &'a Samples,
-    /// Error that is left in the end, in noise floors.
+    /// Cross-validated error that the base of the search leaves with all that was found, in noise floors.
     pub(super) left: f64,
     pub(super) suspects: Vec<Suspect>,
     pub(super) limits: BTreeMap<Effect, Limit>,
@@ -461,13 +461,18 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             format!("the gain changes by {:+.2} % per K{expands}{late}", 100.0 * p.per_kelvin)
         }
         Effect::Creep => {
-            let (p, hold) = (e.creep.as_ref()?, longest_hold(m.samples));
+            let (p, (hold, holds)) = (e.creep.as_ref()?, longest_hold(m.samples));
             let shares = p.seconds.iter().zip(&p.shares);
             let share: f64 = shares.map(|(tau, share)| share * (1.0 - (-hold / tau).exp())).sum();
-            format!(
-                "in the {hold:.2} s of the longest hold after a step the output goes on by {:.1} % of it",
-                100.0 * share
-            )
+            let share = 100.0 * share;
+            match holds {
+                true => format!(
+                    "in the {hold:.2} s of the longest hold after a step the output goes on by {share:.1} % of it"
+                ),
+                false => format!(
+                    "in {hold:.2} s, as long as the longest segment, the output would go on by {share:.1} % of a step; the drive holds nowhere"
+                ),
+            }
         }
         Effect::Resonance => {
             let r = e.resonances.first()?;
@@ -514,13 +519,16 @@ fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
         .filter(|(_, a)| *a > 0.0)
 }
 
-/// The longest time for which the drive stands still \[s\]; the longest segment where it never does.
-fn longest_hold(samples: &Samples) -> f64 {
+/// The longest time for which the drive stands still \[s\], or the longest segment where it never does, and whether it does.
+fn longest_hold(samples: &Samples) -> (f64, bool) {
     let (low, high) = samples.input_range();
     let still = |a: f64, b: f64| (a - b).abs() <= 1e-6 * (high - low);
     let runs = samples.segments.iter().flat_map(|s| samples.input[s.clone()].chunk_by(|a, b| still(*a, *b)));
     let rows = runs.map(<[f64]>::len).max().unwrap_or(0);
-    if rows > LEAST_HOLD { samples.period * (rows - 1) as f64 } else { samples.longest_segment() }
+    match rows > LEAST_HOLD {
+        true => (samples.period * (rows - 1) as f64, true),
+        false => (samples.longest_segment(), false),
+    }
 }
 
 /// Rows that the drive has to stand still for a hold.

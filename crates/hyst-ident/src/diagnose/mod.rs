@@ -257,7 +257,8 @@ pub fn diagnose(
         noise: found.noise,
     })?;
     limits.retain(|effect, _| !named.contains(effect));
-    let left = after.errors.as_ref().map_or(1.0, |e| e.rmse / found.noise.max(f64::MIN_POSITIVE));
+    // Of the base of the search: what the own base misses beside an effect does not speak against it.
+    let left = found.best.cv_rmse() / found.noise.max(f64::MIN_POSITIVE);
     let near = suspects::near(&found, &named, left);
     let suspects = suspects::suspects(&near, model, &samples, remainder.slew_limit);
     let given = found.named.iter().map(|n| Weighed::of(n.effect, true, &n.evidence(left)));

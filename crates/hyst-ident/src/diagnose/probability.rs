@@ -42,7 +42,7 @@ pub(crate) struct Evidence {
     pub(crate) judgement: Judgement,
     /// Error with the next best name over that with this one, both cross-validated.
     pub(crate) next_best: f64,
-    /// Error that is left in the end, in noise floors.
+    /// Cross-validated error that the base of the search leaves with all that was found, in noise floors.
     pub(crate) left: f64,
 }
 

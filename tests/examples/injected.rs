@@ -1,0 +1,235 @@
+//! Known effects put into a measured record, and what is named then: `cargo run --release -p hyst-tests --example injected`.
+//!
+//! Each effect is put into the output of the measured micromanipulator in two sizes, by equations that are not the models', and the record is
+//! fitted and diagnosed as the user would. What the record shows by itself (lag and creep) is expected beside it. A delay or lag adds to the lag
+//! that is there.
+
+use hyst_ident::diagnose::{DiagnoseOptions, Findings, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::{Effect, Kind};
+use hyst_ident::record::{ColumnMap, Columns, Need, OutputUnit, Record};
+use hyst_ident::simulate::Zero;
+use hyst_tests::data;
+use rayon::prelude::*;
+
+/// Sample period of the record \[s\].
+fn period(r: &Record) -> f64 {
+    r.sample_period()
+}
+
+/// First-order lag of some samples.
+fn lagged(x: &[f64], share: f64) -> Vec<f64> {
+    let mut y = x[0];
+    let follow = |x: &f64| {
+        y += share * (x - y);
+        y
+    };
+    x.iter().map(follow).collect()
+}
+
+/// A temperature that rises and falls over the record \[°C\].
+fn temperature(r: &Record) -> Vec<f64> {
+    let whole = r.rows() as f64;
+    let at = |k: usize| {
+        let x = k as f64 / whole;
+        22.0 + 5.0 * (7.0 * x).sin() + 2.0 * (19.0 * x + 0.4).sin()
+    };
+    (0..r.rows()).map(at).collect()
+}
+
+/// A force that changes every few seconds \[N\].
+fn force(r: &Record) -> Vec<f64> {
+    let t = |k: usize| k as f64 * period(r);
+    (0..r.rows()).map(|k| 10.0 * (0.37 * t(k)).sin() + 6.0 * (0.83 * t(k) + 1.0).sin()).collect()
+}
+
+/// A changed record.
+struct Changed {
+    output: Vec<f64>,
+    temperature: Option<Vec<f64>>,
+    load: Option<Vec<f64>>,
+    /// Parameters that are to be found: effect, name, value.
+    truth: Vec<(Effect, &'static str, f64)>,
+    /// Effects that are to be named beside the record's own.
+    effects: Vec<Effect>,
+}
+
+type Injection = Box<dyn Fn(&Record) -> Changed + Send + Sync>;
+
+/// The injections, each with its name.
+fn injections() -> Vec<(String, Injection)> {
+    fn plain(output: Vec<f64>, truth: Vec<(Effect, &'static str, f64)>) -> Changed {
+        let mut effects: Vec<Effect> = truth.iter().map(|t| t.0).collect();
+        effects.dedup();
+        Changed { output, temperature: None, load: None, truth, effects }
+    }
+    fn y(r: &Record) -> Vec<f64> {
+        r.output().unwrap_or_default().to_vec()
+    }
+    let mut all: Vec<(String, Injection)> = Vec::new();
+    let mut put = |name: String, of: Injection| all.push((name, of));
+    for ms in [15.0, 40.0] {
+        put(
+            format!("delay {ms} ms"),
+            Box::new(move |r| {
+                let (y, late) = (y(r), 1e-3 * ms / period(r));
+                let at = |k: usize| {
+                    let x = (k as f64 - late).max(0.0);
+                    let (i, part) = (x as usize, x.fract());
+                    y[i] + part * (y[(i + 1).min(y.len() - 1)] - y[i])
+                };
+                plain((0..y.len()).map(at).collect(), vec![(Effect::Delay, "seconds", 1e-3 * ms)])
+            }),
+        );
+        put(
+            format!("lag {ms} ms"),
+            Box::new(move |r| {
+                let share = 1.0 - (-period(r) / (1e-3 * ms)).exp();
+                plain(lagged(&y(r), share), vec![(Effect::Lag, "seconds", 1e-3 * ms)])
+            }),
+        );
+    }
+    for um in [0.15, 0.4] {
+        put(
+            format!("tone {um} µm at 27.3 Hz"),
+            Box::new(move |r| {
+                let tone = |t: &f64| um * (std::f64::consts::TAU * 27.3 * t + 0.7).sin();
+                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + tone(t)).collect();
+                plain(output, vec![(Effect::Interference, "hz", 27.3), (Effect::Interference, "amplitude", um)])
+            }),
+        );
+    }
+    for percent in [3.0, 8.0] {
+        put(
+            format!("drift {percent} % of the stroke"),
+            Box::new(move |r| {
+                let whole = r.time()[r.rows() - 1];
+                let slope = 46.0 * 0.01 * percent / whole;
+                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + slope * t).collect();
+                plain(output, vec![(Effect::Drift, "per_second", slope)])
+            }),
+        );
+        put(
+            format!("drift that settles at {percent} % of the stroke"),
+            Box::new(move |r| {
+                let height = 46.0 * 0.01 * percent;
+                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + height * (1.0 - (-t / 8.0).exp())).collect();
+                plain(output, vec![(Effect::Drift, "settling", height), (Effect::Drift, "seconds", 8.0)])
+            }),
+        );
+        put(
+            format!("clipping {percent} % below the top"),
+            Box::new(move |r| {
+                let y = y(r);
+                let (low, high) = y.iter().fold((f64::MAX, f64::MIN), |(a, b), y| (a.min(*y), b.max(*y)));
+                let end = high - 0.01 * percent * (high - low);
+                // The stop is the device's: the sensor's noise is still on it.
+                let noise = |k: usize| 0.03 * ((k as f64 * 1.7).sin() + (k as f64 * 2.9).sin());
+                let output = y.iter().enumerate().map(|(k, y)| if *y > end { end + noise(k) } else { *y }).collect();
+                plain(output, vec![(Effect::Saturation, "high", end)])
+            }),
+        );
+    }
+    for (per_k, um_per_k, um_per_n) in [(0.003, 0.1, 0.03), (0.008, 0.3, 0.1)] {
+        put(
+            format!("temperature {per_k} /K behind 3 s"),
+            Box::new(move |r| {
+                let (degc, y) = (temperature(r), y(r));
+                let felt = lagged(&degc, 1.0 - (-period(r) / 3.0).exp());
+                // The zero of the motion is where the record rests.
+                let output =
+                    y.iter().zip(&felt).map(|(at, t)| y[0] + (at - y[0]) * (1.0 + per_k * (t - 22.0))).collect();
+                let truth = vec![(Effect::Temperature, "per_kelvin", per_k)];
+                Changed { temperature: Some(degc), ..plain(output, truth) }
+            }),
+        );
+        put(
+            format!("expansion {um_per_k} µm/K"),
+            Box::new(move |r| {
+                let degc = temperature(r);
+                let output = y(r).iter().zip(&degc).map(|(y, t)| y + um_per_k * (t - 22.0)).collect();
+                let truth = vec![(Effect::Temperature, "expansion", um_per_k)];
+                Changed { temperature: Some(degc), ..plain(output, truth) }
+            }),
+        );
+        put(
+            format!("load {um_per_n} µm/N"),
+            Box::new(move |r| {
+                let newtons = force(r);
+                let output = y(r).iter().zip(&newtons).map(|(y, f)| y + um_per_n * f).collect();
+                Changed { load: Some(newtons), ..plain(output, vec![(Effect::Load, "per_newton", um_per_n)]) }
+            }),
+        );
+    }
+    all
+}
+
+/// What is named in a record, with one zero for each file.
+fn found(record: &Record) -> Findings {
+    let fitting = FitOptions { zero_per_record: true, ..FitOptions::default() };
+    let model = fit(record, Kind::Pi, &fitting).expect("a fit");
+    let options = DiagnoseOptions { zero: Zero::PerRecord, ..DiagnoseOptions::default() };
+    diagnose(record, None, &model, &options, &|_| {}).expect("a diagnosis").findings
+}
+
+/// Whether an effect is named, or declared indistinguishable from one that is.
+fn is_named(findings: &Findings, effect: Effect) -> bool {
+    let tie = |f: &hyst_ident::diagnose::Finding| {
+        f.alternatives.iter().any(|other| other.indistinguishable && other.name == effect)
+    };
+    findings.effects.iter().any(|f| f.name == effect || tie(f))
+}
+
+fn main() {
+    let Some(folder) = data() else { return };
+    let path = folder.join("measured/micromanipulator-train.csv");
+    let plain = Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).expect("the measured record");
+    let by_itself = found(&plain);
+    let own: Vec<Effect> = by_itself.effects.iter().map(|f| f.name).collect();
+    println!("by itself: {}", own.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "));
+    let value = |findings: &Findings, effect: Effect, name: &str| {
+        let found = findings.effects.iter().find(|f| f.name == effect)?.parameters.get(name)?.clone();
+        Some((found.value, found.std_error.unwrap_or(0.0)))
+    };
+    let all = injections();
+    let rows: Vec<(bool, String)> = all
+        .par_iter()
+        .map(|(name, inject)| {
+            let changed = inject(&plain);
+            let record = Record::from_samples(Columns {
+                name: name.clone(),
+                time: plain.time().to_vec(),
+                input: Some(plain.input().to_vec()),
+                output: Some((OutputUnit::Micrometre, changed.output.clone())),
+                temperature: changed.temperature.clone(),
+                load: changed.load.clone(),
+                ..Columns::default()
+            })
+            .expect("a changed record is sound");
+            let findings = found(&record);
+            let named = changed.effects.iter().all(|e| is_named(&findings, *e));
+            let other = |f: &&hyst_ident::diagnose::Finding| {
+                let told =
+                    |e: &Effect| f.name == *e || f.alternatives.iter().any(|a| a.indistinguishable && a.name == *e);
+                !own.iter().any(told) && !changed.effects.iter().any(told)
+            };
+            let nothing_else = !findings.effects.iter().any(|f| other(&f));
+            let mut told = Vec::new();
+            let mut right = true;
+            for (effect, parameter, truth) in &changed.truth {
+                // What is late adds to what is late already.
+                let before =
+                    if own.contains(effect) { value(&by_itself, *effect, parameter).map_or(0.0, |v| v.0) } else { 0.0 };
+                let Some((value, error)) = value(&findings, *effect, parameter) else { continue };
+                let close = (value - before - truth).abs() <= f64::max(0.1 * truth.abs(), 3.0 * error);
+                right &= close;
+                told.push(format!("{parameter} {:.4} ± {error:.4}, true {truth:.4}", value - before));
+            }
+            let names: Vec<&str> = findings.effects.iter().map(|f| f.name.name()).collect();
+            let good = named && nothing_else && right;
+            (good, format!("{} {name}: {} [{}]", if good { "   " } else { "NOT" }, names.join(", "), told.join("; ")))
+        })
+        .collect();
+    rows.iter().for_each(|(_, line)| println!("{line}"));
+    println!("{} of {} right", rows.iter().filter(|r| r.0).count(), rows.len());
+}
