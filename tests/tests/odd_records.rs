@@ -138,19 +138,25 @@ fn a_quantised_output_is_not_unexplained() {
 #[test]
 fn spikes_are_told_and_hide_nothing() {
     let made = |spikes: bool| {
-        let (mut p, mut late, mut rng) = (0.0, 0.0, ChaCha8Rng::seed_from_u64(9));
+        let (mut plays, mut late, mut before, mut rng) = ([0.0; 16], 0.0, 0.0, ChaCha8Rng::seed_from_u64(9));
         let (mut time, mut input, mut output) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..12_000_u32 {
             let t = f64::from(k) * 1e-3;
             let u = 50.0 - 30.0 * (4.0 * t).cos() - 20.0 * (37.0 * t).cos();
-            late += (u - late) / 8.0;
-            p = hyst_core::play(p, late, 8.0);
-            let noise = 2e-3 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
+            // A lag of 8 ms, in small steps.
+            for i in 1..=50 {
+                late += (before + (u - before) * f64::from(i) / 50.0 - late) / 400.0;
+            }
+            before = u;
+            for (p, r) in plays.iter_mut().zip(1..) {
+                *p = hyst_core::play(*p, late, 1.5 * f64::from(r));
+            }
+            let noise = 1e-2 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
             let (hit, size) = (rng.random::<f64>() < 0.05, 0.2 + 2.0 * rng.random::<f64>());
             let spike = if hit && spikes { size } else { 0.0 };
             time.push(t);
             input.push(u);
-            output.push(0.1 * late + 0.05 * p + noise + spike);
+            output.push(0.1 * late + 0.003 * plays.iter().sum::<f64>() + noise + spike);
         }
         let (input, output) = (Some(input), Some((OutputUnit::Micrometre, output)));
         Record::from_samples(Columns { name: "spiked".into(), time, input, output, ..Columns::default() }).unwrap()
@@ -170,8 +176,9 @@ fn spikes_are_told_and_hide_nothing() {
         let seconds = findings.effects[0].parameters["seconds"].value;
         assert!((seconds / 8e-3 - 1.0).abs() < 0.1, "{seconds}");
     }
-    let error = |f: &hyst_ident::diagnose::Findings| f.after.train.unwrap().rmse;
-    assert!(error(&spiked) < 1.5 * error(&clean), "{} {}", error(&spiked), error(&clean));
+    // Small ones on a steep slope of the drive stay.
+    let after = spiked.after.train.unwrap();
+    assert!(after.rmse < 0.2 * after.rmse_all_rows, "{after:?}");
 }
 
 /// A change of the output's unit changes no finding: creep is found at any scale, with either base.

@@ -127,7 +127,7 @@ impl Limits<'_> {
         let mut size = first;
         for _ in 0..ROUNDS {
             let left = self.projector.left(&change(size)?);
-            if !(left > 0.0) {
+            if left <= 0.0 || left.is_nan() {
                 return Ok(None);
             }
             let next = size * (least / left).sqrt();

@@ -20,8 +20,7 @@ pub(crate) struct SignalPath<'a> {
     delay: Option<Delay<f64, DELAY>>,
     lag: Option<Lag<f64>>,
     rate: Option<Rate<f64>>,
-    /// Of each row the gain, and how much warmer than the reference the actuator is \[K\].
-    warmth: Option<(Vec<f64>, Vec<f64>)>,
+    warmth: Option<Warmth>,
     creep: Option<Creep<f64, CREEP>>,
     resonances: Vec<Resonance<f64>>,
     stop: Option<Stop>,
@@ -94,7 +93,7 @@ impl<'a> SignalPath<'a> {
     }
 
     fn carry<const N: usize>(&self, mut columns: [&mut [f64]; N]) {
-        if let Some((factor, _)) = &self.warmth {
+        if let Some(Warmth { factor, .. }) = &self.warmth {
             for v in &mut columns {
                 v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
             }
@@ -107,7 +106,7 @@ impl<'a> SignalPath<'a> {
 
     /// What a thermal expansion of one unit per kelvin adds to the motion.
     pub(crate) fn expansion(&self) -> Option<Vec<f64>> {
-        let mut shift = self.warmth.as_ref()?.1.clone();
+        let mut shift = self.warmth.as_ref()?.kelvin.clone();
         if let Some(creep) = &self.creep {
             self.creep(creep, &mut [&mut shift]);
         }
@@ -167,9 +166,16 @@ impl<'a> SignalPath<'a> {
     }
 }
 
-/// Of each row the gain, and how much warmer than the reference the actuator is \[K\]; `None` where no temperature was recorded. Each segment
-/// begins as after a long time at its first temperature.
-pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<(Vec<f64>, Vec<f64>)>, Error> {
+/// What the temperature does in each row.
+pub(crate) struct Warmth {
+    /// Gain.
+    factor: Vec<f64>,
+    /// How much warmer than the reference the actuator is \[K\].
+    pub(crate) kelvin: Vec<f64>,
+}
+
+/// What the temperature does; `None` where none was recorded. Each segment begins as after a long time at its first temperature.
+pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<Warmth>, Error> {
     if samples.temperature.is_none() {
         return Ok(None);
     }
@@ -181,7 +187,8 @@ pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<
         true => stage.reset_felt(&mut state, &samples.env(k)),
         false => stage.step_felt(&mut state, &samples.env(k)),
     });
-    Ok(Some(warmth.unzip()))
+    let (factor, kelvin) = warmth.unzip();
+    Ok(Some(Warmth { factor, kelvin }))
 }
 
 /// Makes of a drive what an amplifier puts out that changes by `most` a sample at most \[V\] and has rested at the first voltage of each

@@ -32,8 +32,7 @@ fn acting_temperature(model: &Model, scene: &Scene<'_>) -> Option<(Vec<f64>, Axi
     let Some(p) = model.effects.temperature.filter(|p| p.seconds > 0.0) else {
         return Some((measured.clone(), Axis::new("temperature", "°C")));
     };
-    let (_, kelvin) = warmth(&scene.samples, &p).ok()??;
-    let degc = kelvin.into_iter().map(|kelvin| p.reference_degc + kelvin).collect();
+    let degc = warmth(&scene.samples, &p).ok()??.kelvin.into_iter().map(|kelvin| p.reference_degc + kelvin).collect();
     Some((degc, Axis::new("temperature behind its thermal lag", "°C")))
 }
 
