@@ -197,7 +197,7 @@ pub struct Finding {
     pub kind: EffectKind,
     /// Which law it follows; none where a flexible form extends the model, which is more than its parameters say.
     pub law: Option<String>,
-    /// Probability that the name is right, as calibrated on simulated actuators of several hysteresis laws.
+    /// Probability that the name is right; not calibrated yet.
     pub probability: f64,
     /// Parameters.
     pub parameters: BTreeMap<String, Found>,

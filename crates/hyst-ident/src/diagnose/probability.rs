@@ -1,9 +1,9 @@
 //! How probable it is that a name is right.
 //!
 //! A logistic regression on what the search knows of a name: how far it stands above the noise, how much worse the next best name does, how
-//! much of the residual it leaves, and in how many bootstrap draws it helps. Its coefficients are fitted to simulated actuators of several
-//! hysteresis laws whose effects are known (`cargo run --release -p hyst-tests --example reliability`), none of which any test uses; the
-//! reliability diagram in the documentation is drawn from others.
+//! much of the residual the search leaves, and by how much the error falls. The coefficients are set by hand and not calibrated yet:
+//! `cargo run --release -p hyst-tests --example reliability -- COUNT SEED --fit` fits them to simulated actuators of seven hysteresis laws whose
+//! effects are known, and without `--fit` tells the calibration error of those that are in use.
 
 use super::score::Judgement;
 use crate::model::Effect;
