@@ -55,7 +55,13 @@ const CHECKS: &[Check] = &[
     },
     // The process-level tests drive this binary.
     Check { name: "build", arguments: &["build", "--package", "hyst-cli"], environment: &[] },
-    Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast"], environment: &[] },
+    // The lints have compiled the examples, and no test runs one.
+    Check {
+        name: "tests",
+        arguments: &["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests"],
+        environment: &[],
+    },
+    Check { name: "examples in texts", arguments: &["test", "--workspace", "--doc"], environment: &[] },
     Check {
         name: "core without features",
         arguments: &["test", "--package", "hyst-core", "--no-default-features"],
