@@ -1,7 +1,7 @@
 //! Limits of detection: how large an effect that is not named would have to be for this record to show it.
 //!
 //! An effect of a given size changes the output by a column of numbers. What the base and all that was found cannot imitate of that column is
-//! what the search would have gained, and the search accepts from a known gain on ([`score::least_gain`]). So the size follows from linear
+//! what the search would have gained, and the search accepts from a known gain on (`least_gain` in `score.rs`). So the size follows from linear
 //! algebra, without a search; where an effect does not grow in proportion to its parameter, the column is made anew at the size found.
 
 use std::collections::BTreeMap;
