@@ -4,7 +4,7 @@
 //! fitted and diagnosed as the user would. What the record shows by itself (lag and creep) is expected beside it. A delay or lag adds to the lag
 //! that is there.
 
-use hyst_ident::diagnose::{DiagnoseOptions, Findings, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, Finding, Findings, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Effect, Kind};
 use hyst_ident::record::{ColumnMap, Columns, Need, OutputUnit, Record};
@@ -42,6 +42,9 @@ fn force(r: &Record) -> Vec<f64> {
     let t = |k: usize| k as f64 * period(r);
     (0..r.rows()).map(|k| 10.0 * (0.37 * t(k)).sin() + 6.0 * (0.83 * t(k) + 1.0).sin()).collect()
 }
+
+/// Stroke of the device \[µm\].
+const STROKE: f64 = 46.0;
 
 /// A changed record.
 struct Changed {
@@ -100,23 +103,29 @@ fn injections() -> Vec<(String, Injection)> {
         );
     }
     for percent in [3.0, 8.0] {
-        put(
-            format!("drift {percent} % of the stroke"),
-            Box::new(move |r| {
+        let height = STROKE * 0.01 * percent;
+        let added = |name: &str,
+                     of: fn(f64, f64) -> f64,
+                     truth: fn(f64, f64) -> Vec<(&'static str, f64)>|
+         -> (String, Injection) {
+            let inject = move |r: &Record| {
                 let whole = r.time()[r.rows() - 1];
-                let slope = 46.0 * 0.01 * percent / whole;
-                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + slope * t).collect();
-                plain(output, vec![(Effect::Drift, "per_second", slope)])
-            }),
+                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + height * of(*t, whole)).collect();
+                plain(
+                    output,
+                    truth(height, whole).into_iter().map(|(name, value)| (Effect::Drift, name, value)).collect(),
+                )
+            };
+            (format!("{name} {percent} % of the stroke"), Box::new(inject))
+        };
+        let (name, line) = added("drift", |t, whole| t / whole, |height, whole| vec![("per_second", height / whole)]);
+        put(name, line);
+        let (name, settles) = added(
+            "drift that settles at",
+            |t, _| 1.0 - (-t / 8.0).exp(),
+            |height, _| vec![("settling", height), ("seconds", 8.0)],
         );
-        put(
-            format!("drift that settles at {percent} % of the stroke"),
-            Box::new(move |r| {
-                let height = 46.0 * 0.01 * percent;
-                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + height * (1.0 - (-t / 8.0).exp())).collect();
-                plain(output, vec![(Effect::Drift, "settling", height), (Effect::Drift, "seconds", 8.0)])
-            }),
-        );
+        put(name, settles);
         put(
             format!("clipping {percent} % below the top"),
             Box::new(move |r| {
@@ -161,6 +170,29 @@ fn injections() -> Vec<(String, Injection)> {
             }),
         );
     }
+    for (ms, share, um, percent) in [(15.0, 0.03, 0.15, 3.0), (40.0, 0.08, 0.4, 8.0)] {
+        put(
+            format!("lag {ms} ms with creep {share}"),
+            Box::new(move |r| {
+                let late = lagged(&y(r), 1.0 - (-period(r) / (1e-3 * ms)).exp());
+                let slow = lagged(&late, 1.0 - (-period(r) / 6.0).exp());
+                let output = late.iter().zip(&slow).map(|(y, slow)| y + share * (slow - late[0])).collect();
+                Changed {
+                    effects: vec![Effect::Lag, Effect::Creep],
+                    ..plain(output, vec![(Effect::Lag, "seconds", 1e-3 * ms)])
+                }
+            }),
+        );
+        put(
+            format!("tone {um} µm with drift {percent} %"),
+            Box::new(move |r| {
+                let slope = STROKE * 0.01 * percent / r.time()[r.rows() - 1];
+                let add = |t: &f64| um * (std::f64::consts::TAU * 27.3 * t).sin() + slope * t;
+                let output = y(r).iter().zip(r.time()).map(|(y, t)| y + add(t)).collect();
+                plain(output, vec![(Effect::Interference, "amplitude", um), (Effect::Drift, "per_second", slope)])
+            }),
+        );
+    }
     all
 }
 
@@ -172,12 +204,16 @@ fn found(record: &Record) -> Findings {
     diagnose(record, None, &model, &options, &|_| {}).expect("a diagnosis").findings
 }
 
-/// Whether an effect is named, or declared indistinguishable from one that is.
-fn is_named(findings: &Findings, effect: Effect) -> bool {
-    let tie = |f: &hyst_ident::diagnose::Finding| {
-        f.alternatives.iter().any(|other| other.indistinguishable && other.name == effect)
-    };
-    findings.effects.iter().any(|f| f.name == effect || tie(f))
+/// Whether one effect stands for another in this record: it repeats one loop, in which a delay and a lag are alike.
+fn alike(one: Effect, other: Effect) -> bool {
+    let late = |effect| matches!(effect, Effect::Delay | Effect::Lag);
+    one == other || (late(one) && late(other))
+}
+
+/// A parameter of an effect, or of one that is alike, and its standard error.
+fn value(findings: &Findings, effect: Effect, name: &str) -> Option<(f64, f64)> {
+    let found = findings.effects.iter().find(|f| alike(effect, f.name))?.parameters.get(name)?;
+    Some((found.value, found.std_error.unwrap_or(0.0)))
 }
 
 fn main() {
@@ -187,10 +223,6 @@ fn main() {
     let by_itself = found(&plain);
     let own: Vec<Effect> = by_itself.effects.iter().map(|f| f.name).collect();
     println!("by itself: {}", own.iter().map(|e| e.name()).collect::<Vec<_>>().join(", "));
-    let value = |findings: &Findings, effect: Effect, name: &str| {
-        let found = findings.effects.iter().find(|f| f.name == effect)?.parameters.get(name)?.clone();
-        Some((found.value, found.std_error.unwrap_or(0.0)))
-    };
     let all = injections();
     let rows: Vec<(bool, String)> = all
         .par_iter()
@@ -207,22 +239,20 @@ fn main() {
             })
             .expect("a changed record is sound");
             let findings = found(&record);
-            let named = changed.effects.iter().all(|e| is_named(&findings, *e));
-            let other = |f: &&hyst_ident::diagnose::Finding| {
-                let told =
-                    |e: &Effect| f.name == *e || f.alternatives.iter().any(|a| a.indistinguishable && a.name == *e);
-                !own.iter().any(told) && !changed.effects.iter().any(told)
-            };
-            let nothing_else = !findings.effects.iter().any(|f| other(&f));
+            let is_told = |list: &[Effect], f: &Finding| list.iter().any(|e| alike(*e, f.name));
+            let named = changed.effects.iter().all(|e| findings.effects.iter().any(|f| alike(*e, f.name)));
+            let nothing_else = findings.effects.iter().all(|f| is_told(&own, f) || is_told(&changed.effects, f));
             let mut told = Vec::new();
             let mut right = true;
             for (effect, parameter, truth) in &changed.truth {
-                // What is late adds to what is late already.
-                let before =
-                    if own.contains(effect) { value(&by_itself, *effect, parameter).map_or(0.0, |v| v.0) } else { 0.0 };
-                let Some((value, error)) = value(&findings, *effect, parameter) else { continue };
-                let close = (value - before - truth).abs() <= f64::max(0.1 * truth.abs(), 3.0 * error);
-                right &= close;
+                // What is late adds to what is late already. A parameter that is not there is wrong.
+                let before = value(&by_itself, *effect, parameter).map_or(0.0, |v| v.0);
+                let Some((value, error)) = value(&findings, *effect, parameter) else {
+                    right = false;
+                    told.push(format!("no {parameter}"));
+                    continue;
+                };
+                right &= (value - before - truth).abs() <= f64::max(0.1 * truth.abs(), 3.0 * error);
                 told.push(format!("{parameter} {:.4} ± {error:.4}, true {truth:.4}", value - before));
             }
             let names: Vec<&str> = findings.effects.iter().map(|f| f.name.name()).collect();

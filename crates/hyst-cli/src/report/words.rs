@@ -111,32 +111,24 @@ pub(crate) fn limits(findings: &Findings) -> Vec<(String, String, String)> {
     findings.limits.iter().map(of).collect()
 }
 
+/// Rows that are told by number at most.
+const TOLD: usize = 8;
+
 /// Which rows were left out, if some were.
 pub(crate) fn rows(findings: &Findings) -> Option<String> {
     let rows = &findings.rows;
     let LeftOut { gaps, spikes, start_up, saturated } = rows.left_out;
-    let mut left: Vec<String> = [
-        (spikes, "spike"),
-        (start_up, "row of a start-up transient"),
-        (saturated, "row at the end of the sensor's range"),
+    let told: Vec<String> = rows.spikes.iter().take(TOLD).map(usize::to_string).collect();
+    let more = if rows.spikes.len() > TOLD { ", …" } else { "" };
+    let left: Vec<String> = [
+        (spikes, format!("{} (rows {}{more})", count(spikes, "spike"), told.join(", "))),
+        (start_up, format!("{} of a start-up transient", count(start_up, "row"))),
+        (saturated, format!("{} at the end of the sensor's range", count(saturated, "row"))),
+        (gaps, count(gaps, "gap")),
     ]
     .into_iter()
-    .filter(|(n, _)| *n > 0)
-    .map(|(n, what)| match what.split_once(' ') {
-        Some((first, rest)) => format!("{} {rest}", count(n, first)),
-        None => count(n, what),
-    })
+    .filter_map(|(n, text)| (n > 0).then_some(text))
     .collect();
-    if !rows.spikes.is_empty() {
-        const TOLD: usize = 8;
-        let told: Vec<String> = rows.spikes.iter().take(TOLD).map(usize::to_string).collect();
-        let more = if rows.spikes.len() > TOLD { ", …" } else { "" };
-        left[0] += &format!(" (rows {}{more})", told.join(", "));
-    }
-    if gaps > 0 {
-        left.push(count(gaps, "gap"));
-    }
-    let left: Vec<&str> = left.iter().map(String::as_str).collect();
     (!left.is_empty()).then(|| format!("{} used; left out: {}", count(rows.used, "row"), listed(&left)))
 }
 

@@ -4,7 +4,8 @@ use hyst_core::Error;
 
 use super::findings::BaseAdvice;
 use super::trial::Trial;
-use crate::base::{Basis, PiBasis, PreisachBasis};
+use crate::base::Basis;
+use crate::fit::{BLOCKS, FitError, basis_for};
 use crate::lsq::Blocks;
 use crate::model::Kind;
 use crate::nested::{Hypothesis, Problem};
@@ -12,8 +13,6 @@ use crate::samples::Samples;
 
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
-/// Cells along an edge of the triangle that is tried.
-const CELLS: usize = 24;
 /// Error of another kind over that of the own one from which on it is the better one.
 const BETTER: f64 = 0.9;
 
@@ -24,21 +23,19 @@ pub(super) fn base_advice(
     own: (Kind, &dyn Basis),
     found: &Hypothesis,
     per_record: bool,
-) -> Result<Option<BaseAdvice>, Error> {
-    let blocks = Blocks::new(samples, crate::fit::BLOCKS, ROWS);
+    stage: &dyn Fn(Error) -> FitError,
+) -> Result<Option<BaseAdvice>, FitError> {
+    let blocks = Blocks::new(samples, BLOCKS, ROWS);
     let cv_rmse = |basis: &dyn Basis| {
         let problem = Problem::new(samples, basis, &blocks, per_record).holding();
         // A drag belongs to plays.
         let known = Hypothesis { drag: found.drag.filter(|_| basis.drags()), ..found.clone() };
         Ok::<_, Error>(problem.fit_linear(&known)?.and_then(|f| Trial::of(&problem, f)).map(|t| t.cv_rmse()))
     };
-    let Some(own_cv_rmse) = cv_rmse(own.1)? else { return Ok(None) };
+    let Some(own_cv_rmse) = cv_rmse(own.1).map_err(stage)? else { return Ok(None) };
     let mut best: Option<BaseAdvice> = None;
     for model in [Kind::Pi, Kind::Preisach].into_iter().filter(|kind| *kind != own.0) {
-        let error = match model {
-            Kind::Pi => cv_rmse(&PiBasis::for_samples(samples))?,
-            _ => cv_rmse(&PreisachBasis::for_samples(samples, CELLS))?,
-        };
+        let error = cv_rmse(basis_for(model, samples)?.as_ref()).map_err(stage)?;
         let least = best.as_ref().map_or(BETTER * own_cv_rmse, |b| b.cv_rmse);
         if let Some(cv_rmse) = error.filter(|e| *e < least) {
             best = Some(BaseAdvice { model, cv_rmse, own_cv_rmse });

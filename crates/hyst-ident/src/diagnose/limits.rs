@@ -9,12 +9,13 @@ use std::collections::BTreeMap;
 use hyst_core::{DelayParams, Error, LagParams, RateLaw, RateParams, ResonanceParams, TemperatureParams};
 use serde::{Deserialize, Serialize};
 
+use super::scan::Scan;
 use super::score::least_gain;
 use super::trial::Trial;
-use super::{starts, visible};
+use super::{hidden, starts};
 use crate::digits::short;
 use crate::model::{Effect, Effects};
-use crate::nested::{Cause, Hypothesis, Problem, Projector, SignalPath};
+use crate::nested::{Cause, Problem, SignalPath};
 use crate::samples::range;
 
 /// Above the gain from which on the search accepts: noise may take some of it.
@@ -67,16 +68,13 @@ impl Limit {
 
 /// What all limits need.
 struct Limits<'a> {
-    problem: &'a Problem<'a>,
-    found: &'a Trial,
-    projector: Projector<'a>,
-    motion: Vec<f64>,
+    scan: Scan<'a>,
     /// Gain from which on an effect is accepted, and from which on a tone is.
     least: f64,
     least_tone: f64,
 }
 
-/// The limit of each effect that was not found, on the base of the search.
+/// The limit of each effect that was not found, on the base of the search. An asymmetry, which that base has in itself, has none.
 pub(super) fn limits(
     problem: &Problem<'_>,
     found: &Trial,
@@ -85,34 +83,25 @@ pub(super) fn limits(
 ) -> Result<BTreeMap<Effect, Limit>, Error> {
     let h = &found.fit.hypothesis;
     let (rows, left) = (found.fit.rows as f64, found.total());
+    let least = |left: f64| MARGIN * least_gain(rows, left, noise).max(f64::MIN_POSITIVE);
     let all = Limits {
-        problem,
-        found,
-        projector: problem.projector(&found.fit)?,
-        motion: problem.motion(h, &found.fit.solution)?,
-        least: MARGIN * least_gain(rows, left, noise).max(f64::MIN_POSITIVE),
-        least_tone: MARGIN * least_gain(rows, rows * noise * noise, noise).max(f64::MIN_POSITIVE),
+        scan: Scan::new(problem, &found.fit, 0.0)?,
+        least: least(left),
+        // A tone may stand alone, whatever else is left.
+        least_tone: least(rows * noise * noise),
     };
     let mut limits = BTreeMap::new();
-    for effect in Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry) {
+    for effect in Effect::ALL {
         let cause = Cause::Effect(effect);
-        if !h.has_room(cause) || h.causes().contains(&cause) {
+        if h.causes().contains(&cause) {
             continue;
         }
-        limits.insert(effect, if visible(cause, problem) { all.of(effect, units)? } else { hidden(effect, problem) });
+        match hidden(cause, problem) {
+            Some(why) => limits.insert(effect, Limit::hidden(why)),
+            None => all.of(effect, units)?.and_then(|limit| limits.insert(effect, limit)),
+        };
     }
     Ok(limits)
-}
-
-/// Why a record cannot show an effect at all.
-fn hidden(effect: Effect, problem: &Problem<'_>) -> Limit {
-    Limit::hidden(match effect {
-        Effect::Temperature if problem.samples.temperature.is_none() => "the temperature was not recorded",
-        Effect::Temperature => "the temperature did not change by half a kelvin",
-        Effect::Load if problem.samples.load.is_none() => "the load was not recorded",
-        Effect::Load => "the load did not change",
-        _ => "the record repeats one loop, whose shape may as well be the hysteresis",
-    })
 }
 
 impl Limits<'_> {
@@ -126,7 +115,7 @@ impl Limits<'_> {
     ) -> Result<Option<f64>, Error> {
         let mut size = first;
         for _ in 0..ROUNDS {
-            let left = self.projector.left(&change(size)?);
+            let left = self.scan.left(&change(size)?);
             if left <= 0.0 || left.is_nan() {
                 return Ok(None);
             }
@@ -137,32 +126,23 @@ impl Limits<'_> {
             size = next.min(most);
         }
         // At the bound of what an effect can be it is not seen.
-        let left = self.projector.left(&change(size)?);
+        let left = self.scan.left(&change(size)?);
         Ok((size < most || left >= least).then_some(size))
     }
 
-    /// What the motion changes by with another hypothesis.
+    /// What the motion changes by with another stage before the operator.
     fn moved(&self, change: &dyn Fn(&mut Effects)) -> Result<Vec<f64>, Error> {
-        let mut h = self.found.fit.hypothesis.clone();
+        let mut h = self.scan.from.hypothesis.clone();
         change(&mut h.effects);
-        let mut moved = self.problem.motion(&h, &self.found.fit.solution)?;
-        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
-        Ok(moved)
+        self.scan.moved(&h)
     }
 
-    /// What one stage behind the motion changes it by.
-    fn behind(&self, effects: Effects) -> Result<Vec<f64>, Error> {
-        let mut moved = self.motion.clone();
-        SignalPath::new(self.problem.samples, &Hypothesis::of(effects))?.output_side(&mut moved);
-        moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
-        Ok(moved)
-    }
-
-    fn of(&self, effect: Effect, (u, y): (&str, &str)) -> Result<Limit, Error> {
-        let s = self.problem.samples;
+    /// The limit of an effect that this record can show; none of one that is looked for elsewhere.
+    fn of(&self, effect: Effect, (u, y): (&str, &str)) -> Result<Option<Limit>, Error> {
+        let s = self.scan.problem.samples;
         let (low, high) = s.input_range();
         let longest = s.longest_segment();
-        Ok(match effect {
+        Ok(Some(match effect {
             Effect::Delay => {
                 let size = self.size(s.period, 0.1 * longest, self.least, &|seconds| {
                     self.moved(&|e| e.delay = Some(DelayParams { seconds }))
@@ -192,20 +172,20 @@ impl Limits<'_> {
                 let reference_degc = starts::starting_temperature(s);
                 let size = self.size(1e-3, 0.05, self.least, &|per_kelvin| {
                     let p = TemperatureParams { per_kelvin, reference_degc, ..TemperatureParams::default() };
-                    self.behind(Effects { temperature: Some(p), ..Effects::default() })
+                    self.scan.behind(Effects { temperature: Some(p), ..Effects::default() })
                 })?;
                 Limit::of(size, "1/K", "relative change of the gain for each kelvin".into())
             }
             Effect::Creep => {
                 let size = self.size(1e-3, 1.0, self.least, &|decade| {
                     let bank = starts::bank(s, decade / starts::PER_DECADE);
-                    self.behind(Effects { creep: Some(bank), ..Effects::default() })
+                    self.scan.behind(Effects { creep: Some(bank), ..Effects::default() })
                 })?;
                 Limit::of(size, "1", "share of a step by which the output goes on in each decade of time".into())
             }
             Effect::Load => {
-                let Some(load) = &s.load else { return Ok(Limit::hidden("the load was not recorded")) };
-                let path = SignalPath::new(s, &self.found.fit.hypothesis)?;
+                let Some(load) = &s.load else { return Ok(None) };
+                let path = SignalPath::new(s, &self.scan.from.hypothesis)?;
                 let size = self.size(1.0, f64::INFINITY, self.least, &|per_newton| {
                     let mut column: Vec<f64> = load.iter().map(|f| per_newton * f).collect();
                     path.structure(&mut column);
@@ -231,20 +211,20 @@ impl Limits<'_> {
                 })?;
                 Limit::of(size, y, format!("amplitude of a tone at {} Hz in the sensor", short(hz)))
             }
-            Effect::Asymmetry => Limit::hidden("it is looked for on the own base"),
-        })
+            Effect::Asymmetry => return Ok(None),
+        }))
     }
 
     /// The mode that is seen best: how much of the motion it has to carry.
     fn mode(&self) -> Result<Limit, Error> {
-        let s = self.problem.samples;
+        let s = self.scan.problem.samples;
         let (first, last) = (f64::max(4.0 / s.longest_segment(), 1.0), 0.3 / s.period);
         let mut best: Option<(f64, f64)> = None;
         for i in 0..FREQUENCIES {
             let hz = first * (last / first).powf(i as f64 / (FREQUENCIES - 1) as f64);
             let size = self.size(0.2, 1.0, self.least, &|gain| {
                 let mode = ResonanceParams { hz, damping: DAMPING, gain };
-                self.behind(Effects { resonances: vec![mode], ..Effects::default() })
+                self.scan.behind(Effects { resonances: vec![mode], ..Effects::default() })
             })?;
             if let Some(size) = size.filter(|size| best.is_none_or(|(least, _)| *size < least)) {
                 best = Some((size, hz));
@@ -258,17 +238,17 @@ impl Limits<'_> {
         Ok(Limit::of(Some(size.max(LEAST_MODE)), "1", meaning))
     }
 
-    /// How much of the stroke a stop at the upper end has to take.
+    /// How far below the highest output a stop has to lie.
     fn stop(&self, y: &str) -> Limit {
-        let (low, high) = range(self.motion.iter().copied());
+        let (low, high) = range(self.scan.motion.iter().copied());
         let mut depth = SHALLOWEST * (high - low);
         while depth < high - low {
-            let ends: Vec<f64> = self.motion.iter().map(|m| (high - depth - m).min(0.0)).collect();
-            if self.projector.left(&ends) >= self.least {
+            let ends: Vec<f64> = self.scan.motion.iter().map(|m| (high - depth - m).min(0.0)).collect();
+            if self.scan.left(&ends) >= self.least {
                 return Limit::of(
                     Some(depth),
                     y,
-                    "by how much of the stroke a stop at its upper end falls short".into(),
+                    "how far below the highest output a stop at the upper end lies".into(),
                 );
             }
             depth *= DEEPER;

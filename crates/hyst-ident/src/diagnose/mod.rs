@@ -17,6 +17,7 @@ mod extension;
 mod findings;
 mod finer;
 mod limits;
+mod named;
 mod probability;
 mod remainder;
 mod rows;
@@ -259,14 +260,16 @@ pub fn diagnose(
     limits.retain(|effect, _| !named.contains(effect));
     // Of the base of the search: what the own base misses beside an effect does not speak against it.
     let left = found.best.cv_rmse() / found.noise.max(f64::MIN_POSITIVE);
-    let near = suspects::near(&found, &named, left);
-    let suspects = suspects::suspects(&near, model, &samples, remainder.slew_limit);
+    let candidates = suspects::candidates(&found, &named, left);
+    let suspects = suspects::suspects(&candidates, model, &samples, remainder.slew_limit);
     let given = found.named.iter().map(|n| Weighed::of(n.effect, true, &n.evidence(left)));
-    let weighed = given.chain(near.iter().map(|n| Weighed::of(n.effect, false, &n.evidence))).collect();
+    let weighed = given.chain(candidates.iter().map(|n| Weighed::of(n.effect, false, &n.evidence))).collect();
     let base_advice = match remainder.kind {
         RemainderKind::None => None,
-        _ => advice::base_advice(&samples, (model.base.kind(), asked.basis.as_ref()), &hypothesis, per_record)
-            .map_err(stage)?,
+        _ => {
+            let own = (model.base.kind(), asked.basis.as_ref());
+            advice::base_advice(&samples, own, &hypothesis, per_record, &stage)?
+        }
     };
     let findings = findings::collect(&findings::Material {
         left,
@@ -298,21 +301,27 @@ fn hypothesis_of(model: &Model) -> Hypothesis {
     Hypothesis { drag, ..Hypothesis::of(model.effects.clone()) }
 }
 
-/// Whether a record can show a cause at all.
-fn visible(cause: Cause, problem: &Problem<'_>) -> bool {
-    let varies = |column: &Option<Vec<f64>>, least: f64| {
-        column.as_ref().is_some_and(|c| {
-            let (low, high) = crate::samples::range(c.iter().copied());
-            high - low > least
-        })
+/// Why a record cannot show a cause at all; `None` if it can.
+fn hidden(cause: Cause, problem: &Problem<'_>) -> Option<&'static str> {
+    let varies = |column: &[f64], least: f64| {
+        let (low, high) = crate::samples::range(column.iter().copied());
+        high - low > least
     };
     match cause {
-        Cause::Effect(Effect::Temperature) => varies(&problem.samples.temperature, 0.5),
-        Cause::Effect(Effect::Load) => varies(&problem.samples.load, 0.0),
+        Cause::Effect(Effect::Temperature) => match &problem.samples.temperature {
+            None => Some("the temperature was not recorded"),
+            Some(degc) => (!varies(degc, 0.5)).then_some("the temperature did not change by half a kelvin"),
+        },
+        Cause::Effect(Effect::Load) => match &problem.samples.load {
+            None => Some("the load was not recorded"),
+            Some(newtons) => (!varies(newtons, 0.0)).then_some("the load did not change"),
+        },
         // What changes one loop's shape may as well be a hysteresis of that shape. That the output turns after the drive does is none:
         // of what is late, the simplest stands for all.
         Cause::Effect(Effect::RateDependence | Effect::Resonance | Effect::Saturation | Effect::Asymmetry)
-        | Cause::SlewLimit => problem.only_loop.is_none(),
-        _ => true,
+        | Cause::SlewLimit => {
+            problem.only_loop.map(|_| "the record repeats one loop, whose shape may as well be the hysteresis")
+        }
+        _ => None,
     }
 }

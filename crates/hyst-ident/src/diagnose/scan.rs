@@ -7,7 +7,7 @@ use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
 use super::starts::{PER_DECADE, bank, starting_temperature, stops};
 use crate::model::{Effect, Effects};
-use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, Projector, SignalPath};
+use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, Projector, SignalPath, hat};
 use crate::samples::range;
 
 /// Share of the gain that an effect needs from which on a first-order gain is followed up.
@@ -42,6 +42,11 @@ impl<'a> Scan<'a> {
     pub(super) fn gain(&self, column: &[f64]) -> Option<(f64, f64)> {
         let (gain, amplitude) = self.projector.gain(column, &self.residual);
         (amplitude > 0.0 && gain >= self.promising).then_some((gain, amplitude))
+    }
+
+    /// Σ squares of what the fit cannot imitate of a column.
+    pub(super) fn left(&self, column: &[f64]) -> f64 {
+        self.projector.left(column)
     }
 
     /// What the motion changes by with another hypothesis.
@@ -126,7 +131,7 @@ impl<'a> Scan<'a> {
     /// The hats of something that wanders over the record.
     fn hats(&self, of: &dyn Fn(usize) -> f64) -> Vec<Vec<f64>> {
         let rows = self.problem.samples.len();
-        let at = |k: usize| k as f64 / rows.max(2) as f64 * (HATS - 1) as f64;
-        (0..HATS).map(|j| (0..rows).map(|k| (1.0 - (at(k) - j as f64).abs()).max(0.0) * of(k)).collect()).collect()
+        let share = |k: usize| k as f64 / rows.max(2) as f64;
+        (0..HATS).map(|j| (0..rows).map(|k| hat(j, share(k)) * of(k)).collect()).collect()
     }
 }

@@ -10,7 +10,7 @@ use super::scan::Scan;
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::trial::Trial;
 use super::uncertainty::undetermined;
-use super::{starts, visible};
+use super::{hidden, starts};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
@@ -62,15 +62,23 @@ pub(crate) struct Instead {
     pub(crate) judgement: Judgement,
 }
 
+/// An effect that helps a set, but by too little to be named.
+#[derive(Clone)]
+pub(crate) struct Near {
+    pub(crate) effect: Effect,
+    /// Cross-validated RMSE with it \[output unit\].
+    pub(crate) cv_rmse: f64,
+    pub(crate) judgement: Judgement,
+}
+
 /// What a search found.
 pub(crate) struct Search {
     pub(crate) best: Trial,
     pub(crate) named: Vec<Named>,
     /// Standard deviation of the white noise \[output unit\].
     pub(crate) noise: f64,
-    /// What helps what was found in every part of the record, but by too little to be named: effect, cross-validated error with it \[output unit\],
-    /// judgement.
-    pub(crate) near: Vec<(Effect, f64, Judgement)>,
+    /// What helps the best set in every part of the record, but by too little to be named.
+    pub(crate) near: Vec<Near>,
     /// Where the zero wanders beyond the drift of the best set: the cross-validated error that is left once it may \[output unit\].
     pub(crate) beside_wandering: Option<f64>,
 }
@@ -87,7 +95,7 @@ struct Judge<'a> {
     problem: &'a Problem<'a>,
     noise: f64,
     seed: u64,
-    /// What came of adding a cause to a set.
+    /// What came of adding a cause to a set. Each pair is asked for once in a round, so that threads change nothing.
     known: Mutex<Vec<(Hypothesis, Cause, Option<Hypothesis>)>>,
 }
 
@@ -120,24 +128,30 @@ impl Judge<'_> {
         let mut fitted: Vec<Trial> = trials.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
         // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());
-        let mut best: Option<Trial> = None;
-        let plainer = fitted.clone();
-        for trial in fitted {
-            let better = best.as_ref().is_none_or(|best| {
+        let mut best: Option<usize> = None;
+        for (at, trial) in fitted.iter().enumerate() {
+            let better = best.is_none_or(|best| {
+                let best = &fitted[best];
                 let is_simple = trial.fit.solution.len() == best.fit.solution.len();
-                trial.total() < best.total() && (is_simple || score::clearly_better(best, &trial, self.seed))
+                trial.total() < best.total() && (is_simple || score::clearly_better(best, trial, self.seed))
             });
-            if better {
-                best = Some(trial);
-            }
+            best = if better { Some(at) } else { best };
         }
-        let Some(expands) = best.as_ref().filter(|t| expansion(t) != 0.0) else { return Ok(best) };
-        // A zero that rises with a temperature that rises steadily may as well drift.
-        let still = plainer.into_iter().filter(|t| expansion(t) == 0.0).min_by(|a, b| a.total().total_cmp(&b.total()));
-        let Some(still) = still.filter(|t| t.fit.hypothesis.has_room(DRIFT)) else { return Ok(best) };
-        let drifts = self.trials(&self.scan(&still.fit)?, DRIFT)?;
-        let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, expands, self.seed));
-        Ok(if decided { best } else { Some(still) })
+        let Some(best) = best else { return Ok(None) };
+        let chosen = if expansion(&fitted[best]) == 0.0 { best } else { self.unless_it_drifts(&fitted, best)? };
+        Ok(Some(fitted.swap_remove(chosen)))
+    }
+
+    /// Which of the laws of a temperature: the one that expands, or the best that does not where a drift beside it does as well. A zero that moves
+    /// as steadily as the temperature may as well drift.
+    fn unless_it_drifts(&self, laws: &[Trial], expands: usize) -> Result<usize, Error> {
+        let still = (0..laws.len()).filter(|at| expansion(&laws[*at]) == 0.0);
+        let still = still.min_by(|a, b| laws[*a].total().total_cmp(&laws[*b].total()));
+        let Some(still) = still.filter(|at| laws[*at].fit.hypothesis.has_room(DRIFT)) else { return Ok(expands) };
+        // Searched and not looked up: what is known must not depend on which thread was first.
+        let drifts = self.searched(&self.scan(&laws[still].fit)?, DRIFT)?;
+        let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, &laws[expands], self.seed));
+        Ok(if decided { expands } else { still })
     }
 
     fn refit(&self, effects: &Hypothesis) -> Result<Option<Trial>, Error> {
@@ -201,7 +215,8 @@ pub(super) fn further(
 
     let mut beam = vec![start.clone()];
     let mut best = start;
-    let mut near = Vec::new();
+    // What came near to be added, and to which set.
+    let mut near = (best.fit.hypothesis.causes(), Vec::new());
     for round in 1..=MOST {
         if judge.nothing_to_gain(&best) {
             break;
@@ -224,12 +239,15 @@ pub(super) fn further(
             })
             .collect();
         let mut next: Vec<Trial> = Vec::new();
-        near.clear();
-        for (trial, (_, _, cause)) in trials.into_iter().zip(&jobs) {
+        let parent = beam[0].fit.hypothesis.causes();
+        near = (parent.clone(), Vec::new());
+        for (trial, (from, _, cause)) in trials.into_iter().zip(&jobs) {
             let Some((trial, judgement)) = trial? else { continue };
             // A set that is worse than a smaller one found before leads nowhere.
             if trial.total() >= best.total() || !judgement.accepted() {
-                near.extend(cause.effect().filter(|_| judgement.is_sure()).map(|e| (e, trial.cv_rmse(), judgement)));
+                let counts = judgement.is_sure() && from.fit.hypothesis.causes() == parent;
+                let effect = cause.effect().filter(|_| counts);
+                near.1.extend(effect.map(|effect| Near { effect, cv_rmse: trial.cv_rmse(), judgement }));
                 continue;
             }
             // Two ways to the same set of effects: keep the better.
@@ -248,17 +266,11 @@ pub(super) fn further(
         // What has no name takes nearly anything with its many numbers, and may not put an end to the search among names.
         let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.effect().is_none());
         let far = BEAM_WITHIN * best.total();
-        let beside = |t: &Trial| t.total() <= far || (nameless(&best) && !nameless(t));
-        let first = next.iter().skip(1).position(|t| beside(t) && nameless(&best) != nameless(t));
-        let first = first.or_else(|| next.iter().skip(1).position(beside));
-        let mut at = 0;
-        next.retain(|_| {
-            at += 1;
-            at == 1 || first.is_some_and(|first| at == first + 2)
-        });
+        let second = next.iter().skip(1).find(|t| nameless(&best) && !nameless(t));
+        let second = second.or_else(|| next.iter().skip(1).find(|t| t.total() <= far)).cloned();
         // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
         judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments)).max(steps);
-        beam = next;
+        beam = std::iter::once(best.clone()).chain(second).collect();
     }
 
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,
@@ -284,6 +296,7 @@ pub(super) fn further(
         }
     };
     let noise = judge.noise;
+    let near = if near.0 == best.fit.hypothesis.causes() { near.1 } else { Vec::new() };
     if let Some(even) = nearly_even_drift(&judge, &best, already)? {
         let (_, named) = swaps(&judge, &even, already, &left)?;
         return Ok(Search { beside_wandering: Some(best.cv_rmse()), best: even, named, noise, near });
@@ -323,7 +336,7 @@ fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
     let effects = Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry).map(Cause::Effect);
     effects
         .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::SlewLimit])
-        .filter(|c| fit.hypothesis.has_room(*c) && visible(*c, problem))
+        .filter(|c| fit.hypothesis.has_room(*c) && hidden(*c, problem).is_none())
         .collect()
 }
 

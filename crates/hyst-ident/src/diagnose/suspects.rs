@@ -2,8 +2,7 @@
 
 use super::findings::{EffectKind, Suspect};
 use super::probability::{Evidence, NAMED, SUSPECTED};
-use super::score::Judgement;
-use super::search::Search;
+use super::search::{Near, Search};
 use crate::digits::short;
 use crate::model::{Effect, Model};
 use crate::samples::Samples;
@@ -24,20 +23,8 @@ pub fn drive_options(model: &Model, period: f64, slew_limit: Option<f64>) -> Str
     format!("--low {low} --high {high} --rate {}{}", digits(1.0 / period), slew.unwrap_or_default())
 }
 
-/// What is known of each effect that helps beside those that were named, but by too little; `left` is what is left in noise floors.
-pub(super) fn near(found: &Search, named: &[Effect], left: f64) -> Vec<Near> {
-    let others = |effect: Effect| found.near.iter().filter(move |(other, ..)| *other != effect);
-    let of = |(effect, cv_rmse, judgement): &(Effect, f64, Judgement)| {
-        let rival = others(*effect).min_by(|a, b| a.1.total_cmp(&b.1));
-        let next_best = rival.map_or(1.0 / judgement.ratio, |(_, other, _)| other / cv_rmse);
-        let evidence = Evidence { judgement: *judgement, next_best, left };
-        Near { effect: *effect, cv_rmse: *cv_rmse, rival: rival.map(|(other, ..)| *other), evidence }
-    };
-    found.near.iter().filter(|(effect, ..)| !named.contains(effect)).map(of).collect()
-}
-
-/// An effect that helps, but by too little to be named.
-pub(super) struct Near {
+/// What is known of an effect that came near to be named.
+pub(super) struct Candidate {
     pub(super) effect: Effect,
     cv_rmse: f64,
     /// What does nearly as well.
@@ -45,12 +32,29 @@ pub(super) struct Near {
     pub(super) evidence: Evidence,
 }
 
+/// What is known of each effect that helps beside those that were named, but by too little; `left` is what is left in noise floors.
+pub(super) fn candidates(found: &Search, named: &[Effect], left: f64) -> Vec<Candidate> {
+    let of = |near: &Near| {
+        let others = found.near.iter().filter(|other| other.effect != near.effect);
+        let rival = others.min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+        let next_best = rival.map_or(1.0 / near.judgement.ratio, |other| other.cv_rmse / near.cv_rmse);
+        let evidence = Evidence { judgement: near.judgement, next_best, left };
+        Candidate { effect: near.effect, cv_rmse: near.cv_rmse, rival: rival.map(|other| other.effect), evidence }
+    };
+    found.near.iter().filter(|near| !named.contains(&near.effect)).map(of).collect()
+}
+
 /// Those of them that are suspects, the most probable first.
-pub(super) fn suspects(near: &[Near], model: &Model, samples: &Samples, slew_limit: Option<f64>) -> Vec<Suspect> {
+pub(super) fn suspects(
+    candidates: &[Candidate],
+    model: &Model,
+    samples: &Samples,
+    slew_limit: Option<f64>,
+) -> Vec<Suspect> {
     let options = drive_options(model, samples.period, slew_limit);
     let has = |column: &Option<Vec<f64>>, option: &'static str| if column.is_some() { option } else { "" };
     let sensors = format!("{}{}", has(&samples.temperature, " --thermometer"), has(&samples.load, " --load-cell"));
-    let of = |n: &Near| {
+    let of = |n: &Candidate| {
         let usual = if n.effect == USUAL_RIVAL { Effect::Creep } else { USUAL_RIVAL };
         let (name, other) = (n.effect, n.rival.unwrap_or(usual));
         Suspect {
@@ -61,7 +65,8 @@ pub(super) fn suspects(near: &[Near], model: &Model, samples: &Samples, slew_lim
             command: format!("hystctl excite separate {name} {other} {options}{sensors} -o next.csv"),
         }
     };
-    let mut all: Vec<Suspect> = near.iter().map(of).filter(|s| (SUSPECTED..NAMED).contains(&s.probability)).collect();
+    let mut all: Vec<Suspect> =
+        candidates.iter().map(of).filter(|s| (SUSPECTED..NAMED).contains(&s.probability)).collect();
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     all
 }

@@ -49,7 +49,7 @@ pub(super) fn dead_zone_slope(v: f64, threshold: f64) -> f64 {
 }
 
 /// Height of the hat with number `j` of a wandering at a share of the record's rows.
-fn hat(j: usize, share: f64) -> f64 {
+pub(crate) fn hat(j: usize, share: f64) -> f64 {
     (1.0 - (share * (HATS - 1) as f64 - j as f64).abs()).max(0.0)
 }
 

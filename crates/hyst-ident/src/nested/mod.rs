@@ -17,7 +17,7 @@ mod projector;
 mod sensor;
 mod tangent;
 
-pub(crate) use assembly::dead_zone;
+pub(crate) use assembly::{dead_zone, hat};
 pub(crate) use bounds::{ends_at_a_bound, slopes};
 pub(crate) use cross_validation::folds_interleaved;
 use hypothesis::Unknown;

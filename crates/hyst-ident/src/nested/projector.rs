@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Problem;
 
-/// Projects columns off the linear ones of a fit.
+/// Projects columns off those of a fit.
 pub(crate) struct Projector<'a> {
     problem: &'a Problem<'a>,
     blocks: Vec<DMatrix<f64>>,
@@ -40,20 +40,10 @@ impl<'a> Projector<'a> {
         if left <= 1e-9 * own { 0.0 } else { left }
     }
 
-    /// How much of Σ residual² a column would take, all linear unknowns refitted, and the factor at
-    /// which it does.
+    /// How much of Σ residual² a column would take, all unknowns refitted, and the factor at which it does.
     pub(crate) fn gain(&self, column: &[f64], residual: &[f64]) -> (f64, f64) {
-        let Some(factor) = &self.factor else { return (0.0, 0.0) };
-        let n = factor.l_dirty().ncols();
-        let mut cross = DVector::zeros(n);
-        let (mut own, mut with) = (0.0, 0.0);
-        for (rows, x) in self.problem.used.iter().zip(&self.blocks) {
-            let part = DVector::from_iterator(x.nrows(), rows.iter().map(|k| column[*k]));
-            own += part.norm_squared();
-            with += rows.iter().map(|k| column[*k] * residual[*k]).sum::<f64>();
-            cross += x.columns(0, n).tr_mul(&part);
-        }
-        let left = own - cross.dot(&factor.solve(&cross));
-        if left <= 1e-9 * own { (0.0, 0.0) } else { (with * with / left, with / left) }
+        let left = self.left(column);
+        let with: f64 = self.problem.used.iter().flatten().map(|k| column[*k] * residual[*k]).sum();
+        if left > 0.0 { (with * with / left, with / left) } else { (0.0, 0.0) }
     }
 }

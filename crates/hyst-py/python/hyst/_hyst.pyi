@@ -612,7 +612,7 @@ class Temperature(Operator):
         reference_degc: float,
         expansion: float = 0.0,
         seconds: float = 0.0,
-        period: float = 1.0,
+        period: float = 0.0,
     ) -> Temperature: ...
     @property
     def per_kelvin(self) -> float: ...

@@ -100,8 +100,8 @@ models! {
         expansion: f64 = 0.0,
         /// Thermal time constant [s].
         seconds: f64 = 0.0,
-        /// Sample period [s]; of no account without a thermal time constant.
-        period: f64 = 1.0,
+        /// Sample period [s]; needed with a thermal time constant.
+        period: f64 = 0.0,
     }
     params: |p| Ok(TemperatureParams {
         per_kelvin: p.per_kelvin,
@@ -110,7 +110,7 @@ models! {
         seconds: p.seconds,
     }),
     stage: hyst_core::Temperature<f64>,
-    period: |p| p.period,
+    period: |p| if p.seconds == 0.0 && p.period == 0.0 { 1.0 } else { p.period },
     inverse: compensator,
     needs: [temperature],
 

@@ -1,0 +1,327 @@
+//! One named effect in figures and words: its law, its parameters, and why it was named.
+
+use std::collections::BTreeMap;
+
+use hyst_core::{AsymmetryParams, InterferenceParams, RateLaw, ViscousPiParams};
+
+use super::findings::{Alternative, EffectKind, Finding, Found, Material};
+use super::search::Named;
+use crate::digits::{short, signed};
+use crate::model::{Base, Effect, Model, creep_share};
+use crate::record::OutputUnit;
+use crate::samples::Samples;
+
+/// What is told of an effect that was named.
+pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
+    let unit = symbol(m);
+    let after = named.cv_with;
+    let j = &named.judgement;
+    // First what a person can check against the device, then what the statistics say.
+    let mut evidence: Vec<String> = signature(m, named.effect).into_iter().collect();
+    evidence.push(format!(
+        "cross-validated error {} {unit} without it, {} {unit} with it; better in {:.1} % of {} bootstrap draws",
+        short(named.cv_without),
+        short(after),
+        100.0 * j.confidence,
+        super::score::DRAWS
+    ));
+    evidence.push(format!(
+        "explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors",
+        100.0 * j.share,
+        j.over_noise
+    ));
+    if j.alone {
+        evidence.push(
+            "it is there all the time and far above what is left beside it, however little of that it explains: neither the drive nor the \
+             base's misfit makes such a tone"
+                .into(),
+        );
+    }
+    Finding {
+        name: named.effect,
+        kind: EffectKind::of(named.effect),
+        law: law(m.extended, named.effect).map(str::to_owned),
+        probability: named.evidence(m.left).probability(),
+        parameters: parameters(m, named.effect),
+        evidence,
+        alternatives: named
+            .instead
+            .iter()
+            .map(|i| Alternative { name: i.effect, cv_rmse: i.cv_rmse, indistinguishable: i.tie })
+            .collect(),
+        cv_rmse_before: named.cv_without,
+        cv_rmse_after: after,
+    }
+}
+
+/// The law that an effect follows in a model; none of a flexible form.
+fn law(model: &Model, effect: Effect) -> Option<&'static str> {
+    let e = &model.effects;
+    Some(match effect {
+        Effect::Delay => "dead-time",
+        Effect::Lag => "first-order",
+        Effect::RateDependence if e.rate.is_none() => "viscous-plays",
+        Effect::RateDependence => match e.rate?.law {
+            RateLaw::Follows => "power-follows",
+            RateLaw::Holds => "power-holds",
+            RateLaw::Relaxes => "power-relaxes",
+        },
+        Effect::Temperature => match e.temperature? {
+            p if p.expansion != 0.0 && p.seconds > 0.0 => "gain-and-expansion-behind-a-thermal-lag",
+            p if p.expansion != 0.0 => "gain-and-expansion",
+            p if p.seconds > 0.0 => "gain-behind-a-thermal-lag",
+            _ => "gain",
+        },
+        Effect::Load => "compliance",
+        Effect::Resonance => "second-order",
+        Effect::Saturation => "knee",
+        Effect::Drift => match e.drift?.seconds > 0.0 {
+            true => "exponential",
+            false => "line",
+        },
+        Effect::Interference => match harmonics(&e.interference?).next() {
+            Some(_) => "sine-with-harmonics",
+            None => "sine",
+        },
+        // A bank of relaxations, a curve of straight pieces.
+        Effect::Creep | Effect::Asymmetry => return None,
+    })
+}
+
+/// The output's unit as a person writes it.
+fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
+    let unit = &m.model.output.unit;
+    OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
+}
+
+/// The effect in words that a person can check against the device.
+fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
+    let (e, input) = (&m.extended.effects, m.extended.input.symbol());
+    Some(match effect {
+        Effect::Delay => format!("the output follows {:.3} ms late at every frequency", 1e3 * e.delay?.seconds),
+        Effect::Lag => {
+            let tau = e.lag?.seconds;
+            format!(
+                "the phase falls like a first-order lag with its corner at {:.1} Hz",
+                1.0 / (2.0 * std::f64::consts::PI * tau)
+            )
+        }
+        Effect::Asymmetry => {
+            let p = e.asymmetry.as_ref()?;
+            let (low, high) = slopes(p);
+            format!(
+                "the curve behind the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
+            )
+        }
+        Effect::RateDependence if e.rate.is_some() => {
+            let p = e.rate?;
+            format!(
+                "loops widen with the rate to the power of {:.2}: at {} {input}/s the hysteresis sees the drive {} {input} late",
+                p.exponent,
+                short(p.reference_rate),
+                short(p.volts)
+            )
+        }
+        Effect::RateDependence => match rate_dependence(m.extended) {
+            Some(p) if p.volt_seconds > 0.0 => format!(
+                "loops widen with the rate: at 100 {input}/s a sliding play is {:.3} {input} behind",
+                100.0 * p.seconds + (100.0 * p.volt_seconds).sqrt()
+            ),
+            Some(p) => format!("loops widen with the rate: sliding plays lag by {:.3} ms", 1e3 * p.seconds),
+            None => {
+                "loops widen with the rate; this base has no form that does: fit pi, or dpm to records at several rates"
+                    .into()
+            }
+        },
+        Effect::Load => format!("the output yields by {} {} for each N", signed(e.load?.per_newton), symbol(m)),
+        Effect::Saturation => {
+            let (name, limit) = limit(m)?;
+            format!("the output stops at {} {} at its {name} end while the drive goes on", short(limit), symbol(m))
+        }
+        Effect::Temperature => {
+            let p = e.temperature?;
+            let expands = match p.expansion {
+                0.0 => String::new(),
+                expansion => format!(", and the zero moves by {} {} per K", signed(expansion), symbol(m)),
+            };
+            let late = match p.seconds {
+                0.0 => String::new(),
+                seconds => {
+                    format!("; the actuator follows the thermometer with a time constant of {} s", short(seconds))
+                }
+            };
+            format!("the gain changes by {:+.2} % per K{expands}{late}", 100.0 * p.per_kelvin)
+        }
+        Effect::Creep => {
+            let (p, (hold, holds)) = (e.creep.as_ref()?, longest_hold(m.samples));
+            let shares = p.seconds.iter().zip(&p.shares);
+            let share: f64 = shares.map(|(tau, share)| share * (1.0 - (-hold / tau).exp())).sum();
+            let share = 100.0 * share;
+            match holds {
+                true => format!(
+                    "in the {hold:.2} s of the longest hold after a step the output goes on by {share:.1} % of it"
+                ),
+                false => format!(
+                    "in {hold:.2} s, as long as the longest segment, the output would go on by {share:.1} % of a step; the drive holds nowhere"
+                ),
+            }
+        }
+        Effect::Resonance => {
+            let r = e.resonances.first()?;
+            format!("a mode rings at {:.1} Hz with damping ratio {:.4}", r.hz, r.damping)
+        }
+        Effect::Drift => {
+            let (first, last) = (*m.samples.time.first()?, *m.samples.time.last()?);
+            let p = e.drift?;
+            let settles = if p.seconds > 0.0 {
+                format!(" and settles with a time constant of {} s", short(p.seconds))
+            } else {
+                String::new()
+            };
+            format!(
+                "the zero moves by {} {} over the {:.0} s of the record{settles}",
+                signed(p.at(last) - p.at(first)),
+                symbol(m),
+                last - first
+            )
+        }
+        Effect::Interference => {
+            let p = e.interference?;
+            let also: Vec<String> = harmonics(&p)
+                .map(|(order, amplitude)| {
+                    format!("{} {} at {:.1} Hz", short(amplitude), symbol(m), f64::from(order) * p.hz)
+                })
+                .collect();
+            let also = if also.is_empty() { String::new() } else { format!(", with harmonics of {}", also.join(", ")) };
+            format!(
+                "the sensor shows a tone of {} {} at {:.3} Hz{also}, whatever the drive",
+                short(p.amplitude),
+                symbol(m),
+                p.hz
+            )
+        }
+    })
+}
+
+/// Orders and amplitudes \[y\] of the harmonics that a tone has.
+fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
+    (2..)
+        .zip(tone.harmonics.chunks_exact(2))
+        .map(|(order, parts)| (order, parts[0].hypot(parts[1])))
+        .filter(|(_, a)| *a > 0.0)
+}
+
+/// The longest time for which the drive stands still \[s\], or the longest segment where it never does, and whether it does.
+fn longest_hold(samples: &Samples) -> (f64, bool) {
+    let (low, high) = samples.input_range();
+    let still = |a: f64, b: f64| (a - b).abs() <= 1e-6 * (high - low);
+    let runs = samples.segments.iter().flat_map(|s| samples.input[s.clone()].chunk_by(|a, b| still(*a, *b)));
+    let rows = runs.map(<[f64]>::len).max().unwrap_or(0);
+    match rows > LEAST_HOLD {
+        true => (samples.period * (rows - 1) as f64, true),
+        false => (samples.longest_segment(), false),
+    }
+}
+
+/// Rows that the drive has to stand still for a hold.
+const LEAST_HOLD: usize = 50;
+
+/// Slopes of a curve at its two ends.
+fn slopes(p: &AsymmetryParams<Vec<f64>>) -> (f64, f64) {
+    let end = |rising: bool| {
+        let zones = p.thresholds.iter().zip(&p.weights).filter(|(s, _)| (**s >= 0.0) == rising);
+        1.0 + zones.map(|(_, c)| c).sum::<f64>()
+    };
+    (end(false), end(true))
+}
+
+/// The drag of a model's plays.
+fn rate_dependence(model: &Model) -> Option<&ViscousPiParams<Vec<f64>>> {
+    if let Base::ViscousPi(p) = &model.base { Some(p) } else { None }
+}
+
+/// The end at which the motion is stopped, and where the sensor shows it.
+fn limit(m: &Material<'_>) -> Option<(&'static str, f64)> {
+    let (p, zero) = (m.extended.effects.saturation?, m.extended.zero);
+    let (low, high) = (m.extended.output.low - zero, m.extended.output.high - zero);
+    // The one that the output comes nearer to.
+    Some(if p.high - high < low - p.low { ("upper", p.high + zero) } else { ("lower", p.low + zero) })
+}
+
+fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
+    let (e, y, input) = (&m.extended.effects, &m.model.output.unit, m.extended.input.symbol());
+    let mut list = BTreeMap::new();
+    let mut put = |stage: &str, name: &str, value: f64, unit: &str| {
+        let std_error = m.errors.get(&format!("{stage}.{name}")).copied();
+        let suffix = stage.strip_prefix("resonance").unwrap_or_default();
+        list.insert(format!("{name}{suffix}"), Found { value, std_error, unit: unit.into() });
+    };
+    match effect {
+        Effect::Delay => e.delay.iter().for_each(|p| put("delay", "seconds", p.seconds, "s")),
+        Effect::Lag => e.lag.iter().for_each(|p| put("lag", "seconds", p.seconds, "s")),
+        Effect::Asymmetry => e.asymmetry.iter().for_each(|p| {
+            for (i, (s, c)) in p.thresholds.iter().zip(&p.weights).enumerate() {
+                put("asymmetry", &format!("thresholds[{i}]"), *s, y);
+                put("asymmetry", &format!("weights[{i}]"), *c, "1");
+            }
+        }),
+        Effect::RateDependence if e.rate.is_some() => e.rate.iter().for_each(|p| {
+            put("rate-dependence", "volts", p.volts, input);
+            put("rate-dependence", "exponent", p.exponent, "1");
+            put("rate-dependence", "reference_rate", p.reference_rate, &format!("{input}/s"));
+        }),
+        Effect::RateDependence => rate_dependence(m.extended).iter().for_each(|p| {
+            put("rate-dependence", "seconds", p.seconds, "s");
+            put("rate-dependence", "volt_seconds", p.volt_seconds, &format!("{input} s"));
+        }),
+        Effect::Load => e.load.iter().for_each(|p| put("load", "per_newton", p.per_newton, &format!("{y}/N"))),
+        Effect::Saturation => e.saturation.iter().for_each(|p| {
+            if let Some((name, _)) = limit(m) {
+                let value = if name == "upper" { p.high } else { p.low };
+                put("saturation", if name == "upper" { "high" } else { "low" }, value, y);
+                put("saturation", "knee", p.knee, "1");
+            }
+        }),
+        Effect::Temperature => e.temperature.iter().for_each(|p| {
+            put("temperature", "per_kelvin", p.per_kelvin, "1/K");
+            put("temperature", "reference_degc", p.reference_degc, "degC");
+            if p.expansion != 0.0 {
+                put("temperature", "expansion", p.expansion, &format!("{y}/K"));
+            }
+            if p.seconds > 0.0 {
+                put("temperature", "seconds", p.seconds, "s");
+            }
+        }),
+        Effect::Creep => e.creep.iter().for_each(|p| {
+            for (tau, share) in p.seconds.iter().zip(&p.shares).filter(|(_, share)| **share > 0.0) {
+                put("creep", &creep_share(*tau), *share, "1");
+            }
+            put("creep", "total", p.total(), "1");
+        }),
+        Effect::Resonance => {
+            for (i, p) in e.resonances.iter().enumerate() {
+                let stage = if i == 0 { "resonance" } else { "resonance_2" };
+                put(stage, "hz", p.hz, "Hz");
+                put(stage, "damping", p.damping, "1");
+                put(stage, "gain", p.gain, "1");
+            }
+        }
+        Effect::Drift => e.drift.iter().for_each(|p| {
+            if p.seconds == 0.0 {
+                put("drift", "per_second", p.per_second, &format!("{y}/s"));
+            } else {
+                put("drift", "settling", p.settling, y);
+                put("drift", "seconds", p.seconds, "s");
+            }
+        }),
+        Effect::Interference => e.interference.iter().for_each(|p| {
+            put("interference", "hz", p.hz, "Hz");
+            put("interference", "amplitude", p.amplitude, y);
+            put("interference", "phase", p.phase, "rad");
+            for (order, amplitude) in harmonics(p) {
+                put("interference", &format!("harmonic_{order}"), amplitude, y);
+            }
+        }),
+    }
+    list
+}
