@@ -27,7 +27,7 @@ def test_an_operator_comes_back_from_its_file(case, tmp_path):
     loaded = hyst.Model.load(path)
     assert loaded == model.to_model(**ends(case)) and model.to_json(**ends(case)) == path.read_text()
     assert (loaded.input_range, loaded.zero) == ((case.u.min(), case.u.max()), 0.0)
-    operator = loaded.operator(getattr(model, "period", PERIOD))
+    operator = loaded.operator(getattr(model, "period", 0) or PERIOD)
     y = model.simulate(case.u, **case.surroundings)
     assert np.array_equal(operator.simulate(case.u, **case.surroundings), y)
     # The file of the file's operator is the same file.
@@ -38,7 +38,7 @@ def test_an_operator_comes_back_from_its_file(case, tmp_path):
 def test_its_inverse_comes_back_too(case):
     model = case.model()
     y = model.simulate(case.u, **case.surroundings)
-    operator = model.to_model(**ends(case)).operator(getattr(model, "period", PERIOD))
+    operator = model.to_model(**ends(case)).operator(getattr(model, "period", 0) or PERIOD)
     # What a file's inverse leaves to the file and to itself: the inputs of a search and how near it comes.
     options = {name: x for name, x in case.inverse.items() if name == "bandwidth_hz"}
     u, own = (x.compensate(y, **case.surroundings, **o) for x, o in ((operator, options), (model, case.inverse)))

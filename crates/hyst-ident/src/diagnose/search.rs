@@ -126,6 +126,10 @@ impl Judge<'_> {
         let starts = starts::starts(scan, cause)?;
         let trials: Vec<Result<Option<Trial>, Error>> = starts.par_iter().map(|start| self.refit(start)).collect();
         let mut fitted: Vec<Trial> = trials.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        // A law whose parameters end at a bound stands for another that is simpler.
+        if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
+            fitted.retain(|trial| score::sensible(self.problem, trial));
+        }
         // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());
         let mut best: Option<usize> = None;
