@@ -43,22 +43,25 @@ impl TravelBank {
         READ_OUTS * self.rates.len()
     }
 
-    /// The columns `of` these numbers \[V\]: all e, then all e², then all e·x. Each begins at 0 V with virgin memory and goes to the first
+    /// The columns `of` these numbers \[V\]: e, e² and e·x of each element in turn. Each begins at 0 V with virgin memory and goes to the first
     /// voltage of its segment.
     pub(super) fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
-        of.map(|c| {
-            let (read_out, rate) = (c / self.rates.len(), self.rates[c % self.rates.len()]);
-            let mut column = relaxed(drive, segments, rate);
+        let mut columns = Vec::with_capacity(of.len());
+        let elements = if of.is_empty() { 0..0 } else { of.start / READ_OUTS..of.end.div_ceil(READ_OUTS) };
+        for element in elements {
+            let rate = self.rates[element];
+            let relaxed = relaxed(drive, segments, rate);
             let x = |u: f64| (u - self.middle) / self.half;
-            // An element is at most 1/rate away from zero.
-            match read_out {
-                0 => {}
-                1 => column.iter_mut().for_each(|e| *e = rate * *e * *e),
-                _ => column.iter_mut().zip(drive).for_each(|(e, u)| *e *= x(*u)),
+            for read_out in (0..READ_OUTS).filter(|read_out| of.contains(&(READ_OUTS * element + read_out))) {
+                // An element is at most 1/rate away from zero.
+                columns.push(match read_out {
+                    0 => relaxed.clone(),
+                    1 => relaxed.iter().map(|e| rate * e * e).collect(),
+                    _ => relaxed.iter().zip(drive).map(|(e, u)| e * x(*u)).collect(),
+                });
             }
-            column
-        })
-        .collect()
+        }
+        columns
     }
 }
 

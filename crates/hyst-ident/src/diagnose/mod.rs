@@ -129,19 +129,20 @@ pub fn diagnose(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    let searched = |samples: &Samples| {
+    // A search over other rows continues from what the one before has found.
+    let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
-        let base = problem.fit(&start).map_err(stage)?.ok_or_else(unsolvable)?;
-        let found = search::search(&problem, base, options.seed, progress).map_err(stage)?;
+        let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
+        let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
         Ok::<_, FitError>((found, start_up_rows(samples, &residual)))
     };
-    let (mut found, starting) = searched(&samples)?;
+    let (mut found, starting) = searched(&samples, &start)?;
     // A transient may stand out only once what else was missing is found.
     if samples.settling.iter().zip(&starting).any(|(known, starts)| *starts && !*known) {
         progress("searching again without the start-up rows that have come to light");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
-        found = searched(&samples)?.0;
+        found = searched(&samples, &found.best.fit.hypothesis)?.0;
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
@@ -157,7 +158,7 @@ pub fn diagnose(
         if followed.settling != samples.settling {
             progress("searching again with the rows that are no start-up once it is known what acts");
             samples.settling = followed.settling;
-            found = searched(&samples)?.0;
+            found = searched(&samples, &found.best.fit.hypothesis)?.0;
         }
     }
 

@@ -7,7 +7,7 @@ use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
 use super::starts::{PER_DECADE, bank, starting_temperature, stops};
 use crate::model::{Effect, Effects};
-use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, Projector, SignalPath, hat};
+use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, SignalPath, Vantage, hat};
 use crate::samples::range;
 
 /// Share of the gain that an effect needs from which on a first-order gain is followed up.
@@ -21,7 +21,9 @@ pub(super) struct Scan<'a> {
     pub(super) from: &'a Fitted,
     pub(super) residual: Vec<f64>,
     pub(super) motion: Vec<f64>,
-    projector: Projector<'a>,
+    pub(super) vantage: Vantage<'a>,
+    /// Gain in Σ residual² that is asked for.
+    pub(super) least_gain: f64,
     promising: f64,
 }
 
@@ -31,7 +33,8 @@ impl<'a> Scan<'a> {
         Ok(Self {
             residual: problem.residual(from)?,
             motion: problem.motion(&from.hypothesis, &from.solution)?,
-            projector: problem.projector(from)?,
+            vantage: Vantage::new(problem, from)?,
+            least_gain: least,
             promising: PROMISING * least,
             problem,
             from,
@@ -40,13 +43,13 @@ impl<'a> Scan<'a> {
 
     /// Gain of a column and the factor at which it does, where that is promising and the factor positive.
     pub(super) fn gain(&self, column: &[f64]) -> Option<(f64, f64)> {
-        let (gain, amplitude) = self.projector.gain(column, &self.residual);
+        let (gain, amplitude) = self.vantage.projector.gain(column, &self.residual);
         (amplitude > 0.0 && gain >= self.promising).then_some((gain, amplitude))
     }
 
     /// Σ squares of what the fit cannot imitate of a column.
     pub(super) fn left(&self, column: &[f64]) -> f64 {
-        self.projector.left(column)
+        self.vantage.projector.left(column)
     }
 
     /// What the motion changes by with another hypothesis.
@@ -74,7 +77,7 @@ impl<'a> Scan<'a> {
             Cause::SlewLimit => None,
         };
         // Of either sign: a fit may begin at the other.
-        let takes = |column: &Vec<f64>| self.projector.gain(column, &self.residual).0;
+        let takes = |column: &Vec<f64>| self.vantage.projector.gain(column, &self.residual).0;
         Ok(columns.is_none_or(|columns| columns.iter().map(takes).sum::<f64>() >= self.promising))
     }
 

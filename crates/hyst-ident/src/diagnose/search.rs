@@ -12,7 +12,7 @@ use super::trial::Trial;
 use super::uncertainty::undetermined;
 use super::{hidden, starts};
 use crate::model::Effect;
-use crate::nested::{Cause, Fitted, Hypothesis, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Probe, Problem};
 use crate::noise::{noise_floor, quantisation};
 
 /// Σ residual², over that of the best set, beyond which a second one is not carried on beside it.
@@ -25,6 +25,14 @@ const SMALL_DRAG: f64 = 2.0;
 const EVEN: f64 = 0.9;
 /// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
 const MOST_STEP: f64 = 0.25;
+/// Σ residual² of a probe, over that of the leader, up to which it is fitted in full: more than [`BEAM_WITHIN`], so that what is given up would not
+/// have been carried on.
+const MAX_RATIO_TO_LEADER: f64 = 4.0;
+/// The same over that of the best law of its cause.
+const MAX_RATIO_TO_OWN: f64 = 2.0;
+/// Gain of a probe, over that which an effect has to have, from which on it is fitted in full, and from which on it is reported.
+const MIN_GAIN_TO_FIT: f64 = 0.5;
+const MIN_GAIN_TO_REPORT: f64 = 0.2;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -90,6 +98,14 @@ fn expansion(trial: &Trial) -> f64 {
     trial.fit.hypothesis.effects.temperature.map_or(0.0, |p| p.expansion)
 }
 
+/// What is known of a cause added to a fit.
+enum Attempt {
+    /// It was fitted before: what came of it.
+    Known(Option<Hypothesis>),
+    /// Where a probe from each start has led.
+    Begun(Vec<Probe>),
+}
+
 /// Context that every judgement needs.
 struct Judge<'a> {
     problem: &'a Problem<'a>,
@@ -105,7 +121,35 @@ impl Judge<'_> {
         Scan::new(self.problem, from, score::least_gain_from(from.rows as f64, from.squares, self.noise))
     }
 
+    /// A cause added to a scanned fit.
     fn trials(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
+        Ok(self.race(&[(scan, cause)])?.into_iter().next().flatten())
+    }
+
+    /// Each cause added to its scanned fit, in order. All are ranked by probes; only those that may still win, and may gain as
+    /// much as an effect has to, are fitted in full.
+    fn race(&self, jobs: &[(&Scan<'_>, Cause)]) -> Result<Vec<Option<Trial>>, Error> {
+        // Each trial is computed alone and collected in order: threads change nothing.
+        let attempts: Vec<Result<Attempt, Error>> =
+            jobs.par_iter().map(|(scan, cause)| self.attempt(scan, *cause)).collect();
+        let attempts: Vec<Attempt> = attempts.into_iter().collect::<Result<_, _>>()?;
+        let probes = attempts.iter().flat_map(|attempt| match attempt {
+            Attempt::Known(_) => &[],
+            Attempt::Begun(probes) => probes.as_slice(),
+        });
+        let leader = probes.map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
+        let ended: Vec<Result<Option<Trial>, Error>> = jobs
+            .par_iter()
+            .zip(&attempts)
+            .map(|((scan, cause), attempt)| match attempt {
+                Attempt::Known(found) => found.as_ref().map_or(Ok(None), |found| self.refit(found)),
+                Attempt::Begun(probes) => self.ended(scan, *cause, probes, leader),
+            })
+            .collect();
+        ended.into_iter().collect()
+    }
+
+    fn attempt(&self, scan: &Scan<'_>, cause: Cause) -> Result<Attempt, Error> {
         let from = &scan.from.hypothesis;
         // The same fit may be asked for again when effects are swapped.
         let known = self.known.lock().ok().and_then(|known| {
@@ -113,19 +157,51 @@ impl Judge<'_> {
             same.map(|(.., found)| found.clone())
         });
         if let Some(found) = known {
-            return found.map_or(Ok(None), |found| self.refit(&found));
+            return Ok(Attempt::Known(found));
         }
-        let found = self.searched(scan, cause)?;
-        if let Ok(mut known) = self.known.lock() {
-            known.push((from.clone(), cause, found.as_ref().map(|t| t.fit.hypothesis.clone())));
+        let starts = starts::starts(scan, cause)?;
+        let probes: Vec<Result<Option<Probe>, Error>> =
+            starts.par_iter().map(|start| scan.vantage.probe(start)).collect();
+        Ok(Attempt::Begun(probes.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?))
+    }
+
+    /// The best of what came of some starts, those fitted to the end that may win against what leads.
+    fn ended(&self, scan: &Scan<'_>, cause: Cause, probes: &[Probe], leader: f64) -> Result<Option<Trial>, Error> {
+        let gain = |probe: &Probe| scan.from.squares - probe.squares;
+        let own = probes.iter().map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
+        let may_win = |at: usize| {
+            let probe = &probes[at];
+            probe.squares <= MAX_RATIO_TO_LEADER * leader
+                && probe.squares <= MAX_RATIO_TO_OWN * own
+                && gain(probe) >= MIN_GAIN_TO_FIT * scan.least_gain
+                && !probes[..at].iter().any(|other| other.hypothesis.is_near(&probe.hypothesis))
+        };
+        let fits: Vec<Result<Option<Trial>, Error>> = (0..probes.len())
+            .into_par_iter()
+            .map(|at| match may_win(at) {
+                true => self.refit(&probes[at].hypothesis),
+                // It is reported beside the others.
+                false if gain(&probes[at]) >= MIN_GAIN_TO_REPORT * scan.least_gain => {
+                    let as_it_is = self.problem.fit_linear(&probes[at].hypothesis)?;
+                    Ok(as_it_is.and_then(|fit| Trial::of(self.problem, fit)))
+                }
+                false => Ok(None),
+            })
+            .collect();
+        let fitted = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        let found = self.best_law(fitted)?;
+        // What was given up is not known to its end.
+        if (0..probes.len()).all(may_win)
+            && let Ok(mut known) = self.known.lock()
+        {
+            let found = found.as_ref().map(|t| t.fit.hypothesis.clone());
+            known.push((scan.from.hypothesis.clone(), cause, found));
         }
         Ok(found)
     }
 
-    fn searched(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
-        let starts = starts::starts(scan, cause)?;
-        let trials: Vec<Result<Option<Trial>, Error>> = starts.par_iter().map(|start| self.refit(start)).collect();
-        let mut fitted: Vec<Trial> = trials.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+    /// Which of the laws of one cause stands for it.
+    fn best_law(&self, mut fitted: Vec<Trial>) -> Result<Option<Trial>, Error> {
         // A law whose parameters end at a bound stands for another that is simpler.
         if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
             fitted.retain(|trial| score::sensible(self.problem, trial));
@@ -153,7 +229,9 @@ impl Judge<'_> {
         let still = still.min_by(|a, b| laws[*a].total().total_cmp(&laws[*b].total()));
         let Some(still) = still.filter(|at| laws[*at].fit.hypothesis.has_room(DRIFT)) else { return Ok(expands) };
         // Searched and not looked up: what is known must not depend on which thread was first.
-        let drifts = self.searched(&self.scan(&laws[still].fit)?, DRIFT)?;
+        let scan = self.scan(&laws[still].fit)?;
+        let Attempt::Begun(probes) = self.attempt(&scan, DRIFT)? else { return Ok(expands) };
+        let drifts = self.ended(&scan, DRIFT, &probes, f64::INFINITY)?;
         let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, &laws[expands], self.seed));
         Ok(if decided { expands } else { still })
     }
@@ -188,18 +266,18 @@ impl Judge<'_> {
     }
 }
 
-/// Searches from what a model already holds.
+/// Searches from a fit that may hold more than what was there `already`.
 pub(crate) fn search(
     problem: &Problem<'_>,
     base: Fitted,
+    already: &[Cause],
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Search, Error> {
-    let already = base.hypothesis.causes();
-    further(problem, base, &already, f64::INFINITY, seed, progress)
+    further(problem, base, already, f64::INFINITY, seed, progress)
 }
 
-/// Searches on from a fit that may hold more than what was there `already`; the noise is `known` to be no more \[output unit\].
+/// The same where the noise is `known` to be no more \[output unit\].
 pub(super) fn further(
     problem: &Problem<'_>,
     base: Fitted,
@@ -231,22 +309,18 @@ pub(super) fn further(
         let jobs: Vec<(&Trial, &Scan<'_>, Cause)> = parents()
             .flat_map(|(t, scan)| candidates(problem, &t.fit).into_iter().map(move |c| (t, scan, c)))
             .collect();
-        // Each trial is computed alone and collected in order: threads change nothing.
-        let trials: Vec<Result<Option<(Trial, Judgement)>, Error>> = jobs
+        let raced: Vec<(&Scan<'_>, Cause)> = jobs.iter().map(|(_, scan, cause)| (*scan, *cause)).collect();
+        let trials = judge.race(&raced)?;
+        let judged: Vec<Option<Judgement>> = jobs
             .par_iter()
-            .map(|(parent, scan, e)| {
-                let trial = judge.trials(scan, *e)?;
-                Ok(trial.map(|t| {
-                    let judgement = judge.judge(parent, &t);
-                    (t, judgement)
-                }))
-            })
+            .zip(&trials)
+            .map(|((parent, ..), trial)| trial.as_ref().map(|t| judge.judge(parent, t)))
             .collect();
         let mut next: Vec<Trial> = Vec::new();
         let parent = beam[0].fit.hypothesis.causes();
         near = (parent.clone(), Vec::new());
-        for (trial, (from, _, cause)) in trials.into_iter().zip(&jobs) {
-            let Some((trial, judgement)) = trial? else { continue };
+        for ((trial, judgement), (from, _, cause)) in trials.into_iter().zip(judged).zip(&jobs) {
+            let (Some(trial), Some(judgement)) = (trial, judgement) else { continue };
             // A set that is worse than a smaller one found before leads nowhere.
             if trial.total() >= best.total() || !judgement.accepted() {
                 let counts = judgement.is_sure() && from.fit.hypothesis.causes() == parent;
@@ -397,10 +471,10 @@ fn swaps(
         }
         others.retain(|c| *c != cause);
         let scan = judge.scan(&without.fit)?;
-        let trials: Vec<Result<Option<Trial>, Error>> = others.par_iter().map(|e| judge.trials(&scan, *e)).collect();
+        let jobs: Vec<(&Scan<'_>, Cause)> = others.iter().map(|other| (&scan, *other)).collect();
         let mut instead = Vec::new();
-        for (other, trial) in others.iter().zip(trials) {
-            let Some(trial) = trial? else { continue };
+        for (other, trial) in others.iter().zip(judge.race(&jobs)?) {
+            let Some(trial) = trial else { continue };
             let judgement = judge.judge(&without, &trial);
             // A tone that merely stands alone takes nobody's place.
             let accepted = judgement.explains_enough();

@@ -177,30 +177,8 @@ impl Problem<'_> {
         for (c, column) in layout.weights.clone().zip(columns.into_iter().flatten()) {
             put(c, column);
         }
-        for (c, column) in (layout.zeros.start..).zip(self.extras(h)) {
-            put(c, self.thinned(|k| column[k]));
-        }
-        if let (Some(c), Some(mut load)) = (layout.load.clone().next(), self.samples.load.clone()) {
-            path.structure(&mut load);
-            put(c, slowed(&load));
-        }
-        if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
-            put(c, slowed(&shift));
-        }
-        if let (Some(p), Some(point)) = (&h.effects.asymmetry, &point) {
-            let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();
-            let mut zones: Vec<Vec<f64>> = p.thresholds.iter().map(|s| bend(*s)).collect();
-            path.output_side_of(&mut zones);
-            layout.zones.clone().zip(&zones).for_each(|(c, zone)| put(c, slowed(zone)));
-        }
-        let share = |k: usize| k as f64 / self.samples.len().max(2) as f64;
-        for (j, c) in layout.zero_hats.clone().enumerate() {
-            put(c, self.thinned(|k| hat(j, share(k))));
-        }
-        if let Some(point) = &point {
-            for (j, c) in layout.gain_hats.clone().enumerate() {
-                put(c, self.thinned(|k| hat(j, share(k)) * point.motion[k]));
-            }
+        for (c, column) in self.beside_base(h, path, point.as_ref(), &slowed) {
+            put(c, column);
         }
         let mut target = self.thinned(|k| self.samples.output[k]);
         if let (Some(stopped), Some(point)) = (&stopped, &point) {
@@ -218,6 +196,43 @@ impl Problem<'_> {
         Some(Assembly { blocks, total, solution, objective, point })
     }
 
+    /// Columns of all linear unknowns but the base's weights in the rows that count, each with its place. What passes a stop goes through `slowed`.
+    pub(super) fn beside_base(
+        &self,
+        h: &Hypothesis,
+        path: &SignalPath<'_>,
+        point: Option<&Point>,
+        slowed: &dyn Fn(&[f64]) -> Vec<f64>,
+    ) -> Vec<(usize, Vec<f64>)> {
+        let layout = self.layout(h);
+        let mut columns: Vec<(usize, Vec<f64>)> = Vec::new();
+        let extras = self.extras(h).into_iter().map(|column| self.thinned(|k| column[k]));
+        columns.extend((layout.zeros.start..).zip(extras));
+        if let (Some(c), Some(mut load)) = (layout.load.clone().next(), self.samples.load.clone()) {
+            path.structure(&mut load);
+            columns.push((c, slowed(&load)));
+        }
+        if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
+            columns.push((c, slowed(&shift)));
+        }
+        if let (Some(p), Some(point)) = (&h.effects.asymmetry, point) {
+            let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();
+            let mut zones: Vec<Vec<f64>> = p.thresholds.iter().map(|s| bend(*s)).collect();
+            path.output_side_of(&mut zones);
+            columns.extend(layout.zones.clone().zip(&zones).map(|(c, zone)| (c, slowed(zone))));
+        }
+        let share = |k: usize| k as f64 / self.samples.len().max(2) as f64;
+        for (j, c) in layout.zero_hats.clone().enumerate() {
+            columns.push((c, self.thinned(|k| hat(j, share(k)))));
+        }
+        if let Some(point) = point {
+            for (j, c) in layout.gain_hats.clone().enumerate() {
+                columns.push((c, self.thinned(|k| hat(j, share(k)) * point.motion[k])));
+            }
+        }
+        columns
+    }
+
     /// What holds in the rows that count, block by block.
     pub(super) fn thinned<T>(&self, of: impl Fn(usize) -> T) -> Vec<T> {
         self.used.iter().flatten().map(|k| of(*k)).collect()
@@ -232,19 +247,23 @@ impl Problem<'_> {
     /// Measured minus predicted output, all rows.
     pub(super) fn residual_of(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, h)?;
-        let layout = self.layout(h);
         let motion = self.point_at(h, &path, z).motion;
+        Ok(self.residual_along(h, &path, &motion, z))
+    }
+
+    /// The same where the motion is known.
+    pub(super) fn residual_along(&self, h: &Hypothesis, path: &SignalPath<'_>, motion: &[f64], z: &DVector<f64>) -> Vec<f64> {
+        let layout = self.layout(h);
         let extras = self.extras(h);
-        let n = self.samples.len();
         let z = z.as_slice();
         let wanders = |hats: &Range<usize>, k| self.wandering(&z[hats.clone()], k);
-        Ok((0..n)
+        (0..self.samples.len())
             .map(|k| {
                 let beside: f64 = extras.iter().zip(&z[layout.zeros.start..]).map(|(c, z)| z * c[k]).sum();
                 let wandering = wanders(&layout.zero_hats, k) + motion[k] * wanders(&layout.gain_hats, k);
                 self.samples.output[k] - path.stopped(motion[k]).0 - beside - wandering
             })
-            .collect())
+            .collect()
     }
 
     /// Columns of zeros, drift and tone.

@@ -46,6 +46,9 @@ pub(crate) struct Hypothesis {
     pub(crate) slew_limit: Option<f64>,
 }
 
+/// Relative difference up to which two values of a parameter lead to the same optimum.
+const SAME: f64 = 0.02;
+
 /// A parameter as it is searched, with the cause that it belongs to.
 pub(crate) struct Unknown<'a> {
     pub(crate) cause: Cause,
@@ -150,6 +153,15 @@ impl Hypothesis {
         self.effects.visit_nonlinear(&mut |p| {
             f(Unknown { cause: Cause::Effect(p.effect), name: p.name, lower: p.lower, upper: p.upper, value: p.value });
         });
+    }
+
+    /// Whether both hold the same parameters of nearly the same values.
+    pub(crate) fn is_near(&self, other: &Self) -> bool {
+        let (own, others) = (self.nonlinear(), other.nonlinear());
+        let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
+        self.causes() == other.causes()
+            && own.len() == others.len()
+            && own.iter().zip(&others).all(|((a, _), (b, _))| near(*a, *b))
     }
 
     /// Values and bounds of the nonlinear parameters.

@@ -49,6 +49,12 @@ impl Layout {
         }
     }
 
+    /// The places of each kind, in order.
+    pub(super) fn kinds(&self) -> [Range<usize>; 9] {
+        let Self { weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats } = self.clone();
+        [weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats]
+    }
+
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
         self.gain_hats.end

@@ -231,7 +231,20 @@ impl<'a> Problem<'a> {
     /// Change of the output in the rows that count with every nonlinear parameter, by forward differences.
     pub(super) fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
         let path = SignalPath::new(self.samples, h)?;
-        let Point { operator, motion, .. } = self.point_at(h, &path, solution);
+        let point = self.point_at(h, &path, solution);
+        let all: Vec<usize> = (0..h.nonlinear().len()).collect();
+        self.jacobian_at(h, &path, &point, &all)
+    }
+
+    /// The same of the parameters with these numbers, around a course of the motion.
+    pub(super) fn jacobian_at(
+        &self,
+        h: &Hypothesis,
+        path: &SignalPath<'_>,
+        point: &Point,
+        of: &[usize],
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let Point { operator, motion, solution } = point;
         let here = self.thinned(|k| path.stopped(motion[k]).0);
         let reached = range(here.iter().copied());
         let column = |at: usize| -> Result<Vec<f64>, Error> {
@@ -271,7 +284,7 @@ impl<'a> Problem<'a> {
             Ok(there.iter().zip(&here).map(|(a, b)| (a - b) / step).collect())
         };
         // Of several errors the first one, whichever thread was quicker.
-        let columns: Vec<Result<Vec<f64>, Error>> = (0..h.nonlinear().len()).into_par_iter().map(column).collect();
+        let columns: Vec<Result<Vec<f64>, Error>> = of.par_iter().map(|at| column(*at)).collect();
         columns.into_iter().collect()
     }
 
@@ -308,19 +321,23 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If a stage cannot be built at the start.
     pub(crate) fn fit(&self, start: &Hypothesis) -> Result<Option<Fitted>, Error> {
+        self.fit_in(start, ITERATIONS)
+    }
+
+    /// The same in at most this many iterations.
+    pub(super) fn fit_in(&self, start: &Hypothesis, iterations: usize) -> Result<Option<Fitted>, Error> {
         let mut h = start.clone();
         let Some(mut here) = self.assemble(&h, None)? else { return Ok(None) };
         let mut damping = 1e-3;
         let mut jacobian = self.jacobian(&h, &here.solution)?;
-        for _ in 0..ITERATIONS {
+        for _ in 0..iterations {
             if jacobian.is_empty() {
                 break;
             }
             let total = self.with_jacobian(&here, &jacobian);
             let Some((better, there)) = self.step(&h, &here, &total, &mut damping)? else { break };
             let fall = (here.objective - there.objective) / here.objective.max(f64::MIN_POSITIVE);
-            h = better;
-            here = there;
+            (h, here) = (better, there);
             jacobian = self.jacobian(&h, &here.solution)?;
             if fall < TOLERANCE {
                 break;

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Problem;
+use crate::lsq::Gram;
 
 /// Projects columns off those of a fit.
 pub(crate) struct Projector<'a> {
@@ -38,6 +39,20 @@ impl<'a> Projector<'a> {
         }
         let left = own - cross.dot(&factor.solve(&cross));
         if left <= 1e-9 * own { 0.0 } else { left }
+    }
+
+    /// Normal equations of what the fit cannot imitate of some columns over the rows that count, the last being the target; `None` if the fit is
+    /// singular.
+    pub(super) fn off(&self, columns: &DMatrix<f64>) -> Option<Gram> {
+        let factor = self.factor.as_ref()?;
+        let mut cross = DMatrix::zeros(factor.l_dirty().ncols(), columns.ncols());
+        let mut first = 0;
+        for x in &self.blocks {
+            cross += x.columns(0, cross.nrows()).tr_mul(&columns.rows(first, x.nrows()));
+            first += x.nrows();
+        }
+        let matrix = columns.tr_mul(columns) - cross.tr_mul(&factor.solve(&cross));
+        Some(Gram { matrix, rows: columns.nrows() })
     }
 
     /// How much of Σ residual² a column would take, all unknowns refitted, and the factor at which it does.
