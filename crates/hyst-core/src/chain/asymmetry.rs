@@ -1,27 +1,43 @@
-//! Asymmetry: a memory-free curve behind the hysteresis, as a superposition of one-sided dead zones.
+//! Asymmetry: a memory-free curve behind or before the hysteresis, as a superposition of one-sided dead zones.
 //!
 //! `y = v + Σⱼ cⱼ dead_{sⱼ}(v)`, with `dead_s(v) = max(v − s, 0)` for s ≥ 0 and `min(v − s, 0)` for s < 0: the modified
 //! Prandtl-Ishlinskii model (Kuhnen 2003). It bends the two ends of a symmetric loop differently and has a closed-form inverse of the
-//! same shape.
+//! same shape. Before the hysteresis the same curve bends the drive, as the envelope of a generalised operator does: minor loops then widen where
+//! it is steep.
 
 use crate::error::{coefficient, within};
 use crate::{Build, Env, Error, Invert, Meta, Params, Real, Stage};
+
+/// On which side of the hysteresis a curve is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum CurveSide {
+    /// Behind it: the output is bent.
+    #[default]
+    Output,
+    /// Before it: the drive is bent.
+    Input,
+}
 
 /// Parameters of the curve. `L` is any list of numbers. Weights of zero are no asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AsymmetryParams<L> {
-    /// Where the dead zones end, sⱼ \[y\]: those below zero falling, those from zero on rising, in any mix.
+    /// Where the dead zones end, sⱼ \[y, before the hysteresis u\]: those below zero falling, those from zero on rising, in any mix.
     pub thresholds: L,
     /// Change of slope cⱼ beyond each \[ratio\].
     pub weights: L,
+    /// On which side of the hysteresis it is.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub side: CurveSide,
 }
 
 impl<L: AsMut<[f64]>> Params for AsymmetryParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         const INF: f64 = f64::INFINITY;
+        let unit = if self.side == CurveSide::Input { "u" } else { "y" };
         for s in self.thresholds.as_mut() {
-            f(&Meta { name: "thresholds", unit: "y", lower: -INF, upper: INF }, s);
+            f(&Meta { name: "thresholds", unit, lower: -INF, upper: INF }, s);
         }
         for c in self.weights.as_mut() {
             f(&Meta { name: "weights", unit: "", lower: -1.0, upper: INF }, c);
@@ -152,7 +168,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn curve(thresholds: &[f64], weights: &[f64]) -> Asymmetry<f64, 4> {
-        AsymmetryParams { thresholds, weights }.build(&()).unwrap()
+        AsymmetryParams { thresholds, weights, side: CurveSide::Output }.build(&()).unwrap()
     }
 
     proptest! {
@@ -178,7 +194,7 @@ mod tests {
     fn a_curve_that_falls_has_no_inverse() {
         assert!(curve(&[1.0, 2.0], &[-0.6, -0.5]).invert().is_err());
         let built: Result<Asymmetry<f64, 4>, _> =
-            AsymmetryParams { thresholds: [2.0, 1.0], weights: [0.1, 0.1] }.build(&());
+            AsymmetryParams { thresholds: [2.0, 1.0], weights: [0.1, 0.1], side: CurveSide::Input }.build(&());
         assert!(matches!(built, Err(Error::OutOfRange { name: "asymmetry.thresholds", .. })));
     }
 }

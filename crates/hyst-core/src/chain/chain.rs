@@ -2,8 +2,8 @@
 
 use crate::stage::{hold, rest};
 use crate::{
-    Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, Delay, DelayParams, DelayState, Drift,
-    DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Rate,
+    Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, CurveSide, Delay, DelayParams, DelayState,
+    Drift, DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Rate,
     RateParams, RateState, Real, Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams,
     Stage, Temperature, TemperatureParams, TemperatureState,
 };
@@ -14,7 +14,7 @@ pub const MAX_RESONANCES: usize = 2;
 /// Dead zones that the asymmetry of one chain can hold.
 pub const MAX_DEAD_ZONES: usize = 8;
 
-/// `u → delay → lag → rate → HYSTERESIS, asymmetry → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
+/// `u → delay → lag → rate → asymmetry before it, HYSTERESIS, asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
 /// +interference → + zero → y`, every stage but the hysteresis optional.
 ///
 /// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
@@ -26,6 +26,8 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub lag: Option<Lag<T>>,
     /// Loops that widen with the rate of the drive.
     pub rate: Option<Rate<T>>,
+    /// Curve before the memory operator.
+    pub input_curve: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
     /// The memory operator.
     pub hysteresis: H,
     /// Curve behind the memory operator.
@@ -70,6 +72,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             delay: None,
             lag: None,
             rate: None,
+            input_curve: None,
             hysteresis,
             asymmetry: None,
             temperature: None,
@@ -110,12 +113,16 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
-    /// Adds a curve behind the hysteresis.
+    /// Adds a curve behind the hysteresis, or before it.
     ///
     /// # Errors
     /// As [`AsymmetryParams::build`].
     pub fn with_asymmetry<L: AsRef<[f64]>>(mut self, p: &AsymmetryParams<L>) -> Result<Self, Error> {
-        self.asymmetry = Some(p.build(&())?);
+        let curve = Some(p.build(&())?);
+        match p.side {
+            CurveSide::Output => self.asymmetry = curve,
+            CurveSide::Input => self.input_curve = curve,
+        }
         Ok(self)
     }
 
@@ -231,6 +238,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
+        x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
@@ -253,6 +261,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         let mut x = through(&self.delay, u, |g, x| g.step(&mut s.delay, e, x));
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
+        x = through(&self.input_curve, x, |g, x| g.step(&mut (), e, x));
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.step(&mut s.felt, e, x));
@@ -286,7 +295,20 @@ mod tests {
             .and_then(|c| c.with_temperature(&warm(), &cx))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
-            .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [3.0, -2.0], weights: [0.1, -0.05] }))
+            .and_then(|c| {
+                c.with_asymmetry(&AsymmetryParams {
+                    thresholds: [3.0, -2.0],
+                    weights: [0.1, -0.05],
+                    side: CurveSide::Output,
+                })
+            })
+            .and_then(|c| {
+                c.with_asymmetry(&AsymmetryParams {
+                    thresholds: [20.0, 60.0],
+                    weights: [0.2, 0.1],
+                    side: CurveSide::Input,
+                })
+            })
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
             .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 }))
@@ -370,7 +392,7 @@ mod tests {
         let bent = |zones: u8| {
             let thresholds: Vec<f64> = (1..=zones).map(f64::from).collect();
             let weights = std::vec![0.1; thresholds.len()];
-            chain::<f64>().with_asymmetry(&AsymmetryParams { thresholds, weights })
+            chain::<f64>().with_asymmetry(&AsymmetryParams { thresholds, weights, side: CurveSide::Output })
         };
         assert!(bent(8).is_ok());
         assert!(matches!(bent(9), Err(Error::Capacity { needed: 9, holds: MAX_DEAD_ZONES, .. })));

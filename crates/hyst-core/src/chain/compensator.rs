@@ -19,7 +19,7 @@ pub struct CompensatorOptions {
 
 /// The inverse chain, stage by stage from the output back to the input:
 ///
-/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
+/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹, asymmetry⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
 ///
 /// All but rate, resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached); of the rate see [`RateInverse`]. Resonances, lag and delay are inverted in
 /// a band with [`lead`](Self::lead) samples of preview; [`error`](Self::error) states how well. Drift
@@ -37,6 +37,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     temperature: Option<Temperature<T>>,
     asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     hysteresis: HI,
+    input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
     /// Preview besides that of the filters: whole samples of dead time, and what the inverse hysteresis needs.
@@ -151,6 +152,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             hysteresis_lead: hysteresis.lead,
             hysteresis_band: hysteresis.band,
             hysteresis: hysteresis.inverse,
+            input_curve: self.input_curve.as_ref().map(Invert::invert).transpose()?,
             rate: self.rate.as_ref().map(Invert::invert).transpose()?,
             input_side,
             sample_rate: 1.0 / h,
@@ -248,6 +250,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = asymmetry.reset(&mut (), e, x);
         }
         x = self.hysteresis.reset(&mut s.hysteresis, e, x);
+        if let Some(curve) = &self.input_curve {
+            x = curve.reset(&mut (), e, x);
+        }
         if let Some(rate) = &self.rate {
             x = rate.reset(&mut s.rate, e, x);
         }
@@ -289,6 +294,9 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = asymmetry.step(&mut (), e, x);
         }
         x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        if let Some(curve) = &self.input_curve {
+            x = curve.step(&mut (), e, x);
+        }
         if let Some(rate) = &self.rate {
             x = rate.step(&mut s.rate, e, x);
         }
@@ -304,7 +312,7 @@ mod tests {
     use super::*;
     use crate::{
         Activation, ActivationKind, ActivationParams, AntiCausal, AsymmetryParams, BoucWen, BoucWenParams, CreepParams,
-        LagParams, LoadParams, Pi, ResonanceParams, SaturationParams, TemperatureParams,
+        CurveSide, LagParams, LoadParams, Pi, ResonanceParams, SaturationParams, TemperatureParams,
     };
     use std::boxed::Box;
     use std::vec::Vec;
@@ -375,7 +383,20 @@ mod tests {
             .and_then(|c| {
                 c.with_creep(&CreepParams { seconds: &[0.05, 0.5, 5.0], shares: &[0.02, 0.02, 0.02] }, &PERIOD)
             })
-            .and_then(|c| c.with_asymmetry(&AsymmetryParams { thresholds: [2.0, -0.5], weights: [0.2, -0.1] }))
+            .and_then(|c| {
+                c.with_asymmetry(&AsymmetryParams {
+                    thresholds: [2.0, -0.5],
+                    weights: [0.2, -0.1],
+                    side: CurveSide::Output,
+                })
+            })
+            .and_then(|c| {
+                c.with_asymmetry(&AsymmetryParams {
+                    thresholds: [15.0, 45.0],
+                    weights: [0.3, -0.2],
+                    side: CurveSide::Input,
+                })
+            })
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
             .unwrap();

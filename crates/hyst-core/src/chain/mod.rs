@@ -17,7 +17,7 @@ mod resonance;
 mod saturation;
 mod temperature;
 
-pub use asymmetry::{Asymmetry, AsymmetryInverse, AsymmetryParams};
+pub use asymmetry::{Asymmetry, AsymmetryInverse, AsymmetryParams, CurveSide};
 pub use chain::{Chain, ChainState, MAX_DEAD_ZONES, MAX_RESONANCES};
 pub use compensator::{Compensator, CompensatorOptions, CompensatorState, InverseHysteresis};
 pub use creep::{Creep, CreepInverse, CreepInverseState, CreepParams, CreepSideBySide, CreepState};

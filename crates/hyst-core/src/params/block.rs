@@ -16,7 +16,7 @@ use super::ChainParams;
 ///
 /// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays. 3: the rate stage behind the lag, what settles
 /// behind the rate of a drift, harmonics behind the phase of a tone.
-pub const BLOCK_VERSION: u8 = 3;
+pub const BLOCK_VERSION: u8 = 4;
 
 /// A list of at most `N` numbers without heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;

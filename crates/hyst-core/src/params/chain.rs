@@ -16,7 +16,7 @@ pub struct EffectParams<L> {
     pub lag: Option<LagParams>,
     /// Loops that widen with the rate of the drive.
     pub rate: Option<RateParams>,
-    /// Curve behind the hysteresis.
+    /// Curve behind or before the hysteresis.
     pub asymmetry: Option<AsymmetryParams<L>>,
     /// Gain and expansion over temperature.
     pub temperature: Option<TemperatureParams>,

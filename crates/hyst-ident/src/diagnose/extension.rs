@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use hyst_core::CurveSide;
+
 use super::search::Named;
 use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
@@ -69,26 +71,37 @@ impl Own<'_> {
         let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
             return Ok((None, None));
         };
-        let own = shape::bent(&problem, hypothesis, &plain.fit).map_err(stage)?;
-        let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.trial.fit)).transpose()?.flatten();
-        let mut bent = Bent { own, anew: None };
-        if let Some(basis) = &anew {
-            let behind =
-                Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).holding().beside(&problem);
-            match shape::plain(&behind, hypothesis).map_err(stage)? {
-                // Other plays alone were missing, no curve.
-                Some(plain) if shape::is_complete(&plain, richest) => return Ok((None, anew)),
-                Some(plain) => {
-                    bent.anew = shape::bent(&behind, hypothesis, &plain.fit).map_err(stage)?.map(|with| (plain, with));
-                }
-                None => {}
+        let (mut bent, mut bases): (Vec<Bent>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
+        for side in [CurveSide::Output, CurveSide::Input] {
+            // A curve behind the operator is solved for; one before it has to be searched, and only where that is not enough.
+            let complete = |curved: &shape::Curved| shape::is_complete(&curved.trial, richest);
+            if bent.iter().any(|bent| bent.own.iter().chain(bent.anew.iter().map(|(_, with)| with)).any(complete)) {
+                break;
             }
+            let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
+            let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.trial.fit)).transpose()?.flatten();
+            let mut here = Bent { own, anew: None };
+            if let Some(basis) = &anew {
+                let behind =
+                    Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).holding().beside(&problem);
+                match shape::plain(&behind, hypothesis).map_err(stage)? {
+                    // Other plays alone were missing, no curve.
+                    Some(plain) if shape::is_complete(&plain, richest) => return Ok((None, anew)),
+                    Some(plain) => {
+                        let with = shape::bent(&behind, hypothesis, &plain.fit, side).map_err(stage)?;
+                        here.anew = with.map(|with| (plain, with));
+                    }
+                    None => {}
+                }
+            }
+            bent.push(here);
+            bases.push(anew);
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
         let Some(shape) = found else { return Ok((None, None)) };
         self.take(shape.named.effect, &shape.fit, errors);
         *hypothesis = shape.hypothesis;
-        Ok((Some(shape.named), anew.filter(|_| shape.anew)))
+        Ok((Some(shape.named), shape.anew.and_then(|at| bases.swap_remove(at))))
     }
 
     /// The own base with plays where the record calls for them once these effects are known, if they predict clearly better than those

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::{AsymmetryParams, InterferenceParams, RateLaw, ViscousPiParams};
+use hyst_core::{AsymmetryParams, CurveSide, InterferenceParams, RateLaw, ViscousPiParams};
 
 use super::findings::{Alternative, EffectKind, Finding, Found, Material};
 use super::search::Named;
@@ -109,8 +109,12 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         Effect::Asymmetry => {
             let p = e.asymmetry.as_ref()?;
             let (low, high) = slopes(p);
+            let side = match p.side {
+                CurveSide::Output => "behind",
+                CurveSide::Input => "before",
+            };
             format!(
-                "the curve behind the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
+                "the curve {side} the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
             )
         }
         Effect::RateDependence if e.rate.is_some() => {
@@ -260,8 +264,9 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
         Effect::Delay => e.delay.iter().for_each(|p| put("delay", "seconds", p.seconds, "s")),
         Effect::Lag => e.lag.iter().for_each(|p| put("lag", "seconds", p.seconds, "s")),
         Effect::Asymmetry => e.asymmetry.iter().for_each(|p| {
+            let unit = if p.side == CurveSide::Input { input } else { y };
             for (i, (s, c)) in p.thresholds.iter().zip(&p.weights).enumerate() {
-                put("asymmetry", &format!("thresholds[{i}]"), *s, y);
+                put("asymmetry", &format!("thresholds[{i}]"), *s, unit);
                 put("asymmetry", &format!("weights[{i}]"), *c, "1");
             }
         }),

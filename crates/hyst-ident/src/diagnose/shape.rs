@@ -1,10 +1,10 @@
-//! Whether the user's own base lacks a curve behind it: asymmetry, or a stop.
+//! Whether the user's own base lacks a curve behind or before it: asymmetry, or a stop.
 //!
 //! The search runs on a rich base that bends in itself, so that a coarse base is not taken for an effect. Here the own base is asked: if
 //! one curve without memory takes most of what separates it from the rich one, that curve is its name; if not, what is
 //! missing has memory, and the base is too coarse.
 
-use hyst_core::{AsymmetryParams, Error, MAX_DEAD_ZONES};
+use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
 
 use super::search::{Instead, Named};
 use super::trial::Trial;
@@ -35,11 +35,11 @@ pub(super) struct Shape {
     pub(super) hypothesis: Hypothesis,
     pub(super) fit: Fitted,
     pub(super) named: Named,
-    /// Whether it is the curve of the base that was chosen behind it.
-    pub(super) anew: bool,
+    /// The plays that were chosen anew with it, if it is on those: their number among the [`Bent`].
+    pub(super) anew: Option<usize>,
 }
 
-/// The own base with a curve behind it.
+/// The own base with a curve.
 pub(super) struct Curved {
     pub(super) trial: Trial,
     /// Whether the curve bends its two halves differently.
@@ -57,14 +57,14 @@ pub(super) struct Bent {
 struct Tried {
     effect: Effect,
     trial: Trial,
-    /// Without the curve, where it stands behind plays that were chosen anew.
-    anew: Option<Trial>,
+    /// Without the curve, where it is on plays that were chosen anew, and the number of these plays.
+    anew: Option<(usize, Trial)>,
     /// Whether it has the form that its name stands for.
     is_of_its_kind: bool,
 }
 
 impl Tried {
-    fn curve(with: Curved, anew: Option<Trial>) -> Self {
+    fn curve(with: Curved, anew: Option<(usize, Trial)>) -> Self {
         Self { effect: Effect::Asymmetry, trial: with.trial, anew, is_of_its_kind: with.is_lopsided }
     }
 
@@ -90,14 +90,24 @@ pub(super) fn is_complete(plain: &Trial, richest: f64) -> bool {
     plain.cv_rmse() <= MISSING * richest
 }
 
-/// The same with a curve behind it; none if there is one already.
-pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Option<Curved>, Error> {
+/// The same with a curve on this side of it; none if there is one already.
+pub(super) fn bent(
+    problem: &Problem<'_>,
+    found: &Hypothesis,
+    plain: &Fitted,
+    side: CurveSide,
+) -> Result<Option<Curved>, Error> {
     if found.effects.asymmetry.is_some() {
         return Ok(None);
     }
-    let Some(curve) = curve(problem, plain) else { return Ok(None) };
+    let Some(curve) = curve(problem, plain, side) else { return Ok(None) };
     let mut h = found.clone();
     h.effects.asymmetry = Some(curve);
+    if side == CurveSide::Input {
+        // The curve alone is searched: all else keeps what the rich base has given it.
+        let Some(fit) = problem.fit(&h)? else { return Ok(None) };
+        h.effects.asymmetry = fit.hypothesis.effects.asymmetry;
+    }
     let Some(fit) = problem.fit_linear(&h)? else { return Ok(None) };
     // What the curve stretches the operator gives less of: some of its dead zones may lie where nothing comes any more.
     let is_lopsided = fit
@@ -105,7 +115,7 @@ pub(super) fn bent(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) ->
         .effects
         .asymmetry
         .as_ref()
-        .zip(reach(problem, &fit))
+        .zip(reach(problem, &fit, side))
         .is_some_and(|(p, reach)| lopsided(p, reach) >= LOPSIDED);
     Ok(Trial::of(problem, fit).map(|trial| Curved { trial, is_lopsided }))
 }
@@ -116,7 +126,7 @@ pub(super) fn shape(
     problem: &Problem<'_>,
     found: &Hypothesis,
     plain: &Trial,
-    bent: Bent,
+    bent: Vec<Bent>,
     richest: f64,
     noise: f64,
     seed: u64,
@@ -125,21 +135,25 @@ pub(super) fn shape(
     // wandering leaves is no base's.
     let is_least = found.drag.is_none() && !found.zero_wanders && !found.gain_wanders;
     let least = if is_least { richest } else { richest.min(NEAR_NOISE * noise) };
-    let own = bent.own.map(|with| Tried::curve(with, None));
-    let anew = bent.anew.map(|(plain, with)| Tried::curve(with, Some(plain)));
-    let mut tried: Vec<Tried> = own.into_iter().chain(anew).collect();
+    let curves = bent.into_iter().enumerate().flat_map(|(at, Bent { own, anew })| {
+        let own = own.map(|with| Tried::curve(with, None));
+        own.into_iter().chain(anew.map(|(plain, with)| Tried::curve(with, Some((at, plain)))))
+    });
+    let mut tried: Vec<Tried> = curves.collect();
     if found.effects.saturation.is_none() {
         for fitted in stopped(problem, found, &plain.fit)? {
             tried.extend(Trial::of(problem, fitted).map(Tried::stop));
         }
     }
     // What better plays gain is not the curve's.
-    let on_better_plays = tried.iter().find_map(|t| t.anew.clone()).filter(|p| p.total() < plain.total());
-    let plain = on_better_plays.as_ref().unwrap_or(plain);
+    let on_better_plays = tried.iter().filter_map(|t| t.anew.as_ref()).map(|(_, plain)| plain);
+    let best_plays = on_better_plays.min_by(|a, b| a.total().total_cmp(&b.total())).cloned();
+    let best_plays = best_plays.filter(|p| p.total() < plain.total());
+    let plain = best_plays.as_ref().unwrap_or(plain);
     let judged: Vec<Judged<'_>> = tried
         .iter()
         .map(|t| {
-            let (without, closed) = t.anew.as_ref().map_or((plain, CLOSED), |plain| (plain, CLOSED_ANEW));
+            let (without, closed) = t.anew.as_ref().map_or((plain, CLOSED), |(_, plain)| (plain, CLOSED_ANEW));
             let judgement = score::judge(problem, without, &t.trial, noise, seed);
             let accepted = judgement.accepted()
                 && judgement.share >= TAKEN
@@ -166,10 +180,10 @@ pub(super) fn shape(
         Shape {
             hypothesis: trial.fit.hypothesis.clone(),
             fit: trial.fit.clone(),
-            anew: anew.is_some(),
+            anew: anew.as_ref().map(|(at, _)| *at),
             named: Named {
                 effect: *effect,
-                cv_without: anew.as_ref().unwrap_or(plain).cv_rmse(),
+                cv_without: anew.as_ref().map_or(plain, |(_, plain)| plain).cv_rmse(),
                 cv_with: trial.cv_rmse(),
                 judgement: *judgement,
                 instead,
@@ -202,22 +216,25 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
     Ok(fits.into_iter().filter(|f| f.squares < plain.squares).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
-/// Where the operator's output goes in the rows that count, without its ends; none if it stands still.
-fn reach(problem: &Problem<'_>, fit: &Fitted) -> Option<(f64, f64)> {
-    let operator = problem.operator_output(fit).ok()?;
-    let settled = operator.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
+/// Where the operator's output, or the drive, goes in the rows that count, without its ends; none if it stands still.
+fn reach(problem: &Problem<'_>, fit: &Fitted, side: CurveSide) -> Option<(f64, f64)> {
+    let seen = match side {
+        CurveSide::Output => problem.operator_output(fit).ok()?,
+        CurveSide::Input => problem.samples.input.clone(),
+    };
+    let settled = seen.iter().zip(&problem.samples.settling).filter(|(_, s)| !**s).map(|(v, _)| *v);
     let (low, high) = crate::samples::range(settled);
     let (low, high) = (low + MARGIN * (high - low), high - MARGIN * (high - low));
     (low < high).then_some((low, high))
 }
 
-/// Dead zones spread evenly over the operator's output, moving away from zero.
-fn curve(problem: &Problem<'_>, plain: &Fitted) -> Option<AsymmetryParams<Vec<f64>>> {
-    let (low, high) = reach(problem, plain)?;
+/// Dead zones spread evenly over the operator's output or the drive, moving away from zero.
+fn curve(problem: &Problem<'_>, plain: &Fitted, side: CurveSide) -> Option<AsymmetryParams<Vec<f64>>> {
+    let (low, high) = reach(problem, plain, side)?;
     let mut thresholds: Vec<f64> =
         (0..MAX_DEAD_ZONES).map(|i| low + (high - low) * i as f64 / (MAX_DEAD_ZONES - 1) as f64).collect();
     thresholds.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    Some(AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds })
+    Some(AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds, side })
 }
 
 /// Share of a curve's bend that is even about the middle of what it spans, straight parts left out: 1 where only one half bends or both bend
@@ -246,7 +263,7 @@ mod tests {
     /// A curve of these slopes from each threshold to the next.
     fn curve(thresholds: &[f64], slopes: &[f64]) -> AsymmetryParams<Vec<f64>> {
         let weights = slopes.windows(2).map(|s| s[1] - s[0]).collect();
-        AsymmetryParams { thresholds: thresholds.to_vec(), weights }
+        AsymmetryParams { thresholds: thresholds.to_vec(), weights, side: CurveSide::Output }
     }
 
     #[test]
@@ -278,9 +295,13 @@ mod tests {
     #[test]
     fn zero_within_the_curve_changes_nothing() {
         // The same bends about zero: zones open away from it, the stretch that holds it has the slope 1.
-        let odd = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![0.1, -0.2, -0.2, 0.1] };
+        let zones = |weights: [f64; 4]| AsymmetryParams {
+            weights: weights.to_vec(),
+            ..curve(&[-20.0, -10.0, 10.0, 20.0], &[])
+        };
+        let odd = zones([0.1, -0.2, -0.2, 0.1]);
         assert!(lopsided(&odd, (-20.0, 20.0)) < 1e-9);
-        let even = AsymmetryParams { thresholds: vec![-20.0, -10.0, 10.0, 20.0], weights: vec![-0.1, -0.1, 0.1, 0.1] };
+        let even = zones([-0.1, -0.1, 0.1, 0.1]);
         assert!(lopsided(&even, (-20.0, 20.0)) > 0.99);
     }
 }

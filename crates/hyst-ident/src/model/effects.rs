@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use hyst_core::{
-    AsymmetryParams, CreepParams, DelayParams, DriftParams, EffectParams, InterferenceParams, LagParams, LoadParams,
-    MAX_RESONANCES, Meta, Params, RateParams, ResonanceParams, SaturationParams, TemperatureParams,
+    AsymmetryParams, CreepParams, CurveSide, DelayParams, DriftParams, EffectParams, InterferenceParams, LagParams,
+    LoadParams, MAX_RESONANCES, Meta, Params, RateParams, ResonanceParams, SaturationParams, TemperatureParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub enum Effect {
     Delay,
     /// First-order lag of the amplifier.
     Lag,
-    /// A curve behind the hysteresis: one end of the loop is steeper.
+    /// A curve behind or before the hysteresis: one end of the loop is steeper.
     Asymmetry,
     /// Loops that widen with the rate of the drive.
     RateDependence,
@@ -103,6 +103,9 @@ impl FromStr for Effect {
     }
 }
 
+/// Lower bound of the change of slope at one place of a curve: the curve may not fall.
+const LEAST_BEND: f64 = -0.9;
+
 /// A bank of creep elements, as parameters.
 pub type CreepBank = CreepParams<Vec<f64>>;
 
@@ -125,7 +128,7 @@ pub struct Effects {
     pub drift: Option<DriftParams>,
     /// Tone.
     pub interference: Option<InterferenceParams>,
-    /// Curve behind the hysteresis.
+    /// Curve behind or before the hysteresis.
     pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
     /// Compliance under the load.
     pub load: Option<LoadParams>,
@@ -218,12 +221,19 @@ impl Effects {
     }
 
     /// The stages that act before the hysteresis, in their order.
-    pub(crate) fn input_side(&self) -> (Option<DelayParams>, Option<LagParams>, Option<RateParams>) {
-        (self.delay, self.lag, self.rate)
+    pub(crate) fn input_side(
+        &self,
+    ) -> (Option<DelayParams>, Option<LagParams>, Option<RateParams>, Option<&AsymmetryParams<Vec<f64>>>) {
+        (self.delay, self.lag, self.rate, self.curve(CurveSide::Input))
+    }
+
+    /// The curve, if it is on this side of the hysteresis.
+    pub(crate) fn curve(&self, side: CurveSide) -> Option<&AsymmetryParams<Vec<f64>>> {
+        self.asymmetry.as_ref().filter(|p| p.side == side)
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// The rate and the height of a drift, load, a thermal expansion, the weights of an asymmetry, and the amplitude and phase of a tone enter linearly and are
+    /// The rate and the height of a drift, load, a thermal expansion, the weights of an asymmetry behind the hysteresis, and the amplitude and phase of a tone enter linearly and are
     /// not among them.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
@@ -245,6 +255,16 @@ impl Effects {
         }
         if let Some(p) = &mut self.rate {
             pass(Effect::RateDependence, "", p, f);
+        }
+        if let Some(p) = self.asymmetry.as_mut().filter(|p| p.side == CurveSide::Input) {
+            let mut at = 0;
+            p.visit(&mut |meta, value| {
+                if meta.name == "weights" {
+                    let name = format!("weights[{at}]");
+                    f(Parameter { effect: Effect::Asymmetry, name, lower: LEAST_BEND, upper: meta.upper, value });
+                    at += 1;
+                }
+            });
         }
         if let Some(p) = &mut self.temperature {
             let lags = p.seconds > 0.0;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hyst_core::{Error, HARMONIC_PARTS};
+use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
@@ -115,7 +115,7 @@ impl Problem<'_> {
         let layout = self.layout(h);
         let z = z.as_slice();
         let mut motion = operator.clone();
-        if let Some(p) = &h.effects.asymmetry {
+        if let Some(p) = h.effects.curve(CurveSide::Output) {
             let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
             for v in &mut motion {
                 *v += zones().map(|(s, c)| c * dead_zone(*v, *s)).sum::<f64>();
@@ -215,7 +215,7 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
             columns.push((c, slowed(&shift)));
         }
-        if let (Some(p), Some(point)) = (&h.effects.asymmetry, point) {
+        if let (Some(p), Some(point)) = (h.effects.curve(CurveSide::Output), point) {
             let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();
             let mut zones: Vec<Vec<f64>> = p.thresholds.iter().map(|s| bend(*s)).collect();
             path.output_side_of(&mut zones);
@@ -252,7 +252,13 @@ impl Problem<'_> {
     }
 
     /// The same where the motion is known.
-    pub(super) fn residual_along(&self, h: &Hypothesis, path: &SignalPath<'_>, motion: &[f64], z: &DVector<f64>) -> Vec<f64> {
+    pub(super) fn residual_along(
+        &self,
+        h: &Hypothesis,
+        path: &SignalPath<'_>,
+        motion: &[f64],
+        z: &DVector<f64>,
+    ) -> Vec<f64> {
         let layout = self.layout(h);
         let extras = self.extras(h);
         let z = z.as_slice();

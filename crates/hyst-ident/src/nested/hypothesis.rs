@@ -1,6 +1,6 @@
 //! What a trial assumes besides the rate-independent base.
 
-use hyst_core::TemperatureParams;
+use hyst_core::{CurveSide, TemperatureParams};
 
 use crate::base::DragParams;
 use crate::model::{Effect, Effects};
@@ -121,7 +121,7 @@ impl Hypothesis {
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
     pub(super) fn changes_the_base(&self) -> bool {
-        self.effects.input_side() != (None, None, None) || self.drag.is_some() || self.slew_limit.is_some()
+        self.effects.input_side() != (None, None, None, None) || self.drag.is_some() || self.slew_limit.is_some()
     }
 
     /// Whether the hysteresis is driven, and follows, as in another set.
@@ -133,7 +133,7 @@ impl Hypothesis {
 
     /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.
     pub(super) fn is_bent(&self) -> bool {
-        self.effects.asymmetry.is_some() || self.effects.saturation.is_some() || self.gain_wanders
+        self.effects.curve(CurveSide::Output).is_some() || self.effects.saturation.is_some() || self.gain_wanders
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.

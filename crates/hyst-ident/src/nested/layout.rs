@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hyst_core::HARMONIC_PARTS;
+use hyst_core::{CurveSide, HARMONIC_PARTS};
 
 use super::Hypothesis;
 
@@ -43,7 +43,7 @@ impl Layout {
             tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
             expansion: next(some(e.temperature.is_some_and(|p| p.expansion != 0.0), 1)),
-            zones: next(e.asymmetry.as_ref().map_or(0, |a| a.thresholds.len())),
+            zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),
         }

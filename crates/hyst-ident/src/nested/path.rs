@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use hyst_core::{
-    Build, Creep, Delay, Env, Error, Invert, Lag, Rate, Resonance, Sampling, Saturation, SaturationInverse, Stage,
-    Temperature, TemperatureParams,
+    Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
+    SaturationInverse, Stage, Temperature, TemperatureParams,
 };
 
 use super::Hypothesis;
@@ -20,6 +20,7 @@ pub(crate) struct SignalPath<'a> {
     delay: Option<Delay<f64, DELAY>>,
     lag: Option<Lag<f64>>,
     rate: Option<Rate<f64>>,
+    curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
     warmth: Option<Warmth>,
     creep: Option<Creep<f64, CREEP>>,
     resonances: Vec<Resonance<f64>>,
@@ -38,7 +39,7 @@ impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let cx = Sampling { period: samples.period };
         let effects = &h.effects;
-        let (delay, lag, rate) = effects.input_side();
+        let (delay, lag, rate, curve) = effects.input_side();
         let warmth = effects.temperature.as_ref().map(|p| warmth(samples, p)).transpose()?;
         let stop = effects.saturation.as_ref().map(|p| {
             let forward: Saturation<f64> = p.build(&())?;
@@ -50,6 +51,7 @@ impl<'a> SignalPath<'a> {
             delay: delay.map(|p| p.build(&cx)).transpose()?,
             lag: lag.map(|p| p.build(&cx)).transpose()?,
             rate: rate.map(|p| p.build(&cx)).transpose()?,
+            curve: curve.map(|p| p.build(&())).transpose()?,
             warmth: warmth.flatten(),
             creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
             resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
@@ -71,6 +73,9 @@ impl<'a> SignalPath<'a> {
         }
         if let Some(rate) = &self.rate {
             self.filter(rate, &mut [&mut drive]);
+        }
+        if let Some(curve) = &self.curve {
+            self.filter(curve, &mut [&mut drive]);
         }
         drive
     }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use hyst_core::{Error, HARMONIC_PARTS};
+use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -413,7 +413,7 @@ impl<'a> Problem<'a> {
             // Nothing but zero is none.
             temperature.expansion = if *expansion == 0.0 { f64::MIN_POSITIVE } else { *expansion };
         }
-        if let Some(curve) = &mut h.effects.asymmetry {
+        if let Some(curve) = h.effects.asymmetry.as_mut().filter(|p| p.side == CurveSide::Output) {
             curve.weights = z[layout.zones.clone()].to_vec();
         }
         let mut bounds = self.bounds(&h);

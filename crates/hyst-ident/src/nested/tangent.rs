@@ -1,6 +1,6 @@
 //! A record as the operator alone sees it.
 
-use hyst_core::Error;
+use hyst_core::{CurveSide, Error};
 
 use super::assembly::dead_zone_slope;
 use super::{Fitted, Problem, SignalPath};
@@ -43,7 +43,7 @@ impl<'a> Problem<'a> {
         let path = SignalPath::new(self.samples, h)?;
         let point = self.point_at(h, &path, &fit.solution);
         let (layout, z) = (self.layout(h), fit.solution.as_slice());
-        let curve = h.effects.asymmetry.as_ref().map(|p| {
+        let curve = h.effects.curve(CurveSide::Output).map(|p| {
             let zones = || p.thresholds.iter().zip(&z[layout.zones.clone()]);
             point
                 .operator
@@ -153,7 +153,11 @@ mod tests {
                 ..Default::default()
             }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
-            asymmetry: Some(AsymmetryParams { thresholds: vec![1.0, 2.5, -0.1], weights: vec![0.1, 0.2, 0.1] }),
+            asymmetry: Some(AsymmetryParams {
+                thresholds: vec![1.0, 2.5, -0.1],
+                weights: vec![0.1, 0.2, 0.1],
+                side: CurveSide::Output,
+            }),
             saturation: Some(SaturationParams { low: -9.0, high: 4.5, knee: 0.05 }),
             ..Effects::default()
         };

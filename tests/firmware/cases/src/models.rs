@@ -17,7 +17,7 @@ pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -
 pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
 pub(crate) const BENT: AsymmetryParams<[f64; 3]> =
-    AsymmetryParams { thresholds: [4.0, 10.0, -3.0], weights: [0.1, -0.05, 0.2] };
+    AsymmetryParams { thresholds: [4.0, 10.0, -3.0], weights: [0.1, -0.05, 0.2], side: CurveSide::Output };
 pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
 pub(crate) const STOPS: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
 pub(crate) const GAINS: PidParams = PidParams {

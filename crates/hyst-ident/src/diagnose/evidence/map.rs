@@ -1,5 +1,7 @@
 //! What depends on a quantity of the same moment: temperature, load, rate, or the output itself.
 
+use hyst_core::CurveSide;
+
 use super::bins::Bins;
 use super::drive::{Branch, branches, rates};
 use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
@@ -106,16 +108,22 @@ pub(super) fn trailing(scene: &Scene<'_>) -> Option<Picture> {
     Some(picture)
 }
 
-/// The residual over the output, rising and falling apart.
-pub(super) fn curve(scene: &Scene<'_>) -> Option<Picture> {
+/// The residual over the output, or over the drive where the curve is before the hysteresis, rising and falling apart.
+pub(super) fn curve(model: &Model, scene: &Scene<'_>) -> Option<Picture> {
     let branches = branches(&scene.samples);
-    let at = |k: usize| scene.without.predicted[k];
+    let before = model.effects.curve(CurveSide::Input).is_some();
+    let at = |k: usize| if before { scene.samples.input[k] } else { scene.without.predicted[k] };
     let bins = Bins::over(scene.rows().map(at), FINE)?;
-    let caption = "Means at each output. A curve behind the hysteresis bends both branches alike, rising (line) and \
-        falling (points): without it they lie on one bent curve, with it they are level.";
-    let x = Axis::new("predicted without it", scene.unit);
-    let mut picture =
-        Picture::new(Some(Effect::Asymmetry), "Residual over the output", x, scene.residual_axis(), caption);
+    let (title, x, caption) = if before {
+        let caption = "Means at each drive. A curve before the hysteresis bends the loop and makes its branches, rising (line) and falling \
+            (points), wider where it is steep: without it they are bent and apart, with it they are level.";
+        ("Residual over the drive", Axis::new("drive", scene.drive_unit), caption)
+    } else {
+        let caption = "Means at each output. A curve behind the hysteresis bends both branches alike, rising (line) and \
+            falling (points): without it they lie on one bent curve, with it they are level.";
+        ("Residual over the output", Axis::new("predicted without it", scene.unit), caption)
+    };
+    let mut picture = Picture::new(Some(Effect::Asymmetry), title, x, scene.residual_axis(), caption);
     for (role, name, view) in both(scene) {
         let on = |branch: Branch| {
             let rows = scene.rows().filter(|k| branches[*k] == branch);

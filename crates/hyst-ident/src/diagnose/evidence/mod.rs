@@ -135,7 +135,7 @@ fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
             pictures.extend(frequency::response_pictures(effect, model, scene));
             pictures
         }
-        Effect::Asymmetry => map::curve(scene).into_iter().collect(),
+        Effect::Asymmetry => map::curve(model, scene).into_iter().collect(),
         Effect::Temperature => {
             let pictures = [map::gain_over_temperature(model, scene), map::expansion_over_temperature(model, scene)];
             pictures.into_iter().flatten().collect()
