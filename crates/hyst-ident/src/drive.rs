@@ -89,6 +89,8 @@ pub(crate) struct Drive<'a> {
     /// `steps` values for each row: those that lead to it, and its own.
     values: Cow<'a, [f64]>,
     passes: Passes,
+    /// Rows of each segment that pass before it begins; none where it begins at rest.
+    history: Vec<usize>,
 }
 
 impl<'a> Drive<'a> {
@@ -104,7 +106,13 @@ impl<'a> Drive<'a> {
                 samples.segments.iter().flat_map(|s| band_limited(&rows[s.clone()], passes)).collect()
             }
         };
-        Self { samples, rows, steps: between.steps(), values, passes }
+        Self { samples, rows, steps: between.steps(), values, passes, history: vec![0; samples.segments.len()] }
+    }
+
+    /// The same where the first rows of each segment, as many as `history` says, have passed before it begins: what came before a record that
+    /// begins in mid-cycle is taken for what comes after.
+    pub(crate) fn after(self, history: Vec<usize>) -> Self {
+        Self { history, ..self }
     }
 
     /// Sample period that a stage has to be built for \[s\].
@@ -112,12 +120,19 @@ impl<'a> Drive<'a> {
         self.samples.period / self.steps as f64
     }
 
-    /// Output of a stage over the rows, one segment after the other, each from rest under its first input.
+    /// Output of a stage over the rows, one segment after the other, each from rest under its first input or after its history.
     pub(crate) fn run<S: Stage<f64>>(&self, stage: &S, out: &mut [f64]) {
         let mut state = Box::new(stage.state());
-        for segment in &self.samples.segments {
+        for (segment, history) in self.samples.segments.iter().zip(&self.history) {
             let Some(first) = segment.clone().next() else { continue };
             out[first] = stage.reset(&mut state, &self.samples.env(first), self.rows[first]);
+            let before = first + 1..first + history;
+            for k in before.clone().chain((!before.is_empty()).then_some(first)) {
+                let env = self.samples.env(k);
+                for u in &self.values[k * self.steps..(k + 1) * self.steps] {
+                    out[first] = stage.step(&mut state, &env, *u);
+                }
+            }
             let again = match self.passes {
                 Passes::Once => 0..0,
                 Passes::Periodic => segment.clone(),

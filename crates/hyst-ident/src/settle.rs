@@ -13,6 +13,8 @@ const SWEPT: f64 = 0.9;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
 
+/// Part of a transient, as one over this, that has at least the mean power of all of it.
+const AT_ONCE: usize = 4;
 /// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
 const NO_MORE: f64 = 1.05;
 /// Share of the output's span below which an RMSE is rounding.
@@ -34,6 +36,24 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
+/// Rows of each segment after which its drive has swept its range and passes its first value in the direction in which it began: what came
+/// before a record that begins in mid-cycle. None where it never does.
+pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
+    let cycle = |s: &std::ops::Range<usize>| {
+        let u = &samples.input[s.clone()];
+        let (low, high) = range(u.iter().copied());
+        let start = *u.first()?;
+        let rises = *u.iter().find(|u| **u != start)? > start;
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        u.windows(2).position(|u| {
+            (least, most) = (least.min(u[1]), most.max(u[1]));
+            let passes = if rises { u[0] < start && start <= u[1] } else { u[0] > start && start >= u[1] };
+            passes && most - least >= SWEPT * (high - low)
+        })
+    };
+    samples.segments.iter().map(|s| cycle(s).map(|before| before + 1)).collect()
+}
+
 /// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let (windows, blind) = (windows(samples), &samples.blind);
@@ -52,6 +72,11 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
+        // What is left from before is there at once, and decays. What comes later, in a sweep that passes a mode, is the record's own.
+        let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>() / rows.len().max(1) as f64;
+        if power(&rows[..=last / AT_ONCE]) < power(&rows[..=last]) {
+            continue;
+        }
         // What decays into the residual's level goes on below it for about half as long again.
         let end = (last + last / 2 + 1).min(rows.len());
         settling[s.start..s.start + end].fill(true);
@@ -124,6 +149,23 @@ mod tests {
     use super::*;
     use crate::nested::Hypothesis;
     use crate::record::{Columns, OutputUnit, Record};
+
+    #[test]
+    fn a_cycle_ends_where_the_drive_comes_by_as_it_began() {
+        let cycle = |input: Vec<f64>| first_cycles(&Samples::of_columns(1e-3, input.clone(), input))[0];
+        let sine =
+            |phase: f64| (0..300).map(|k| (std::f64::consts::TAU * f64::from(k) / 100.0 + phase).sin()).collect();
+        // One period, whatever the phase.
+        for phase in [0.3, 1.0, 2.0, 4.0] {
+            assert!(
+                cycle(sine(phase)).is_some_and(|rows| rows.abs_diff(100) <= 1),
+                "{phase}: {:?}",
+                cycle(sine(phase))
+            );
+        }
+        assert_eq!(cycle((0..100).map(f64::from).collect()), None);
+        assert_eq!(cycle(vec![1.0; 100]), None);
+    }
 
     /// A hundred rows of a rising line; the sensor's range ends nowhere.
     fn samples() -> Samples {

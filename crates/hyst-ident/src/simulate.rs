@@ -1,5 +1,7 @@
 //! `simulate`: what a model says about a record.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::drive::{Drive, Passes};
@@ -8,7 +10,7 @@ use crate::metrics::Errors;
 use crate::model::Model;
 use crate::record::{OutputUnit, Record};
 use crate::samples::Samples;
-use crate::settle::start_up_rows;
+use crate::settle::{first_cycles, start_up_rows};
 
 /// What is done with the sensor's zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,38 +85,65 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
     simulate_with(model, record, &SimulateOptions { zero, ..SimulateOptions::default() })
 }
 
-/// Runs a model over a record. Memory starts virgin in each segment; the drive goes on between samples as the model's file says.
+/// Runs a model over a record. Memory starts virgin in each segment; where the output shows that it did not and fewer rows are a start-up then, as
+/// after the segment's own first cycle. The drive goes on between samples as the model's file says.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
 pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) -> Result<Simulation, FitError> {
-    let mut samples = Samples::from_record(record).at_temperature(options.temperature);
+    let samples = Samples::from_record(record).at_temperature(options.temperature);
     check(model, record, &samples)?;
     let passes = if options.periodic { Passes::Periodic } else { Passes::Once };
     let drive = Drive::new(&samples, model.between_samples, passes);
     let chain = model.build(drive.period()).map_err(|source| FitError::Stage { record: record.name(), source })?;
+    let chain = Box::new(chain);
     let mut predicted = vec![0.0; samples.len()];
-    drive.run(&*Box::new(chain), &mut predicted);
+    drive.run(&*chain, &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
+    let mut settling = samples.settling.clone();
     if record.output().is_some() {
-        let residual: Vec<f64> = samples.output.iter().zip(&predicted).map(|(y, p)| y - p).collect();
-        samples.settling = start_up_rows(&samples, &residual);
+        let missed =
+            |predicted: &[f64]| -> Vec<f64> { samples.output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
+        let mut residual = missed(&predicted);
+        settling = start_up_rows(&samples, &residual);
+        let history = histories(&samples, &settling);
+        if history.iter().any(|rows| *rows > 0) {
+            let mut cycled = vec![0.0; samples.len()];
+            drive.after(history).run(&*chain, &mut cycled);
+            let after = start_up_rows(&samples, &missed(&cycled));
+            for segment in &samples.segments {
+                let starting = |rows: &[bool]| rows[segment.clone()].iter().filter(|s| **s).count();
+                if starting(&after) < starting(&settling) {
+                    predicted[segment.clone()].copy_from_slice(&cycled[segment.clone()]);
+                }
+            }
+            residual = missed(&predicted);
+            settling = start_up_rows(&samples, &residual);
+        }
         if options.zero == Zero::PerRecord {
             for rows in record.rows_of_files() {
-                let settled = || rows.clone().filter(|k| !samples.settling[*k]);
+                let settled = || rows.clone().filter(|k| !settling[*k]);
                 let mean = settled().map(|k| residual[k]).sum::<f64>() / settled().count().max(1) as f64;
                 predicted[rows.clone()].iter_mut().for_each(|p| *p += mean);
                 zeros.push(mean);
             }
         }
         errors = Some(
-            Errors::of(&samples.output, &predicted, &samples.settling)
+            Errors::of(&samples.output, &predicted, &settling)
                 .map_err(|source| FitError::Compare { record: record.name(), source })?,
         );
     }
     let extrapolated = Extrapolated::of(model, &samples.input);
-    Ok(Simulation { predicted, settling: samples.settling, zeros, errors, extrapolated })
+    Ok(Simulation { predicted, settling, zeros, errors, extrapolated })
+}
+
+/// Rows that may have passed before each segment in which a start-up shows.
+fn histories(samples: &Samples, settling: &[bool]) -> Vec<usize> {
+    let starts = |s: &Range<usize>| settling[s.clone()].iter().zip(&samples.blind[s.clone()]).any(|(s, b)| *s && !*b);
+    let cycles = first_cycles(samples);
+    let of = |(s, cycle): (&Range<usize>, Option<usize>)| if starts(s) { cycle.unwrap_or(0) } else { 0 };
+    samples.segments.iter().zip(cycles).map(of).collect()
 }
 
 /// What to do about a record whose output is in this unit, and not in the model's.

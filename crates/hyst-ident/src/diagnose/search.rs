@@ -33,6 +33,9 @@ const MAX_RATIO_TO_OWN: f64 = 2.0;
 /// Gain of a probe, over that which an effect has to have, from which on it is fitted in full, and from which on it is reported.
 const MIN_GAIN_TO_FIT: f64 = 0.5;
 const MIN_GAIN_TO_REPORT: f64 = 0.2;
+/// Effects that make the drive arrive late, and the share of what one of them explains (variance) that another beside it has to explain.
+const TAKES_TIME: [Effect; 3] = [Effect::Delay, Effect::Lag, Effect::RateDependence];
+const MIN_SHARE_OF_KIND: f64 = 0.01;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -430,19 +433,32 @@ pub(super) fn beyond(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
     names
 }
 
-/// Drops the effect that is needed least, if there is one that is not needed or whose law the record does not determine.
+/// Drops the effect that is needed least, if there is one that is not needed, whose law the record does not determine, or that takes no more than
+/// the misfit of the law of another of its kind.
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = beyond(&best.fit.hypothesis, already);
     let loose = undetermined(&best.fit);
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.without(best, *e, already)).collect();
+    let reduced: Vec<Option<Trial>> = reduced.into_iter().collect::<Result<_, _>>()?;
+    let explained = |trial: &Option<Trial>| trial.as_ref().map_or(f64::INFINITY, |t| t.total() - best.total());
+    let takes_time = |cause: &Cause| cause.effect().is_some_and(|e| TAKES_TIME.contains(&e));
+    // No law is the device's to the last digit: a second law of the same kind takes what the first one misses.
+    let of_its_kind: Vec<bool> = names
+        .iter()
+        .zip(&reduced)
+        .map(|(cause, own)| {
+            let mut others = names.iter().zip(&reduced).filter(|(other, _)| takes_time(other) && *other != cause);
+            takes_time(cause) && others.any(|(_, t)| explained(own) < MIN_SHARE_OF_KIND * explained(t))
+        })
+        .collect();
     let mut least: Option<Trial> = None;
-    for (cause, trial) in names.iter().zip(reduced) {
+    for ((cause, trial), is_misfit) in names.iter().zip(reduced).zip(of_its_kind) {
         // Without one effect another may be driven to nonsense: then the first one is needed.
-        let Some(trial) = trial?.filter(|t| score::sensible(judge.problem, t)) else { continue };
+        let Some(trial) = trial.filter(|t| score::sensible(judge.problem, t)) else { continue };
         let is_loose =
             cause.effect().is_some_and(|effect| loose.contains(&effect)) && !score::is_far_better(&trial, best);
-        if (is_loose || !judge.judge(&trial, best).accepted())
+        if (is_loose || is_misfit || !judge.judge(&trial, best).accepted())
             && least.as_ref().is_none_or(|l| trial.total() < l.total())
         {
             least = Some(trial);
