@@ -13,8 +13,8 @@ const SWEPT: f64 = 0.9;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
 
-/// Part of a transient, as one over this, that has at least the mean power of all of it.
-const AT_ONCE: usize = 4;
+/// Parts of a transient of which the first one has the highest power.
+const DECAY_PARTS: usize = 4;
 /// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
 const NO_MORE: f64 = 1.05;
 /// Share of the output's span below which an RMSE is rounding.
@@ -72,9 +72,11 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
-        // What is left from before is there at once, and decays. What comes later, in a sweep that passes a mode, is the record's own.
-        let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>() / rows.len().max(1) as f64;
-        if power(&rows[..=last / AT_ONCE]) < power(&rows[..=last]) {
+        // What is left from before is largest at once, and decays. What comes later, in a sweep that passes a mode, is the record's own.
+        let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64;
+        let mut parts = rows[..=last].chunks(last / DECAY_PARTS + 1).map(power);
+        let first = parts.next().unwrap_or(0.0);
+        if parts.any(|later| later > first) {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
