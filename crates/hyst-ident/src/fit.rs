@@ -18,7 +18,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{start_up_rows, windows};
+use crate::settle::{AT_REST, start_up_rows, windows};
 use crate::simulate::{Zero, simulate};
 
 /// Cells along one edge of the Preisach triangle.
@@ -376,7 +376,7 @@ pub(crate) fn fit_settled(
     // by a fit that has not seen them. So too where a record begins away from 0 V: its memory there is
     // nobody's guess. If neither, they belong to the record (and hold its virgin curve).
     let (low, high) = samples.input_range();
-    let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > 0.1 * low.abs().max(high.abs()));
+    let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > AT_REST * low.abs().max(high.abs()));
     let residual = if away || rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
     samples.settling = start_up_rows(samples, residual);
     let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };

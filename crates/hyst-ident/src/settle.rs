@@ -13,8 +13,10 @@ const SWEPT: f64 = 0.9;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
 
-/// Parts of a transient of which the first one has the highest power.
-const DECAY_PARTS: usize = 4;
+/// Share of its range by which a drive has turned back when it counts as turned.
+const TURNED: f64 = 0.02;
+/// Share of the largest drive below which a segment begins at rest.
+pub(crate) const AT_REST: f64 = 0.1;
 /// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
 const NO_MORE: f64 = 1.05;
 /// Share of the output's span below which an RMSE is rounding.
@@ -66,17 +68,19 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let rms = (outside().map(|r| r * r).sum::<f64>() / n).sqrt();
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
     let mut settling = blind.clone();
+    let (low, high) = samples.input_range();
     for (s, window) in samples.segments.iter().zip(&windows) {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
         }
         let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
-        // What is left from before is largest at once, and decays. What comes later, in a sweep that passes a mode, is the record's own.
-        let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64;
-        let mut parts = rows[..=last].chunks(last / DECAY_PARTS + 1).map(power);
-        let first = parts.next().unwrap_or(0.0);
-        if parts.any(|later| later > first) {
+        // At rest the memory is known: beyond the first branches, which may be virgin, what is left from before can only ring or creep, and decays.
+        // What comes later, in a sweep that passes a mode, is the record's own.
+        let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>();
+        let (first, second) = rows[..=last].split_at(last.div_ceil(2));
+        let at_rest = samples.input[s.start].abs() < AT_REST * low.abs().max(high.abs());
+        if at_rest && last > 2 * first_turn(&samples.input[s.clone()]) && power(first) < power(second) {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
@@ -84,6 +88,17 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
         settling[s.start..s.start + end].fill(true);
     }
     settling
+}
+
+/// Rows until a drive that begins at rest turns for the first time.
+fn first_turn(u: &[f64]) -> usize {
+    let (low, high) = range(u.iter().copied());
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    let turned = u.iter().position(|u| {
+        (least, most) = (least.min(*u), most.max(*u));
+        (most - u).min(u - least) > TURNED * (high - low)
+    });
+    turned.unwrap_or(u.len())
 }
 
 /// Fits without some rows, and says which are a start-up then; `None` if that cannot be solved.

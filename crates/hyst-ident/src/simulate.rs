@@ -111,10 +111,15 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         if history.iter().any(|rows| *rows > 0) {
             let mut cycled = vec![0.0; samples.len()];
             drive.after(history).run(&*chain, &mut cycled);
-            let after = start_up_rows(&samples, &missed(&cycled));
+            let left = missed(&cycled);
+            let after = start_up_rows(&samples, &left);
             for segment in &samples.segments {
                 let starting = |rows: &[bool]| rows[segment.clone()].iter().filter(|s| **s).count();
-                if starting(&after) < starting(&settling) {
+                // Nor may it miss more of what the model follows from rest.
+                let squares = |residual: &[f64]| {
+                    segment.clone().filter(|k| !settling[*k]).map(|k| residual[k] * residual[k]).sum::<f64>()
+                };
+                if starting(&after) < starting(&settling) && squares(&left) <= squares(&residual) {
                     predicted[segment.clone()].copy_from_slice(&cycled[segment.clone()]);
                 }
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hyst_core::CurveSide;
 
-use super::search::Named;
+use super::search::{Named, Search, further};
 use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
 use crate::base::Drag;
@@ -102,6 +102,27 @@ impl Own<'_> {
         self.take(shape.named.effect, &shape.fit, errors);
         *hypothesis = shape.hypothesis;
         Ok((Some(shape.named), shape.anew.and_then(|at| bases.swap_remove(at))))
+    }
+
+    /// What a search on the own base finds where the rich one needs nothing; none unless it explains the record as well as that.
+    pub(super) fn closing(
+        &self,
+        found: &Hypothesis,
+        start: &Hypothesis,
+        richest: f64,
+        noise: f64,
+        seed: u64,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Result<Option<Search>, FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let stage = |e| self.stage(e);
+        let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
+        if shape::is_complete(&plain, richest) {
+            return Ok(None);
+        }
+        let search = further(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
+        Ok(Some(search).filter(|s| !s.named.is_empty() && s.best.cv_rmse() <= shape::CLOSED_ANEW * richest))
     }
 
     /// The own base with plays where the record calls for them once these effects are known, if they predict clearly better than those

@@ -118,6 +118,7 @@ pub fn diagnose(
         BasisOf::Fixed(kept) => Some(kept.clone()),
         _ => None,
     };
+    let kept_none = kept.is_none();
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
@@ -205,6 +206,17 @@ pub fn diagnose(
         basis = behind.or(basis);
         found.named.extend(curve);
         found.named.sort_by_key(|n| n.effect);
+    }
+    // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
+    if found.named.is_empty() && only_loop.is_none() && kept_none {
+        progress("asking whether the model's own base with an effect explains as much");
+        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
+        if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
+            hypothesis = closing.best.fit.hypothesis.clone();
+            errors = uncertainty::standard_errors(&closing.best.fit, samples.time[0]);
+            found = closing;
+            basis = asked.on_better_plays(&hypothesis)?.or(basis);
+        }
     }
     let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
 

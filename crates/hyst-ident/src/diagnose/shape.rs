@@ -17,7 +17,7 @@ const MISSING: f64 = 1.1;
 /// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
 const CLOSED: f64 = 1.7;
 /// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
-const CLOSED_ANEW: f64 = 1.25;
+pub(super) const CLOSED_ANEW: f64 = 1.25;
 /// Share of what stands above the noise floor that it has to take.
 const TAKEN: f64 = 0.9;
 /// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
