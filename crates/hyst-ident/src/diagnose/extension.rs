@@ -17,6 +17,9 @@ use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::Simulation;
 
+/// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
+const MAX_RISE: f64 = 1.05;
+
 /// A model and the record that it is extended on.
 #[derive(Clone, Copy)]
 pub(super) struct Own<'a> {
@@ -202,7 +205,13 @@ impl Own<'_> {
             let squares = |s: &Simulation| rows().map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>();
             squares(after) < squares(before)
         };
-        errs_less(&|_| true) || errs_less(&|k| !after.settling[k])
+        let both = |k: usize| !before.settling[k] && !after.settling[k];
+        let squares = |s: &Simulation| {
+            let rows = (0..samples.len()).filter(|k| both(*k));
+            rows.map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>()
+        };
+        (errs_less(&|_| true) || errs_less(&|k| !after.settling[k]))
+            && squares(after) <= MAX_RISE * MAX_RISE * squares(before)
     }
 
     /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does

@@ -8,7 +8,7 @@ use hyst_core::{ResonanceParams, SaturationParams};
 use super::tone::stands_alone;
 use super::trial::Trial;
 use crate::Samples;
-use crate::nested::{Problem, ends_at_a_bound, shown_motion};
+use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
 use crate::samples::range;
 
 /// Bootstrap draws.
@@ -177,7 +177,7 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.lag.is_none_or(|p| time(p.seconds))
         && e.rate.is_none_or(|p| p.volts > 0.0)
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
-        && e.saturation.is_none_or(|p| stops_something(samples, trial, &p))
+        && e.saturation.is_none_or(|p| stops_something(samples, &trial.fit, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
         && e.resonances.iter().all(|p| {
@@ -203,8 +203,8 @@ const TOUCHED: f64 = 0.003;
 const NEAR_LIMIT: f64 = 0.05;
 
 /// Whether the output comes to one of the limits and stays there for some rows.
-fn stops_something(samples: &Samples, trial: &Trial, p: &SaturationParams) -> bool {
-    let shown = shown_motion(samples, &trial.fit);
+pub(super) fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
+    let shown = shown_motion(samples, fit);
     let (low, high) = range(shown.iter().copied());
     let near = NEAR_LIMIT * (high - low);
     let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
