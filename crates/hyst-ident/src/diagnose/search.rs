@@ -35,7 +35,7 @@ const MIN_GAIN_TO_FIT: f64 = 0.5;
 const MIN_GAIN_TO_REPORT: f64 = 0.2;
 /// Effects that make the drive arrive late, and the share of what one of them explains (variance) that another beside it has to explain.
 const TAKES_TIME: [Effect; 3] = [Effect::Delay, Effect::Lag, Effect::RateDependence];
-const MIN_SHARE_OF_KIND: f64 = 0.01;
+pub(super) const MIN_SHARE_OF_KIND: f64 = 0.01;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 

@@ -6,11 +6,11 @@
 
 use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
 
-use super::search::{Instead, Named};
+use super::search::{Instead, MIN_SHARE_OF_KIND, Named};
 use super::trial::Trial;
 use super::{score, starts};
 use crate::model::Effect;
-use crate::nested::{Fitted, Hypothesis, Problem, dead_zone};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem, dead_zone};
 
 /// Error of the own base over that of the rich one from which on something is missing.
 const MISSING: f64 = 1.1;
@@ -160,6 +160,19 @@ pub(super) fn shape(
                 && t.trial.cv_rmse() <= closed * least
                 && t.is_of_its_kind;
             Judged { tried: t, judgement, accepted }
+        })
+        .collect();
+    // A curve beside a stop may be no more than what the law of the stop misses.
+    let unstopped = match found.effects.saturation {
+        Some(_) => self::plain(problem, &found.without(Cause::Effect(Effect::Saturation)))?,
+        None => None,
+    };
+    let by_stop = unstopped.map_or(0.0, |without| without.total() - plain.total());
+    let judged: Vec<Judged<'_>> = judged
+        .into_iter()
+        .map(|j| {
+            let enough = plain.total() - j.tried.trial.total() >= MIN_SHARE_OF_KIND * by_stop;
+            Judged { accepted: j.accepted && enough, ..j }
         })
         .collect();
     // A stop has fewer numbers than a curve: where they are as good as each other it is the stop.

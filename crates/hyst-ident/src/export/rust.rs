@@ -93,7 +93,7 @@ pub fn rust(model: &Model) -> String {
          {inverse}\
          {surroundings}\
          #[allow(unused_imports)]\n\
-         use hyst_core::{{*, Curve::*, GlOrder::*, RateLaw::*, SlipReading::*}};\n\
+         use hyst_core::{{*, Curve::*, CurveSide::*, GlOrder::*, RateLaw::*, SlipReading::*}};\n\
          \n\
          /// The memory operator.\n\
          pub const OPERATOR: {operator};\n\

@@ -67,6 +67,7 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "tanh" => &["y = k0 u + alpha du/dt + beta tanh(gamma u)"],
         "asymmetry" => &[
             "y = u + sum over j of weights[j] d[j]: of thresholds[j] >= 0, d = max(u - thresholds[j], 0); below, min(u - thresholds[j], 0)",
+            "side: output, it bends what the hysteresis gives; input, it bends the drive before the hysteresis",
         ],
         "temperature" => &[
             "y = u (1 + per_kelvin x) + expansion x, seconds dx/dt = T - reference_degc - x, T the measured temperature",
