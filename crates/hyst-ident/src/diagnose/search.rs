@@ -174,8 +174,10 @@ impl Judge<'_> {
         let own = probes.iter().map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
         let may_win = |at: usize| {
             let probe = &probes[at];
-            probe.squares <= MAX_RATIO_TO_LEADER * leader
-                && probe.squares <= MAX_RATIO_TO_OWN * own
+            // In one loop all that is late is alike in the end, however far apart its laws begin.
+            let is_near = self.problem.only_loop.is_some()
+                || (probe.squares <= MAX_RATIO_TO_LEADER * leader && probe.squares <= MAX_RATIO_TO_OWN * own);
+            is_near
                 && gain(probe) >= MIN_GAIN_TO_FIT * scan.least_gain
                 && !probes[..at].iter().any(|other| other.hypothesis.is_near(&probe.hypothesis))
         };

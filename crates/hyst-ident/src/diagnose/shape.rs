@@ -230,7 +230,10 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
         let stop = f.hypothesis.effects.saturation;
         stop.is_some_and(|p| score::stops_something(problem.samples, f, &p))
     };
-    Ok(fits.into_iter().filter(|f| f.squares < plain.squares && stops(f)).min_by(|a, b| a.squares.total_cmp(&b.squares)))
+    Ok(fits
+        .into_iter()
+        .filter(|f| f.squares < plain.squares && stops(f))
+        .min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
 /// Where the operator's output, or the drive, goes in the rows that count, without its ends; none if it stands still.
