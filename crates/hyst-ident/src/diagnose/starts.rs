@@ -27,6 +27,9 @@ const SCAN: usize = 48;
 /// Exponents of the rate that are tried, and the overdrive at the reference rate, as a share of the range.
 const EXPONENTS: [f64; 4] = [0.15, 0.4, 0.7, 1.0];
 const TRIED_OVERDRIVE: f64 = 0.005;
+/// Ratio of one start of a delay or lag to the one before, and the share of a segment below which they are.
+const LATER: f64 = 12.0;
+const MOST_LATE: f64 = 0.01;
 /// Slopes of the coarse scan, and what each is of the one before.
 const SLOPES: usize = 20;
 const LESS_STEEP: f64 = 0.65;
@@ -54,8 +57,8 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         }
     };
     Ok(match effect {
-        Effect::Delay => vec![with(&|e| e.delay = Some(DelayParams { seconds: samples.period }))],
-        Effect::Lag => vec![with(&|e| e.lag = Some(LagParams { seconds: samples.period }))],
+        Effect::Delay => lateness(samples).map(|seconds| with(&|e| e.delay = Some(DelayParams { seconds }))).collect(),
+        Effect::Lag => lateness(samples).map(|seconds| with(&|e| e.lag = Some(LagParams { seconds }))).collect(),
         Effect::RateDependence => {
             // A drag that grows with the rate, and one that grows with its root.
             let (low, high) = samples.input_range();
@@ -105,6 +108,13 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
             found.into_iter().map(|mode| with(&|e| e.resonances.push(mode))).collect()
         }
     })
+}
+
+/// Times by which the output may be late \[s\]: a sample, and where the sample rate is high for the record, more.
+fn lateness(samples: &Samples) -> impl Iterator<Item = f64> {
+    let most = MOST_LATE * samples.longest_segment();
+    let times = [1.0, LATER, LATER * LATER].map(|periods| periods * samples.period);
+    times.into_iter().enumerate().filter(move |(i, seconds)| *i == 0 || *seconds < most).map(|(_, seconds)| seconds)
 }
 
 /// A stop at the upper and one at the lower end of what the sensor has shown, the other end far away; none where it has shown no motion.

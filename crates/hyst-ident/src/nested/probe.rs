@@ -14,7 +14,7 @@ use crate::lsq::{Bounds, solve_near};
 /// Iterations of a probe.
 const ITERATIONS: usize = 8;
 /// Relative fall of the objective at which it has converged.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 1e-4;
 /// Damped steps that are tried in one iteration.
 const TRIES: usize = 4;
 /// Iterations of an exact fit where the base's columns cannot be held.
