@@ -23,6 +23,10 @@ use crate::simulate::{Zero, simulate};
 
 /// Cells along one edge of the Preisach triangle.
 pub(crate) const CELLS: usize = 24;
+/// And of the coarsest, for a short record.
+const MIN_CELLS: usize = 8;
+/// Rows for each unknown that a fit needs.
+pub(crate) const ROWS_EACH: usize = 3;
 /// Blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
 /// Rows that one fit uses at most; longer records are thinned evenly after filtering.
@@ -294,7 +298,13 @@ impl BasisOf {
 pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitError> {
     Ok(match kind {
         Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
-        Kind::Preisach => BasisOf::Preisach(PreisachBasis::for_samples(samples, CELLS)),
+        Kind::Preisach => {
+            // A short record determines a coarser triangle.
+            let most = samples.len() / ROWS_EACH;
+            let finest = |cells: &usize| PreisachBasis::for_samples(samples, *cells).len() <= most;
+            let cells = (MIN_CELLS..=CELLS).rev().find(finest).unwrap_or(MIN_CELLS);
+            BasisOf::Preisach(PreisachBasis::for_samples(samples, cells))
+        }
         other => return Err(FitError::NoBasis { kind: other.name() }),
     })
 }

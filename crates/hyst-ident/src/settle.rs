@@ -167,6 +167,24 @@ mod tests {
     use crate::nested::Hypothesis;
     use crate::record::{Columns, OutputUnit, Record};
 
+    /// From rest: a drive of many cycles, and what is missed of its output.
+    fn missed(of: impl Fn(f64) -> f64) -> usize {
+        let phase = |k: i32| std::f64::consts::TAU * f64::from(k) / 100.0;
+        let input: Vec<f64> = (0..3000).map(|k| (1.0 - phase(k).cos()) * (0.2 + f64::from(k) / 3000.0)).collect();
+        let samples = Samples::of_columns(1e-3, input.clone(), input);
+        let residual: Vec<f64> = (0..3000).map(|k| of(f64::from(k)) + 0.01 * (0.7 * f64::from(k)).sin()).collect();
+        count(&start_up_rows(&samples, &residual))
+    }
+
+    #[test]
+    fn what_decays_from_the_first_row_is_a_start_up_and_what_comes_later_is_none() {
+        assert!((300..1000).contains(&missed(|k| (-k / 100.0).exp())), "{}", missed(|k| (-k / 100.0).exp()));
+        // A sweep that passes a mode.
+        assert_eq!(missed(|k| (-((k - 900.0) / 150.0).powi(2)).exp()), 0);
+        // The first branch alone, before the drive turns.
+        assert!(missed(|k| (-((k - 30.0) / 10.0).powi(2)).exp()) > 30);
+    }
+
     #[test]
     fn a_cycle_ends_where_the_drive_comes_by_as_it_began() {
         let cycle = |input: Vec<f64>| first_cycles(&Samples::of_columns(1e-3, input.clone(), input))[0];

@@ -36,6 +36,11 @@ impl PiBasis {
         Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain }
     }
 
+    /// The same with a share of the plays.
+    pub(crate) fn coarser(samples: &Samples, by: usize) -> Self {
+        Self { thresholds: even(samples, LOOPS.div_ceil(by), VIRGIN.div_ceil(by)), ..Self::for_samples(samples) }
+    }
+
     /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
     /// are left out clearly better than these do and are no more. `None` if there are none. The output shows a play as what `through`
     /// makes of it.

@@ -19,6 +19,11 @@ use crate::Samples;
 use crate::lsq::Bounds;
 use crate::repetition::only_loop;
 
+/// Rows for each unknown of the base: with fewer, noise looks like an effect.
+pub(crate) const ROWS_EACH: usize = 10;
+/// Divisor of the number of plays for the shortest records.
+const COARSEST: usize = 5;
+
 /// Plays with quadratic and cubic curves, and a bank that relaxes with travel.
 #[derive(Clone, Debug)]
 pub(crate) struct ScreeningBasis {
@@ -35,7 +40,13 @@ impl ScreeningBasis {
     /// For the input range of a record; with drag only where the base that is extended in the end has one too, and with that base
     /// if it is kept as it is.
     pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
-        let linear = PiBasis::for_samples(samples);
+        // A short record determines fewer curves.
+        let of = |by: usize| Self::of(samples, PiBasis::coarser(samples, by), drags, kept.clone());
+        let fits = |basis: &Self| ROWS_EACH * basis.len() <= samples.len();
+        (1..COARSEST).map(of).find(fits).unwrap_or_else(|| of(COARSEST))
+    }
+
+    fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();

@@ -43,7 +43,7 @@ pub use suspects::{FOLLOWED, drive_options};
 
 use extension::Own;
 
-use crate::base::{Basis, DragParams, ScreeningBasis};
+use crate::base::{Basis, DragParams, ROWS_EACH, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
@@ -84,8 +84,6 @@ pub struct Diagnosis {
     pub weighed: Vec<Weighed>,
 }
 
-/// Rows that the search needs for each unknown of its base: with fewer, noise looks like an effect.
-const ROWS_PER_UNKNOWN: usize = 10;
 /// Rows that the search uses at most.
 const SEARCH_ROWS: usize = 16_000;
 /// Rows that the search for a curve behind the own base uses at most.
@@ -123,7 +121,7 @@ pub fn diagnose(
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
-    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
+    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * screening.len());
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
     }

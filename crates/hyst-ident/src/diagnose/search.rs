@@ -104,7 +104,7 @@ fn expansion(trial: &Trial) -> f64 {
 /// What is known of a cause added to a fit.
 enum Attempt {
     /// It was fitted before: what came of it.
-    Known(Option<Hypothesis>),
+    Known(Option<Box<Hypothesis>>),
     /// Where a probe from each start has led.
     Begun(Vec<Probe>),
 }
@@ -160,7 +160,7 @@ impl Judge<'_> {
             same.map(|(.., found)| found.clone())
         });
         if let Some(found) = known {
-            return Ok(Attempt::Known(found));
+            return Ok(Attempt::Known(found.map(Box::new)));
         }
         let starts = starts::starts(scan, cause)?;
         let probes: Vec<Result<Option<Probe>, Error>> =

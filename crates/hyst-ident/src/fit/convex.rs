@@ -1,8 +1,8 @@
 //! Fits that are one convex problem: weights over plays or cells.
 
 use super::{
-    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, basis_for, check, fit_settled, sign_matters, solved, to_model,
-    with_errors,
+    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_EACH, basis_for, check, fit_settled, sign_matters, solved,
+    to_model, with_errors,
 };
 use crate::base::{Drag, SlidingPlays};
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
@@ -14,8 +14,6 @@ use crate::samples::Samples;
 
 /// Rows below which no model of this version can be fitted, whatever they show.
 const FEWEST: usize = 45;
-/// Rows for each unknown that a fit needs.
-const ROWS_EACH: usize = 3;
 /// How it is done, in words.
 const HOW: &str = "convex: weights that are not negative, one optimum";
 

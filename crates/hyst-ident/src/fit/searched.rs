@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, check, model_of, with_errors};
+use super::{Fit, FitError, FitOptions, Optimizer, ROWS_EACH, check, model_of, with_errors};
 use crate::BetweenSamples;
 use crate::identify::{Beside, Ended, Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
 use crate::optimize::{Method, Progress, SearchError};
@@ -14,8 +14,6 @@ use crate::settle::start_up_rows;
 
 /// Most rows that a global search looks at.
 const SEARCHED: usize = 12_000;
-/// Rows for each unknown that a fit needs.
-const ROWS_EACH: usize = 3;
 /// Share of what a linear drive leaves that a band-limited one has to stay below: what makes no difference is linear.
 const LESS: f64 = 0.99;
 

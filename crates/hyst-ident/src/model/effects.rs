@@ -136,6 +136,15 @@ pub struct Effects {
     pub saturation: Option<SaturationParams>,
 }
 
+/// The stages that act before the hysteresis, in their order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct InputSide<'a> {
+    pub(crate) delay: Option<DelayParams>,
+    pub(crate) lag: Option<LagParams>,
+    pub(crate) rate: Option<RateParams>,
+    pub(crate) curve: Option<&'a AsymmetryParams<Vec<f64>>>,
+}
+
 /// A parameter as it is searched, with what moves it.
 pub(crate) struct Parameter<'a> {
     pub(crate) effect: Effect,
@@ -220,11 +229,9 @@ impl Effects {
         less
     }
 
-    /// The stages that act before the hysteresis, in their order.
-    pub(crate) fn input_side(
-        &self,
-    ) -> (Option<DelayParams>, Option<LagParams>, Option<RateParams>, Option<&AsymmetryParams<Vec<f64>>>) {
-        (self.delay, self.lag, self.rate, self.curve(CurveSide::Input))
+    /// The stages that act before the hysteresis.
+    pub(crate) fn input_side(&self) -> InputSide<'_> {
+        InputSide { delay: self.delay, lag: self.lag, rate: self.rate, curve: self.curve(CurveSide::Input) }
     }
 
     /// The curve, if it is on this side of the hysteresis.

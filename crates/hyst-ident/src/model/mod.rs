@@ -15,5 +15,5 @@ pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA, ZERO};
 pub use hyst_core::Kind;
 pub use operator::{Base, Compensator, HostChain, InverseState, Operator, OperatorInverse, OperatorState, searchable};
 
-pub(crate) use effects::creep_share;
+pub(crate) use effects::{InputSide, creep_share};
 pub(crate) use operator::{ROOM as TEMPERATURE_OF_INVERSE, searched_range};

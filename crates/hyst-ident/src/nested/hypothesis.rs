@@ -3,7 +3,7 @@
 use hyst_core::{CurveSide, TemperatureParams};
 
 use crate::base::DragParams;
-use crate::model::{Effect, Effects};
+use crate::model::{Effect, Effects, InputSide};
 
 /// Something that a trial may add to the base: an effect that has a name, or what has none.
 ///
@@ -121,7 +121,7 @@ impl Hypothesis {
 
     /// Whether anything changes what drives the hysteresis, or how it follows.
     pub(super) fn changes_the_base(&self) -> bool {
-        self.effects.input_side() != (None, None, None, None) || self.drag.is_some() || self.slew_limit.is_some()
+        self.effects.input_side() != InputSide::default() || self.drag.is_some() || self.slew_limit.is_some()
     }
 
     /// Whether the hysteresis is driven, and follows, as in another set.

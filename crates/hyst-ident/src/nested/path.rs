@@ -10,6 +10,7 @@ use hyst_core::{
 use super::Hypothesis;
 use crate::Samples;
 use crate::base::BESIDE;
+use crate::model::InputSide;
 use crate::model::capacity::{CREEP, DELAY};
 
 /// What leads to the hysteresis and what follows it, for one set of causes.
@@ -39,7 +40,7 @@ impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let cx = Sampling { period: samples.period };
         let effects = &h.effects;
-        let (delay, lag, rate, curve) = effects.input_side();
+        let InputSide { delay, lag, rate, curve } = effects.input_side();
         let warmth = effects.temperature.as_ref().map(|p| warmth(samples, p)).transpose()?;
         let stop = effects.saturation.as_ref().map(|p| {
             let forward: Saturation<f64> = p.build(&())?;
