@@ -121,11 +121,16 @@ impl Own<'_> {
         let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
         let stage = |e| self.stage(e);
         let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
-        if shape::is_complete(&plain, richest) {
+        // What a wandering or a slow amplifier leaves is no base's.
+        let nameless = found.causes().iter().any(|cause| cause.effect().is_none());
+        if nameless || shape::is_complete(&plain, richest) {
             return Ok(None);
         }
+        let (before, floor) = (plain.total(), plain.fit.rows as f64 * noise * noise);
         let search = further(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
-        Ok(Some(search).filter(|s| !s.named.is_empty() && s.best.cv_rmse() <= shape::CLOSED_ANEW * richest))
+        let closes = search.best.cv_rmse() <= shape::CLOSED_ANEW * richest
+            && before - search.best.total() >= shape::TAKEN * (before - floor);
+        Ok(Some(search).filter(|s| closes && !s.named.is_empty()))
     }
 
     /// The own base with plays where the record calls for them once these effects are known, if they predict clearly better than those

@@ -19,7 +19,7 @@ const CLOSED: f64 = 1.7;
 /// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
 pub(super) const CLOSED_ANEW: f64 = 1.25;
 /// Share of what stands above the noise floor that it has to take.
-const TAKEN: f64 = 0.9;
+pub(super) const TAKEN: f64 = 0.9;
 /// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
 /// operators are too coarse for.
 const LOPSIDED: f64 = 0.25;
