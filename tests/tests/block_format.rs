@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 use hyst_core::{
     ActivationParams, AsymmetryParams, BLOCK_VERSION, BlockError, BoucWenOscillatorParams, BoucWenParams, ChainParams,
-    CreepParams, Curve, CurveSide, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
+    CreepParams, Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
     InterferenceParams, Kind, LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams,
     PiParams, PreisachParams, RateLaw, RateParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams,
     TdPiParams, TemperatureParams, ViscousPiParams, read_block, write_block,
@@ -118,11 +118,7 @@ fn effects() -> Vec<(&'static str, Effects)> {
         delay: Some(DelayParams { seconds: 1.5 }),
         lag: Some(LagParams { seconds: 2.5 }),
         rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, law: RateLaw::Holds }),
-        asymmetry: Some(AsymmetryParams {
-            thresholds: vec![1.5, 2.5],
-            weights: vec![3.5, 4.5],
-            side: CurveSide::Input,
-        }),
+        asymmetry: Some(AsymmetryParams::before(vec![1.5, 2.5], vec![3.5, 4.5])),
         temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5, expansion: 3.25, seconds: 4.25 }),
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),
         load: Some(LoadParams { per_newton: 1.5 }),

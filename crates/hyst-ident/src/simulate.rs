@@ -108,7 +108,8 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         let mut residual = missed(&predicted);
         settling = start_up_rows(&samples, &residual);
         let history = histories(&samples, &settling);
-        if history.iter().any(|rows| *rows > 0) {
+        // A period of a steady state has its own history.
+        if !options.periodic && history.iter().any(|rows| *rows > 0) {
             let mut cycled = vec![0.0; samples.len()];
             drive.after(history).run(&*chain, &mut cycled);
             let left = missed(&cycled);

@@ -32,6 +32,18 @@ pub struct AsymmetryParams<L> {
     pub side: CurveSide,
 }
 
+impl<L> AsymmetryParams<L> {
+    /// A curve behind the hysteresis: thresholds \[y\] and changes of slope.
+    pub const fn behind(thresholds: L, weights: L) -> Self {
+        Self { thresholds, weights, side: CurveSide::Output }
+    }
+
+    /// A curve before the hysteresis: thresholds \[u\] and changes of slope.
+    pub const fn before(thresholds: L, weights: L) -> Self {
+        Self { thresholds, weights, side: CurveSide::Input }
+    }
+}
+
 impl<L: AsMut<[f64]>> Params for AsymmetryParams<L> {
     fn visit(&mut self, f: &mut dyn FnMut(&Meta, &mut f64)) {
         const INF: f64 = f64::INFINITY;
@@ -168,7 +180,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn curve(thresholds: &[f64], weights: &[f64]) -> Asymmetry<f64, 4> {
-        AsymmetryParams { thresholds, weights, side: CurveSide::Output }.build(&()).unwrap()
+        AsymmetryParams::behind(thresholds, weights).build(&()).unwrap()
     }
 
     proptest! {
@@ -193,8 +205,7 @@ mod tests {
     #[test]
     fn a_curve_that_falls_has_no_inverse() {
         assert!(curve(&[1.0, 2.0], &[-0.6, -0.5]).invert().is_err());
-        let built: Result<Asymmetry<f64, 4>, _> =
-            AsymmetryParams { thresholds: [2.0, 1.0], weights: [0.1, 0.1], side: CurveSide::Input }.build(&());
+        let built: Result<Asymmetry<f64, 4>, _> = AsymmetryParams::before([2.0, 1.0], [0.1, 0.1]).build(&());
         assert!(matches!(built, Err(Error::OutOfRange { name: "asymmetry.thresholds", .. })));
     }
 }

@@ -295,20 +295,8 @@ mod tests {
             .and_then(|c| c.with_temperature(&warm(), &cx))
             .and_then(|c| c.with_creep(&CreepParams { seconds: &[0.1, 1.0, 10.0], shares: &[0.01, 0.01, 0.01] }, &cx))
             .and_then(|c| c.with_resonance(&ResonanceParams { hz: 120.0, damping: 0.03, gain: 0.9 }, &cx))
-            .and_then(|c| {
-                c.with_asymmetry(&AsymmetryParams {
-                    thresholds: [3.0, -2.0],
-                    weights: [0.1, -0.05],
-                    side: CurveSide::Output,
-                })
-            })
-            .and_then(|c| {
-                c.with_asymmetry(&AsymmetryParams {
-                    thresholds: [20.0, 60.0],
-                    weights: [0.2, 0.1],
-                    side: CurveSide::Input,
-                })
-            })
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([3.0, -2.0], [0.1, -0.05])))
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([20.0, 60.0], [0.2, 0.1])))
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.02 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -5.0, high: 14.0, knee: 0.1 }))
             .and_then(|c| c.with_drift(&DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 }))
@@ -392,7 +380,7 @@ mod tests {
         let bent = |zones: u8| {
             let thresholds: Vec<f64> = (1..=zones).map(f64::from).collect();
             let weights = std::vec![0.1; thresholds.len()];
-            chain::<f64>().with_asymmetry(&AsymmetryParams { thresholds, weights, side: CurveSide::Output })
+            chain::<f64>().with_asymmetry(&AsymmetryParams::behind(thresholds, weights))
         };
         assert!(bent(8).is_ok());
         assert!(matches!(bent(9), Err(Error::Capacity { needed: 9, holds: MAX_DEAD_ZONES, .. })));

@@ -312,7 +312,7 @@ mod tests {
     use super::*;
     use crate::{
         Activation, ActivationKind, ActivationParams, AntiCausal, AsymmetryParams, BoucWen, BoucWenParams, CreepParams,
-        CurveSide, LagParams, LoadParams, Pi, ResonanceParams, SaturationParams, TemperatureParams,
+        LagParams, LoadParams, Pi, ResonanceParams, SaturationParams, TemperatureParams,
     };
     use std::boxed::Box;
     use std::vec::Vec;
@@ -383,20 +383,8 @@ mod tests {
             .and_then(|c| {
                 c.with_creep(&CreepParams { seconds: &[0.05, 0.5, 5.0], shares: &[0.02, 0.02, 0.02] }, &PERIOD)
             })
-            .and_then(|c| {
-                c.with_asymmetry(&AsymmetryParams {
-                    thresholds: [2.0, -0.5],
-                    weights: [0.2, -0.1],
-                    side: CurveSide::Output,
-                })
-            })
-            .and_then(|c| {
-                c.with_asymmetry(&AsymmetryParams {
-                    thresholds: [15.0, 45.0],
-                    weights: [0.3, -0.2],
-                    side: CurveSide::Input,
-                })
-            })
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams::behind([2.0, -0.5], [0.2, -0.1])))
+            .and_then(|c| c.with_asymmetry(&AsymmetryParams::before([15.0, 45.0], [0.3, -0.2])))
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
             .unwrap();

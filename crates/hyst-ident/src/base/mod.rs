@@ -11,7 +11,7 @@ pub(crate) use drag::{Drag, DragParams};
 pub(crate) use fixed::FixedBasis;
 pub(crate) use pi::{PiBasis, SlidingPlays, play_column};
 pub(crate) use preisach::PreisachBasis;
-pub(crate) use screening::{ROWS_EACH, ScreeningBasis};
+pub(crate) use screening::{ROWS_PER_UNKNOWN, ScreeningBasis};
 
 use std::ops::Range;
 

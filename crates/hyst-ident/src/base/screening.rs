@@ -20,7 +20,7 @@ use crate::lsq::Bounds;
 use crate::repetition::only_loop;
 
 /// Rows for each unknown of the base: with fewer, noise looks like an effect.
-pub(crate) const ROWS_EACH: usize = 10;
+pub(crate) const ROWS_PER_UNKNOWN: usize = 10;
 /// Divisor of the number of plays for the shortest records.
 const COARSEST: usize = 5;
 
@@ -42,7 +42,7 @@ impl ScreeningBasis {
     pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
         // A short record determines fewer curves.
         let of = |by: usize| Self::of(samples, PiBasis::coarser(samples, by), drags, kept.clone());
-        let fits = |basis: &Self| ROWS_EACH * basis.len() <= samples.len();
+        let fits = |basis: &Self| ROWS_PER_UNKNOWN * basis.len() <= samples.len();
         (1..COARSEST).map(of).find(fits).unwrap_or_else(|| of(COARSEST))
     }
 

@@ -203,6 +203,7 @@ impl Own<'_> {
 
     /// Whether it errs less `after` than `before`, over the rows that count for the search: a model that misses a stop, say, takes
     /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
+    /// In any case it may not err more, by [`MAX_RISE`], over the rows that are a start-up for neither.
     pub(super) fn is_helped(&self, before: &Simulation, after: &Simulation) -> bool {
         let samples = self.samples;
         let errs_less = |counts: &dyn Fn(usize) -> bool| {

@@ -19,6 +19,7 @@ mod finer;
 mod limits;
 mod named;
 mod probability;
+mod race;
 mod remainder;
 mod rows;
 mod scan;
@@ -43,7 +44,7 @@ pub use suspects::{FOLLOWED, drive_options};
 
 use extension::Own;
 
-use crate::base::{Basis, DragParams, ROWS_EACH, ScreeningBasis};
+use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
@@ -116,12 +117,11 @@ pub fn diagnose(
         BasisOf::Fixed(kept) => Some(kept.clone()),
         _ => None,
     };
-    let kept_none = kept.is_none();
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
-    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * screening.len());
+    let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
     if rows < needed {
         return Err(FitError::TooShort { record: train.name(), rows, unknowns: screening.len(), needed });
     }
@@ -206,7 +206,7 @@ pub fn diagnose(
         found.named.sort_by_key(|n| n.effect);
     }
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
-    if found.named.is_empty() && only_loop.is_none() && kept_none {
+    if found.named.is_empty() && only_loop.is_none() && !matches!(own, BasisOf::Fixed(_)) {
         progress("asking whether the model's own base with an effect explains as much");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {

@@ -12,7 +12,7 @@ use super::trial::Trial;
 use super::uncertainty::undetermined;
 use super::{hidden, starts};
 use crate::model::Effect;
-use crate::nested::{Cause, Fitted, Hypothesis, Probe, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
 
 /// Σ residual², over that of the best set, beyond which a second one is not carried on beside it.
@@ -25,14 +25,6 @@ const SMALL_DRAG: f64 = 2.0;
 const EVEN: f64 = 0.9;
 /// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
 const MOST_STEP: f64 = 0.25;
-/// Σ residual² of a probe, over that of the leader, up to which it is fitted in full: more than [`BEAM_WITHIN`], so that what is given up would not
-/// have been carried on.
-const MAX_RATIO_TO_LEADER: f64 = 4.0;
-/// The same over that of the best law of its cause.
-const MAX_RATIO_TO_OWN: f64 = 2.0;
-/// Gain of a probe, over that which an effect has to have, from which on it is fitted in full, and from which on it is reported.
-const MIN_GAIN_TO_FIT: f64 = 0.5;
-const MIN_GAIN_TO_REPORT: f64 = 0.2;
 /// Effects that make the drive arrive late, and the share of what one of them explains (variance) that another beside it has to explain.
 const TAKES_TIME: [Effect; 3] = [Effect::Delay, Effect::Lag, Effect::RateDependence];
 pub(super) const MIN_SHARE_OF_KIND: f64 = 0.01;
@@ -94,154 +86,24 @@ pub(crate) struct Search {
     pub(crate) beside_wandering: Option<f64>,
 }
 
-const DRIFT: Cause = Cause::Effect(Effect::Drift);
-
-/// Thermal expansion of a set \[y/K\].
-fn expansion(trial: &Trial) -> f64 {
-    trial.fit.hypothesis.effects.temperature.map_or(0.0, |p| p.expansion)
-}
-
-/// What is known of a cause added to a fit.
-enum Attempt {
-    /// It was fitted before: what came of it.
-    Known(Option<Box<Hypothesis>>),
-    /// Where a probe from each start has led.
-    Begun(Vec<Probe>),
-}
+pub(super) const DRIFT: Cause = Cause::Effect(Effect::Drift);
 
 /// Context that every judgement needs.
-struct Judge<'a> {
-    problem: &'a Problem<'a>,
+pub(super) struct Judge<'a> {
+    pub(super) problem: &'a Problem<'a>,
     noise: f64,
-    seed: u64,
-    /// What came of adding a cause to a set. Each pair is asked for once in a round, so that threads change nothing.
-    known: Mutex<Vec<(Hypothesis, Cause, Option<Hypothesis>)>>,
+    pub(super) seed: u64,
+    /// What came of adding a cause to a set. It is looked up before a race and written in it, so that threads change nothing.
+    pub(super) known: Mutex<Vec<(Hypothesis, Cause, Option<Hypothesis>)>>,
 }
 
 impl Judge<'_> {
     /// Scans a fit for what may be added to it.
-    fn scan<'b>(&'b self, from: &'b Fitted) -> Result<Scan<'b>, Error> {
+    pub(super) fn scan<'b>(&'b self, from: &'b Fitted) -> Result<Scan<'b>, Error> {
         Scan::new(self.problem, from, score::least_gain_from(from.rows as f64, from.squares, self.noise))
     }
 
-    /// A cause added to a scanned fit.
-    fn trials(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
-        Ok(self.race(&[(scan, cause)])?.into_iter().next().flatten())
-    }
-
-    /// Each cause added to its scanned fit, in order. All are ranked by probes; only those that may still win, and may gain as
-    /// much as an effect has to, are fitted in full.
-    fn race(&self, jobs: &[(&Scan<'_>, Cause)]) -> Result<Vec<Option<Trial>>, Error> {
-        // Each trial is computed alone and collected in order: threads change nothing.
-        let attempts: Vec<Result<Attempt, Error>> =
-            jobs.par_iter().map(|(scan, cause)| self.attempt(scan, *cause)).collect();
-        let attempts: Vec<Attempt> = attempts.into_iter().collect::<Result<_, _>>()?;
-        let probes = attempts.iter().flat_map(|attempt| match attempt {
-            Attempt::Known(_) => &[],
-            Attempt::Begun(probes) => probes.as_slice(),
-        });
-        let leader = probes.map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
-        let ended: Vec<Result<Option<Trial>, Error>> = jobs
-            .par_iter()
-            .zip(&attempts)
-            .map(|((scan, cause), attempt)| match attempt {
-                Attempt::Known(found) => found.as_ref().map_or(Ok(None), |found| self.refit(found)),
-                Attempt::Begun(probes) => self.ended(scan, *cause, probes, leader),
-            })
-            .collect();
-        ended.into_iter().collect()
-    }
-
-    fn attempt(&self, scan: &Scan<'_>, cause: Cause) -> Result<Attempt, Error> {
-        let from = &scan.from.hypothesis;
-        // The same fit may be asked for again when effects are swapped.
-        let known = self.known.lock().ok().and_then(|known| {
-            let same = known.iter().find(|(parent, of, _)| *of == cause && parent == from);
-            same.map(|(.., found)| found.clone())
-        });
-        if let Some(found) = known {
-            return Ok(Attempt::Known(found.map(Box::new)));
-        }
-        let starts = starts::starts(scan, cause)?;
-        let probes: Vec<Result<Option<Probe>, Error>> =
-            starts.par_iter().map(|start| scan.vantage.probe(start)).collect();
-        Ok(Attempt::Begun(probes.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?))
-    }
-
-    /// The best of what came of some starts, those fitted to the end that may win against what leads.
-    fn ended(&self, scan: &Scan<'_>, cause: Cause, probes: &[Probe], leader: f64) -> Result<Option<Trial>, Error> {
-        let gain = |probe: &Probe| scan.from.squares - probe.squares;
-        let own = probes.iter().map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
-        let may_win = |at: usize| {
-            let probe = &probes[at];
-            // In one loop all that is late is alike in the end, however far apart its laws begin.
-            let is_near = self.problem.only_loop.is_some()
-                || (probe.squares <= MAX_RATIO_TO_LEADER * leader && probe.squares <= MAX_RATIO_TO_OWN * own);
-            is_near
-                && gain(probe) >= MIN_GAIN_TO_FIT * scan.least_gain
-                && !probes[..at].iter().any(|other| other.hypothesis.is_near(&probe.hypothesis))
-        };
-        let fits: Vec<Result<Option<Trial>, Error>> = (0..probes.len())
-            .into_par_iter()
-            .map(|at| match may_win(at) {
-                true => self.refit(&probes[at].hypothesis),
-                // It is reported beside the others.
-                false if gain(&probes[at]) >= MIN_GAIN_TO_REPORT * scan.least_gain => {
-                    let as_it_is = self.problem.fit_linear(&probes[at].hypothesis)?;
-                    Ok(as_it_is.and_then(|fit| Trial::of(self.problem, fit)))
-                }
-                false => Ok(None),
-            })
-            .collect();
-        let fitted = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
-        let found = self.best_law(fitted)?;
-        // What was given up is not known to its end.
-        if (0..probes.len()).all(may_win)
-            && let Ok(mut known) = self.known.lock()
-        {
-            let found = found.as_ref().map(|t| t.fit.hypothesis.clone());
-            known.push((scan.from.hypothesis.clone(), cause, found));
-        }
-        Ok(found)
-    }
-
-    /// Which of the laws of one cause stands for it.
-    fn best_law(&self, mut fitted: Vec<Trial>) -> Result<Option<Trial>, Error> {
-        // A law whose parameters end at a bound stands for another that is simpler.
-        if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
-            fitted.retain(|trial| score::sensible(self.problem, trial));
-        }
-        // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
-        fitted.sort_by_key(|trial| trial.fit.solution.len());
-        let mut best: Option<usize> = None;
-        for (at, trial) in fitted.iter().enumerate() {
-            let better = best.is_none_or(|best| {
-                let best = &fitted[best];
-                let is_simple = trial.fit.solution.len() == best.fit.solution.len();
-                trial.total() < best.total() && (is_simple || score::clearly_better(best, trial, self.seed))
-            });
-            best = if better { Some(at) } else { best };
-        }
-        let Some(best) = best else { return Ok(None) };
-        let chosen = if expansion(&fitted[best]) == 0.0 { best } else { self.unless_it_drifts(&fitted, best)? };
-        Ok(Some(fitted.swap_remove(chosen)))
-    }
-
-    /// Which of the laws of a temperature: the one that expands, or the best that does not where a drift beside it does as well. A zero that moves
-    /// as steadily as the temperature may as well drift.
-    fn unless_it_drifts(&self, laws: &[Trial], expands: usize) -> Result<usize, Error> {
-        let still = (0..laws.len()).filter(|at| expansion(&laws[*at]) == 0.0);
-        let still = still.min_by(|a, b| laws[*a].total().total_cmp(&laws[*b].total()));
-        let Some(still) = still.filter(|at| laws[*at].fit.hypothesis.has_room(DRIFT)) else { return Ok(expands) };
-        // Searched and not looked up: what is known must not depend on which thread was first.
-        let scan = self.scan(&laws[still].fit)?;
-        let Attempt::Begun(probes) = self.attempt(&scan, DRIFT)? else { return Ok(expands) };
-        let drifts = self.ended(&scan, DRIFT, &probes, f64::INFINITY)?;
-        let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, &laws[expands], self.seed));
-        Ok(if decided { expands } else { still })
-    }
-
-    fn refit(&self, effects: &Hypothesis) -> Result<Option<Trial>, Error> {
+    pub(super) fn refit(&self, effects: &Hypothesis) -> Result<Option<Trial>, Error> {
         Ok(self.problem.fit(effects)?.and_then(|f| Trial::of(self.problem, f)))
     }
 

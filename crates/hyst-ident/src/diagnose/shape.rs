@@ -283,7 +283,7 @@ mod tests {
     /// A curve of these slopes from each threshold to the next.
     fn curve(thresholds: &[f64], slopes: &[f64]) -> AsymmetryParams<Vec<f64>> {
         let weights = slopes.windows(2).map(|s| s[1] - s[0]).collect();
-        AsymmetryParams { thresholds: thresholds.to_vec(), weights, side: CurveSide::Output }
+        AsymmetryParams::behind(thresholds.to_vec(), weights)
     }
 
     #[test]

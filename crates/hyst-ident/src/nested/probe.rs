@@ -173,3 +173,89 @@ fn new_parameters(known: &Hypothesis, start: &Hypothesis) -> Vec<usize> {
     let known = names(known);
     names(start).into_iter().enumerate().filter(|(_, name)| !known.contains(name)).map(|(at, _)| at).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Samples;
+    use crate::base::ScreeningBasis;
+    use crate::lsq::Blocks;
+    use crate::model::{CreepBank, Effects};
+    use hyst_core::{CreepParams, DriftParams, LagParams, TemperatureParams, play};
+
+    /// Plays under a drive of several rates, its drive late by 4 ms, and what else `also` adds in each row \[y\].
+    fn samples(late: bool, also: impl Fn(usize, f64) -> f64) -> Samples {
+        let rows = 6000;
+        let drive = |t: f64| 50.0 * (1.0 - (5.0 * t * (1.0 + t)).cos()) * (0.6 + 0.4 * (1.1 * t).cos());
+        let input: Vec<f64> = (0..rows).map(|k| drive(1e-3 * f64::from(k))).collect();
+        let (mut v, mut plays) = (0.0, [0.0; 6]);
+        let output = input.iter().enumerate().map(|(k, u)| {
+            v = if late { v + (u - v) * (1.0 - (-0.25f64).exp()) } else { *u };
+            plays.iter_mut().enumerate().for_each(|(i, p)| *p = play(*p, v, 3.0 * (i + 1) as f64));
+            let y = 0.1 * v + 0.01 * plays.iter().sum::<f64>();
+            y + also(k, y) + 2e-3 * (1e4 * (y + 0.37 * k as f64)).sin()
+        });
+        let output = output.collect();
+        Samples::of_columns(1e-3, input, output)
+    }
+
+    /// What a probe and a full fit from the same start come to.
+    fn both(samples: &Samples, start: Effects) -> (Probe, Fitted, f64) {
+        let basis = ScreeningBasis::for_samples(samples, false, None);
+        let blocks = Blocks::new(samples, 40, 3000);
+        let problem = Problem::new(samples, &basis, &blocks, false);
+        let from = problem.fit(&Hypothesis::default()).unwrap().unwrap();
+        let vantage = Vantage::new(&problem, &from).unwrap();
+        let probe = vantage.probe(&Hypothesis::of(start.clone())).unwrap().unwrap();
+        let fit = problem.fit(&Hypothesis::of(start)).unwrap().unwrap();
+        (probe, fit, from.squares)
+    }
+
+    #[test]
+    fn what_a_probe_finds_is_what_a_fit_finds() {
+        let lag = Effects { lag: Some(LagParams { seconds: 1e-3 }), ..Effects::default() };
+        let (probe, fit, before) = both(&samples(true, |_, _| 0.0), lag);
+        let seconds = |h: &Hypothesis| h.effects.lag.unwrap().seconds;
+        assert!(probe.squares < 0.1 * before, "{} of {before}", probe.squares);
+        let (probed, fitted) = (seconds(&probe.hypothesis), seconds(&fit.hypothesis));
+        assert!((probed / fitted - 1.0).abs() < 0.1 && (fitted / 4e-3 - 1.0).abs() < 0.05, "{probed} {fitted}");
+    }
+
+    /// What is solved for takes its height in the first step; what only settles has its time constant searched.
+    #[test]
+    fn a_drift_needs_no_more_than_its_columns() {
+        let settles = |k: usize, _: f64| 0.4 * (1.0 - (-1e-3 * k as f64 / 1.5).exp());
+        let drift = DriftParams { seconds: 0.8, ..DriftParams::default() };
+        let (probe, fit, before) = both(&samples(false, settles), Effects { drift: Some(drift), ..Effects::default() });
+        assert!(probe.squares < 0.1 * before && probe.squares < 1.5 * fit.squares, "{} {}", probe.squares, fit.squares);
+        let seconds = probe.hypothesis.effects.drift.unwrap().seconds;
+        assert!((seconds / 1.5 - 1.0).abs() < 0.1, "{seconds} s");
+    }
+
+    #[test]
+    fn a_gain_over_temperature_and_a_creep_are_found() {
+        let degc = |k: usize| 23.0 + 4.0 * (9e-4 * k as f64).sin();
+        let warm = Samples {
+            temperature: Some((0..6000).map(degc).collect()),
+            ..samples(false, |k, y| 0.01 * (degc(k) - 23.0) * y)
+        };
+        let gain = TemperatureParams { reference_degc: 23.0, ..TemperatureParams::default() };
+        let (probe, ..) = both(&warm, Effects { temperature: Some(gain), ..Effects::default() });
+        let per_kelvin = probe.hypothesis.effects.temperature.unwrap().per_kelvin;
+        assert!((per_kelvin / 0.01 - 1.0).abs() < 0.05, "{per_kelvin}");
+        // Nothing creeps there: shares stay at nothing.
+        let bank: CreepBank = CreepParams { seconds: vec![0.2, 2.0], shares: vec![0.0, 0.0] };
+        let (probe, _, before) = both(&samples(false, |_, _| 0.0), Effects { creep: Some(bank), ..Effects::default() });
+        assert!(probe.squares > 0.9 * before, "{} of {before}", probe.squares);
+    }
+
+    #[test]
+    fn only_the_new_parameters_are_searched() {
+        let lag = Some(LagParams { seconds: 1e-3 });
+        let known = Hypothesis::of(Effects { lag, ..Effects::default() });
+        let drift = Some(DriftParams { seconds: 0.5, ..DriftParams::default() });
+        let start = Hypothesis::of(Effects { lag, drift, ..Effects::default() });
+        assert_eq!(new_parameters(&known, &start), [1]);
+        assert!(new_parameters(&start, &start).is_empty());
+    }
+}

@@ -106,6 +106,7 @@ mod tests {
             }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
             saturation: Some(SaturationParams { low: 0.3, high: 4.5, knee: 0.05 }),
+            asymmetry: Some(AsymmetryParams::before(vec![10.0, 30.0], vec![0.3, -0.2])),
             ..Effects::default()
         };
         let drag = Some(DragParams { seconds: 2e-3, volt_seconds: 1e-3 });
@@ -153,11 +154,7 @@ mod tests {
                 ..Default::default()
             }),
             resonances: vec![ResonanceParams { hz: 60.0, damping: 0.05, gain: 0.8 }],
-            asymmetry: Some(AsymmetryParams {
-                thresholds: vec![1.0, 2.5, -0.1],
-                weights: vec![0.1, 0.2, 0.1],
-                side: CurveSide::Output,
-            }),
+            asymmetry: Some(AsymmetryParams::behind(vec![1.0, 2.5, -0.1], vec![0.1, 0.2, 0.1])),
             saturation: Some(SaturationParams { low: -9.0, high: 4.5, knee: 0.05 }),
             ..Effects::default()
         };

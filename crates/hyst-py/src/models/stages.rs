@@ -60,7 +60,7 @@ models! {
         /// Changes of slope [ratio], shape (n,).
         weights: Vec<f64>,
     }
-    params: |p| Ok(AsymmetryParams { thresholds: p.thresholds.clone(), weights: p.weights.clone(), side: hyst_core::CurveSide::Output }),
+    params: |p| Ok(AsymmetryParams::behind(p.thresholds.clone(), p.weights.clone())),
     stage: hyst_core::Asymmetry<f64, { hyst_core::MAX_DEAD_ZONES }>,
     inverse: closed,
     needs: [],

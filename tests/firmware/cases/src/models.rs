@@ -16,8 +16,7 @@ pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.0
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
 pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
-pub(crate) const BENT: AsymmetryParams<[f64; 3]> =
-    AsymmetryParams { thresholds: [4.0, 10.0, -3.0], weights: [0.1, -0.05, 0.2], side: CurveSide::Output };
+pub(crate) const BENT: AsymmetryParams<[f64; 3]> = AsymmetryParams::behind([4.0, 10.0, -3.0], [0.1, -0.05, 0.2]);
 pub(crate) const COMPLIANCE: LoadParams = LoadParams { per_newton: -0.02 };
 pub(crate) const STOPS: SaturationParams = SaturationParams { low: -2.0, high: 20.0, knee: 0.2 };
 pub(crate) const GAINS: PidParams = PidParams {

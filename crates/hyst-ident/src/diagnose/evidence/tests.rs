@@ -1,8 +1,8 @@
 //! Evidence on records whose truth is known: a model's own prediction, with one more effect and noise.
 
 use hyst_core::{
-    AsymmetryParams, CreepParams, CurveSide, DelayParams, DriftParams, InterferenceParams, LagParams, LoadParams,
-    PiParams, ResonanceParams, SaturationParams, TemperatureParams, ViscousPiParams,
+    AsymmetryParams, CreepParams, DelayParams, DriftParams, InterferenceParams, LagParams, LoadParams, PiParams,
+    ResonanceParams, SaturationParams, TemperatureParams, ViscousPiParams,
 };
 use rand::{Rng, SeedableRng};
 
@@ -263,7 +263,7 @@ fn a_stop_holds_the_measurement() {
 
 #[test]
 fn a_curve_bends_both_branches_alike() {
-    let asymmetry = Some(AsymmetryParams { thresholds: vec![10.0], weights: vec![0.08], side: CurveSide::Output });
+    let asymmetry = Some(AsymmetryParams::behind(vec![10.0], vec![0.08]));
     let found = evidence(&actuator(Base::Pi(pi()), Effects { asymmetry, ..Effects::default() }), Effect::Asymmetry);
     let over = curves(&found, Effect::Asymmetry, "Residual over the output");
     for branch in &over[..2] {

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use hyst_core::{
-    AsymmetryParams, CreepParams, CurveSide, DelayParams, EffectParams, InterferenceParams, LagParams, ResonanceParams,
+    AsymmetryParams, CreepParams, DelayParams, EffectParams, InterferenceParams, LagParams, ResonanceParams,
     SaturationParams,
 };
 use nalgebra::DVector;
@@ -198,7 +198,7 @@ fn ends(add: &dyn Fn(f64, f64) -> DVector<f64>) -> Vec<Node> {
 fn zones(rig: &Rig) -> Vec<DVector<f64>> {
     let top = rig.plain.iter().copied().fold(0.0, f64::max);
     let zone = |share: f64| {
-        let curve = AsymmetryParams { thresholds: vec![share * top], weights: vec![1.0], side: CurveSide::Output };
+        let curve = AsymmetryParams::behind(vec![share * top], vec![1.0]);
         or_nothing(rig, rig.added(0.0, &Effects { asymmetry: Some(curve), ..Effects::default() }))
     };
     ZONES.map(zone).into_iter().collect()
