@@ -188,9 +188,12 @@ mod tests {
         let rows = 6000;
         let drive = |t: f64| 50.0 * (1.0 - (5.0 * t * (1.0 + t)).cos()) * (0.6 + 0.4 * (1.1 * t).cos());
         let input: Vec<f64> = (0..rows).map(|k| drive(1e-3 * f64::from(k))).collect();
-        let (mut v, mut plays) = (0.0, [0.0; 6]);
+        let (mut v, mut before, mut plays) = (0.0, 0.0, [0.0; 6]);
         let output = input.iter().enumerate().map(|(k, u)| {
-            v = if late { v + (u - v) * (1.0 - (-0.25f64).exp()) } else { *u };
+            // In the middle between the rows: with the drive at either end the lag would be half a period off.
+            let between = 0.5 * (before + u);
+            before = *u;
+            v = if late { v + (between - v) * (1.0 - (-0.25f64).exp()) } else { *u };
             plays.iter_mut().enumerate().for_each(|(i, p)| *p = play(*p, v, 3.0 * (i + 1) as f64));
             let y = 0.1 * v + 0.01 * plays.iter().sum::<f64>();
             y + also(k, y) + 2e-3 * (1e4 * (y + 0.37 * k as f64)).sin()
@@ -216,7 +219,8 @@ mod tests {
         let lag = Effects { lag: Some(LagParams { seconds: 1e-3 }), ..Effects::default() };
         let (probe, fit, before) = both(&samples(true, |_, _| 0.0), lag);
         let seconds = |h: &Hypothesis| h.effects.lag.unwrap().seconds;
-        assert!(probe.squares < 0.1 * before, "{} of {before}", probe.squares);
+        // The columns are held at a drive that does not lag: a share of the second order stays.
+        assert!(probe.squares < 0.2 * before, "{} of {before}", probe.squares);
         let (probed, fitted) = (seconds(&probe.hypothesis), seconds(&fit.hypothesis));
         assert!((probed / fitted - 1.0).abs() < 0.1 && (fitted / 4e-3 - 1.0).abs() < 0.05, "{probed} {fitted}");
     }
