@@ -370,7 +370,10 @@ pub(crate) fn fit_settled(
     name: &dyn Fn() -> String,
 ) -> Result<(Fitted, Vec<f64>), FitError> {
     let run = |samples: &Samples| everywhere(samples, basis, options.zero_per_record, name);
-    let all = run(samples)?;
+    let mut all = run(samples)?;
+    if samples.mark_spikes(&all.1) {
+        all = run(samples)?;
+    }
     let windows = windows(samples);
     let mut without = samples.clone();
     for (s, w) in samples.segments.iter().zip(&windows) {

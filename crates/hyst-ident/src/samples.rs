@@ -6,7 +6,7 @@ use hyst_core::Env;
 
 use crate::clipping::clipped_rows;
 use crate::record::Record;
-use crate::spikes::spiked_rows;
+use crate::spikes::{spiked_residual, spiked_rows};
 
 /// Columns of one or more records with the same units and sample period.
 #[derive(Clone, Debug)]
@@ -108,6 +108,16 @@ impl Samples {
             settling: vec![false; rows],
             blind: vec![false; rows],
         }
+    }
+
+    /// Marks the spikes that what a fit leaves of these rows shows; whether there are any that were not known.
+    pub(crate) fn mark_spikes(&mut self, residual: &[f64]) -> bool {
+        let spiked = spiked_residual(self, residual);
+        let new = spiked.iter().zip(&self.blind).any(|(spiked, known)| *spiked && !known);
+        for rows in [&mut self.blind, &mut self.settling] {
+            rows.iter_mut().zip(&spiked).for_each(|(row, spiked)| *row |= spiked);
+        }
+        new
     }
 
     /// Number of rows.

@@ -91,7 +91,7 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
 pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) -> Result<Simulation, FitError> {
-    let samples = Samples::from_record(record).at_temperature(options.temperature);
+    let mut samples = Samples::from_record(record).at_temperature(options.temperature);
     check(model, record, &samples)?;
     let passes = if options.periodic { Passes::Periodic } else { Passes::Once };
     let drive = Drive::new(&samples, model.between_samples, passes);
@@ -102,16 +102,16 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     let mut zeros = Vec::new();
     let mut errors = None;
     let mut settling = samples.settling.clone();
-    if record.output().is_some() {
-        let missed =
-            |predicted: &[f64]| -> Vec<f64> { samples.output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
+    if let Some(output) = record.output() {
+        let missed = |predicted: &[f64]| -> Vec<f64> { output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
         let mut residual = missed(&predicted);
+        samples.mark_spikes(&residual);
         settling = start_up_rows(&samples, &residual);
         let history = histories(&samples, &settling);
         // A period of a steady state has its own history.
         if !options.periodic && history.iter().any(|rows| *rows > 0) {
             let mut cycled = vec![0.0; samples.len()];
-            drive.after(history).run(&*chain, &mut cycled);
+            Drive::new(&samples, model.between_samples, passes).after(history).run(&*chain, &mut cycled);
             let left = missed(&cycled);
             let after = start_up_rows(&samples, &left);
             for segment in &samples.segments {

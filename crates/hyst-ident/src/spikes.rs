@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use crate::Samples;
+
 /// Rows to each side whose median a row is held against: a spike of up to three rows stands out of it, what rises or falls does not.
 const BESIDE: usize = 3;
 /// Rows to each side whose steps are the usual ones.
@@ -22,6 +24,16 @@ const MOST: f64 = 0.1;
 
 /// Marks the spikes of an output.
 pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
+    spikes(input, output, output, segments)
+}
+
+/// Marks the spikes of an output that a fit of it shows: what it follows hides none in its `residual`.
+pub(crate) fn spiked_residual(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    spikes(&samples.input, &samples.output, residual, &samples.segments)
+}
+
+/// Marks the spikes of `signal`, an output or what is known of it.
+fn spikes(input: &[f64], output: &[f64], signal: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
     let mut spiked = vec![false; output.len()];
     let digit = crate::noise::quantisation(output) * 12f64.sqrt();
     let span = |x: &[f64]| {
@@ -34,9 +46,9 @@ pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize
     for s in segments {
         // At an end of a segment what rises has no rows on the other side.
         for k in s.start + BESIDE..s.end.saturating_sub(BESIDE).max(s.start + BESIDE) {
-            let own = output[k];
+            let own = signal[k];
             beside.clear();
-            beside.extend_from_slice(&output[k - BESIDE..=k + BESIDE]);
+            beside.extend_from_slice(&signal[k - BESIDE..=k + BESIDE]);
             let out = (own - quantile(&mut beside, 0.5)).abs();
             if out <= STANDS_OUT * digit {
                 continue;
@@ -48,7 +60,7 @@ pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize
             }
             let around = k.saturating_sub(AROUND).max(s.start)..(k + AROUND + 1).min(s.end);
             steps.clear();
-            steps.extend(output[around].windows(2).map(|y| (y[1] - y[0]).abs()));
+            steps.extend(signal[around].windows(2).map(|y| (y[1] - y[0]).abs()));
             spiked[k] = out > STANDS_OUT * quantile(&mut steps, USUAL);
         }
     }
@@ -100,6 +112,21 @@ mod tests {
         assert!(found(4000, |t| (0.01 * t).sin(), |k| if k > 1500 { 0.3 } else { 0.0 }).is_empty());
         let steps = |t: f64| (t / 100.0).floor() / 40.0;
         assert!(found(4000, steps, |k| 0.02 * (-((k % 100) as f64) / 20.0).exp() * (k as f64).sin()).is_empty());
+    }
+
+    /// Three rows wide under a drive that goes further in a row: the output alone hides it, what a model leaves does not.
+    #[test]
+    fn what_the_drive_hides_a_residual_shows() {
+        let rows = 1400;
+        let input: Vec<f64> = (0..rows).map(|k| 50.0 * (1.0 - (0.0314 * k as f64).cos())).collect();
+        let at = |k: usize| (600..603).contains(&k);
+        let residual: Vec<f64> =
+            (0..rows).map(|k| 0.01 * (2.0 * k as f64).sin() + f64::from(u8::from(at(k)))).collect();
+        let output: Vec<f64> = input.iter().zip(&residual).map(|(u, r)| 0.1 * u + r).collect();
+        let samples = Samples::of_columns(1e-3, input, output);
+        assert!(!spiked_rows(&samples.input, &samples.output, &samples.segments).contains(&true));
+        let found = spiked_residual(&samples, &residual);
+        assert!((0..rows).all(|k| found[k] == at(k)));
     }
 
     #[test]

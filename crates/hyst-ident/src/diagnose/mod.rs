@@ -12,10 +12,12 @@
 
 mod advice;
 mod changed;
+mod colour;
 mod evidence;
 mod extension;
 mod findings;
 mod finer;
+mod history;
 mod limits;
 mod named;
 mod probability;

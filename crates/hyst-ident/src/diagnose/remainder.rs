@@ -3,6 +3,7 @@
 use super::findings::{Remainder, RemainderKind};
 use super::finer::AT_FLOOR;
 use super::search::Search;
+use super::{colour, history};
 use crate::digits::short;
 use crate::model::Effect;
 use crate::nested::Hypothesis;
@@ -89,6 +90,30 @@ pub(super) fn judge(
     // The search ran on a richer, rate-independent base: what that one takes is the base's.
     let above = (rmse * rmse - noise2).max(f64::MIN_POSITIVE);
     let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
+    let residual: Vec<f64> = samples.output.iter().zip(&after.predicted).map(|(y, p)| y - p).collect();
+    let counts: Vec<bool> = after.settling.iter().map(|s| !s).collect();
+    if taken < RICHER {
+        let undecided = history::undecided(samples, &residual, &counts).unwrap_or(f64::INFINITY);
+        let decided = 1.0 - (undecided - noise2).max(0.0) / above;
+        if decided >= RICHER {
+            let what = format!(
+                "{:.2} % of span: {:.0} % of its variance comes back where the input and its history do, so that it is a map of them that this base, \
+                 and the richer ones that were tried, are too coarse for",
+                percent(rmse),
+                100.0 * decided
+            );
+            return left(RemainderKind::BaseCapacity, what);
+        }
+        if let Some(exponent) = colour::flicker(&residual, &samples.segments, &counts, found.noise) {
+            let what = format!(
+                "what is left is noise: {:.3} % of span; its power falls with the frequency to the power of {exponent:.1}, like the flicker noise of \
+                 a sensor, down to a white floor of {:.3} %",
+                percent(rmse),
+                percent(found.noise)
+            );
+            return left(RemainderKind::None, what);
+        }
+    }
     let map = "a map of the input's history that this base is too coarse for";
     let (kind, rest) = if taken >= NEARLY_ALL || (taken >= RICHER && richest <= AT_FLOOR * found.noise) {
         (RemainderKind::BaseCapacity, format!("nearly all of it is {map}"))

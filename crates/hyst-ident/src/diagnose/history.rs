@@ -1,0 +1,99 @@
+//! How much of a remainder the history of the input decides, whatever the law.
+//!
+//! Two rows at which the input and the plays of all widths are the same have the same rate-independent memory. What the remainders of
+//! two such rows differ by is no map of that memory: `δ = ½ mean (rᵢ − rⱼ)²`, j the nearest neighbour of i, estimates the variance of the rest
+//! (the delta test; Pi and Peterson, Neural Computation 6, 1994). No base is needed that could follow.
+
+use std::ops::Range;
+
+use hyst_core::play;
+use rayon::prelude::*;
+
+use crate::samples::{Samples, range};
+
+/// Half widths of the plays, as shares of half the drive's swing.
+const WIDTHS: [f64; 5] = [0.08, 0.2, 0.4, 0.6, 0.8];
+/// Rows that are compared at most, each with each other.
+const ROWS: usize = 4000;
+/// Share of the rows before and after a row that are no neighbours of it: they have its memory, and its noise as well.
+const SAME_TIME: usize = 200;
+
+/// Variance of what the history of the input does not decide of `residual`, over the rows that count \[residual²\]; `None` of too few.
+pub(super) fn undecided(samples: &Samples, residual: &[f64], counts: &[bool]) -> Option<f64> {
+    let rows: Vec<usize> = (0..samples.len()).filter(|k| counts[*k]).collect();
+    let step = rows.len().div_ceil(ROWS).max(1);
+    let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
+    let apart = (rows.len() / SAME_TIME).max(3);
+    if rows.len() <= 4 * apart {
+        return None;
+    }
+    let all = states(&samples.input, &samples.segments);
+    let states: Vec<State> = rows.iter().map(|k| all[*k]).collect();
+    let differences: Vec<f64> = (0..rows.len())
+        .into_par_iter()
+        .map(|i| {
+            let others = (0..(i + 1).saturating_sub(apart)).chain(i + apart..rows.len());
+            let mut nearest = (f64::INFINITY, i);
+            for j in others {
+                let distance = states[i].iter().zip(&states[j]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+                if distance < nearest.0 {
+                    nearest = (distance, j);
+                }
+            }
+            residual[rows[i]] - residual[rows[nearest.1]]
+        })
+        .collect();
+    Some(0.5 * differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64)
+}
+
+/// The input and the plays.
+type State = [f64; WIDTHS.len() + 1];
+
+/// The memory at each row, in halves of the drive's swing.
+fn states(input: &[f64], segments: &[Range<usize>]) -> Vec<State> {
+    let (low, high) = range(input.iter().copied());
+    let half = (0.5 * (high - low)).max(f64::MIN_POSITIVE);
+    let mut states = Vec::with_capacity(input.len());
+    for segment in segments {
+        let mut state = [0.0; WIDTHS.len() + 1];
+        for u in &input[segment.clone()] {
+            state[0] = u / half;
+            let (now, plays) = (state[0], &mut state[1..]);
+            plays.iter_mut().zip(WIDTHS).for_each(|(p, r)| *p = play(*p, now, r));
+            states.push(state);
+        }
+    }
+    states
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_of_the_memory_is_told_from_what_comes_with_time() {
+        let rows = 6000;
+        let input: Vec<f64> =
+            (0..rows).map(|k| 0.01 * f64::from(k)).map(|t| 30.0 * (t.sin() + (0.31 * t).sin())).collect();
+        let mut p = 0.0;
+        let map: Vec<f64> = input
+            .iter()
+            .map(|u| {
+                p = play(p, *u, 13.0);
+                (0.07 * p).sin() + 0.3 * (0.2 * u).cos()
+            })
+            .collect();
+        let samples = Samples::of_columns(1e-3, input.clone(), input);
+        let counts = vec![true; samples.len()];
+        let variance = |x: &[f64]| {
+            let mean = x.iter().sum::<f64>() / x.len() as f64;
+            x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64
+        };
+        let left = undecided(&samples, &map, &counts).unwrap();
+        assert!(left < 0.1 * variance(&map), "{left} of {}", variance(&map));
+        let tone: Vec<f64> = (0..rows).map(|k| (0.0371 * f64::from(k)).sin()).collect();
+        let left = undecided(&samples, &tone, &counts).unwrap();
+        assert!(left > 0.8 * variance(&tone), "{left} of {}", variance(&tone));
+        assert_eq!(undecided(&samples, &map, &vec![false; samples.len()]), None);
+    }
+}
