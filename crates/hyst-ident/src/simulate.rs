@@ -75,6 +75,8 @@ pub struct Simulation {
     pub errors: Option<Errors>,
     /// Inputs beyond the model's own range.
     pub extrapolated: Extrapolated,
+    /// Whether a segment begins as after its own first cycle, and not at rest.
+    pub(crate) in_mid_cycle: bool,
 }
 
 /// Runs a model over a record at the temperatures that it holds, as [`simulate_with`].
@@ -101,6 +103,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     drive.run(&*chain, &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
+    let mut in_mid_cycle = false;
     let mut settling = samples.settling.clone();
     if let Some(output) = record.output() {
         let missed = |predicted: &[f64]| -> Vec<f64> { output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
@@ -122,6 +125,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                 };
                 if starting(&after) < starting(&settling) && squares(&left) <= squares(&residual) {
                     predicted[segment.clone()].copy_from_slice(&cycled[segment.clone()]);
+                    in_mid_cycle = true;
                 }
             }
             residual = missed(&predicted);
@@ -141,7 +145,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         );
     }
     let extrapolated = Extrapolated::of(model, &samples.input);
-    Ok(Simulation { predicted, settling, zeros, errors, extrapolated })
+    Ok(Simulation { predicted, settling, zeros, errors, extrapolated, in_mid_cycle })
 }
 
 /// Rows that may have passed before each segment in which a start-up shows.

@@ -86,7 +86,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
         let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
         let residual: Vec<f64> = (0..ROWS).map(|k| of(k, &mut normal)).collect();
-        flicker(&residual, &[0..ROWS], &[true; ROWS], 0.3)
+        flicker(&residual, std::slice::from_ref(&(0..ROWS)), &[true; ROWS], 0.3)
     }
 
     /// Relaxers an octave apart, whose powers add up to 1/f.
@@ -115,6 +115,6 @@ mod tests {
 
     #[test]
     fn a_short_record_tells_nothing() {
-        assert_eq!(flicker(&[0.1; 90], &[0..90], &[true; 90], 0.1), None);
+        assert_eq!(flicker(&[0.1; 90], std::slice::from_ref(&(0..90)), &[true; 90], 0.1), None);
     }
 }

@@ -77,8 +77,8 @@ impl<'a> Scan<'a> {
             Cause::SlewLimit => None,
         };
         // Of either sign: a fit may begin at the other.
-        let takes = |column: &Vec<f64>| self.vantage.projector.gain(column, &self.residual).0;
-        Ok(columns.is_none_or(|columns| columns.iter().map(takes).sum::<f64>() >= self.promising))
+        let takes = |columns: &[Vec<f64>]| self.vantage.projector.joint_gain(columns, &self.residual);
+        Ok(columns.is_none_or(|columns| !columns.is_empty() && takes(&columns) >= self.promising))
     }
 
     /// First-order columns of an effect; none where its place is looked for first.

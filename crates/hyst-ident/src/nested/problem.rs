@@ -18,6 +18,9 @@ use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
 
+/// How near to a bound an unknown counts as held there, as a share of all that are bounded.
+const NEAR_BOUND: f64 = 1e-9;
+
 /// A record, a base and how rows are cut into blocks.
 pub(crate) struct Problem<'a> {
     pub(crate) samples: &'a Samples,
@@ -453,7 +456,18 @@ impl<'a> Problem<'a> {
             all.columns_mut(linear, slopes).copy_from(&j);
             all
         };
-        let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside).collect();
+        let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
+        let mut blocks: Vec<DMatrix<f64>> = blocks.collect();
+        // What is held at a bound imitates nothing: to first order it cannot move.
+        let bounds = self.bounds(&fit.hypothesis);
+        let bounded = at.solution.iter().zip(&bounds).filter(|(_, b)| b.lower.is_finite());
+        // Solvers end within a rounding of a bound.
+        let near = NEAR_BOUND * bounded.map(|(value, _)| value.abs()).sum::<f64>();
+        let is_held = |(value, b): (&f64, &Bounds)| *value <= b.lower + near || *value >= b.upper - near;
+        let held: Vec<bool> = at.solution.iter().zip(&bounds).map(is_held).collect();
+        for x in &mut blocks {
+            (0..held.len()).filter(|i| held[*i]).for_each(|i| x.column_mut(i).fill(0.0));
+        }
         Ok(Projector::new(self, blocks))
     }
 

@@ -55,6 +55,25 @@ impl<'a> Projector<'a> {
         Some(Gram { matrix, rows: columns.nrows() })
     }
 
+    /// How much of Σ residual² some columns would take together, all unknowns refitted.
+    pub(crate) fn joint_gain(&self, columns: &[Vec<f64>], residual: &[f64]) -> f64 {
+        let thinned = |column: &[f64]| self.problem.thinned(|k| column[k]);
+        let all: Vec<Vec<f64>> = columns.iter().map(|c| thinned(c)).chain([thinned(residual)]).collect();
+        let rows = all[0].len();
+        let Some(Gram { mut matrix, .. }) = self.off(&DMatrix::from_fn(rows, all.len(), |k, i| all[i][k])) else {
+            return 0.0;
+        };
+        let n = columns.len();
+        let with: DVector<f64> = matrix.view((0, n), (n, 1)).column(0).into_owned();
+        for i in 0..n {
+            // What the fit imitates takes nothing, and columns that are alike share.
+            let own = all[i].iter().map(|x| x * x).sum::<f64>();
+            matrix[(i, i)] += 1e-9 * own.max(f64::MIN_POSITIVE);
+        }
+        let factor = matrix.view((0, 0), (n, n)).into_owned().cholesky();
+        factor.map_or(0.0, |factor| with.dot(&factor.solve(&with)))
+    }
+
     /// How much of Σ residual² a column would take, all unknowns refitted, and the factor at which it does.
     pub(crate) fn gain(&self, column: &[f64], residual: &[f64]) -> (f64, f64) {
         let left = self.left(column);

@@ -334,6 +334,7 @@ fn what_is_left_is_found_where_it_is() {
         zeros: Vec::new(),
         errors: None,
         extrapolated: Default::default(),
+        in_mid_cycle: false,
     };
     // The first segment, at rest, is noise alone.
     samples.output[..4000].iter_mut().for_each(|y| *y *= 0.05);
