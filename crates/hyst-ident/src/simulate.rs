@@ -67,7 +67,7 @@ impl Extrapolated {
 pub struct Simulation {
     /// Output \[output unit\], per row.
     pub predicted: Vec<f64>,
-    /// Rows that do not count: start-up rows, and those in which the sensor stands at the end of its range.
+    /// Rows that do not count: start-up rows, and those in which the sensor is at the end of its range or spikes.
     pub settling: Vec<bool>,
     /// Constant that was added per file; empty with [`Zero::None`].
     pub zeros: Vec<f64>,
@@ -114,6 +114,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         // A period of a steady state has its own history.
         if !options.periodic && history.iter().any(|rows| *rows > 0) {
             let mut cycled = vec![0.0; samples.len()];
+            // Anew, since `samples` knows its spikes now.
             Drive::new(&samples, model.between_samples, passes).after(history).run(&*chain, &mut cycled);
             let left = missed(&cycled);
             let after = start_up_rows(&samples, &left);

@@ -18,11 +18,11 @@ const LEAST_OCTAVES: usize = 4;
 const SCATTER: f64 = 0.25;
 /// Excess kurtosis up to which a sample is as good as normal: jumps, bursts and what acts at the turns alone have more or less.
 const NORMAL: f64 = 1.0;
-/// The longest stretch of rows, over the windows of the spectrum.
+/// Windows of the spectrum that the longest stretch of rows holds, without overlap.
 const WINDOWS: usize = 4;
 
 /// The exponent p of noise whose power falls as `1/fᵖ` and that a sensor may have; `None` if `residual` is something else, or white.
-/// `counts` are the rows to look at, `white` the deviation of the white noise.
+/// `counts` are the rows to look at, `white` the standard deviation of the white noise \[unit of the residual\].
 pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[bool], white: f64) -> Option<f64> {
     let runs: Vec<Range<usize>> = segments.iter().flat_map(|s| runs(s, counts)).collect();
     let rows = || runs.iter().cloned().flatten().map(|k| residual[k]);
@@ -36,16 +36,16 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
     }
     let hann = Hann::new(length);
     let mut power = vec![0.0; length / 2 + 1];
-    let mut count = 0.0;
+    let mut energy = 0.0;
     for window in windows(&runs, length) {
         power.iter_mut().zip(hann.spectrum(&residual[window])).for_each(|(p, x)| *p += x.norm_sqr());
-        count += hann.energy();
+        energy += hann.energy();
     }
     // Octaves from the third line on: the window smears the removed mean over the first two.
     let octaves = (1..).map(|i| 1usize << i).take_while(|first| 2 * first <= length / 2);
     let points: Vec<[f64; 2]> = octaves
         .map(|first| {
-            let mean = power[first..2 * first].iter().sum::<f64>() / (first as f64 * count);
+            let mean = power[first..2 * first].iter().sum::<f64>() / (first as f64 * energy);
             [(first as f64).log10(), mean - white * white]
         })
         .filter(|[_, above]| *above > ABOVE_WHITE * white * white)

@@ -4,31 +4,33 @@
 //! two such rows differ by is no map of that memory: `δ = ½ mean (rᵢ − rⱼ)²`, j the nearest neighbour of i, estimates the variance of the rest
 //! (the delta test; Pi and Peterson, Neural Computation 6, 1994). No base is needed that could follow.
 
-use std::ops::Range;
-
-use hyst_core::play;
 use rayon::prelude::*;
 
-use crate::samples::{Samples, range};
+use crate::base::play_column;
+use crate::samples::Samples;
 
 /// Half widths of the plays, as shares of half the drive's swing.
-const WIDTHS: [f64; 5] = [0.08, 0.2, 0.4, 0.6, 0.8];
+const WIDTHS: [f64; 6] = [0.0, 0.08, 0.2, 0.4, 0.6, 0.8];
 /// Rows that are compared at most, each with each other.
 const ROWS: usize = 4000;
-/// Share of the rows before and after a row that are no neighbours of it: they have its memory, and its noise as well.
-const SAME_TIME: usize = 200;
+/// Share of all rows that are no neighbours of a row, to either side of it: their memory is the same, and so is what comes with time.
+const SAME_TIME: f64 = 0.005;
+/// Fewest such rows.
+const FEWEST: usize = 3;
 
 /// Variance of what the history of the input does not decide of `residual`, over the rows that count \[residual²\]; `None` of too few.
 pub(super) fn undecided(samples: &Samples, residual: &[f64], counts: &[bool]) -> Option<f64> {
     let rows: Vec<usize> = (0..samples.len()).filter(|k| counts[*k]).collect();
     let step = rows.len().div_ceil(ROWS).max(1);
     let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
-    let apart = (rows.len() / SAME_TIME).max(3);
+    let apart = ((SAME_TIME * rows.len() as f64) as usize).max(FEWEST);
     if rows.len() <= 4 * apart {
         return None;
     }
-    let all = states(&samples.input, &samples.segments);
-    let states: Vec<State> = rows.iter().map(|k| all[*k]).collect();
+    let (low, high) = samples.input_range();
+    let plays = WIDTHS.map(|r| play_column(&samples.input, &samples.segments, 0.5 * r * (high - low)));
+    // The input itself is a play without width.
+    let states: Vec<[f64; WIDTHS.len()]> = rows.iter().map(|k| plays.each_ref().map(|p| p[*k])).collect();
     let differences: Vec<f64> = (0..rows.len())
         .into_par_iter()
         .map(|i| {
@@ -46,29 +48,10 @@ pub(super) fn undecided(samples: &Samples, residual: &[f64], counts: &[bool]) ->
     Some(0.5 * differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64)
 }
 
-/// The input and the plays.
-type State = [f64; WIDTHS.len() + 1];
-
-/// The memory at each row, in halves of the drive's swing.
-fn states(input: &[f64], segments: &[Range<usize>]) -> Vec<State> {
-    let (low, high) = range(input.iter().copied());
-    let half = (0.5 * (high - low)).max(f64::MIN_POSITIVE);
-    let mut states = Vec::with_capacity(input.len());
-    for segment in segments {
-        let mut state = [0.0; WIDTHS.len() + 1];
-        for u in &input[segment.clone()] {
-            state[0] = u / half;
-            let (now, plays) = (state[0], &mut state[1..]);
-            plays.iter_mut().zip(WIDTHS).for_each(|(p, r)| *p = play(*p, now, r));
-            states.push(state);
-        }
-    }
-    states
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hyst_core::play;
 
     #[test]
     fn a_map_of_the_memory_is_told_from_what_comes_with_time() {

@@ -109,10 +109,20 @@ impl Judge<'_> {
                 false => Ok(None),
             })
             .collect();
-        let fitted = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        let mut fitted: Vec<Trial> = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
+        // Fitted to the end, a cause also imitates what else is missing, beyond what it can be: a creep alone takes the part of a lag.
+        // Where none of its laws is sensible then, they count as their probes left them.
+        let overreaches = !fitted.iter().any(|trial| score::sensible(self.problem, trial));
+        if overreaches {
+            for probe in apart.iter().filter(|probe| may_win(probe)) {
+                let as_it_is = self.problem.fit_linear(&probe.hypothesis)?;
+                fitted.extend(as_it_is.and_then(|fit| Trial::of(self.problem, fit)));
+            }
+        }
         let found = self.best_law(fitted)?;
-        // What was given up is not known to its end.
-        if apart.iter().all(may_win)
+        // What was given up, or stands as a probe left it, is not known to its end.
+        if !overreaches
+            && apart.iter().all(may_win)
             && let Ok(mut known) = self.known.lock()
         {
             let found = found.as_ref().map(|t| t.fit.hypothesis.clone());

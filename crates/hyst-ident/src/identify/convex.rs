@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
-use crate::lsq::{Bounds, Gram};
+use crate::lsq::{Bounds, Gram, held};
 use crate::model::ZERO;
 
 /// A column with less than this share of the mean square of all is touched by no row.
@@ -80,11 +80,8 @@ pub(crate) fn untouched(total: &Gram, n: usize) -> Vec<bool> {
 /// Unknowns that are not held at a bound. One that no row touches is not held: nothing has pushed it there.
 pub(crate) fn free(values: &[f64], total: &Gram, bounds: &[Bounds]) -> Vec<usize> {
     let untouched = untouched(total, values.len());
-    let bounded = values.iter().zip(bounds).filter(|(_, b)| b.lower.is_finite());
-    // Solvers end within a rounding of a bound.
-    let near = 1e-9 * bounded.map(|(value, _)| value.abs()).sum::<f64>();
-    let held = |i: usize| values[i] <= bounds[i].lower + near || values[i] >= bounds[i].upper - near;
-    (0..values.len()).filter(|i| untouched[*i] || !held(*i)).collect()
+    let held = held(values.iter(), bounds);
+    (0..values.len()).filter(|i| untouched[*i] || !held[*i]).collect()
 }
 
 /// Standard errors of the `free` ones of `parameters`, the unknowns of `total`; the others are held. What the fit adds so that

@@ -6,4 +6,4 @@ mod quadratic;
 
 pub(crate) use gram::{Blocks, Bordered, Gram};
 pub(crate) use ordered::{Order, nearest_ordered};
-pub(crate) use quadratic::{Bounds, solve, solve_near};
+pub(crate) use quadratic::{Bounds, held, solve, solve_near};

@@ -30,6 +30,16 @@ impl Bounds {
     }
 }
 
+/// How near to a bound an unknown counts as held there, as a share of the sum of all that are bounded: solvers end within a rounding of it.
+const NEAR_BOUND: f64 = 1e-9;
+
+/// Which of some values are held at a bound.
+pub(crate) fn held<'a>(values: impl Iterator<Item = &'a f64> + Clone, bounds: &[Bounds]) -> Vec<bool> {
+    let bounded = values.clone().zip(bounds).filter(|(_, b)| b.lower.is_finite());
+    let near = NEAR_BOUND * bounded.map(|(value, _)| value.abs()).sum::<f64>();
+    values.zip(bounds).map(|(value, b)| *value <= b.lower + near || *value >= b.upper - near).collect()
+}
+
 /// Relative ridge on scaled columns: keeps two collinear columns from growing against each other
 /// without moving what the record determines.
 const RIDGE: f64 = 1e-10;

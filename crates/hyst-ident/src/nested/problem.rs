@@ -13,13 +13,10 @@ use super::cross_validation::{cross_validate, folds_by_experiment, folds_interle
 use super::{Cause, Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
-use crate::lsq::{Blocks, Bordered, Bounds, Gram, solve_near};
+use crate::lsq::{Blocks, Bordered, Bounds, Gram, held, solve_near};
 use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
-
-/// How near to a bound an unknown counts as held there, as a share of all that are bounded.
-const NEAR_BOUND: f64 = 1e-9;
 
 /// A record, a base and how rows are cut into blocks.
 pub(crate) struct Problem<'a> {
@@ -459,12 +456,11 @@ impl<'a> Problem<'a> {
         let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
         let mut blocks: Vec<DMatrix<f64>> = blocks.collect();
         // What is held at a bound imitates nothing: to first order it cannot move.
-        let bounds = self.bounds(&fit.hypothesis);
-        let bounded = at.solution.iter().zip(&bounds).filter(|(_, b)| b.lower.is_finite());
-        // Solvers end within a rounding of a bound.
-        let near = NEAR_BOUND * bounded.map(|(value, _)| value.abs()).sum::<f64>();
-        let is_held = |(value, b): (&f64, &Bounds)| *value <= b.lower + near || *value >= b.upper - near;
-        let held: Vec<bool> = at.solution.iter().zip(&bounds).map(is_held).collect();
+        let mut held = held(at.solution.iter(), &self.bounds(&fit.hypothesis));
+        fit.hypothesis.clone().visit_nonlinear(&mut |p| {
+            let limit = box_of(&p, self.samples);
+            held.push(*p.value <= limit.lower || *p.value >= limit.upper);
+        });
         for x in &mut blocks {
             (0..held.len()).filter(|i| held[*i]).for_each(|i| x.column_mut(i).fill(0.0));
         }
