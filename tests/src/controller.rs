@@ -14,7 +14,7 @@ pub fn controller(gain: f64, plays: u32, range: [f64; 2]) -> [Vec<u8>; 2] {
         weights: (0..plays).map(|i| 0.022 * (-0.25 * f64::from(i)).exp()).collect(),
     });
     let effects = EffectParams { lag: Some(LagParams { seconds: 0.003 }), ..EffectParams::default() };
-    let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, zero: 0.0, input: range };
+    let model: ChainParams<Vec<f64>> = ChainParams { operator, effects, falls: false, zero: 0.0, input: range };
     let pid = PidParams {
         proportional: 0.5,
         integral: 60.0,

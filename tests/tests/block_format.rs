@@ -154,11 +154,12 @@ fn effects() -> Vec<(&'static str, Effects)> {
 
 fn blocks() -> Vec<(String, Block)> {
     let (zero, input) = (-0.25, [-10.5, 120.5]);
-    let block = |operator, effects| Block { operator, effects, zero, input };
+    let block = |operator, effects| Block { operator, effects, falls: false, zero, input };
     let smallest = || Operator::Pi(PiParams { gain: 1.5, thresholds: Vec::new(), weights: Vec::new() });
     let of_operators = operators().into_iter().map(|(name, o)| (name.to_owned(), block(o, Effects::default())));
     let of_effects = effects().into_iter().map(|(name, e)| (format!("{name} (stage)"), block(smallest(), e)));
-    of_operators.chain(of_effects).collect()
+    let falling = Block { falls: true, ..block(smallest(), Effects::default()) };
+    of_operators.chain(of_effects).chain([("falling".to_owned(), falling)]).collect()
 }
 
 fn bytes(block: &Block) -> Vec<u8> {
@@ -227,7 +228,7 @@ fn a_block_of_an_older_version_is_refused_by_its_number() {
         16400000000000001a400000000000000000000000000000000000d0bf00000000000025c00000000000205e40ca03433d";
     let error = read_block::<Vec<f64>, Vec<f64>>(&unhex(OLD)).unwrap_err();
     assert_eq!(error, BlockError::Version { version: 1 });
-    assert!(error.to_string().contains("block version 1, this build reads 4: export the model anew"), "{error}");
+    assert!(error.to_string().contains("block version 1, this build reads 5: export the model anew"), "{error}");
 }
 
 /// The head of a block as `hyst_core::read_block` documents it.

@@ -7,6 +7,7 @@ use hyst_ident::excite::{Identification, Limits};
 use hyst_ident::fit::{FitError, FitOptions, fit};
 use hyst_ident::model::{Effect, Kind};
 use hyst_ident::record::{ColumnMap, Columns, Need, OutputUnit, Record};
+use hyst_ident::simulate::{Zero, simulate};
 use hyst_tests::{Lab, measured, played};
 
 /// Lag of the actuator \[s\].
@@ -110,15 +111,29 @@ fn an_offset_of_many_strokes() {
     shows_the_lag(&changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y += 4321.0)));
 }
 
-/// A sensor of the other sign is refused with what to do, and what is to be done works.
+/// A sensor of the other sign is the model's; a model of the other sign is refused with what to do, and what is to be done works.
 #[test]
 fn a_sensor_of_the_other_sign() {
-    let turned = changed(&record_of(&lagging()), |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
-    let refused = fit(&turned, Kind::Pi, &FitOptions::default()).unwrap_err();
+    let upright = record_of(&lagging());
+    let turned = changed(&upright, |c| outputs(c).iter_mut().for_each(|y| *y = -*y));
+    shows_the_lag(&turned);
+    let model = fit(&upright, Kind::Pi, &FitOptions::default()).unwrap();
+    let refused = diagnose(&turned, None, &model, &DiagnoseOptions::default(), &|_| {}).unwrap_err();
     assert!(
         matches!(refused, FitError::Falling { .. }) && refused.to_string().contains("--map displacement_um=-"),
         "{refused}"
     );
+    // Convex and searched fits of it are those of the upright record, turned.
+    for kind in [Kind::Pi, Kind::Preisach, Kind::BoucWen] {
+        let fitted = |record: &Record| {
+            let model = fit(record, kind, &FitOptions::default()).unwrap();
+            simulate(&model, record, Zero::None).unwrap()
+        };
+        let [up, down] = [&upright, &turned].map(fitted);
+        let largest = up.predicted.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+        let apart = up.predicted.iter().zip(&down.predicted).fold(0.0, |m: f64, (a, b)| m.max((a + b).abs()));
+        assert!(apart < 1e-3 * largest, "{kind:?}: {apart} of {largest}");
+    }
     let mut csv = Vec::new();
     turned.write_csv(&mut csv).unwrap();
     let map = ColumnMap::parse(["displacement_um=-displacement_um"]).unwrap();

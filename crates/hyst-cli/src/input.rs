@@ -44,14 +44,14 @@ pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<R
     if falls(&record) {
         let column = record.output_unit().map_or("", |unit| unit.column());
         say(&format!(
-            "note: {}: the output falls where the input rises; if its sign is turned, read it with --map {column}=-COLUMN",
+            "note: {}: the output falls where the input rises; if that of the model does not, read it with --map {column}=-COLUMN",
             record.name()
         ));
     }
     Ok(record)
 }
 
-/// Whether the output goes against the input; a fit refuses such a record by itself.
+/// Whether the output goes against the input.
 fn falls(record: &Record) -> bool {
     let (u, y) = (record.input(), record.output().unwrap_or_default());
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;

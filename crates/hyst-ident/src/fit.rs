@@ -74,9 +74,9 @@ pub enum FitError {
         /// Its value.
         value: f64,
     },
-    /// The output falls where the input rises.
+    /// The output falls where that of the model rises, or the other way round.
     #[error(
-        "{record}: the output falls where the input rises, and these models rise; turn its sign for every command with --map {column}=-COLUMN, where COLUMN is its name in the file, or take out the minus that a --map has already"
+        "{record}: the output has the other sign than the model's; turn it with --map {column}=-COLUMN, where COLUMN is its name in the file, take out the minus that a --map has already, or fit the model anew to this record"
     )]
     Falling {
         /// The record.
@@ -254,7 +254,7 @@ pub fn fit_with(
     Ok(fit)
 }
 
-/// Models that rise and fall with their input: a record in which the output falls has a sensor with the wrong sign.
+/// Models that rise and fall with their input, or against it.
 pub(crate) fn sign_matters(kind: Kind) -> bool {
     // The oscillator lags by up to half a turn.
     kind != Kind::BoucWenOscillator
@@ -328,7 +328,8 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
     })
 }
 
-pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<(), FitError> {
+/// Whether a record can be fitted; `wrong_sign` if its output falls where the model's rises, or rises where that falls.
+pub(crate) fn check(record: &Record, samples: &Samples, wrong_sign: bool) -> Result<(), FitError> {
     let name = record.name();
     let Some(unit) = record.output_unit() else {
         return Err(FitError::Missing {
@@ -352,10 +353,7 @@ pub(crate) fn check(record: &Record, samples: &Samples, sign: bool) -> Result<()
     if most - least <= 1e-12 * most.abs().max(least.abs()).max(f64::MIN_POSITIVE) {
         return Err(FitError::ConstantOutput { record: name, column: unit.column().into(), value: least });
     }
-    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-    let (u, y) = (mean(&samples.input), mean(&samples.output));
-    let together: f64 = samples.input.iter().zip(&samples.output).map(|(a, b)| (a - u) * (b - y)).sum();
-    if sign && together <= 0.0 {
+    if wrong_sign {
         return Err(FitError::Falling { record: name, column: unit.column() });
     }
     Ok(())
@@ -465,6 +463,7 @@ pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64
             low: least,
             high: most,
         },
+        falls: samples.falls,
         zero,
         base,
         effects: Effects::default(),

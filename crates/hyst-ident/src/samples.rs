@@ -23,6 +23,8 @@ pub struct Samples {
     pub temperature: Option<Vec<f64>>,
     /// Load \[N\], where it was recorded.
     pub load: Option<Vec<f64>>,
+    /// Whether the output falls where the input rises.
+    pub(crate) falls: bool,
     /// Stretches between which the device rests.
     pub segments: Vec<Range<usize>>,
     /// File that each segment came from.
@@ -44,6 +46,7 @@ impl Samples {
             output: record.output().unwrap_or_default().to_vec(),
             temperature: record.temperature().map(<[f64]>::to_vec),
             load: record.load().map(<[f64]>::to_vec),
+            falls: falls(record.input(), record.output().unwrap_or_default()),
             segments: record.segments().to_vec(),
             file_of_segment: record.file_of_segment().to_vec(),
             settling: blind.clone(),
@@ -86,6 +89,7 @@ impl Samples {
             output: column(&self.output),
             temperature: self.temperature.as_deref().map(column),
             load: self.load.as_deref().map(column),
+            falls: self.falls,
             file_of_segment: keep.iter().map(|s| self.file_of_segment[*s]).collect(),
             settling: keep.iter().flat_map(|s| self.settling[self.segments[*s].clone()].iter().copied()).collect(),
             blind: keep.iter().flat_map(|s| self.blind[self.segments[*s].clone()].iter().copied()).collect(),
@@ -99,6 +103,7 @@ impl Samples {
         Self {
             period,
             time: (0..rows).map(|k| k as f64 * period).collect(),
+            falls: falls(&input, &output),
             input,
             output,
             temperature: None,
@@ -172,6 +177,13 @@ fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
         blind.iter_mut().zip(spiked).for_each(|(blind, spiked)| *blind |= spiked);
     }
     blind
+}
+
+/// Whether an output falls where its input rises.
+fn falls(input: &[f64], output: &[f64]) -> bool {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let (u, y) = (mean(input), mean(output));
+    input.iter().zip(output).map(|(a, b)| (a - u) * (b - y)).sum::<f64>() < 0.0
 }
 
 /// Smallest and largest value; (∞, −∞) of nothing.

@@ -121,6 +121,12 @@ impl Model {
         self.0.zero
     }
 
+    /// Whether the output falls where the drive rises: a negative gain.
+    #[getter]
+    fn falls(&self) -> bool {
+        self.0.falls
+    }
+
     /// How the drive goes on between samples: ``linear`` or ``band-limited``. ``simulate`` knows the whole record and goes by it.
     #[getter]
     fn between_samples(&self) -> &'static str {

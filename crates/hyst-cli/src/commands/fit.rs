@@ -38,6 +38,9 @@ struct Summary {
     errors: Option<Errors>,
     base: Option<BaseSummary>,
     sensor_zero: f64,
+    /// The gain is negative.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    falls: bool,
     how: String,
     /// How the drive goes on between samples.
     between_samples: BetweenSummary,
@@ -141,6 +144,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
         errors: simulated.errors,
         base: base_summary(&model),
         sensor_zero: model.zero,
+        falls: model.falls,
         how,
         between_samples: BetweenSummary {
             taken: model.between_samples,
@@ -275,6 +279,9 @@ impl Summary {
         lines.extend(self.surface.as_ref().map(|s| surface::measured(s, unit)));
         lines.extend(self.dynamics.as_ref().map(|d| surface::dynamics(d, unit, &self.input_unit)));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
+        if self.falls {
+            lines.push("negative gain: the output falls where the input rises".to_owned());
+        }
         lines.push(self.how.clone());
         lines.extend(self.between_samples.text(unit));
         if let Some(TrialsSummary { count, costs: Some(costs), .. }) = self.trials.as_ref().filter(|t| t.count > 1) {

@@ -14,7 +14,7 @@ pub const MAX_RESONANCES: usize = 2;
 /// Dead zones that the asymmetry of one chain can hold.
 pub const MAX_DEAD_ZONES: usize = 8;
 
-/// `u → delay → lag → rate → asymmetry before it, HYSTERESIS, asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
+/// `u → delay → lag → rate → asymmetry before it, ±HYSTERESIS, asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
 /// +interference → + zero → y`, every stage but the hysteresis optional.
 ///
 /// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
@@ -30,6 +30,8 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub input_curve: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
     /// The memory operator.
     pub hysteresis: H,
+    /// Whether the output falls where the operator rises: a negative gain.
+    pub falls: bool,
     /// Curve behind the memory operator.
     pub asymmetry: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
     /// Gain and expansion over temperature.
@@ -74,6 +76,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             rate: None,
             input_curve: None,
             hysteresis,
+            falls: false,
             asymmetry: None,
             temperature: None,
             creep: None,
@@ -195,11 +198,23 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
         Ok(self)
     }
 
+    /// Sets whether the output falls where the operator rises.
+    pub fn with_falling(mut self, falls: bool) -> Self {
+        self.falls = falls;
+        self
+    }
+
     /// Sets what the sensor shows at rest \[output unit\].
     pub fn with_zero(mut self, zero: f64) -> Self {
         self.zero = T::from_f64(zero);
         self
     }
+}
+
+/// The other way round if it falls.
+#[inline]
+pub(super) fn signed<T: Real>(falls: bool, x: T) -> T {
+    if falls { -x } else { x }
 }
 
 /// Applies `f` of a stage if it is there.
@@ -239,7 +254,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
-        x = self.hysteresis.reset(&mut s.hysteresis, e, x);
+        x = signed(self.falls, self.hysteresis.reset(&mut s.hysteresis, e, x));
         x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
         x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
@@ -262,7 +277,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.step(&mut (), e, x));
-        x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        x = signed(self.falls, self.hysteresis.step(&mut s.hysteresis, e, x));
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.step(&mut s.felt, e, x));
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));

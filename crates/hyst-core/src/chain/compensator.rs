@@ -1,5 +1,6 @@
 //! The inverse of a chain: from a reference to the drive that makes the actuator follow it.
 
+use super::chain::signed;
 use super::preview::{Preview, PreviewState};
 use crate::stage::{hold, rest};
 use crate::{
@@ -36,6 +37,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     creep: Option<CreepInverse<T, C>>,
     temperature: Option<Temperature<T>>,
     asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
+    falls: bool,
     hysteresis: HI,
     input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
@@ -149,6 +151,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             temperature: self.temperature,
             asymmetry: self.asymmetry.as_ref().map(Invert::invert).transpose()?,
             whole_samples: self.delay.as_ref().map_or(0, Delay::whole_samples) + hysteresis.lead,
+            falls: self.falls,
             hysteresis_lead: hysteresis.lead,
             hysteresis_band: hysteresis.band,
             hysteresis: hysteresis.inverse,
@@ -249,7 +252,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.reset(&mut (), e, x);
         }
-        x = self.hysteresis.reset(&mut s.hysteresis, e, x);
+        x = self.hysteresis.reset(&mut s.hysteresis, e, signed(self.falls, x));
         if let Some(curve) = &self.input_curve {
             x = curve.reset(&mut (), e, x);
         }
@@ -293,7 +296,7 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
         }
-        x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        x = self.hysteresis.step(&mut s.hysteresis, e, signed(self.falls, x));
         if let Some(curve) = &self.input_curve {
             x = curve.step(&mut (), e, x);
         }
@@ -388,8 +391,10 @@ mod tests {
             .and_then(|c| c.with_load(&LoadParams { per_newton: 0.05 }))
             .and_then(|c| c.with_saturation(&SaturationParams { low: -4.0, high: 10.0, knee: 0.3 }))
             .unwrap();
-        let (worst, stated) = worst(&chain, |k| 4.0 + smooth(k), 4000);
-        assert!(worst < 1e-11 && stated == 0.0, "{worst}");
+        let (rising, stated) = worst(&chain, |k| 4.0 + smooth(k), 4000);
+        assert!(rising < 1e-11 && stated == 0.0, "{rising}");
+        let (falling, _) = worst(&chain.with_falling(true), |k| 4.0 - 0.4 * smooth(k), 4000);
+        assert!(falling < 1e-11, "{falling}");
     }
 
     #[test]

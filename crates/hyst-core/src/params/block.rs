@@ -15,8 +15,8 @@ use super::ChainParams;
 /// Version of the blocks that this version of the library writes and reads.
 ///
 /// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays. 3: the rate stage behind the lag, what settles
-/// behind the rate of a drift, harmonics behind the phase of a tone.
-pub const BLOCK_VERSION: u8 = 4;
+/// behind the rate of a drift, harmonics behind the phase of a tone. 4: the side of a curve. 5: whether the output falls, before the zero.
+pub const BLOCK_VERSION: u8 = 5;
 
 /// A list of at most `N` numbers without heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;
@@ -135,7 +135,7 @@ pub fn write_block<'a, L: serde::Serialize, E: serde::Serialize>(
 /// # use hyst_core::{ChainParams, EffectParams, PiParams, write_block};
 /// # let thresholds: Vec<f64> = (1..=20).map(f64::from).collect();
 /// # let operator = OperatorParams::Pi(PiParams { gain: 0.1, weights: thresholds.clone(), thresholds });
-/// # let fitted: ChainParams<Vec<f64>> = ChainParams { operator, effects: EffectParams::default(), zero: 0.0, input: [0.0, 120.0] };
+/// # let fitted: ChainParams<Vec<f64>> = ChainParams { operator, effects: EffectParams::default(), falls: false, zero: 0.0, input: [0.0, 120.0] };
 /// # let mut buffer = [0; 512];
 /// # let flash = write_block(&fitted, &mut buffer).unwrap();
 /// assert!(load(flash).is_ok());
@@ -196,6 +196,7 @@ mod tests {
                 resonances: [Some(ResonanceParams { hz: 90.0, damping: 0.03, gain: 1.0 }), None],
                 ..EffectParams::default()
             },
+            falls: false,
             zero: -1.5,
             input: [0.0, 120.0],
         }
@@ -238,10 +239,10 @@ mod tests {
         assert_eq!(read_block::<List<8>, List<8>>(bytes), Err(BlockError::TooLong));
         assert_eq!(read_block::<List<16>, List<1>>(bytes), Err(BlockError::TooLong));
         let payload = bytes[HEAD..bytes.len() - TAIL].to_vec();
-        // Too little, too much, and an option that is neither there nor absent (the last byte before the sensor's zero and the
+        // Too little, too much, and an option that is neither there nor absent (the last byte before the sign, the sensor's zero and the
         // range of the input says that there is no interference).
         let mut option = payload.clone();
-        option[payload.len() - 25] = 7;
+        option[payload.len() - 26] = 7;
         for broken in [payload[..payload.len() - 1].to_vec(), [&payload[..], &[0]].concat(), option] {
             assert_eq!(read_block::<List<16>, List<8>>(&honest(&broken)), Err(BlockError::Malformed));
         }

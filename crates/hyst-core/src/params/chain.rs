@@ -91,6 +91,8 @@ pub struct ChainParams<L, E = L> {
     pub operator: OperatorParams<L>,
     /// The stages around it.
     pub effects: EffectParams<E>,
+    /// Whether the output falls where the operator rises.
+    pub falls: bool,
     /// What the sensor shows at rest \[y\].
     pub zero: f64,
     /// Inputs that the model was identified on, lowest and highest \[u\].
@@ -107,6 +109,6 @@ impl<L, E: AsRef<[f64]>> ChainParams<L, E> {
         hysteresis: H,
         cx: &Sampling,
     ) -> Result<Chain<T, H, D, C>, Error> {
-        Ok(self.effects.around(hysteresis, cx)?.with_zero(self.zero))
+        Ok(self.effects.around(hysteresis, cx)?.with_falling(self.falls).with_zero(self.zero))
     }
 }

@@ -250,6 +250,7 @@ mod tests {
     /// by `beside`.
     fn ended(dead: usize, error: f32, beside: f32) -> State {
         let model: ChainParams<Vec<f64>> = ChainParams {
+            falls: false,
             operator: OperatorParams::Pi(PiParams {
                 gain: f64::from(GAIN),
                 thresholds: Vec::new(),

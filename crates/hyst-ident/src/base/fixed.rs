@@ -5,7 +5,7 @@ use std::ops::Range;
 use hyst_core::{Error, Sampling};
 use nalgebra::DMatrix;
 
-use super::{Basis, Drag};
+use super::{Basis, Drag, turned};
 use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
 use crate::model::{Base, Model, Operator};
@@ -15,6 +15,7 @@ use crate::{BetweenSamples, Samples};
 #[derive(Clone, Debug)]
 pub(crate) struct FixedBasis {
     pub(crate) base: Base,
+    falls: bool,
     between: BetweenSamples,
     operator: Box<Operator>,
     /// Segments and surroundings of the record that it is for.
@@ -31,7 +32,13 @@ impl FixedBasis {
         let between = model.between_samples;
         let period = samples.period / between.steps() as f64;
         let operator = Operator::new(&model.base, [low, high], &Sampling { period })?;
-        Ok(Self { base: model.base.clone(), between, operator: Box::new(operator), samples: samples.clone() })
+        Ok(Self {
+            base: model.base.clone(),
+            falls: model.falls,
+            between,
+            operator: Box::new(operator),
+            samples: samples.clone(),
+        })
     }
 }
 
@@ -43,7 +50,7 @@ impl Basis for FixedBasis {
             Drive::of(&self.samples, drive, self.between, Passes::Once).run(&*self.operator, &mut column);
             column
         };
-        of.map(column).collect()
+        turned(self.falls, of.map(column).collect())
     }
 
     fn drags(&self) -> bool {

@@ -22,6 +22,14 @@ use crate::lsq::Bounds;
 /// Columns that run through an operator or a filter side by side: each waits for its own last sample only.
 pub(crate) const BESIDE: usize = 4;
 
+/// The columns of an operator whose output falls where the drive rises: with the other sign.
+fn turned(falls: bool, mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    if falls {
+        columns.iter_mut().flatten().for_each(|x| *x = -*x);
+    }
+    columns
+}
+
 /// A family of operators, linear in their weights.
 ///
 /// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it

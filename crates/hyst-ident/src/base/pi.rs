@@ -5,7 +5,7 @@ use std::ops::Range;
 use hyst_core::play;
 use nalgebra::DMatrix;
 
-use super::{BESIDE, Basis, Drag};
+use super::{BESIDE, Basis, Drag, turned};
 use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
@@ -25,6 +25,8 @@ const STEP: f64 = 1e-6;
 pub(crate) struct PiBasis {
     pub(crate) thresholds: Vec<f64>,
     pub(crate) floor: f64,
+    /// Whether the output falls where the operator rises: weights stay positive, columns change their sign.
+    pub(crate) falls: bool,
 }
 
 impl PiBasis {
@@ -33,7 +35,7 @@ impl PiBasis {
     pub(crate) fn for_samples(samples: &Samples) -> Self {
         let (low, high) = samples.input_range();
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
-        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain }
+        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain, falls: samples.falls }
     }
 
     /// The same with a share of the plays.
@@ -52,14 +54,14 @@ impl PiBasis {
         most: Option<usize>,
     ) -> Option<Self> {
         let elements = |r: &[f64]| {
-            let mut plays = plays(&samples.input, &samples.segments, r, drag);
+            let mut plays = turned(self.falls, plays(&samples.input, &samples.segments, r, drag));
             through(&mut plays);
             plays
         };
         let bank = |rows| {
-            let mut identity = [samples.input.clone()];
+            let mut identity = turned(self.falls, vec![samples.input.clone()]);
             through(&mut identity);
-            let [identity] = identity;
+            let identity = identity.swap_remove(0);
             let candidates = even(samples, CANDIDATES, CANDIDATES / 4);
             Bank::new(samples, vec![(identity, Bounds::above(self.floor))], candidates, &elements, rows)
         };
@@ -87,7 +89,7 @@ impl Basis for PiBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let identity = of.contains(&0).then(|| drive.to_vec());
         let thresholds = &self.thresholds[of.start.max(1) - 1..of.end.max(1) - 1];
-        identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect()
+        turned(self.falls, identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect())
     }
 
     fn is_odd(&self) -> bool {
@@ -120,6 +122,7 @@ impl Basis for SlidingPlays<'_> {
         let plain = self.plays.len();
         let slope = |i: usize| -> Vec<f64> {
             let (r, w) = (self.plays.thresholds[i], self.weights[i + 1]);
+            let w = if self.plays.falls { -w } else { w };
             let (up, down) = (one_play(drive, segments, r + step, drag), one_play(drive, segments, r - step, drag));
             up.iter().zip(down).map(|(up, down)| 0.5 * w * (up - down) / step).collect()
         };

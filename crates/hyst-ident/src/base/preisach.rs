@@ -6,7 +6,7 @@ use std::ops::Range;
 use hyst_core::{Build, Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
 use nalgebra::DMatrix;
 
-use super::{Basis, Drag};
+use super::{Basis, Drag, turned};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::capacity::NODES;
@@ -26,6 +26,8 @@ pub(crate) struct PreisachBasis {
     pub(crate) grid: Grid,
     pub(crate) rest: f64,
     pub(crate) floor: f64,
+    /// Whether the output falls where the operator rises: weights stay positive, columns change their sign.
+    pub(crate) falls: bool,
 }
 
 impl PreisachBasis {
@@ -53,7 +55,7 @@ impl PreisachBasis {
         };
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
         let width = (high - low) / cells as f64;
-        Self { grid: Grid { low, high, cells }, rest, floor: FLOOR * gain * width }
+        Self { grid: Grid { low, high, cells }, rest, floor: FLOOR * gain * width, falls: samples.falls }
     }
 
     fn triangle(&self) -> usize {
@@ -173,7 +175,7 @@ impl PreisachBasis {
 
 impl Basis for PreisachBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        self.some(&of, drive, segments)
+        turned(self.falls, self.some(&of, drive, segments))
     }
 
     fn together(&self) -> usize {
@@ -190,7 +192,7 @@ impl Basis for PreisachBasis {
             let zero = map.reset(&mut state, &env, self.rest);
             out.extend(drive[segment.clone()].iter().map(|u| map.step(&mut state, &env, *u) - zero));
         }
-        Some(out)
+        Some(turned(self.falls, vec![out]).swap_remove(0))
     }
 
     fn drags(&self) -> bool {

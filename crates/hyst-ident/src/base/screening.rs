@@ -41,7 +41,9 @@ impl ScreeningBasis {
     /// if it is kept as it is.
     pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
         // A short record determines fewer curves.
-        let of = |by: usize| Self::of(samples, PiBasis::coarser(samples, by), drags, kept.clone());
+        // Its weights have either sign.
+        let plays = |by| PiBasis { falls: false, ..PiBasis::coarser(samples, by) };
+        let of = |by: usize| Self::of(samples, plays(by), drags, kept.clone());
         let fits = |basis: &Self| ROWS_PER_UNKNOWN * basis.len() <= samples.len();
         (1..COARSEST).map(of).find(fits).unwrap_or_else(|| of(COARSEST))
     }

@@ -110,7 +110,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis, FitError> {
     let before = simulate(model, train, options.zero)?;
     let mut samples = Samples::from_record(train);
-    check(train, &samples, sign_matters(model.base.kind()))?;
+    samples.falls &= sign_matters(model.base.kind());
+    check(train, &samples, samples.falls != model.falls)?;
     let stage = |source| FitError::Stage { record: train.name(), source };
     let per_record = options.zero == Zero::PerRecord;
 

@@ -134,6 +134,7 @@ mod tests {
             segments: Vec::new(),
             file_of_segment: vec![0; 3],
             settling: Vec::new(),
+            falls: false,
             blind: Vec::new(),
         };
         for t0 in starts {

@@ -96,7 +96,7 @@ impl From<DpmFit> for Fit {
 pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError> {
     let name = || record.name();
     let mut samples = Samples::from_record(record);
-    check(record, &samples, true)?;
+    check(record, &samples, samples.falls)?;
     let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(&samples, s)).collect();
     // A segment in which nothing moves has no rate.
     let slowest = rates.iter().copied().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min);

@@ -58,7 +58,7 @@ pub struct FodReport {
 /// As [`Surface::measure`]; [`EverettError::NotMonotone`] with `as_measured` where the surface is not.
 pub fn fit_fod(record: &Record, options: &FodOptions) -> Result<FodFit, FitError> {
     let samples = Samples::from_record(record);
-    check(record, &samples, true)?;
+    check(record, &samples, samples.falls)?;
     let surface = Surface::measure(&record.name(), &samples, options.cells)?;
     let (valid, report) = checked(&surface, &record.name(), options.as_measured)?;
     let base = Base::Preisach(valid.params());

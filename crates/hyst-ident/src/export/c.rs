@@ -61,6 +61,9 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     let (input, output) = (harmless(model.input.symbol()), harmless(model.output.symbol()));
     let _ = writeln!(text, "\n/* What the sensor shows at rest: added to what leaves the last stage. */");
     let _ = writeln!(text, "static const double {name}_zero = {:?}; /* {output} */", model.zero);
+    if model.falls {
+        let _ = writeln!(text, "/* The output falls where the input rises: y = -H(u) leaves the hysteresis H. */");
+    }
     let _ = writeln!(text, "/* Inputs that the model was identified on. */");
     let _ = writeln!(text, "static const double {name}_input_low = {:?}; /* {input} */", model.input.low);
     let _ = writeln!(text, "static const double {name}_input_high = {:?}; /* {input} */", model.input.high);

@@ -99,6 +99,8 @@ pub fn rust(model: &Model) -> String {
          pub const OPERATOR: {operator};\n\
          /// The stages around it.\n\
          pub const EFFECTS: EffectParams<&[f64]> = {effects:?};\n\
+         /// Whether the output falls where the operator rises.\n\
+         pub const FALLS: bool = {falls};\n\
          /// What the sensor shows at rest [{unit}].\n\
          pub const ZERO: f64 = {zero:?};\n\
          /// Inputs that the model was identified on, lowest and highest [{input}].\n\
@@ -110,11 +112,12 @@ pub fn rust(model: &Model) -> String {
          /// If the sample period does not suit the parameters, or the dead time does not fit.\n\
          pub fn chain<T: Real, const D: usize>(\n    sampling: &Sampling,\n) -> Result<Chain<T, {operator_type}, D, {creep}>, Error> {{\n    \
          let hysteresis: {operator_type} = OPERATOR.build({context})?;\n    \
-         Ok(EFFECTS.around(hysteresis, sampling)?.with_zero(ZERO))\n\
+         Ok(EFFECTS.around(hysteresis, sampling)?.with_falling(FALLS).with_zero(ZERO))\n\
          }}\n",
         version = env!("CARGO_PKG_VERSION"),
         origin = origin(model),
         effects = params.effects,
+        falls = params.falls,
         zero = params.zero,
         range = params.input,
         period = period,

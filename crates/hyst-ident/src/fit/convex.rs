@@ -1,8 +1,8 @@
 //! Fits that are one convex problem: weights over plays or cells.
 
 use super::{
-    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_EACH, basis_for, check, fit_settled, sign_matters, solved,
-    to_model, with_errors,
+    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_EACH, basis_for, check, fit_settled, solved, to_model,
+    with_errors,
 };
 use crate::base::{Drag, SlidingPlays};
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
@@ -26,7 +26,7 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
         _ => Ok(()),
     };
     enough(samples.len(), FEWEST / ROWS_EACH)?;
-    check(record, &samples, sign_matters(kind))?;
+    check(record, &samples, false)?;
     let basis = basis_for(kind, &samples)?;
     enough(samples.len(), basis.len())?;
     let (fitted, left) = fit_settled(&mut samples, basis.as_ref(), options, &name)?;

@@ -7,6 +7,7 @@ use hyst_core::Kind;
 use super::{Fit, FitError, FitOptions, Optimizer, ROWS_EACH, check, model_of, with_errors};
 use crate::BetweenSamples;
 use crate::identify::{Beside, Ended, Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
+use crate::model::ZERO;
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
@@ -24,7 +25,12 @@ pub(super) fn fit(
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
     let mut samples = Samples::from_record(record);
-    check(record, &samples, super::sign_matters(kind))?;
+    check(record, &samples, false)?;
+    // The operators rise: one that falls is fitted to the output with the other sign, which the model turns back.
+    samples.falls &= super::sign_matters(kind);
+    if samples.falls {
+        samples.output.iter_mut().for_each(|y| *y = -*y);
+    }
     if kind_needs_temperature(kind) && samples.temperature.is_none() {
         return Err(FitError::Missing {
             record: record.name(),
@@ -37,13 +43,21 @@ pub(super) fn fit(
     let Searched { best, left, how } = setup.search(&samples, watch)?;
     // What is still ringing or remembers what was before the record says nothing about the model.
     samples.settling = best.settling;
-    let family = setup.family(&samples, best.between)?;
-    let identification = Identification::new(&family, &samples, options.zero_per_record, &name)?;
-    let found = identification.conclude(identification.polish(&best.located)?);
-    let zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
+    let (mut found, given) = {
+        let family = setup.family(&samples, best.between)?;
+        let identification = Identification::new(&family, &samples, options.zero_per_record, &name)?;
+        (identification.conclude(identification.polish(&best.located)?), family.given())
+    };
+    let mut zero = found.zeros.iter().sum::<f64>() / found.zeros.len().max(1) as f64;
+    if samples.falls {
+        samples.output.iter_mut().for_each(|y| *y = -*y);
+        zero = -zero;
+        let zeros = found.estimate.parameters.iter_mut().filter(|p| p.name.starts_with(ZERO));
+        zeros.for_each(|p| p.value = -p.value);
+    }
     let mut model = model_of(record, &samples, found.base.clone(), zero, options.seed);
     model.between_samples = best.between;
-    let how = [how].into_iter().chain(family.given()).chain(found.ended.iter().map(at_bound)).collect::<Vec<_>>();
+    let how = [how].into_iter().chain(given).chain(found.ended.iter().map(at_bound)).collect::<Vec<_>>();
     let fit = Fit::at_once(with_errors(model, &found.estimate), &how.join("; "));
     let (trials, evaluations) = (found.trials, found.evaluations);
     Ok(Fit { estimate: Some(found.estimate), trials, evaluations, between_samples: left, ..fit })

@@ -36,6 +36,7 @@ fn record(
         segments: Vec::new(),
         file_of_segment: Vec::new(),
         settling: Vec::new(),
+        falls: false,
         blind: Vec::new(),
     };
     for t in degc {
@@ -473,6 +474,7 @@ fn rows_that_repeat_others_add_nothing() {
             temperature: samples.temperature.as_deref().map(again),
             segments: std::slice::from_ref(&(0..rows)).to_vec(),
             settling: vec![false; rows],
+            falls: false,
             blind: vec![false; rows],
             ..samples.clone()
         }

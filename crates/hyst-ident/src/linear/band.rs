@@ -43,6 +43,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
         output: Vec::new(),
         temperature: None,
         load: None,
+        falls: samples.falls,
         segments: Vec::new(),
         file_of_segment: samples.file_of_segment.clone(),
         settling: Vec::new(),

@@ -51,6 +51,7 @@ impl Model {
             },
             between_samples: BetweenSamples::Linear,
             output: Channel { column: output.column().into(), unit: output.suffix().into(), low: 0.0, high: 0.0 },
+            falls: false,
             zero: 0.0,
             base,
             effects,

@@ -70,6 +70,8 @@ struct File<S> {
     seed: u64,
     input: Input,
     output: Channel,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    falls: bool,
     zero: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     zero_std_error: Option<f64>,
@@ -91,6 +93,8 @@ pub struct Model {
     pub between_samples: BetweenSamples,
     /// The output.
     pub output: Channel,
+    /// Whether the output falls where the hysteresis rises: its gain is negative.
+    pub falls: bool,
     /// What the sensor shows at rest \[output unit\].
     pub zero: f64,
     /// The hysteresis.
@@ -176,7 +180,7 @@ impl Model {
         let cx = Sampling { period };
         let chain: HostChain =
             self.effects.to_params().around(Operator::new(&self.base, [self.input.low, self.input.high], &cx)?, &cx)?;
-        Ok(chain.with_zero(self.zero))
+        Ok(chain.with_falling(self.falls).with_zero(self.zero))
     }
 
     /// The stages as the file has them: a JSON object each, with name, parameters, units and standard errors.
@@ -189,6 +193,7 @@ impl Model {
         ChainParams {
             operator: self.base.clone(),
             effects: self.effects.to_params(),
+            falls: self.falls,
             zero: self.zero,
             input: [self.input.low, self.input.high],
         }
@@ -241,6 +246,7 @@ impl Model {
             seed: self.seed,
             input: Input { column, unit, low, high, between_samples: self.between_samples },
             output: self.output.clone(),
+            falls: self.falls,
             zero: self.zero,
             zero_std_error: self.std_errors.get(ZERO).copied(),
             rmse: self.rmse,
@@ -334,6 +340,7 @@ impl Model {
             input,
             between_samples,
             output: file.output,
+            falls: file.falls,
             zero: file.zero,
             base,
             effects,

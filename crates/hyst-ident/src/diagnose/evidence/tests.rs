@@ -23,6 +23,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
         segments: Vec::new(),
         file_of_segment: vec![0; segments.len()],
         settling: Vec::new(),
+        falls: false,
         blind: Vec::new(),
     };
     let mut start = 0.0;
@@ -59,6 +60,7 @@ fn actuator(base: Base, effects: Effects) -> Model {
         between_samples: crate::BetweenSamples::Linear,
         input: channel("voltage_v", "V"),
         output: channel("displacement_um", "um"),
+        falls: false,
         zero: 0.4,
         base,
         effects,
