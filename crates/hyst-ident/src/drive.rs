@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
-use hyst_core::Stage;
+use hyst_core::{Env, Stage};
 use serde::{Deserialize, Serialize};
 
 use crate::Samples;
@@ -122,10 +122,20 @@ impl<'a> Drive<'a> {
 
     /// Output of a stage over the rows, one segment after the other, each from rest under its first input or after its history.
     pub(crate) fn run<S: Stage<f64>>(&self, stage: &S, out: &mut [f64]) {
+        self.run_from(stage, |state, _, env, u0| stage.reset(state, env, u0), out);
+    }
+
+    /// The same where `begin` says in what state each segment, by its number, begins under its first input.
+    pub(crate) fn run_from<S: Stage<f64>>(
+        &self,
+        stage: &S,
+        begin: impl Fn(&mut S::State, usize, &Env<f64>, f64) -> f64,
+        out: &mut [f64],
+    ) {
         let mut state = Box::new(stage.state());
-        for (segment, history) in self.samples.segments.iter().zip(&self.history) {
+        for (i, (segment, history)) in self.samples.segments.iter().zip(&self.history).enumerate() {
             let Some(first) = segment.clone().next() else { continue };
-            out[first] = stage.reset(&mut state, &self.samples.env(first), self.rows[first]);
+            out[first] = begin(&mut state, i, &self.samples.env(first), self.rows[first]);
             let before = first + 1..first + history;
             for k in before.clone().chain((!before.is_empty()).then_some(first)) {
                 let env = self.samples.env(k);
@@ -144,6 +154,25 @@ impl<'a> Drive<'a> {
                 }
             }
         }
+    }
+
+    /// The first `rows` of one segment, which `begin` begins.
+    pub(crate) fn beginning<S: Stage<f64>>(
+        &self,
+        segment: usize,
+        rows: usize,
+        stage: &S,
+        begin: impl Fn(&mut S::State, &Env<f64>, f64) -> f64,
+    ) -> Vec<f64> {
+        let mut state = Box::new(stage.state());
+        let first = self.samples.segments[segment].start;
+        let mut out = vec![begin(&mut state, &self.samples.env(first), self.rows[first])];
+        for k in first + 1..first + rows {
+            let env = self.samples.env(k);
+            let values = &self.values[k * self.steps..(k + 1) * self.steps];
+            out.extend(values.iter().map(|u| stage.step(&mut state, &env, *u)).next_back());
+        }
+        out
     }
 }
 

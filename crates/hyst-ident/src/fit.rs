@@ -5,7 +5,7 @@ mod options;
 mod searched;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use hyst_core::{Grid, PiParams, ViscousPiParams};
 
@@ -13,6 +13,7 @@ use crate::BetweenSamples;
 use crate::base::{Basis, DragParams, FixedBasis, PiBasis, PreisachBasis};
 use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
+use crate::memory;
 use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError, ZERO};
 use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
@@ -21,6 +22,8 @@ use crate::samples::Samples;
 use crate::settle::{AT_REST, start_up_rows, windows};
 use crate::simulate::{Zero, simulate};
 
+/// How often the past of a record is asked for, each time with what was fitted to the rows that the last one explains.
+const RECALLS: usize = 2;
 /// Cells along one edge of the Preisach triangle.
 pub(crate) const CELLS: usize = 24;
 /// And of the coarsest, for a short record.
@@ -359,19 +362,65 @@ pub(crate) fn check(record: &Record, samples: &Samples, wrong_sign: bool) -> Res
     Ok(())
 }
 
-/// Fits the base and finds the start-up rows while it does: sets `samples.settling`. Gives the fit and what it has left in the rows
-/// that it used.
+/// Fits the base and finds the start-up rows while it does, and what the actuator remembered when each segment began: sets `samples.settling` and
+/// `samples.pasts`. Gives the fit and what it has left in the rows that it used.
 pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,
     name: &dyn Fn() -> String,
 ) -> Result<(Fitted, Vec<f64>), FitError> {
-    let run = |samples: &Samples| everywhere(samples, basis, options.zero_per_record, name);
-    let mut all = run(samples)?;
-    if samples.mark_spikes(&all.1) {
-        all = run(samples)?;
+    let run = |samples: &Samples, basis: &dyn Basis| everywhere(samples, basis, options.zero_per_record, name);
+    let all = run(samples, basis)?;
+    samples.mark_spikes(&all.1);
+    // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
+    let plays = PiBasis::for_samples(samples);
+    let by_plays = recalled(samples, &plays, |samples| run(samples, &plays))?;
+    if !basis.remembers() {
+        samples.pasts.iter_mut().for_each(Vec::clear);
     }
+    samples.settling.copy_from_slice(&samples.blind);
+    let (found, _) = start_up_found(samples, Some(&by_plays), |samples| run(samples, basis))?;
+    Ok(within(samples, found))
+}
+
+/// Finds what the actuator remembered when each segment began, as plays follow it: sets `samples.pasts`. Gives what they miss of each row.
+fn recalled(
+    samples: &mut Samples,
+    plays: &PiBasis,
+    run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
+) -> Result<Vec<f64>, FitError> {
+    let (mut found, mut late) = start_up_found(samples, None, &run)?;
+    let starts = |s: &Range<usize>| s.clone().any(|k| samples.settling[k] && !samples.blind[k]);
+    let asked: Vec<bool> = samples.segments.iter().map(starts).collect();
+    for _ in 0..RECALLS {
+        if !asked.contains(&true) {
+            break;
+        }
+        let pasts = memory::recalled(samples, plays, &late, &asked);
+        if pasts == samples.pasts {
+            break;
+        }
+        let mut recalled = Samples { pasts, settling: samples.blind.clone(), ..samples.clone() };
+        let with_past = start_up_found(&mut recalled, None, &run)?;
+        let count = |samples: &Samples| samples.settling.iter().filter(|s| **s).count();
+        if count(&recalled) >= count(samples) {
+            break;
+        }
+        *samples = recalled;
+        (found, late) = with_past;
+    }
+    Ok(found.1)
+}
+
+/// Finds the start-up rows: sets `samples.settling`. Gives the fit to the rows that count, and one to those that are a start-up for none.
+/// `beside` is what another base misses of each row.
+fn start_up_found(
+    samples: &mut Samples,
+    beside: Option<&[f64]>,
+    run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
+) -> Result<((Fitted, Vec<f64>), Fitted), FitError> {
+    let all = run(samples)?;
     let windows = windows(samples);
     let mut without = samples.clone();
     for (s, w) in samples.segments.iter().zip(&windows) {
@@ -388,10 +437,21 @@ pub(crate) fn fit_settled(
     // nobody's guess. If neither, they belong to the record (and hold its virgin curve).
     let (low, high) = samples.input_range();
     let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > AT_REST * low.abs().max(high.abs()));
-    let residual = if away || rms_late(&all.1) > 1.5 * rms_late(&late.1) { &late.1 } else { &all.1 };
-    samples.settling = start_up_rows(samples, residual);
+    let judged_late = away || rms_late(&all.1) > 1.5 * rms_late(&late.1);
+    let mut residual = if judged_late { late.1.clone() } else { all.1.clone() };
+    // What has not seen them need not have all weights that they call for. What another base follows there is no start-up.
+    if let Some(beside) = beside.filter(|_| judged_late) {
+        for (s, w) in samples.segments.iter().zip(&windows) {
+            let rows = s.start..s.start + w;
+            let squares = |r: &[f64]| rows.clone().filter(|k| !samples.blind[*k]).map(|k| r[k] * r[k]).sum::<f64>();
+            if squares(beside) < squares(&residual) {
+                residual[rows.clone()].copy_from_slice(&beside[rows]);
+            }
+        }
+    }
+    samples.settling = start_up_rows(samples, &residual);
     let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
-    Ok(within(samples, found))
+    Ok((found, late.0))
 }
 
 /// A fit to the rows that count, and what it leaves in every row.
@@ -478,7 +538,7 @@ pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64
 }
 
 fn fitted_on(record: &Record, samples: &Samples) -> Vec<FittedOn> {
-    let of_file = |(source, rows): (&crate::record::Source, std::ops::Range<usize>)| {
+    let of_file = |(source, rows): (&crate::record::Source, Range<usize>)| {
         let settling_rows = samples.settling[rows.clone()].iter().filter(|s| **s).count();
         FittedOn {
             file: std::path::Path::new(&source.name)

@@ -26,6 +26,7 @@ pub mod identify;
 pub mod linear;
 mod loop_gains;
 mod lsq;
+mod memory;
 pub mod metrics;
 pub mod model;
 mod nested;

@@ -29,6 +29,8 @@ pub struct Samples {
     pub segments: Vec<Range<usize>>,
     /// File that each segment came from.
     pub file_of_segment: Vec<usize>,
+    /// Drive before each segment began, as far as the memory shows it \[V\]; nothing where it began at rest.
+    pub(crate) pasts: Vec<Vec<f64>>,
     /// Rows that are left out of fits and of the settled error: those that show no motion, and a start-up transient once it is found.
     pub settling: Vec<bool>,
     /// Rows in which the sensor shows no motion: it stands at the end of its range, or spikes.
@@ -48,6 +50,7 @@ impl Samples {
             load: record.load().map(<[f64]>::to_vec),
             falls: falls(record.input(), record.output().unwrap_or_default()),
             segments: record.segments().to_vec(),
+            pasts: vec![Vec::new(); record.segments().len()],
             file_of_segment: record.file_of_segment().to_vec(),
             settling: blind.clone(),
             blind,
@@ -84,6 +87,7 @@ impl Samples {
         Self {
             period: self.period,
             segments: keep.iter().map(length).collect(),
+            pasts: keep.iter().map(|s| self.pasts.get(*s).cloned().unwrap_or_default()).collect(),
             time: column(&self.time),
             input: column(&self.input),
             output: column(&self.output),
@@ -109,6 +113,7 @@ impl Samples {
             temperature: None,
             load: None,
             segments: std::iter::once(0..rows).collect(),
+            pasts: vec![Vec::new()],
             file_of_segment: vec![0],
             settling: vec![false; rows],
             blind: vec![false; rows],

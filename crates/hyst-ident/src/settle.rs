@@ -137,7 +137,7 @@ pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fi
 }
 
 /// Residual minus each file's mean outside the windows: another sensor zero is no transient.
-fn centre(samples: &Samples, residual: &[f64], windows: &[usize], blind: &[bool]) -> Vec<f64> {
+pub(crate) fn centre(samples: &Samples, residual: &[f64], windows: &[usize], blind: &[bool]) -> Vec<f64> {
     let mut centred = residual.to_vec();
     for file in 0..samples.files() {
         let own =

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
+use crate::memory;
 use crate::metrics::Errors;
-use crate::model::Model;
+use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
 use crate::samples::Samples;
-use crate::settle::{first_cycles, start_up_rows};
+use crate::settle::{centre, first_cycles, start_up_rows, windows};
 
 /// What is done with the sensor's zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,8 +76,8 @@ pub struct Simulation {
     pub errors: Option<Errors>,
     /// Inputs beyond the model's own range.
     pub extrapolated: Extrapolated,
-    /// Whether a segment begins as after its own first cycle, and not at rest.
-    pub(crate) in_mid_cycle: bool,
+    /// Segments that do not begin at rest, but after turns of the drive that are not in the record, or as after their own first cycle.
+    pub(crate) in_mid_cycle: Vec<bool>,
 }
 
 /// Runs a model over a record at the temperatures that it holds, as [`simulate_with`].
@@ -103,30 +104,46 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     drive.run(&*chain, &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
-    let mut in_mid_cycle = false;
+    let mut in_mid_cycle = vec![false; samples.segments.len()];
     let mut settling = samples.settling.clone();
     if let Some(output) = record.output() {
         let missed = |predicted: &[f64]| -> Vec<f64> { output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
         let mut residual = missed(&predicted);
         samples.mark_spikes(&residual);
         settling = start_up_rows(&samples, &residual);
-        let history = histories(&samples, &settling);
+        let starts = started(&samples, &settling);
         // A period of a steady state has its own history.
-        if !options.periodic && history.iter().any(|rows| *rows > 0) {
-            let mut cycled = vec![0.0; samples.len()];
-            // Anew, since `samples` knows its spikes now.
-            Drive::new(&samples, model.between_samples, passes).after(history).run(&*chain, &mut cycled);
-            let left = missed(&cycled);
-            let after = start_up_rows(&samples, &left);
-            for segment in &samples.segments {
-                let starting = |rows: &[bool]| rows[segment.clone()].iter().filter(|s| **s).count();
-                // Nor may it miss more of what the model follows from rest.
-                let squares = |residual: &[f64]| {
-                    segment.clone().filter(|k| !settling[*k]).map(|k| residual[k] * residual[k]).sum::<f64>()
-                };
-                if starting(&after) < starting(&settling) && squares(&left) <= squares(&residual) {
-                    predicted[segment.clone()].copy_from_slice(&cycled[segment.clone()]);
-                    in_mid_cycle = true;
+        if !options.periodic && starts.contains(&true) {
+            let from_rest = residual.clone();
+            let drive = || Drive::new(&samples, model.between_samples, passes);
+            let mut others = Vec::new();
+            // The drive may have turned before the record began, ...
+            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts);
+            if pasts.iter().any(|past| !past.is_empty()) {
+                let mut turned = vec![0.0; samples.len()];
+                drive().run_from(&*chain, |s, i, env, u0| chain.reset_after(s, env, u0, &pasts[i]), &mut turned);
+                others.push(turned);
+            }
+            // ... or gone on as it does afterwards.
+            let history = histories(&samples, &starts);
+            if history.iter().any(|rows| *rows > 0) {
+                let mut cycled = vec![0.0; samples.len()];
+                drive().after(history).run(&*chain, &mut cycled);
+                others.push(cycled);
+            }
+            for other in others {
+                let (left, now) = (missed(&other), start_up_rows(&samples, &missed(&predicted)));
+                let after = start_up_rows(&samples, &left);
+                for (segment, in_mid_cycle) in samples.segments.iter().zip(&mut in_mid_cycle) {
+                    let starting = |rows: &[bool]| rows[segment.clone()].iter().filter(|s| **s).count();
+                    // Nor may it miss more of what the model follows from rest.
+                    let squares = |residual: &[f64]| {
+                        segment.clone().filter(|k| !settling[*k]).map(|k| residual[k] * residual[k]).sum::<f64>()
+                    };
+                    if starting(&after) < starting(&now) && squares(&left) <= squares(&from_rest) {
+                        predicted[segment.clone()].copy_from_slice(&other[segment.clone()]);
+                        *in_mid_cycle = true;
+                    }
                 }
             }
             residual = missed(&predicted);
@@ -149,12 +166,46 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     Ok(Simulation { predicted, settling, zeros, errors, extrapolated, in_mid_cycle })
 }
 
-/// Rows that may have passed before each segment in which a start-up shows.
-fn histories(samples: &Samples, settling: &[bool]) -> Vec<usize> {
+/// Segments in which a start-up shows.
+fn started(samples: &Samples, settling: &[bool]) -> Vec<bool> {
     let starts = |s: &Range<usize>| settling[s.clone()].iter().zip(&samples.blind[s.clone()]).any(|(s, b)| *s && !*b);
-    let cycles = first_cycles(samples);
-    let of = |(s, cycle): (&Range<usize>, Option<usize>)| if starts(s) { cycle.unwrap_or(0) } else { 0 };
-    samples.segments.iter().zip(cycles).map(of).collect()
+    samples.segments.iter().map(starts).collect()
+}
+
+/// Rows that may have passed before each segment in which a start-up shows.
+fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
+    first_cycles(samples)
+        .into_iter()
+        .zip(starts)
+        .map(|(cycle, starts)| cycle.filter(|_| *starts).unwrap_or(0))
+        .collect()
+}
+
+/// The past of each segment in which a start-up shows after which the model follows its first rows best; `residual` is that from rest.
+fn recalled(
+    samples: &Samples,
+    residual: &[f64],
+    drive: &Drive<'_>,
+    chain: &HostChain,
+    starts: &[bool],
+) -> Vec<Vec<f64>> {
+    let windows = windows(samples);
+    let centred = centre(samples, residual, &windows, &samples.blind);
+    let of = |i: usize| -> Vec<f64> {
+        let rows = samples.segments[i].start..samples.segments[i].start + windows[i];
+        if !starts[i] || rows.is_empty() {
+            return Vec::new();
+        }
+        let zero = residual[rows.start] - centred[rows.start];
+        let squares = |past: &Vec<f64>| -> f64 {
+            let output =
+                drive.beginning(i, windows[i], chain, |state, env, u0| chain.reset_after(state, env, u0, past));
+            let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);
+            left.map(|(k, v)| (samples.output[k] - zero - v).powi(2)).sum()
+        };
+        memory::best(memory::pasts(samples.input[rows.start], samples.input_range()), squares)
+    };
+    (0..starts.len()).map(of).collect()
 }
 
 /// What to do about a record whose output is in this unit, and not in the model's.

@@ -246,25 +246,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
 
     /// A temperature that is no finite number counts as T₀ of the temperature stage (0 °C without one), a load as zero.
     fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        s.temperature = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
-        let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
-        let e = &Env { temperature, load, ..*e };
-        let u0 = rest(&mut s.input, u0);
-        let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
-        x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
-        x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
-        x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
-        x = signed(self.falls, self.hysteresis.reset(&mut s.hysteresis, e, x));
-        x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
-        x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
-        x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
-        x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
-        for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
-            x = through(g, x, |g, x| g.reset(s, e, x));
-        }
-        x = through(&self.saturation, x, |g, x| g.reset(&mut (), e, x));
-        x = through(&self.drift, x, |g, x| g.reset(&mut (), e, x));
-        through(&self.interference, x, |g, x| g.reset(&mut (), e, x)) + self.zero
+        self.reset_after(s, e, u0, &[])
     }
 
     /// An input, temperature or load that is no finite number is replaced by the last one that was.
@@ -288,6 +270,43 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.saturation, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.drift, x, |g, x| g.step(&mut (), e, x));
         through(&self.interference, x, |g, x| g.step(&mut (), e, x)) + self.zero
+    }
+}
+
+impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
+    /// Starts as [`reset`](Stage::reset) does, but with the memory that this past of the drive has left, oldest first, slow enough for all that leads
+    /// to the hysteresis; all other stages are at rest under `u0`.
+    pub fn reset_after(&self, s: &mut ChainState<T, H::State, D, C>, e: &Env<T>, u0: T, past: &[T]) -> T {
+        s.temperature = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
+        let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
+        let e = &Env { temperature, load, ..*e };
+        let u0 = rest(&mut s.input, u0);
+        let mut x = through(&self.delay, u0, |g, x| g.reset(&mut s.delay, e, x));
+        x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
+        x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
+        x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
+        x = match past.split_first() {
+            None => self.hysteresis.reset(&mut s.hysteresis, e, x),
+            Some((first, rest)) => {
+                let bent = |u: T| through(&self.input_curve, u, |g, u| g.reset(&mut (), e, u));
+                self.hysteresis.reset(&mut s.hysteresis, e, bent(*first));
+                for u in rest.iter().filter(|u| u.is_finite()) {
+                    self.hysteresis.step(&mut s.hysteresis, e, bent(*u));
+                }
+                self.hysteresis.step(&mut s.hysteresis, e, x)
+            }
+        };
+        x = signed(self.falls, x);
+        x = through(&self.asymmetry, x, |g, x| g.reset(&mut (), e, x));
+        x = through(&self.temperature, x, |g, x| g.reset(&mut s.felt, e, x));
+        x = through(&self.creep, x, |g, x| g.reset(&mut s.creep, e, x));
+        x = through(&self.load, x, |g, x| g.reset(&mut (), e, x));
+        for (g, s) in self.resonances.iter().zip(&mut s.resonances) {
+            x = through(g, x, |g, x| g.reset(s, e, x));
+        }
+        x = through(&self.saturation, x, |g, x| g.reset(&mut (), e, x));
+        x = through(&self.drift, x, |g, x| g.reset(&mut (), e, x));
+        through(&self.interference, x, |g, x| g.reset(&mut (), e, x)) + self.zero
     }
 }
 

@@ -53,6 +53,10 @@ impl Basis for FixedBasis {
         turned(self.falls, of.map(column).collect())
     }
 
+    fn remembers(&self) -> bool {
+        false
+    }
+
     fn drags(&self) -> bool {
         false
     }

@@ -46,6 +46,10 @@ pub(crate) trait Basis: Sync {
     fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         None
     }
+    /// Whether a segment may have a [past](crate::memory): the columns depend on drive and segments alone.
+    fn remembers(&self) -> bool {
+        true
+    }
     /// Whether there is a drag: a rate-dependent form of the operator.
     fn drags(&self) -> bool {
         true

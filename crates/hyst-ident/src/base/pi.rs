@@ -10,6 +10,7 @@ use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
 use crate::lsq::Bounds;
+use crate::memory::WithPast;
 
 /// Plays whose loops lie inside the record's swing.
 const LOOPS: usize = 15;
@@ -53,8 +54,10 @@ impl PiBasis {
         through: &(dyn Fn(&mut [Vec<f64>]) + Sync),
         most: Option<usize>,
     ) -> Option<Self> {
+        let all = WithPast::new(&samples.input, &samples.segments, &samples.pasts);
         let elements = |r: &[f64]| {
-            let mut plays = turned(self.falls, plays(&samples.input, &samples.segments, r, drag));
+            let plays = plays(&all.drive, &all.segments, r, drag);
+            let mut plays = turned(self.falls, plays.iter().map(|play| all.own(play)).collect());
             through(&mut plays);
             plays
         };

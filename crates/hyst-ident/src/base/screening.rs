@@ -138,6 +138,10 @@ impl Basis for ScreeningBasis {
         Some(v)
     }
 
+    fn remembers(&self) -> bool {
+        self.kept.is_none()
+    }
+
     fn drags(&self) -> bool {
         self.drags
     }

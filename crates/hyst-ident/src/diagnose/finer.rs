@@ -13,7 +13,7 @@ use super::score;
 use super::search::{Search, beyond, further};
 use super::starts::starts;
 use super::trial::Trial;
-use super::uncertainty::{standard_errors, undetermined};
+use super::uncertainty::{Undetermined, standard_errors};
 use crate::base::{PreisachBasis, ScreeningBasis};
 use crate::lsq::Blocks;
 use crate::model::Effect;
@@ -98,11 +98,10 @@ pub(super) fn refine(
     decide_rivals(&triangle, found, &mut best, seed)?;
     loop {
         let mut least: Option<Trial> = None;
-        let loose = undetermined(&best.fit);
+        let loose = Undetermined::of(&best.fit);
         for cause in beyond(&best.fit.hypothesis, already) {
             let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
-            let is_loose =
-                cause.effect().is_some_and(|effect| loose.contains(&effect)) && !score::is_far_better(&without, &best);
+            let is_loose = loose.speaks_against(cause, || score::is_far_better(&without, &best));
             if (is_loose || !score::judge(&triangle, &without, &best, found.noise, seed).accepted())
                 && least.as_ref().is_none_or(|l| without.total() < l.total())
             {

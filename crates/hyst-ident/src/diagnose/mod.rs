@@ -124,10 +124,12 @@ pub fn diagnose(
     // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
-    // Nor are those that the model itself follows from rest: a rich base that has not seen them may be anywhere there.
-    if !before.in_mid_cycle {
-        let followed = samples.settling.iter_mut().zip(&before.settling).zip(&samples.blind);
-        followed.filter(|((_, missed), blind)| !**missed && !**blind).for_each(|((settling, _), _)| *settling = false);
+    // Nor are those that the model itself follows: a rich base that has not seen them may be anywhere there. Unless it follows them after a past
+    // that the search does not know.
+    for ((segment, in_mid_cycle), past) in samples.segments.iter().zip(&before.in_mid_cycle).zip(&samples.pasts) {
+        for k in segment.clone().filter(|_| !in_mid_cycle || !past.is_empty()) {
+            samples.settling[k] &= before.settling[k] || samples.blind[k];
+        }
     }
     let (rows, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * screening.len());
     if rows < needed {

@@ -9,7 +9,7 @@ use super::probability::Evidence;
 use super::scan::Scan;
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
 use super::trial::Trial;
-use super::uncertainty::undetermined;
+use super::uncertainty::Undetermined;
 use super::{hidden, starts};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
@@ -301,7 +301,7 @@ pub(super) fn beyond(h: &Hypothesis, already: &[Cause]) -> Vec<Cause> {
 /// the misfit of the law of another of its kind.
 fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Option<Trial>, Error> {
     let names = beyond(&best.fit.hypothesis, already);
-    let loose = undetermined(&best.fit);
+    let loose = Undetermined::of(&best.fit);
     let reduced: Vec<Result<Option<Trial>, Error>> =
         names.par_iter().map(|e| judge.without(best, *e, already)).collect();
     let reduced: Vec<Option<Trial>> = reduced.into_iter().collect::<Result<_, _>>()?;
@@ -320,8 +320,7 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Optio
     for ((cause, trial), is_misfit) in names.iter().zip(reduced).zip(of_its_kind) {
         // Without one effect another may be driven to nonsense: then the first one is needed.
         let Some(trial) = trial.filter(|t| score::sensible(judge.problem, t)) else { continue };
-        let is_loose =
-            cause.effect().is_some_and(|effect| loose.contains(&effect)) && !score::is_far_better(&trial, best);
+        let is_loose = loose.speaks_against(*cause, || score::is_far_better(&trial, best));
         if (is_loose || is_misfit || !judge.judge(&trial, best).accepted())
             && least.as_ref().is_none_or(|l| trial.total() < l.total())
         {

@@ -132,6 +132,7 @@ mod tests {
             temperature: None,
             load: None,
             segments: Vec::new(),
+            pasts: Vec::new(),
             file_of_segment: vec![0; 3],
             settling: Vec::new(),
             falls: false,

@@ -6,18 +6,38 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lsq::Gram;
 use crate::model::Effect;
-use crate::nested::{Fitted, Layout};
+use crate::nested::{Cause, Fitted, Layout};
 
 /// Standard errors by which a parameter has to differ from the value at which its effect vanishes.
 const MIN_STD_ERRORS: f64 = 2.0;
+/// And below which it means nothing, however much lower the error is with it.
+const MEANINGLESS: f64 = 1.0;
 
 /// Effects whose law this record does not determine: a parameter that cannot be told from the value at which its effect is absent (or, for
-/// the damping of a mode, from zero) says nothing, however much lower the error is with it.
-pub(super) fn undetermined(fit: &Fitted) -> Vec<Effect> {
+/// the damping of a mode, from zero) says little.
+pub(super) struct Undetermined {
+    little: Vec<Effect>,
+    nothing: Vec<Effect>,
+}
+
+impl Undetermined {
+    pub(super) fn of(fit: &Fitted) -> Self {
+        Self { little: within(fit, MIN_STD_ERRORS), nothing: within(fit, MEANINGLESS) }
+    }
+
+    /// Whether a cause goes for that: a parameter that says nothing speaks against it however much lower the error is with it.
+    pub(super) fn speaks_against(&self, cause: Cause, far_better: impl FnOnce() -> bool) -> bool {
+        let Some(effect) = cause.effect() else { return false };
+        self.nothing.contains(&effect) || self.little.contains(&effect) && !far_better()
+    }
+}
+
+/// Effects with a parameter that is less than so many standard errors from the value at which they vanish.
+fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
     let errors = standard_errors(fit, 0.0);
     let e = &fit.hypothesis.effects;
     // A parameter at a bound has no error: the bounds are judged elsewhere.
-    let unsure = |key: &str, value: f64| errors.get(key).is_some_and(|error| value.abs() < MIN_STD_ERRORS * error);
+    let unsure = |key: &str, value: f64| errors.get(key).is_some_and(|error| value.abs() < std_errors * error);
     let modes = e.resonances.iter().zip(["resonance", "resonance_2"]);
     let mut loose_mode = modes.map(|(mode, stage)| {
         [("hz", mode.hz), ("damping", mode.damping), ("gain", mode.gain)]

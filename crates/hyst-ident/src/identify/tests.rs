@@ -34,6 +34,7 @@ fn record(
         temperature: Some(Vec::new()),
         load: None,
         segments: Vec::new(),
+        pasts: Vec::new(),
         file_of_segment: Vec::new(),
         settling: Vec::new(),
         falls: false,

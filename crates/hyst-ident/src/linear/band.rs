@@ -45,6 +45,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
         load: None,
         falls: samples.falls,
         segments: Vec::new(),
+        pasts: samples.pasts.clone(),
         file_of_segment: samples.file_of_segment.clone(),
         settling: Vec::new(),
         blind: Vec::new(),

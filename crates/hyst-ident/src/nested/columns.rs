@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{Hypothesis, Problem, SignalPath};
 use crate::Samples;
 use crate::base::{BESIDE, Basis, Drag};
+use crate::memory;
 
 /// Numbers that are kept at most: 64 MB.
 const KEPT: usize = 8_000_000;
@@ -30,7 +31,7 @@ pub(super) fn passes(basis: &dyn Basis, rows: usize) -> Vec<Range<usize>> {
 /// Columns of one base for one drive.
 pub(super) enum BaseColumns<'a> {
     Kept(Cow<'a, [Vec<f64>]>),
-    Made { problem: &'a Problem<'a>, drive: Vec<f64>, drag: Drag },
+    Made { problem: &'a Problem<'a>, drive: Vec<f64>, pasts: Cow<'a, [Vec<f64>]>, drag: Drag },
 }
 
 impl BaseColumns<'_> {
@@ -38,10 +39,11 @@ impl BaseColumns<'_> {
     pub(super) fn map<T: Send>(&self, f: impl Fn(Vec<Vec<f64>>) -> T + Sync) -> Vec<T> {
         match self {
             Self::Kept(columns) => columns.par_chunks(2 * BESIDE).map(|columns| f(columns.to_vec())).collect(),
-            Self::Made { problem, drive, drag } => {
+            Self::Made { problem, drive, pasts, drag } => {
                 let Problem { samples, basis, .. } = problem;
                 let passes = passes(*basis, samples.len());
-                passes.into_par_iter().map(|of| f(basis.columns(of, drive, &samples.segments, drag))).collect()
+                let some = |of| memory::columns(*basis, of, drive, &samples.segments, pasts, drag);
+                passes.into_par_iter().map(|of| f(some(of))).collect()
             }
         }
     }
@@ -59,12 +61,13 @@ impl BaseColumns<'_> {
                 });
                 v
             }
-            Self::Made { problem, drive, drag } => {
+            Self::Made { problem, drive, pasts, drag } => {
                 let Problem { samples, basis, .. } = problem;
-                basis.combined(weights, drive, &samples.segments, drag).unwrap_or_else(|| {
+                let combined = memory::combined(*basis, weights, drive, &samples.segments, pasts, drag);
+                combined.unwrap_or_else(|| {
                     let passes = passes(*basis, samples.len());
                     let part = |of: Range<usize>| {
-                        let columns = basis.columns(of.clone(), drive, &samples.segments, drag);
+                        let columns = memory::columns(*basis, of.clone(), drive, &samples.segments, pasts, drag);
                         Self::Kept(Cow::Owned(columns)).combined(&weights[of], rows)
                     };
                     let mut v = vec![0.0; rows];
@@ -82,7 +85,7 @@ impl BaseColumns<'_> {
 
 impl Problem<'_> {
     /// The base's columns for what leads to the hysteresis.
-    pub(super) fn columns<'b>(&'b self, path: &SignalPath<'_>, h: &Hypothesis) -> BaseColumns<'b> {
+    pub(super) fn columns<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         if let (false, Some(raw)) = (h.changes_the_base(), &self.raw) {
             return BaseColumns::Kept(Cow::Borrowed(raw));
         }
@@ -94,9 +97,9 @@ impl Problem<'_> {
     }
 
     /// The same, none of them kept.
-    fn made<'b>(&'b self, path: &SignalPath<'_>, h: &Hypothesis) -> BaseColumns<'b> {
+    fn made<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         let drag = h.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
-        BaseColumns::Made { problem: self, drive: path.input_side(), drag }
+        BaseColumns::Made { problem: self, drive: path.input_side(), pasts: path.pasts(), drag }
     }
 
     /// The output of the operator with these weights, where nothing else is asked of its columns.

@@ -1,5 +1,6 @@
 //! The stages around the hysteresis, over whole columns.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use hyst_core::{
@@ -79,6 +80,13 @@ impl<'a> SignalPath<'a> {
             self.filter(curve, &mut [&mut drive]);
         }
         drive
+    }
+
+    /// The drive of the hysteresis before each segment began: slow enough for all that leads to it but a curve.
+    pub(crate) fn pasts(&self) -> Cow<'a, [Vec<f64>]> {
+        let Some(curve) = &self.curve else { return Cow::Borrowed(&self.samples.pasts) };
+        let through = |past: &Vec<f64>| past.iter().map(|u| curve.reset(&mut (), &Env::default(), *u)).collect();
+        Cow::Owned(self.samples.pasts.iter().map(through).collect())
     }
 
     /// Carries what the hysteresis gives on to the stop, in place.

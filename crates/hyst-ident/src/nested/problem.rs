@@ -14,6 +14,7 @@ use super::{Cause, Hypothesis, Projector, SignalPath};
 use crate::Samples;
 use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bordered, Bounds, Gram, held, solve_near};
+use crate::memory;
 use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
@@ -88,7 +89,8 @@ impl<'a> Problem<'a> {
         let made: Vec<(f64, Vec<Vec<f64>>)> = passes(basis, samples.len())
             .into_par_iter()
             .map(|of| {
-                let columns = basis.columns(of, &samples.input, &samples.segments, &Drag::NONE);
+                let Samples { input, segments, pasts, .. } = samples;
+                let columns = memory::columns(basis, of, input, segments, pasts, &Drag::NONE);
                 let squares = columns.iter().flat_map(|c| used.iter().flatten().map(|k| c[*k] * c[*k])).sum();
                 (squares, if kept { columns } else { Vec::new() })
             })

@@ -21,6 +21,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
         temperature: None,
         load: None,
         segments: Vec::new(),
+        pasts: Vec::new(),
         file_of_segment: vec![0; segments.len()],
         settling: Vec::new(),
         falls: false,
@@ -336,7 +337,7 @@ fn what_is_left_is_found_where_it_is() {
         zeros: Vec::new(),
         errors: None,
         extrapolated: Default::default(),
-        in_mid_cycle: false,
+        in_mid_cycle: Vec::new(),
     };
     // The first segment, at rest, is noise alone.
     samples.output[..4000].iter_mut().for_each(|y| *y *= 0.05);
