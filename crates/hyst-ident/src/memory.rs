@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::base::{Basis, Drag};
 use crate::nested::Fitted;
 use crate::samples::{Samples, range};
-use crate::settle::{first_cycles, windows};
+use crate::settle::{AT_REST, first_cycles, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -24,8 +24,9 @@ const DECAY: usize = 16;
 const AMPLITUDES: usize = 6;
 /// Rows from one turn to the next.
 const ROWS: usize = 16;
-/// Relaxation that a past has to take out of the first rows, as a ratio of RMS residuals: less is what chance finds among so many.
-const HELPS: f64 = 1.1;
+/// What a past has to leave of the first rows at most, as a ratio of RMS residuals: less than it explains is something else, a transient of the sensor
+/// or an effect that is missing.
+const HELPS: f64 = 2.0;
 
 /// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
 pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
@@ -59,6 +60,12 @@ fn path(turns: &[f64], u0: f64) -> Vec<f64> {
     }
     path.pop();
     path
+}
+
+/// Whether a segment begins near 0 V, where the memory is that of a rest: what stands out there is a transient.
+pub(crate) fn begins_at_rest(samples: &Samples, segment: usize) -> bool {
+    let (low, high) = samples.input_range();
+    samples.input[samples.segments[segment].start].abs() <= AT_REST * low.abs().max(high.abs())
 }
 
 /// A drive with the past of each segment before it.
@@ -128,7 +135,7 @@ pub(crate) fn recalled(samples: &Samples, basis: &dyn Basis, fitted: &Fitted, as
     let (weights, windows, cycles) = (&fitted.weights[..], windows(samples), first_cycles(samples));
     let of_segment = |i: usize| -> Vec<f64> {
         let (start, window) = (samples.segments[i].start, windows[i]);
-        if window == 0 || !asked[i] {
+        if window == 0 || !asked[i] || begins_at_rest(samples, i) {
             return Vec::new();
         }
         let (all, rows) = (0..window, start..start + window);

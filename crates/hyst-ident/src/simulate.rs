@@ -193,7 +193,7 @@ fn recalled(
     let centred = centre(samples, residual, &windows, &samples.blind);
     let of = |i: usize| -> Vec<f64> {
         let rows = samples.segments[i].start..samples.segments[i].start + windows[i];
-        if !starts[i] || rows.is_empty() {
+        if !starts[i] || rows.is_empty() || memory::begins_at_rest(samples, i) {
             return Vec::new();
         }
         let zero = residual[rows.start] - centred[rows.start];

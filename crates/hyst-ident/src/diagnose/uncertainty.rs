@@ -11,7 +11,7 @@ use crate::nested::{Cause, Fitted, Layout};
 /// Standard errors by which a parameter has to differ from the value at which its effect vanishes.
 const MIN_STD_ERRORS: f64 = 2.0;
 /// And below which it means nothing, however much lower the error is with it.
-const MEANINGLESS: f64 = 1.0;
+const MEANINGLESS: f64 = 0.1;
 
 /// Effects whose law this record does not determine: a parameter that cannot be told from the value at which its effect is absent (or, for
 /// the damping of a mode, from zero) says little.
