@@ -110,9 +110,10 @@ impl Judge<'_> {
             })
             .collect();
         let mut fitted: Vec<Trial> = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
-        // Fitted to the end, a cause also imitates what else is missing, beyond what it can be: a creep alone takes the part of a lag.
-        // Where none of its laws is sensible then, they count as their probes left them.
-        let overreaches = !fitted.iter().any(|trial| score::sensible(self.problem, trial));
+        // Fitted to the end, a bank of relaxations also takes the part of a lag, beyond what a creep can be. Where it is not sensible then, it counts
+        // as its probes left it.
+        let creeps = apart.iter().any(|probe| probe.hypothesis.effects.creep != scan.from.hypothesis.effects.creep);
+        let overreaches = creeps && !fitted.iter().any(|trial| score::sensible(self.problem, trial));
         if overreaches {
             for probe in apart.iter().filter(|probe| may_win(probe)) {
                 let as_it_is = self.problem.fit_linear(&probe.hypothesis)?;
