@@ -371,38 +371,42 @@ pub(crate) fn fit_settled(
     name: &dyn Fn() -> String,
 ) -> Result<(Fitted, Vec<f64>), FitError> {
     let run = |samples: &Samples, basis: &dyn Basis| everywhere(samples, basis, options.zero_per_record, name);
-    let all = run(samples, basis)?;
-    samples.mark_spikes(&all.1);
-    // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
-    let plays = PiBasis::for_samples(samples);
-    let by_plays = recalled(samples, &plays, |samples| run(samples, &plays))?;
-    if !basis.remembers() {
-        samples.pasts.iter_mut().for_each(Vec::clear);
+    let mut all = run(samples, basis)?;
+    if samples.mark_spikes(&all.1) {
+        all = run(samples, basis)?;
     }
-    samples.settling.copy_from_slice(&samples.blind);
-    let (found, _) = start_up_found(samples, Some(&by_plays), |samples| run(samples, basis))?;
+    let (mut found, _) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
+    if memory::asked(samples, &samples.settling).contains(&true) {
+        // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
+        samples.settling.copy_from_slice(&samples.blind);
+        let plays = PiBasis::for_samples(samples);
+        let by_plays = recalled(samples, |samples| run(samples, &plays), &plays)?;
+        if !basis.remembers() {
+            samples.pasts.iter_mut().for_each(Vec::clear);
+        }
+        samples.settling.copy_from_slice(&samples.blind);
+        let all = run(samples, basis)?;
+        (found, _) = start_up_found(samples, all, Some(&by_plays), |samples| run(samples, basis))?;
+    }
     Ok(within(samples, found))
 }
 
 /// Finds what the actuator remembered when each segment began, as plays follow it: sets `samples.pasts`. Gives what they miss of each row.
 fn recalled(
     samples: &mut Samples,
-    plays: &PiBasis,
     run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
+    plays: &PiBasis,
 ) -> Result<Vec<f64>, FitError> {
-    let (mut found, mut late) = start_up_found(samples, None, &run)?;
-    let starts = |s: &Range<usize>| s.clone().any(|k| samples.settling[k] && !samples.blind[k]);
-    let asked: Vec<bool> = samples.segments.iter().map(starts).collect();
-    for _ in 0..RECALLS {
-        if !asked.contains(&true) {
-            break;
-        }
+    let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
+    let asked = memory::asked(samples, &samples.settling);
+    for _ in (0..RECALLS).filter(|_| asked.contains(&true)) {
         let pasts = memory::recalled(samples, plays, &late, &asked);
         if pasts == samples.pasts {
             break;
         }
         let mut recalled = Samples { pasts, settling: samples.blind.clone(), ..samples.clone() };
-        let with_past = start_up_found(&mut recalled, None, &run)?;
+        let all = run(&recalled)?;
+        let with_past = start_up_found(&mut recalled, all, None, &run)?;
         let count = |samples: &Samples| samples.settling.iter().filter(|s| **s).count();
         if count(&recalled) >= count(samples) {
             break;
@@ -413,14 +417,14 @@ fn recalled(
     Ok(found.1)
 }
 
-/// Finds the start-up rows: sets `samples.settling`. Gives the fit to the rows that count, and one to those that are a start-up for none.
-/// `beside` is what another base misses of each row.
+/// Finds the start-up rows, given a fit to all: sets `samples.settling`. Gives the fit to the rows that count, and one to those that are a start-up
+/// for none. `beside` is what another base misses of each row.
 fn start_up_found(
     samples: &mut Samples,
+    all: (Fitted, Vec<f64>),
     beside: Option<&[f64]>,
     run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
 ) -> Result<((Fitted, Vec<f64>), Fitted), FitError> {
-    let all = run(samples)?;
     let windows = windows(samples);
     let mut without = samples.clone();
     for (s, w) in samples.segments.iter().zip(&windows) {

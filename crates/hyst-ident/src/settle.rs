@@ -90,6 +90,12 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     settling
 }
 
+/// Segments in which rows are a start-up.
+pub(crate) fn started(samples: &Samples, settling: &[bool]) -> Vec<bool> {
+    let starts = |s: &std::ops::Range<usize>| s.clone().any(|k| settling[k] && !samples.blind[k]);
+    samples.segments.iter().map(starts).collect()
+}
+
 /// Rows until a drive that begins at rest turns for the first time.
 fn first_turn(u: &[f64]) -> usize {
     let (low, high) = range(u.iter().copied());

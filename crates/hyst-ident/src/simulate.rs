@@ -1,7 +1,5 @@
 //! `simulate`: what a model says about a record.
 
-use std::ops::Range;
-
 use serde::{Deserialize, Serialize};
 
 use crate::drive::{Drive, Passes};
@@ -11,7 +9,7 @@ use crate::metrics::Errors;
 use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
 use crate::samples::Samples;
-use crate::settle::{centre, first_cycles, start_up_rows, windows};
+use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
 
 /// What is done with the sensor's zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,7 +116,8 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let drive = || Drive::new(&samples, model.between_samples, passes);
             let mut others = Vec::new();
             // The drive may have turned before the record began, ...
-            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts);
+            let asked = memory::asked(&samples, &settling);
+            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &asked);
             if pasts.iter().any(|past| !past.is_empty()) {
                 let mut turned = vec![0.0; samples.len()];
                 drive().run_from(&*chain, |s, i, env, u0| chain.reset_after(s, env, u0, &pasts[i]), &mut turned);
@@ -166,12 +165,6 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     Ok(Simulation { predicted, settling, zeros, errors, extrapolated, in_mid_cycle })
 }
 
-/// Segments in which a start-up shows.
-fn started(samples: &Samples, settling: &[bool]) -> Vec<bool> {
-    let starts = |s: &Range<usize>| settling[s.clone()].iter().zip(&samples.blind[s.clone()]).any(|(s, b)| *s && !*b);
-    samples.segments.iter().map(starts).collect()
-}
-
 /// Rows that may have passed before each segment in which a start-up shows.
 fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
     first_cycles(samples)
@@ -181,19 +174,19 @@ fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
         .collect()
 }
 
-/// The past of each segment in which a start-up shows after which the model follows its first rows best; `residual` is that from rest.
+/// The past of each segment that is `asked` for after which the model follows its first rows best; `residual` is that from rest.
 fn recalled(
     samples: &Samples,
     residual: &[f64],
     drive: &Drive<'_>,
     chain: &HostChain,
-    starts: &[bool],
+    asked: &[bool],
 ) -> Vec<Vec<f64>> {
     let windows = windows(samples);
     let centred = centre(samples, residual, &windows, &samples.blind);
     let of = |i: usize| -> Vec<f64> {
         let rows = samples.segments[i].start..samples.segments[i].start + windows[i];
-        if !starts[i] || rows.is_empty() || memory::begins_at_rest(samples, i) {
+        if !asked[i] || rows.is_empty() {
             return Vec::new();
         }
         let zero = residual[rows.start] - centred[rows.start];
@@ -205,7 +198,7 @@ fn recalled(
         };
         memory::best(memory::pasts(samples.input[rows.start], samples.input_range()), squares)
     };
-    (0..starts.len()).map(of).collect()
+    (0..asked.len()).map(of).collect()
 }
 
 /// What to do about a record whose output is in this unit, and not in the model's.

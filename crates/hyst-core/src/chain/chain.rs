@@ -274,8 +274,8 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
 }
 
 impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
-    /// Starts as [`reset`](Stage::reset) does, but with the memory that this past of the drive has left, oldest first, slow enough for all that leads
-    /// to the hysteresis; all other stages are at rest under `u0`.
+    /// Starts as [`reset`](Stage::reset) does, but with the memory that a past of the drive has left: `past` \[u\], oldest first, one sample each, slow
+    /// enough for all that leads to the hysteresis. All other stages are at rest under `u0`. What is no finite number in `past` is passed over.
     pub fn reset_after(&self, s: &mut ChainState<T, H::State, D, C>, e: &Env<T>, u0: T, past: &[T]) -> T {
         s.temperature = self.temperature.as_ref().map_or(T::ZERO, Temperature::reference);
         let (temperature, load) = (hold(&mut s.temperature, e.temperature), rest(&mut s.load, e.load));
@@ -285,12 +285,13 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         x = through(&self.lag, x, |g, x| g.reset(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
-        x = match past.split_first() {
+        let mut past = past.iter().filter(|u| u.is_finite());
+        x = match past.next() {
             None => self.hysteresis.reset(&mut s.hysteresis, e, x),
-            Some((first, rest)) => {
+            Some(first) => {
                 let bent = |u: T| through(&self.input_curve, u, |g, u| g.reset(&mut (), e, u));
                 self.hysteresis.reset(&mut s.hysteresis, e, bent(*first));
-                for u in rest.iter().filter(|u| u.is_finite()) {
+                for u in past {
                     self.hysteresis.step(&mut s.hysteresis, e, bent(*u));
                 }
                 self.hysteresis.step(&mut s.hysteresis, e, x)
@@ -342,6 +343,27 @@ mod tests {
 
     fn warm() -> TemperatureParams {
         TemperatureParams { per_kelvin: 0.005, reference_degc: 23.0, expansion: 0.05, seconds: 1.5 }
+    }
+
+    /// The hysteresis begins where the same drive would have left it; what is no number is passed over.
+    #[test]
+    fn a_past_is_remembered_by_the_hysteresis_alone() {
+        let past = [f64::NAN, 0.0, 70.0, 15.0, f64::INFINITY, 40.0];
+        let driven = |chain: &Chain<f64, Pi<f64, 4>, 16, 4>, past: &[f64]| {
+            let (mut s, e) = (chain.state(), Env::default());
+            chain.reset_after(&mut s, &e, 30.0, past)
+        };
+        let operator = chain::<f64>().hysteresis;
+        let plain = Chain::new(operator).with_falling(true);
+        let (mut s, e) = (operator.state(), Env::default());
+        operator.reset(&mut s, &e, 0.0);
+        let left = [70.0, 15.0, 40.0, 30.0].map(|u| operator.step(&mut s, &e, u))[3];
+        assert_eq!(driven(&plain, &past), -left);
+        assert_ne!(driven(&plain, &past), driven(&plain, &[]));
+        // Without a past it is a reset, whatever stands around.
+        let whole = chain::<f64>();
+        let mut s = whole.state();
+        assert_eq!(driven(&whole, &[]), whole.reset(&mut s, &e, 30.0));
     }
 
     fn run<T: Real>(rows: usize) -> Vec<f64> {
