@@ -24,8 +24,8 @@ const DECAY: usize = 16;
 const AMPLITUDES: usize = 6;
 /// Rows from one turn to the next.
 const ROWS: usize = 16;
-/// What a past has to leave of the first rows at most, as a ratio of RMS residuals: less than it explains is something else, a transient of the sensor
-/// or an effect that is missing.
+/// RMS residual of the first rows from rest over that after a past, from which on the past is taken: where it explains less, something else acts, a
+/// transient of the sensor or an effect that is missing.
 const HELPS: f64 = 2.0;
 
 /// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
@@ -131,8 +131,8 @@ pub(crate) fn combined(
     basis.combined(weights, &all.drive, &all.segments, drag).map(|v| all.own(&v))
 }
 
-/// The past of each segment after which a fitted base follows its first rows best; none where a start from rest does as well, and none of segments
-/// that are not `asked` for.
+/// The past of each segment after which a fitted base follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
+/// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment.
 pub(crate) fn recalled(samples: &Samples, basis: &dyn Basis, fitted: &Fitted, asked: &[bool]) -> Vec<Vec<f64>> {
     let (weights, windows, cycles) = (&fitted.weights[..], windows(samples), first_cycles(samples));
     let of_segment = |i: usize| -> Vec<f64> {
@@ -161,7 +161,7 @@ pub(crate) fn recalled(samples: &Samples, basis: &dyn Basis, fitted: &Fitted, as
     (0..asked.len()).map(of_segment).collect()
 }
 
-/// The past after which least is left; none if that is hardly less than without one.
+/// The past after which least is left; none unless that is at most the share [`HELPS`] says of what a start from rest leaves.
 pub(crate) fn best(pasts: Vec<Vec<f64>>, squares: impl Fn(&Vec<f64>) -> f64 + Sync) -> Vec<f64> {
     let from_rest = squares(&Vec::new());
     let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
