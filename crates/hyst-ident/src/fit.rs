@@ -264,6 +264,7 @@ pub(crate) fn sign_matters(kind: Kind) -> bool {
 }
 
 /// A base of a kind, with the grid or thresholds that the record calls for.
+#[derive(Clone)]
 pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
@@ -380,7 +381,13 @@ pub(crate) fn fit_settled(
         // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
-        let by_plays = recalled(samples, |samples| run(samples, &plays), &plays)?;
+        let recalls = |samples: &Samples, (fitted, residual): &(Fitted, Vec<f64>), asked: &[bool]| {
+            let blocks = Blocks::new(samples, BLOCKS, ROWS);
+            let problem = Problem::new(samples, &plays, &blocks, options.zero_per_record);
+            memory::recalled(&problem, fitted, residual, asked)
+                .map_err(|source| FitError::Stage { record: name(), source })
+        };
+        let by_plays = recalled(samples, |samples| run(samples, &plays), &recalls)?;
         if !basis.remembers() {
             samples.pasts.iter_mut().for_each(Vec::clear);
         }
@@ -395,12 +402,12 @@ pub(crate) fn fit_settled(
 fn recalled(
     samples: &mut Samples,
     run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
-    plays: &PiBasis,
+    recalls: &dyn Fn(&Samples, &(Fitted, Vec<f64>), &[bool]) -> Result<Vec<Vec<f64>>, FitError>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
     let asked = memory::asked(samples, &samples.settling);
     for _ in (0..RECALLS).filter(|_| asked.contains(&true)) {
-        let pasts = memory::recalled(samples, plays, &late, &asked);
+        let pasts = recalls(samples, &late, &asked)?;
         if pasts == samples.pasts {
             break;
         }
@@ -424,7 +431,7 @@ fn start_up_found(
     all: (Fitted, Vec<f64>),
     beside: Option<&[f64]>,
     run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
-) -> Result<((Fitted, Vec<f64>), Fitted), FitError> {
+) -> Result<((Fitted, Vec<f64>), (Fitted, Vec<f64>)), FitError> {
     let windows = windows(samples);
     let mut without = samples.clone();
     for (s, w) in samples.segments.iter().zip(&windows) {
@@ -455,7 +462,7 @@ fn start_up_found(
     }
     samples.settling = start_up_rows(samples, &residual);
     let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
-    Ok((found, late.0))
+    Ok((found, late))
 }
 
 /// A fit to the rows that count, and what it leaves in every row.

@@ -7,12 +7,13 @@
 
 use std::ops::Range;
 
+use hyst_core::Error;
 use rayon::prelude::*;
 
 use crate::base::{Basis, Drag};
-use crate::nested::Fitted;
-use crate::samples::{Samples, range};
-use crate::settle::{AT_REST, first_cycles, started, windows};
+use crate::nested::{Fitted, Problem};
+use crate::samples::Samples;
+use crate::settle::{AT_REST, centre, first_cycles, started, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -24,9 +25,11 @@ const DECAY: usize = 16;
 const AMPLITUDES: usize = 6;
 /// Rows from one turn to the next.
 const ROWS: usize = 16;
-/// RMS residual of the first rows from rest over that after a past, from which on the past is taken: where it explains less, something else acts, a
-/// transient of the sensor or an effect that is missing.
+/// RMS of what the first rows from rest leave above the level of the other rows, over that after a past, from which on the past is taken: where it
+/// explains less, something else acts, a transient of the sensor or an effect that is missing.
 const HELPS: f64 = 2.0;
+/// RMS residual of the first rows, over that of the others, from which on a past is looked for.
+const STANDS_OUT: f64 = 1.4;
 
 /// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
 pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
@@ -39,15 +42,99 @@ pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
     for first in levels() {
         turns.extend(levels().filter(|second| (second - u0) * (first - u0) < 0.0).map(|second| vec![first, second]));
     }
-    for i in 1..=AMPLITUDES {
-        let amplitude = span * i as f64 / AMPLITUDES as f64;
-        let turn = |k: usize| {
-            let size = amplitude * (1.0 - k as f64 / DECAY as f64);
-            u0 + if k.is_multiple_of(2) { size } else { -size }
-        };
-        turns.push((0..DECAY).map(turn).collect());
+    let decays = (1..=AMPLITUDES).map(|i| decay(u0, span * i as f64 / AMPLITUDES as f64));
+    turns.iter().map(|turns| path(turns, u0)).chain(decays).collect()
+}
+
+/// How a device may have come to where a segment begins.
+#[derive(Clone, Copy)]
+enum History {
+    /// It was demagnetised there, or has rested there from the start: wide plays stand at the first voltage.
+    Demagnetised,
+    /// It went on as it does afterwards.
+    Cycled,
+    /// It rested where the segment before had ended, and was driven on from there.
+    Continued,
+    /// It was driven to the upper or to the lower end of the range.
+    FromAbove,
+    FromBelow,
+}
+
+impl History {
+    const ALL: [Self; 5] = [Self::Demagnetised, Self::Cycled, Self::Continued, Self::FromAbove, Self::FromBelow];
+
+    /// The drive before a segment; none where there can be none.
+    fn past(self, samples: &Samples, segment: usize) -> Option<Vec<f64>> {
+        let rows = samples.segments[segment].clone();
+        let (u0, (low, high)) = (samples.input[rows.start], samples.input_range());
+        Some(match self {
+            Self::Demagnetised => decay(u0, high - low),
+            Self::Cycled => samples.input[rows.start..rows.start + first_cycles(samples)[segment]?].to_vec(),
+            Self::Continued => {
+                let before = samples.segments[segment.checked_sub(1)?].clone();
+                let earlier = samples.pasts.get(segment - 1).into_iter().flatten();
+                path(&in_force(earlier.chain(&samples.input[before])), u0)
+            }
+            Self::FromAbove => path(&[high], u0),
+            Self::FromBelow => path(&[low], u0),
+        })
     }
-    turns.iter().map(|turns| path(turns, u0)).collect()
+}
+
+/// The record after the histories that leave least of it: one for its first segment and one for all others, of those that are `asked` for. `squares` is
+/// what a fit leaves of the record.
+pub(crate) fn with_histories<E>(
+    samples: &Samples,
+    asked: &[bool],
+    squares: &mut dyn FnMut(&Samples) -> Result<f64, E>,
+) -> Result<Samples, E> {
+    let mut best = samples.clone();
+    let mut least = squares(&best)?;
+    for first in [true, false] {
+        let known = best.clone();
+        for history in History::ALL {
+            let mut after = known.clone();
+            let mut is_new = false;
+            for segment in (0..samples.segments.len()).filter(|i| asked[*i] && (*i == 0) == first) {
+                if let Some(past) = history.past(&after, segment) {
+                    (after.pasts[segment], is_new) = (past, true);
+                }
+            }
+            if is_new {
+                let left = squares(&after)?;
+                if left < least {
+                    (best, least) = (after, left);
+                }
+            }
+        }
+    }
+    Ok(best)
+}
+
+/// The turns of a drive from 0 V that a memory which wipes out still holds at its end.
+fn in_force<'a>(drive: impl Iterator<Item = &'a f64>) -> Vec<f64> {
+    let mut turns: Vec<f64> = vec![0.0];
+    for u in drive.copied() {
+        // What goes on in one direction is no turn, and what goes beyond an earlier turn wipes out that and the one after it.
+        while let [.., a, b] = turns[..]
+            && ((u - b) * (b - a) >= 0.0 || (turns.len() > 2 && (u - a) * (b - a) <= 0.0))
+        {
+            let goes_on = (u - b) * (b - a) >= 0.0;
+            turns.truncate(turns.len() - if goes_on { 1 } else { 2 });
+        }
+        turns.push(u);
+    }
+    turns.remove(0);
+    turns
+}
+
+/// A drive that swings about `u0` with less and less amplitude, as one that demagnetises \[V\].
+fn decay(u0: f64, amplitude: f64) -> Vec<f64> {
+    let turn = |k: usize| {
+        let size = amplitude * (1.0 - k as f64 / DECAY as f64);
+        u0 + if k.is_multiple_of(2) { size } else { -size }
+    };
+    path(&(0..DECAY).map(turn).collect::<Vec<f64>>(), u0)
 }
 
 /// From 0 V from turn to turn, and on to `u0` without reaching it.
@@ -62,12 +149,17 @@ fn path(turns: &[f64], u0: f64) -> Vec<f64> {
     path
 }
 
+/// Segments that do not begin near 0 V, where the memory is that of a rest.
+pub(crate) fn away(samples: &Samples) -> Vec<bool> {
+    let (low, high) = samples.input_range();
+    let reach = low.abs().max(high.abs());
+    samples.segments.iter().map(|s| samples.input[s.start].abs() > AT_REST * reach).collect()
+}
+
 /// Segments whose past is worth asking for: a start-up shows, and they do not begin near 0 V. There the memory is that of a rest, and what stands out
 /// is a transient.
 pub(crate) fn asked(samples: &Samples, settling: &[bool]) -> Vec<bool> {
-    let (low, high) = samples.input_range();
-    let away = |s: &Range<usize>| samples.input[s.start].abs() > AT_REST * low.abs().max(high.abs());
-    samples.segments.iter().zip(started(samples, settling)).map(|(s, starts)| starts && away(s)).collect()
+    away(samples).into_iter().zip(started(samples, settling)).map(|(away, starts)| starts && away).collect()
 }
 
 /// A drive with the past of each segment before it.
@@ -131,43 +223,70 @@ pub(crate) fn combined(
     basis.combined(weights, &all.drive, &all.segments, drag).map(|v| all.own(&v))
 }
 
-/// The past of each segment after which a fitted base follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
-/// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment.
-pub(crate) fn recalled(samples: &Samples, basis: &dyn Basis, fitted: &Fitted, asked: &[bool]) -> Vec<Vec<f64>> {
-    let (weights, windows, cycles) = (&fitted.weights[..], windows(samples), first_cycles(samples));
-    let of_segment = |i: usize| -> Vec<f64> {
+/// The past of each segment after which a fit follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
+/// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment. `residual` is what the fit has
+/// left in all rows.
+///
+/// # Errors
+/// If a stage of the fit cannot be built.
+pub(crate) fn recalled(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    residual: &[f64],
+    asked: &[bool],
+) -> Result<Vec<Vec<f64>>, Error> {
+    let samples = problem.samples;
+    let (windows, cycles) = (windows(samples), first_cycles(samples));
+    let centred = centre(samples, residual, &windows, &samples.blind);
+    let of_segment = |i: usize| -> Result<Vec<f64>, Error> {
         let (start, window) = (samples.segments[i].start, windows[i]);
         if window == 0 || !asked[i] {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        let (all, rows) = (0..window, start..start + window);
-        let zero = fitted.zeros.get(samples.file_of_segment[i]).or(fitted.zeros.first()).copied().unwrap_or(0.0);
-        let drive = &samples.input[rows.clone()];
-        let squares = |past: &Vec<f64>| -> f64 {
-            let (whole, pasts) = (std::slice::from_ref(&all), std::slice::from_ref(past));
-            let output = combined(basis, weights, drive, whole, pasts, &Drag::NONE).unwrap_or_else(|| {
-                let columns = columns(basis, 0..basis.len(), drive, whole, pasts, &Drag::NONE);
-                let at = |k: usize| columns.iter().zip(weights).map(|(c, w)| w * c[k]).sum();
-                (0..window).map(at).collect()
-            });
-            let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);
-            left.map(|(k, v)| (samples.output[k] - zero - v).powi(2)).sum()
+        let beginning = samples.beginning(i, window);
+        // What does not move leaves the same.
+        let motion = |past: &Vec<f64>| {
+            let after = Samples { pasts: vec![past.clone()], ..beginning.clone() };
+            problem.motion_in(fitted, &after)
+        };
+        let level = level(samples, &centred, &windows, i);
+        let now = motion(&beginning.pasts[0])?;
+        let squares = |past: &Vec<f64>| {
+            let left = motion(past).ok()?;
+            let left = now.iter().zip(left).zip(&centred[start..start + window]).zip(&beginning.blind);
+            Some(left.filter(|(_, blind)| !**blind).map(|(((now, then), r), _)| (r + now - then).powi(2)).sum::<f64>())
         };
         let mut pasts = pasts(samples.input[start], samples.input_range());
         // Or it went on as it does afterwards.
         pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
-        best(pasts, squares)
+        Ok(best(pasts, level, |past| squares(past).unwrap_or(f64::INFINITY)))
     };
     (0..asked.len()).map(of_segment).collect()
 }
 
-/// The past after which least is left; none unless that is at most the share [`HELPS`] says of what a start from rest leaves.
-pub(crate) fn best(pasts: Vec<Vec<f64>>, squares: impl Fn(&Vec<f64>) -> f64 + Sync) -> Vec<f64> {
+/// The past after which least is left of the first rows; none unless what stands above the `level` of as many others falls to at most the share that
+/// [`HELPS`] says (all Σ residual²).
+pub(crate) fn best(pasts: Vec<Vec<f64>>, level: f64, squares: impl Fn(&Vec<f64>) -> f64 + Sync) -> Vec<f64> {
     let from_rest = squares(&Vec::new());
+    if from_rest < STANDS_OUT * STANDS_OUT * level {
+        return Vec::new();
+    }
     let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
-    let (_, least) = range(all.iter().map(|x| -x));
-    let found = all.iter().position(|x| *x == -least).filter(|_| HELPS * HELPS * -least < from_rest);
+    let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let helps = HELPS * HELPS * (least - level).max(0.0) < from_rest - level;
+    let found = all.iter().position(|x| *x == least).filter(|_| helps);
     found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
+}
+
+/// Σ residual² of as many rows as a segment has at its beginning, at the level of those of the record in which no start-up can lie; `centred` is without
+/// a sensor's zero.
+pub(crate) fn level(samples: &Samples, centred: &[f64], windows: &[usize], segment: usize) -> f64 {
+    let others = samples.segments.iter().zip(windows).flat_map(|(s, w)| s.start + w..s.end);
+    let others = others.filter(|k| !samples.blind[*k]).map(|k| centred[k] * centred[k]);
+    let (sum, rows) = others.fold((0.0, 0usize), |(sum, rows), square| (sum + square, rows + 1));
+    let start = samples.segments[segment].start;
+    let own = (start..start + windows[segment]).filter(|k| !samples.blind[*k]).count();
+    sum * own as f64 / rows.max(1) as f64
 }
 
 #[cfg(test)]

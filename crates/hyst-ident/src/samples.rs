@@ -100,6 +100,14 @@ impl Samples {
         }
     }
 
+    /// The first rows of a segment alone.
+    pub(crate) fn beginning(&self, segment: usize, rows: usize) -> Self {
+        let mut cut = self.clone();
+        let own = &mut cut.segments[segment];
+        own.end = own.end.min(own.start + rows);
+        cut.segments_only(&[segment])
+    }
+
     /// One segment that begins at time 0, without surroundings, all of whose rows count: what unit tests change where they need more.
     #[cfg(test)]
     pub(crate) fn of_columns(period: f64, input: Vec<f64>, output: Vec<f64>) -> Self {

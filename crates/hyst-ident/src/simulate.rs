@@ -196,7 +196,8 @@ fn recalled(
             let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);
             left.map(|(k, v)| (samples.output[k] - zero - v).powi(2)).sum()
         };
-        memory::best(memory::pasts(samples.input[rows.start], samples.input_range()), squares)
+        let level = memory::level(samples, &centred, &windows, i);
+        memory::best(memory::pasts(samples.input[rows.start], samples.input_range()), level, squares)
     };
     (0..asked.len()).map(of).collect()
 }

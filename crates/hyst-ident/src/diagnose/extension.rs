@@ -2,23 +2,44 @@
 
 use std::collections::BTreeMap;
 
-use hyst_core::CurveSide;
+use hyst_core::{CurveSide, Error};
 
 use super::search::{Named, Search, further};
 use super::shape::Bent;
 use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
-use crate::base::Drag;
+use crate::base::{Drag, PiBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
+use crate::memory;
 use crate::model::{Effect, Model};
-use crate::nested::{Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_rows, unless_followed};
+use crate::settle::{Settled, start_up_rows, unless_followed, windows};
 use crate::simulate::Simulation;
 
 /// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
 const MAX_RISE: f64 = 1.05;
+
+/// How often a start is looked for, each time with what is known of it.
+const RECALLS: usize = 2;
+
+/// A record with the start of each segment, and what the own base with a curve leaves of it then, cross-validated \[y\].
+struct Start {
+    samples: Samples,
+    cv_rmse: f64,
+}
+
+/// What the own base was found to lack beside what was found before.
+#[derive(Default)]
+pub(super) struct Shaped {
+    /// A curve or a stop, and the fit with it and with all that is known then.
+    pub(super) curve: Option<(Named, Fitted)>,
+    /// The base, if its plays were chosen anew.
+    pub(super) basis: Option<BasisOf>,
+    /// What was found once more beside the curve, in the place of all that was found before.
+    pub(super) searched: Option<Search>,
+}
 
 /// A model and the record that it is extended on.
 #[derive(Clone, Copy)]
@@ -35,8 +56,8 @@ pub(super) struct Own<'a> {
     pub(super) per_record: bool,
 }
 
-impl Own<'_> {
-    fn stage(&self, source: hyst_core::Error) -> FitError {
+impl<'a> Own<'a> {
+    fn stage(&self, source: Error) -> FitError {
         FitError::Stage { record: self.train.name(), source }
     }
 
@@ -51,45 +72,117 @@ impl Own<'_> {
         Ok(())
     }
 
+    fn on<'b>(&self, basis: &'b BasisOf, blocks: &'b Blocks) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem::new(self.samples, basis.as_ref(), blocks, self.per_record)
+    }
+
     /// Standard errors of an effect's parameters.
-    fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
+    pub(super) fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
         let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
         errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
     }
 
-    /// Looks on the own base for what only it can show: whether it lacks a curve. Changes what was found accordingly, and gives the
-    /// curve; and the base, if its plays were chosen anew.
+    /// The record with the start of each segment as the own base shows it once it has the curve that it may lack: beneath what a missing curve leaves
+    /// everywhere no start stands out. None if that is as it was known.
+    pub(super) fn with_start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
+        let behind = self.start_beside(hypothesis, richest, CurveSide::Output)?;
+        // A curve before the hysteresis has to be searched: only where one behind it leaves much.
+        let before = match &behind {
+            Some(behind) if behind.cv_rmse > shape::CLOSED * richest => {
+                self.start_beside(hypothesis, richest, CurveSide::Input)?
+            }
+            _ => None,
+        };
+        let better = [behind, before].into_iter().flatten().min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+        let is_new = |s: &Samples| s.settling != self.samples.settling || s.pasts != self.samples.pasts;
+        Ok(better.map(|start| start.samples).filter(is_new))
+    }
+
+    /// The same beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
+    fn start_beside(&self, hypothesis: &Hypothesis, richest: f64, side: CurveSide) -> Result<Option<Start>, FitError> {
+        let stage = |e| self.stage(e);
+        let bent = |samples: &Samples| {
+            let blocks = Blocks::new(samples, BLOCKS, SHAPE_ROWS);
+            let problem = Problem::new(samples, self.basis.as_ref(), &blocks, self.per_record);
+            let Some(plain) = shape::plain(&problem, hypothesis)? else { return Ok(None) };
+            if shape::is_complete(&plain, richest) {
+                return Ok(None);
+            }
+            let Some(bent) = shape::bent(&problem, hypothesis, &plain.fit, side)? else { return Ok(None) };
+            let residual = problem.residual(&bent.trial.fit)?;
+            let pasts = memory::recalled(&problem, &bent.trial.fit, &residual, &memory::away(samples))?;
+            Ok::<_, Error>(Some((bent.trial, pasts, start_up_rows(samples, &residual))))
+        };
+        let squares = |samples: &Samples| {
+            let bent = bent(samples).map_err(stage)?;
+            Ok::<_, FitError>(bent.map_or(f64::INFINITY, |(trial, ..)| trial.fit.squares))
+        };
+        // Of what came before, a part is seen all through the record: each history is judged by a fit of its own, to the rows in which no start-up can
+        // lie.
+        let mut late = self.samples.clone();
+        for (segment, rows) in self.samples.segments.iter().zip(windows(self.samples)) {
+            late.settling[segment.start..segment.start + rows].fill(true);
+        }
+        let mut known = memory::with_histories(&late, &memory::away(&late), &mut |samples| squares(samples))?;
+        // Then the turns, as far as the first rows show them; what is left is a start-up.
+        let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
+        for _ in 0..RECALLS {
+            let Some((_, pasts, _)) = bent(&known).map_err(stage)? else { break };
+            let mut next = known.clone();
+            next.pasts.iter_mut().zip(pasts).filter(|(_, new)| !new.is_empty()).for_each(|(old, new)| *old = new);
+            if next.pasts == known.pasts || all(&next)? >= all(&known)? {
+                break;
+            }
+            known = next;
+        }
+        let Some((trial, _, starting)) = bent(&known).map_err(stage)? else { return Ok(None) };
+        known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
+        Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
+    }
+
+    /// Looks on the own base for what only it can show: whether it lacks a curve. `known` is what the model held already, `hypothesis` what was found
+    /// beyond it.
     pub(super) fn shape(
         &self,
-        hypothesis: &mut Hypothesis,
-        errors: &mut BTreeMap<String, f64>,
+        known: &Hypothesis,
+        hypothesis: &Hypothesis,
         richest: f64,
         noise: f64,
         seed: u64,
-    ) -> Result<(Option<Named>, Option<BasisOf>), FitError> {
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Result<Shaped, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
+        let problem = self.on(self.basis, &blocks).holding();
         let stage = |e| self.stage(e);
         let plain = shape::plain(&problem, hypothesis).map_err(stage)?;
         let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
-            return Ok((None, None));
+            return Ok(Shaped::default());
         };
         let (mut bent, mut bases): (Vec<Bent>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
+        let complete = |curved: &shape::Curved| shape::is_complete(&curved.trial, richest);
         for side in [CurveSide::Output, CurveSide::Input] {
             // A curve behind the operator is solved for; one before it has to be searched, and only where that is not enough.
-            let complete = |curved: &shape::Curved| shape::is_complete(&curved.trial, richest);
-            if bent.iter().any(|bent| bent.own.iter().chain(bent.anew.iter().map(|(_, with)| with)).any(complete)) {
+            if bent.iter().flat_map(Bent::curves).any(complete) {
                 break;
             }
             let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
             let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.trial.fit)).transpose()?.flatten();
+            // The own plays were chosen without the curve, and follow what it makes of the drive.
+            let anew = match (anew, &own) {
+                (None, Some(bent)) if !complete(bent) => self.even(&problem, &bent.trial.fit)?,
+                (anew, _) => anew,
+            };
             let mut here = Bent { own, anew: None };
             if let Some(basis) = &anew {
-                let behind =
-                    Problem::new(self.samples, basis.as_ref(), &blocks, self.per_record).holding().beside(&problem);
+                let behind = self.on(basis, &blocks).beside(&problem).holding();
                 match shape::plain(&behind, hypothesis).map_err(stage)? {
                     // Other plays alone were missing, no curve.
-                    Some(plain) if shape::is_complete(&plain, richest) => return Ok((None, anew)),
+                    Some(plain) if shape::is_complete(&plain, richest) => {
+                        return Ok(Shaped { basis: anew, ..Shaped::default() });
+                    }
                     Some(plain) => {
                         let with = shape::bent(&behind, hypothesis, &plain.fit, side).map_err(stage)?;
                         here.anew = with.map(|with| (plain, with));
@@ -100,11 +193,33 @@ impl Own<'_> {
             bent.push(here);
             bases.push(anew);
         }
+        // What was found on another base, without the curve, has taken a part of it: all is searched once more with the curve.
+        let all = bent.iter().enumerate().flat_map(|(at, bent)| bent.curves().map(move |curved| (at, curved)));
+        let best = all.min_by(|(_, a), (_, b)| a.trial.total().total_cmp(&b.trial.total()));
+        let mut searched = None;
+        if let Some((at, curved)) = best.filter(|(_, curved)| !complete(curved) && curved.takes(&plain, noise)) {
+            let is_anew = bent[at].own.as_ref().is_none_or(|own| !std::ptr::eq(own, curved));
+            let basis = bases[at].as_ref().filter(|_| is_anew).unwrap_or(self.basis);
+            let free = self.on(basis, &blocks).beside(&problem);
+            let already: Vec<Cause> = known.causes().into_iter().chain([Cause::Effect(Effect::Asymmetry)]).collect();
+            if let Some(from) = free.fit(&curved.trial.fit.hypothesis).map_err(stage)? {
+                progress("searching with the curve that the model's own base lacks");
+                let search = further(&free, from, &already, noise, seed, progress).map_err(stage)?;
+                let with = shape::Curved { trial: search.best.clone(), is_lopsided: curved.is_lopsided };
+                let plain = bent[at].anew.as_ref().filter(|_| is_anew).map(|(plain, _)| plain.clone());
+                bent.push(match plain {
+                    Some(plain) => Bent { own: None, anew: Some((plain, with)) },
+                    None => Bent { own: Some(with), anew: None },
+                });
+                bases.push(if is_anew { bases[at].clone() } else { None });
+                searched = Some(search);
+            }
+        }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
-        let Some(shape) = found else { return Ok((None, None)) };
-        self.take(shape.named.effect, &shape.fit, errors);
-        *hypothesis = shape.hypothesis;
-        Ok((Some(shape.named), shape.anew.and_then(|at| bases.swap_remove(at))))
+        let Some(shape) = found else { return Ok(Shaped::default()) };
+        let basis = shape.anew.and_then(|at| bases.swap_remove(at));
+        let searched = searched.filter(|search| search.best.fit.hypothesis == shape.hypothesis);
+        Ok(Shaped { curve: Some((shape.named, shape.fit)), basis, searched })
     }
 
     /// What a search on the own base finds where the rich one needs nothing; none unless it explains the record as well as that.
@@ -147,6 +262,13 @@ impl Own<'_> {
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
         Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))
+    }
+
+    /// Plays spread evenly over what drives them, as a fit begins with.
+    fn even(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
+        let BasisOf::Pi(_) = self.basis else { return Ok(None) };
+        let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
+        Ok(Some(BasisOf::Pi(PiBasis::for_samples(&seen.samples))))
     }
 
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a

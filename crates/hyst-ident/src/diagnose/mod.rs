@@ -206,15 +206,43 @@ pub fn diagnose(
         let Some(better) = better else { break };
         basis = Some(better);
     }
+    // Where each segment has begun, if that shows only beside a curve.
+    let mut started: Option<Samples> = None;
     // A base that is not odd bends by its own weights: what a curve behind it took would be its misfit.
     if only_loop.is_none() && own.as_ref().is_odd() {
         progress("asking whether the model's own base lacks a curve");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
-        let (curve, behind) = asked.shape(&mut hypothesis, &mut errors, richest, found.noise, options.seed)?;
-        basis = behind.or(basis);
-        found.named.extend(curve);
-        found.named.sort_by_key(|n| n.effect);
+        let shaped_beside = |effects: &Hypothesis| {
+            let with_start = asked.with_start(effects, richest)?;
+            let asked = Own { samples: with_start.as_ref().unwrap_or(&samples), ..asked };
+            let shaped = asked.shape(&start, effects, richest, found.noise, options.seed, progress)?;
+            Ok::<_, FitError>((with_start, shaped))
+        };
+        let (mut with_start, mut shaped) = shaped_beside(&hypothesis)?;
+        // What was found may be no more than the trace that a missing curve leaves on a base that does not have it.
+        if shaped.curve.is_none() && shaped.basis.is_none() && !found.named.is_empty() {
+            let alone = shaped_beside(&start)?;
+            if alone.1.curve.is_some() {
+                found.named.clear();
+                (with_start, shaped) = alone;
+            }
+        }
+        if let Some((curve, fit)) = shaped.curve {
+            match &shaped.searched {
+                Some(_) => errors = uncertainty::standard_errors(&fit, samples.time[0]),
+                None => asked.take(curve.effect, &fit, &mut errors),
+            }
+            if let Some(searched) = shaped.searched {
+                found.named = searched.named;
+            }
+            hypothesis = fit.hypothesis;
+            found.named.push(curve);
+            found.named.sort_by_key(|n| n.effect);
+            started = with_start;
+        }
+        basis = shaped.basis.or(basis);
     }
+    let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
     if found.named.is_empty() && only_loop.is_none() && !matches!(own, BasisOf::Fixed(_)) {
         progress("asking whether the model's own base with an effect explains as much");

@@ -42,6 +42,9 @@ const SLOWEST_MODE: f64 = 1.0;
 /// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
 const MOST_DAMPING: f64 = 0.35;
 
+/// Damping ratio below which a mode that was set off goes on for three periods: 1/(2π ζ) of them pass until 1/e is left.
+const GOES_ON: f64 = 0.053;
+
 /// How an effect was judged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judgement {
@@ -181,15 +184,21 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
         && e.resonances.iter().all(|p| {
-            rings(p) && p.damping < MOST_DAMPING && p.hz > f64::max(2.5 / longest, SLOWEST_MODE) && p.hz < 0.9 * nyquist
+            rings(p, longest)
+                && p.damping < MOST_DAMPING
+                && p.hz > f64::max(2.5 / longest, SLOWEST_MODE)
+                && p.hz < 0.9 * nyquist
         })
         && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE) && !is_harmonic(problem, p.hz))
 }
 
-/// Whether a mode's own part at its frequency, g/(2ζ), exceeds the part of the motion that does not go through it, 1 − g: what only ripples the
-/// motion there is the misfit of another law as well.
-fn rings(mode: &ResonanceParams) -> bool {
-    mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping && mode.gain > 0.0
+/// Whether a mode rings: by itself it goes on for some periods, or its own part at its frequency, g/(2ζ), exceeds the part of the motion that does
+/// not go through it, 1 − g, so that the phase turns. What only ripples the motion there is the misfit of another law as well. What does not
+/// decay within the record may as well be a harmonic of the drive.
+fn rings(mode: &ResonanceParams, longest: f64) -> bool {
+    let turns_the_phase = mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping;
+    let decays = std::f64::consts::TAU * mode.hz * mode.damping * longest >= 1.0;
+    mode.gain > 0.0 && decays && (turns_the_phase || mode.damping < GOES_ON)
 }
 
 /// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
@@ -217,9 +226,11 @@ mod tests {
 
     #[test]
     fn a_ripple_of_the_motion_is_no_mode() {
-        let mode = |damping: f64, gain: f64| ResonanceParams { hz: 48.0, damping, gain };
-        assert!(!rings(&mode(0.062, 0.02)) && !rings(&mode(0.1, 0.004)) && !rings(&mode(0.0, 0.0)));
+        let rings = |damping: f64, gain: f64| rings(&ResonanceParams { hz: 48.0, damping, gain }, 10.0);
+        assert!(!rings(0.062, 0.02) && !rings(0.1, 0.004) && !rings(0.01, 0.0));
         // Lightly damped modes that carry little, a mode beside a stiff part, and one that carries all and hardly rings.
-        assert!(rings(&mode(0.01, 0.05)) && rings(&mode(0.05, 0.4)) && rings(&mode(0.3, 1.0)));
+        assert!(rings(0.02, 0.01) && rings(0.01, 0.05) && rings(0.05, 0.4) && rings(0.3, 1.0));
+        // What does not decay in the record.
+        assert!(!rings(1e-4, 0.6));
     }
 }

@@ -15,16 +15,20 @@ use crate::nested::{Cause, Fitted, Hypothesis, Problem, dead_zone};
 /// Error of the own base over that of the rich one from which on something is missing.
 const MISSING: f64 = 1.1;
 /// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
-const CLOSED: f64 = 1.7;
+pub(super) const CLOSED: f64 = 1.7;
 /// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
 pub(super) const CLOSED_ANEW: f64 = 1.25;
 /// Share of what stands above the noise floor that it has to take.
 pub(super) const TAKEN: f64 = 0.9;
+/// And from which on it is the curve that was missing, whatever else is left.
+const NEARLY_ALL: f64 = 0.98;
 /// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
 /// operators are too coarse for.
 const LOPSIDED: f64 = 0.25;
 /// Points at which the two halves of a curve are compared.
 const POINTS: usize = 64;
+/// How often the dead zones of a curve are placed anew at most, where the operator goes with the one before.
+const PLACINGS: usize = 6;
 /// Noise floors that count as near the noise.
 const NEAR_NOISE: f64 = 1.5;
 /// Ends of the curve: share of the motion's range beyond the outermost dead zone.
@@ -43,7 +47,15 @@ pub(super) struct Shape {
 pub(super) struct Curved {
     pub(super) trial: Trial,
     /// Whether the curve bends its two halves differently.
-    is_lopsided: bool,
+    pub(super) is_lopsided: bool,
+}
+
+impl Curved {
+    /// Whether it takes so much of what the base leaves above the noise without a curve that the rest may be no more than what the curve has bent.
+    pub(super) fn takes(&self, plain: &Trial, noise: f64) -> bool {
+        let above = plain.total() - plain.fit.rows as f64 * noise * noise;
+        self.is_lopsided && plain.total() - self.trial.total() >= TAKEN * above
+    }
 }
 
 /// The same on the user's plays, and on others.
@@ -51,6 +63,12 @@ pub(super) struct Bent {
     pub(super) own: Option<Curved>,
     /// On the plays that were chosen behind that curve: without it, where they lack something too, and with it.
     pub(super) anew: Option<(Trial, Curved)>,
+}
+
+impl Bent {
+    pub(super) fn curves(&self) -> impl Iterator<Item = &Curved> {
+        self.own.iter().chain(self.anew.iter().map(|(_, with)| with))
+    }
 }
 
 /// What the own base may lack.
@@ -100,23 +118,30 @@ pub(super) fn bent(
     if found.effects.asymmetry.is_some() {
         return Ok(None);
     }
-    let Some(curve) = curve(problem, plain, side) else { return Ok(None) };
-    let mut h = found.clone();
-    h.effects.asymmetry = Some(curve);
-    if side == CurveSide::Input {
-        // The curve alone is searched: all else keeps what the rich base has given it.
-        let Some(fit) = problem.fit(&h)? else { return Ok(None) };
-        h.effects.asymmetry = fit.hypothesis.effects.asymmetry;
+    let mut best: Option<Fitted> = None;
+    for _ in 0..PLACINGS {
+        // What the curve stretches the operator gives less of: some of its dead zones may lie where nothing comes any more.
+        let Some(seen) = reach(problem, best.as_ref().unwrap_or(plain), side) else { break };
+        let mut h = found.clone();
+        h.effects.asymmetry = Some(curve(seen, side));
+        if side == CurveSide::Input {
+            // The curve alone is searched: all else keeps what the rich base has given it.
+            let Some(fit) = problem.fit(&h)? else { break };
+            h.effects.asymmetry = fit.hypothesis.effects.asymmetry;
+        }
+        let Some(fit) = problem.fit_linear(&h)? else { break };
+        if best.as_ref().is_some_and(|best| best.squares <= fit.squares) {
+            break;
+        }
+        best = Some(fit);
+        // The drive goes where it goes.
+        if side == CurveSide::Input {
+            break;
+        }
     }
-    let Some(fit) = problem.fit_linear(&h)? else { return Ok(None) };
-    // What the curve stretches the operator gives less of: some of its dead zones may lie where nothing comes any more.
-    let is_lopsided = fit
-        .hypothesis
-        .effects
-        .asymmetry
-        .as_ref()
-        .zip(reach(problem, &fit, side))
-        .is_some_and(|(p, reach)| lopsided(p, reach) >= LOPSIDED);
+    let Some(fit) = best else { return Ok(None) };
+    let curve = fit.hypothesis.effects.asymmetry.as_ref();
+    let is_lopsided = curve.zip(reach(problem, &fit, side)).is_some_and(|(p, reach)| lopsided(p, reach) >= LOPSIDED);
     Ok(Trial::of(problem, fit).map(|trial| Curved { trial, is_lopsided }))
 }
 
@@ -157,7 +182,7 @@ pub(super) fn shape(
             let judgement = score::judge(problem, without, &t.trial, noise, seed);
             let accepted = judgement.accepted()
                 && judgement.share >= TAKEN
-                && t.trial.cv_rmse() <= closed * least
+                && (t.trial.cv_rmse() <= closed * least || judgement.share >= NEARLY_ALL)
                 && t.is_of_its_kind;
             Judged { tried: t, judgement, accepted }
         })
@@ -248,13 +273,12 @@ fn reach(problem: &Problem<'_>, fit: &Fitted, side: CurveSide) -> Option<(f64, f
     (low < high).then_some((low, high))
 }
 
-/// Dead zones spread evenly over the operator's output or the drive, moving away from zero.
-fn curve(problem: &Problem<'_>, plain: &Fitted, side: CurveSide) -> Option<AsymmetryParams<Vec<f64>>> {
-    let (low, high) = reach(problem, plain, side)?;
+/// Dead zones spread evenly from the lowest to the highest value that enters the curve, moving away from zero.
+fn curve((low, high): (f64, f64), side: CurveSide) -> AsymmetryParams<Vec<f64>> {
     let mut thresholds: Vec<f64> =
         (0..MAX_DEAD_ZONES).map(|i| low + (high - low) * i as f64 / (MAX_DEAD_ZONES - 1) as f64).collect();
     thresholds.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    Some(AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds, side })
+    AsymmetryParams { weights: vec![0.0; thresholds.len()], thresholds, side }
 }
 
 /// Share of a curve's bend that is even about the middle of what it spans, straight parts left out: 1 where only one half bends or both bend

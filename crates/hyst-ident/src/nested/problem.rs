@@ -224,6 +224,20 @@ impl<'a> Problem<'a> {
         Ok(motion.into_iter().map(|m| path.stopped(m).0).collect())
     }
 
+    /// What a fit of this problem says of the motion in other rows, as the sensor would show it without zero, drift and tone.
+    pub(crate) fn motion_in(&self, fit: &Fitted, samples: &Samples) -> Result<Vec<f64>, Error> {
+        let there = Problem {
+            samples,
+            used: Vec::new(),
+            raw: None,
+            penalty: None,
+            only_loop: None,
+            unpredictable: OnceLock::new(),
+            ..*self
+        };
+        there.motion(&fit.hypothesis, &fit.solution)
+    }
+
     /// The output of the operator alone, before any curve behind it.
     pub(crate) fn operator_output(&self, fit: &Fitted) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, &fit.hypothesis)?;
