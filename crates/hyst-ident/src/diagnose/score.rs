@@ -207,17 +207,22 @@ fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
     problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 
-/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the motion's span.
+/// Share of the rows in which a stop has to halve the motion at least, and how near to a hard limit the output has to come for that, as a share of the
+/// motion's span.
 const TOUCHED: f64 = 0.003;
 const NEAR_LIMIT: f64 = 0.05;
+/// Width of a knee, as a share of the range between the limits, from which on the law of a stop has ended at its bound.
+const WIDEST_KNEE: f64 = 0.45;
 
-/// Whether the output comes to one of the limits and stays there for some rows.
+/// Whether the output comes so near to one of the limits that it follows the motion by less than half, and does so in some rows.
 pub(super) fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
     let shown = shown_motion(samples, fit);
     let (low, high) = range(shown.iter().copied());
-    let near = NEAR_LIMIT * (high - low);
+    // In a knee of width w the slope is 1 − x² at the share x of it.
+    let halved = (1.0 - 0.5f64.sqrt()) * p.knee * (p.high - p.low);
+    let near = halved.max(NEAR_LIMIT * (high - low));
     let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
-    p.knee < 0.2 && touched as f64 > TOUCHED * shown.len() as f64
+    p.knee < WIDEST_KNEE && touched as f64 > TOUCHED * shown.len() as f64
 }
 
 #[cfg(test)]

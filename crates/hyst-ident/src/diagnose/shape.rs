@@ -166,7 +166,7 @@ pub(super) fn shape(
     });
     let mut tried: Vec<Tried> = curves.collect();
     if found.effects.saturation.is_none() {
-        for fitted in stopped(problem, found, &plain.fit)? {
+        for fitted in stopped(problem, &plain.fit)? {
             tried.extend(Trial::of(problem, fitted).map(Tried::stop));
         }
     }
@@ -230,14 +230,14 @@ pub(super) fn shape(
     }))
 }
 
-/// Fits of the own base with a stop, from several beginnings. Everything else stays as it was found: on this coarser base it would take
-/// up the misfit.
-fn stopped(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<Vec<Fitted>, Error> {
+/// Fits of the own base with a stop, from several beginnings: where `open`, the same without one, shows its ends. Everything else stays as it was found:
+/// on this coarser base it would take up the misfit.
+fn stopped(problem: &Problem<'_>, open: &Fitted) -> Result<Vec<Fitted>, Error> {
     let mut fits = Vec::new();
-    let ends = starts::stops(problem.samples, plain).into_iter().flatten();
-    let above_rest = starts::stops_above_rest(problem.samples, plain).into_iter().flatten();
-    for stop in found.effects.saturation.into_iter().chain(ends).chain(above_rest) {
-        let mut h = found.clone();
+    let ends = starts::stops(problem.samples, open).into_iter().flatten();
+    let above_rest = starts::stops_above_rest(problem.samples, open).into_iter().flatten();
+    for stop in ends.chain(above_rest) {
+        let mut h = open.hypothesis.clone();
         h.effects.saturation = Some(stop);
         fits.extend(problem.fit(&h)?.and_then(|f| {
             h.effects.saturation = f.hypothesis.effects.saturation;
@@ -247,17 +247,19 @@ fn stopped(problem: &Problem<'_>, found: &Hypothesis, plain: &Fitted) -> Result<
     Ok(fits)
 }
 
-/// Where the own base meets a stop that the rich one has found: what lies behind a stop is hidden, and each base fills it in its own way.
+/// Where the own base meets a stop that the rich one has found: what lies behind a stop is hidden, and each base fills it in its own way. The limits
+/// are those of the motion, which begins at another zero on each base.
 pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
-    let Some(plain) = problem.fit_linear(found)? else { return Ok(None) };
-    let fits = stopped(problem, found, &plain)?;
+    let Some(open) = problem.fit_linear(&found.without(Cause::Effect(Effect::Saturation)))? else { return Ok(None) };
+    let as_found = problem.fit_linear(found)?;
     let stops = |f: &Fitted| {
         let stop = f.hypothesis.effects.saturation;
         stop.is_some_and(|p| score::stops_something(problem.samples, f, &p))
     };
-    Ok(fits
+    Ok(stopped(problem, &open)?
         .into_iter()
-        .filter(|f| f.squares < plain.squares && stops(f))
+        .chain(as_found)
+        .filter(|f| f.squares < open.squares && stops(f))
         .min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 

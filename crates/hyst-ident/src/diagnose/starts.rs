@@ -117,26 +117,28 @@ fn lateness(samples: &Samples) -> impl Iterator<Item = f64> {
     times.into_iter().enumerate().filter(move |(i, seconds)| *i == 0 || *seconds < most).map(|(_, seconds)| seconds)
 }
 
-/// A stop at the upper and one at the lower end of what the sensor has shown, the other end far away; none where it has shown no motion.
-pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 2]> {
+/// A stop at the upper and one at the lower end of what the sensor has shown, the other end far away, and one at both; none where it has shown no motion.
+pub(super) fn stops(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 3]> {
     let mut shown = shown_motion(samples, from);
     shown.sort_by(f64::total_cmp);
     let at = |share: f64| shown.get((share * shown.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
     // Noise reaches beyond a stop: not the very last value.
     let (low, high) = (at(0.001), at(0.999));
     let far = FAR_STOP * (high - low);
-    let stops =
-        [SaturationParams { low: high - far, high, knee: 0.01 }, SaturationParams { low, high: low + far, knee: 0.01 }];
-    stops.iter().all(|stop| stop.low < stop.high).then_some(stops)
+    let stop = |low, high| SaturationParams { low, high, knee: KNEE };
+    let stops = [stop(high - far, high), stop(low, low + far), stop(low, high)];
+    (low < high).then_some(stops)
 }
 
 /// Lower stops under which the device rests: it only shows its motion once it has gone that far.
 pub(super) fn stops_above_rest(samples: &Samples, from: &Fitted) -> Option<[SaturationParams; 3]> {
-    let [_, lower] = stops(samples, from)?;
+    let [_, lower, _] = stops(samples, from)?;
     let span = (lower.high - lower.low) / FAR_STOP;
     Some([0.03, 0.1, 0.25].map(|share| SaturationParams { low: lower.low + share * span, ..lower }))
 }
 
+/// Width of a knee at the start, as a share of the range between the limits.
+const KNEE: f64 = 0.01;
 /// How far away, in spans of the output, a stop is that nothing reaches.
 const FAR_STOP: f64 = 3.0;
 
