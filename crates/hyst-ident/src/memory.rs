@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::base::{Basis, Drag};
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
-use crate::settle::{AT_REST, centre, first_cycles, started, windows};
+use crate::settle::{AT_REST, centre, first_cycles, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -28,6 +28,8 @@ const ROWS: usize = 16;
 /// RMS of what the first rows from rest leave above the level of the other rows, over that after a past, from which on the past is taken: where it
 /// explains less, something else acts, a transient of the sensor or an effect that is missing.
 const HELPS: f64 = 2.0;
+/// Σ residual² of a record after a history, over that from rest, from which on the history is taken.
+const HISTORY_HELPS: f64 = 0.8;
 /// RMS residual of the first rows, over that of the others, from which on a past is looked for.
 const STANDS_OUT: f64 = 1.4;
 
@@ -70,11 +72,7 @@ impl History {
         Some(match self {
             Self::Demagnetised => decay(u0, high - low),
             Self::Cycled => samples.input[rows.start..rows.start + first_cycles(samples)[segment]?].to_vec(),
-            Self::Continued => {
-                let before = samples.segments[segment.checked_sub(1)?].clone();
-                let earlier = samples.pasts.get(segment - 1).into_iter().flatten();
-                path(&in_force(earlier.chain(&samples.input[before])), u0)
-            }
+            Self::Continued => continued(samples, segment)?,
             Self::FromAbove => path(&[high], u0),
             Self::FromBelow => path(&[low], u0),
         })
@@ -92,6 +90,7 @@ pub(crate) fn with_histories<E>(
     let mut least = squares(&best)?;
     for first in [true, false] {
         let known = best.clone();
+        let enough = HISTORY_HELPS * least;
         for history in History::ALL {
             let mut after = known.clone();
             let mut is_new = false;
@@ -102,13 +101,22 @@ pub(crate) fn with_histories<E>(
             }
             if is_new {
                 let left = squares(&after)?;
-                if left < least {
+                if left < least.min(enough) {
                     (best, least) = (after, left);
                 }
             }
         }
     }
     Ok(best)
+}
+
+/// The drive before a segment that continues the one before, of the same file; none for the first.
+pub(crate) fn continued(samples: &Samples, segment: usize) -> Option<Vec<f64>> {
+    let last = segment.checked_sub(1)?;
+    let of_one_file = samples.file_of_segment[last] == samples.file_of_segment[segment];
+    let earlier = samples.pasts.get(last).into_iter().flatten();
+    let drive = earlier.chain(&samples.input[samples.segments[last].clone()]);
+    of_one_file.then(|| path(&in_force(drive), samples.input[samples.segments[segment].start]))
 }
 
 /// The turns of a drive from 0 V that a memory which wipes out still holds at its end.
@@ -154,12 +162,6 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     let (low, high) = samples.input_range();
     let reach = low.abs().max(high.abs());
     samples.segments.iter().map(|s| samples.input[s.start].abs() > AT_REST * reach).collect()
-}
-
-/// Segments whose past is worth asking for: a start-up shows, and they do not begin near 0 V. There the memory is that of a rest, and what stands out
-/// is a transient.
-pub(crate) fn asked(samples: &Samples, settling: &[bool]) -> Vec<bool> {
-    away(samples).into_iter().zip(started(samples, settling)).map(|(away, starts)| starts && away).collect()
 }
 
 /// A drive with the past of each segment before it.
@@ -237,7 +239,7 @@ pub(crate) fn recalled(
 ) -> Result<Vec<Vec<f64>>, Error> {
     let samples = problem.samples;
     let (windows, cycles) = (windows(samples), first_cycles(samples));
-    let centred = centre(samples, residual, &windows, &samples.blind);
+    let (centred, away) = (centre(samples, residual, &windows, &samples.blind), away(samples));
     let of_segment = |i: usize| -> Result<Vec<f64>, Error> {
         let (start, window) = (samples.segments[i].start, windows[i]);
         if window == 0 || !asked[i] {
@@ -259,22 +261,31 @@ pub(crate) fn recalled(
         let mut pasts = pasts(samples.input[start], samples.input_range());
         // Or it went on as it does afterwards.
         pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
-        Ok(best(pasts, level, |past| squares(past).unwrap_or(f64::INFINITY)))
+        pasts.extend(continued(samples, i));
+        pasts.extend(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned());
+        Ok(best(pasts, level, away[i], |past| squares(past).unwrap_or(f64::INFINITY)))
     };
     (0..asked.len()).map(of_segment).collect()
 }
 
 /// The past after which least is left of the first rows; none unless what stands above the `level` of as many others falls to at most the share that
-/// [`HELPS`] says (all Σ residual²).
-pub(crate) fn best(pasts: Vec<Vec<f64>>, level: f64, squares: impl Fn(&Vec<f64>) -> f64 + Sync) -> Vec<f64> {
+/// [`HELPS`] says (all Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
+/// out any more.
+pub(crate) fn best(
+    pasts: Vec<Vec<f64>>,
+    level: f64,
+    away: bool,
+    squares: impl Fn(&Vec<f64>) -> f64 + Sync,
+) -> Vec<f64> {
     let from_rest = squares(&Vec::new());
-    if from_rest < STANDS_OUT * STANDS_OUT * level {
+    let stands_out = STANDS_OUT * STANDS_OUT * level;
+    if from_rest < stands_out {
         return Vec::new();
     }
     let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
     let least = all.iter().copied().fold(f64::INFINITY, f64::min);
     let helps = HELPS * HELPS * (least - level).max(0.0) < from_rest - level;
-    let found = all.iter().position(|x| *x == least).filter(|_| helps);
+    let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || least < stands_out));
     found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }
 

@@ -116,8 +116,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let drive = || Drive::new(&samples, model.between_samples, passes);
             let mut others = Vec::new();
             // The drive may have turned before the record began, ...
-            let asked = memory::asked(&samples, &settling);
-            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &asked);
+            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts);
             if pasts.iter().any(|past| !past.is_empty()) {
                 let mut turned = vec![0.0; samples.len()];
                 drive().run_from(&*chain, |s, i, env, u0| chain.reset_after(s, env, u0, &pasts[i]), &mut turned);
@@ -183,7 +182,7 @@ fn recalled(
     asked: &[bool],
 ) -> Vec<Vec<f64>> {
     let windows = windows(samples);
-    let centred = centre(samples, residual, &windows, &samples.blind);
+    let (centred, away) = (centre(samples, residual, &windows, &samples.blind), memory::away(samples));
     let of = |i: usize| -> Vec<f64> {
         let rows = samples.segments[i].start..samples.segments[i].start + windows[i];
         if !asked[i] || rows.is_empty() {
@@ -197,7 +196,9 @@ fn recalled(
             left.map(|(k, v)| (samples.output[k] - zero - v).powi(2)).sum()
         };
         let level = memory::level(samples, &centred, &windows, i);
-        memory::best(memory::pasts(samples.input[rows.start], samples.input_range()), level, squares)
+        let mut pasts = memory::pasts(samples.input[rows.start], samples.input_range());
+        pasts.extend(memory::continued(samples, i));
+        memory::best(pasts, level, away[i], squares)
     };
     (0..asked.len()).map(of).collect()
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use hyst_core::{CurveSide, Error};
 
-use super::search::{Named, Search, further};
+use super::search::{Named, Search, further, with_own_laws};
 use super::shape::Bent;
-use super::{FINAL_ROWS, SHAPE_ROWS, shape, uncertainty};
+use super::trial::Trial;
+use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
 use crate::base::{Drag, PiBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
@@ -87,38 +88,69 @@ impl<'a> Own<'a> {
 
     /// The record with the start of each segment as the own base shows it once it has the curve that it may lack: beneath what a missing curve leaves
     /// everywhere no start stands out. None if that is as it was known.
-    pub(super) fn with_start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
-        let behind = self.start_beside(hypothesis, richest, CurveSide::Output)?;
+    pub(super) fn start_beside_a_curve(
+        &self,
+        hypothesis: &Hypothesis,
+        richest: f64,
+    ) -> Result<Option<Samples>, FitError> {
+        let behind = self.started(hypothesis, richest, Some(CurveSide::Output))?;
         // A curve before the hysteresis has to be searched: only where one behind it leaves much.
         let before = match &behind {
             Some(behind) if behind.cv_rmse > shape::CLOSED * richest => {
-                self.start_beside(hypothesis, richest, CurveSide::Input)?
+                self.started(hypothesis, richest, Some(CurveSide::Input))?
             }
             _ => None,
         };
         let better = [behind, before].into_iter().flatten().min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
-        let is_new = |s: &Samples| s.settling != self.samples.settling || s.pasts != self.samples.pasts;
-        Ok(better.map(|start| start.samples).filter(is_new))
+        Ok(better.map(|start| start.samples).filter(|start| self.is_another(start)))
     }
 
-    /// The same beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
-    fn start_beside(&self, hypothesis: &Hypothesis, richest: f64, side: CurveSide) -> Result<Option<Start>, FitError> {
+    /// The same as the own base shows it with what was found.
+    pub(super) fn start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
+        let start = self.started(hypothesis, richest, None)?;
+        Ok(start.map(|start| start.samples).filter(|start| self.is_another(start)))
+    }
+
+    fn is_another(&self, start: &Samples) -> bool {
+        start.settling != self.samples.settling || start.pasts != self.samples.pasts
+    }
+
+    /// The start of each segment, beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
+    fn started(
+        &self,
+        hypothesis: &Hypothesis,
+        richest: f64,
+        side: Option<CurveSide>,
+    ) -> Result<Option<Start>, FitError> {
         let stage = |e| self.stage(e);
-        let bent = |samples: &Samples| {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let plain = shape::plain(&self.on(self.basis, &blocks), hypothesis).map_err(stage)?;
+        if plain.is_none_or(|plain| shape::is_complete(&plain, richest)) {
+            return Ok(None);
+        }
+        // Near 0 V only where everything is known but the start.
+        let asked = match side {
+            Some(_) => memory::away(self.samples),
+            None => vec![true; self.samples.segments.len()],
+        };
+        // What a fit with another start leaves, what it leaves in each row, and the turns of the drive before that these call for.
+        let fitted = |samples: &Samples, recalls: bool| {
             let blocks = Blocks::new(samples, BLOCKS, SHAPE_ROWS);
             let problem = Problem::new(samples, self.basis.as_ref(), &blocks, self.per_record);
-            let Some(plain) = shape::plain(&problem, hypothesis)? else { return Ok(None) };
-            if shape::is_complete(&plain, richest) {
-                return Ok(None);
-            }
-            let Some(bent) = shape::bent(&problem, hypothesis, &plain.fit, side)? else { return Ok(None) };
-            let residual = problem.residual(&bent.trial.fit)?;
-            let pasts = memory::recalled(&problem, &bent.trial.fit, &residual, &memory::away(samples))?;
-            Ok::<_, Error>(Some((bent.trial, pasts, start_up_rows(samples, &residual))))
+            let Some(plain) = problem.fit_linear(hypothesis)? else { return Ok(None) };
+            let fit = match side {
+                Some(side) => shape::bent(&problem, hypothesis, &plain, side)?.map(|bent| bent.trial.fit),
+                None => Some(plain),
+            };
+            let Some(fit) = fit else { return Ok(None) };
+            let residual = problem.residual(&fit)?;
+            let asked: Vec<bool> = asked.iter().map(|asked| recalls && *asked).collect();
+            let pasts = memory::recalled(&problem, &fit, &residual, &asked)?;
+            Ok::<_, Error>(Trial::of(&problem, fit).map(|trial| (trial, residual, pasts)))
         };
         let squares = |samples: &Samples| {
-            let bent = bent(samples).map_err(stage)?;
-            Ok::<_, FitError>(bent.map_or(f64::INFINITY, |(trial, ..)| trial.fit.squares))
+            let fitted = fitted(samples, false).map_err(stage)?;
+            Ok::<_, FitError>(fitted.map_or(f64::INFINITY, |(trial, ..)| trial.fit.squares))
         };
         // Of what came before, a part is seen all through the record: each history is judged by a fit of its own, to the rows in which no start-up can
         // lie.
@@ -126,11 +158,11 @@ impl<'a> Own<'a> {
         for (segment, rows) in self.samples.segments.iter().zip(windows(self.samples)) {
             late.settling[segment.start..segment.start + rows].fill(true);
         }
-        let mut known = memory::with_histories(&late, &memory::away(&late), &mut |samples| squares(samples))?;
+        let mut known = memory::with_histories(&late, &asked, &mut |samples| squares(samples))?;
         // Then the turns, as far as the first rows show them; what is left is a start-up.
         let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
         for _ in 0..RECALLS {
-            let Some((_, pasts, _)) = bent(&known).map_err(stage)? else { break };
+            let Some((.., pasts)) = fitted(&known, true).map_err(stage)? else { break };
             let mut next = known.clone();
             next.pasts.iter_mut().zip(pasts).filter(|(_, new)| !new.is_empty()).for_each(|(old, new)| *old = new);
             if next.pasts == known.pasts || all(&next)? >= all(&known)? {
@@ -138,7 +170,8 @@ impl<'a> Own<'a> {
             }
             known = next;
         }
-        let Some((trial, _, starting)) = bent(&known).map_err(stage)? else { return Ok(None) };
+        let Some((trial, residual, _)) = fitted(&known, false).map_err(stage)? else { return Ok(None) };
+        let starting = start_up_rows(&known, &residual);
         known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
         Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
     }
@@ -269,6 +302,34 @@ impl<'a> Own<'a> {
         let BasisOf::Pi(_) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         Ok(Some(BasisOf::Pi(PiBasis::for_samples(&seen.samples))))
+    }
+
+    /// What was found beyond what is `known`, all refitted on the own base; none unless that misses next to nothing of what the rich one shows. A rich
+    /// base takes a part of what it is searched for, and its own parameters say less.
+    pub(super) fn refound(
+        &self,
+        known: &Hypothesis,
+        hypothesis: &Hypothesis,
+        richest: f64,
+        noise: f64,
+        seed: u64,
+    ) -> Result<Option<Fitted>, FitError> {
+        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
+        let problem = self.on(self.basis, &blocks);
+        let stage = |e| self.stage(e);
+        let held = shape::plain(&self.on(self.basis, &blocks).holding(), hypothesis).map_err(stage)?;
+        let follows = |trial: &Trial| {
+            let cv_rmse = trial.cv_rmse();
+            let is_worth = || held.as_ref().is_none_or(|held| score::is_worth(held, trial));
+            let is_near = cv_rmse <= shape::CLOSED_ANEW * richest || cv_rmse <= shape::CLOSED * richest && is_worth();
+            is_near && score::sensible(&problem, trial)
+        };
+        let fit = problem.fit(hypothesis).map_err(stage)?;
+        let Some(mut trial) = fit.and_then(|fit| Trial::of(&problem, fit)) else { return Ok(None) };
+        if trial.cv_rmse() > shape::CLOSED_ANEW * richest {
+            trial = with_own_laws(&problem, trial, &known.causes(), noise, seed).map_err(stage)?;
+        }
+        Ok(Some(trial).filter(follows).map(|trial| trial.fit))
     }
 
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a

@@ -11,13 +11,14 @@ use hyst_core::Error;
 use super::scan::Scan;
 use super::score;
 use super::search::{Search, beyond, further};
+use super::shape::own_stop;
 use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
 use crate::base::{PreisachBasis, ScreeningBasis};
 use crate::lsq::Blocks;
 use crate::model::Effect;
-use crate::nested::{Cause, Hypothesis, Problem};
+use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
@@ -77,21 +78,22 @@ pub(super) fn refine(
     let basis = PreisachBasis::for_samples(samples, CELLS);
     let mut settled = samples.clone();
     let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file);
-    let Some(rough) = first.fit_linear(&found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
+    let Some(rough) = placed(&first, &found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
     // A triangle that keeps every turn in its memory also shows how long an unknown start lasts.
     let starting = start_up_rows(samples, &first.residual(&rough)?);
     settled.settling.iter_mut().zip(starting).for_each(|(known, starts)| *known |= starts);
     drop(first);
     let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file);
     let fitted = |h: &Hypothesis| Ok::<_, Error>(triangle.fit(h)?.and_then(|f| Trial::of(&triangle, f)));
-    let Some(mut best) = fitted(&found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
+    let Some(mut best) = fitted(&rough.hypothesis)? else { return Ok(of(&found.best)) };
     if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
         return Ok(of(&found.best));
     }
     if best.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()
         && best.cv_rmse() > WORTH_A_SEARCH * found.noise
         && let Some(anew) = searched_anew(problem, &triangle, found, already, seed, progress)?
-        && let Some(with) = fitted(&anew.best.fit.hypothesis)?
+        && let Some(rough) = placed(&triangle, &anew.best.fit.hypothesis)?
+        && let Some(with) = fitted(&rough.hypothesis)?
     {
         (*found, best) = (anew, with);
     }
@@ -115,6 +117,12 @@ pub(super) fn refine(
         found.named.retain(|n| stays.contains(&Cause::Effect(n.effect)));
     }
     Ok(of(&best))
+}
+
+/// A first fit of what was found on another base: a stop stands where this base meets it.
+fn placed(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
+    let stop = if found.effects.saturation.is_some() { own_stop(problem, found)? } else { None };
+    stop.map_or_else(|| problem.fit_linear(found), |stop| Ok(Some(stop)))
 }
 
 /// The finer base without one cause, all else refitted; its parameters as they are where that already shows that it is not needed.
@@ -174,7 +182,9 @@ fn searched_anew(
 ) -> Result<Option<Search>, Error> {
     let basis = PreisachBasis::for_samples(problem.samples, SEARCHED_CELLS);
     let coarser = Problem::new(triangle.samples, &basis, triangle.blocks, triangle.zero_per_file);
-    let from = coarser.fit(&found.best.fit.hypothesis)?.and_then(|f| Trial::of(&coarser, f));
+    let rough = placed(&coarser, &found.best.fit.hypothesis)?;
+    let from = rough.map(|rough| coarser.fit(&rough.hypothesis)).transpose()?.flatten();
+    let from = from.and_then(|f| Trial::of(&coarser, f));
     let Some(from) = from.filter(|t| t.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()) else { return Ok(None) };
     let mut anew = further(&coarser, from.fit, already, found.noise, seed, progress)?;
     beside_nameless(&coarser, &mut anew, already)?;

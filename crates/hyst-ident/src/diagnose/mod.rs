@@ -44,7 +44,7 @@ pub use limits::Limit;
 pub use probability::Weighed;
 pub use suspects::{FOLLOWED, drive_options};
 
-use extension::Own;
+use extension::{Own, Shaped};
 
 use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
@@ -213,16 +213,17 @@ pub fn diagnose(
         progress("asking whether the model's own base lacks a curve");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         let shaped_beside = |effects: &Hypothesis| {
-            let with_start = asked.with_start(effects, richest)?;
+            let with_start = asked.start_beside_a_curve(effects, richest)?;
             let asked = Own { samples: with_start.as_ref().unwrap_or(&samples), ..asked };
             let shaped = asked.shape(&start, effects, richest, found.noise, options.seed, progress)?;
             Ok::<_, FitError>((with_start, shaped))
         };
         let (mut with_start, mut shaped) = shaped_beside(&hypothesis)?;
         // What was found may be no more than the trace that a missing curve leaves on a base that does not have it.
-        if shaped.curve.is_none() && shaped.basis.is_none() && !found.named.is_empty() {
+        let left = |shaped: &Shaped| shaped.curve.as_ref().map_or(f64::INFINITY, |(curve, _)| curve.cv_with);
+        if left(&shaped) > shape::CLOSED_ANEW * richest && shaped.basis.is_none() && !found.named.is_empty() {
             let alone = shaped_beside(&start)?;
-            if alone.1.curve.is_some() {
+            if left(&alone.1) < left(&shaped) {
                 found.named.clear();
                 (with_start, shaped) = alone;
             }
@@ -257,6 +258,15 @@ pub fn diagnose(
     let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
 
     progress("refitting the model with what was found");
+    // Nor was it seen how each segment begins while the effects stood in the record.
+    let begun = if effects(&hypothesis) == effects(&start) { None } else { asked.start(&hypothesis, richest)? };
+    let asked = Own { samples: begun.as_ref().unwrap_or(asked.samples), ..asked };
+    if effects(&hypothesis) != effects(&start)
+        && let Some(fit) = asked.refound(&start, &hypothesis, richest, found.noise, options.seed)?
+    {
+        errors = uncertainty::standard_errors(&fit, samples.time[0]);
+        hypothesis = fit.hypothesis;
+    }
     let mut extended = model.clone();
     if effects(&hypothesis) != effects(&start) {
         extended = asked.extended(&hypothesis, &errors)?;

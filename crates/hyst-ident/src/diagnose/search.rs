@@ -188,8 +188,8 @@ pub(super) fn further(
         near = (parent.clone(), Vec::new());
         for ((trial, judgement), (from, _, cause)) in trials.into_iter().zip(judged).zip(&jobs) {
             let (Some(trial), Some(judgement)) = (trial, judgement) else { continue };
-            // A set that is worse than a smaller one found before leads nowhere.
-            if trial.total() >= best.total() || !judgement.accepted() {
+            // A set that is hardly better than a smaller one found before leads nowhere.
+            if !score::is_worth(&best, &trial) && !judgement.alone || !judgement.accepted() {
                 let counts = judgement.is_sure() && from.fit.hypothesis.causes() == parent;
                 let effect = cause.effect().filter(|_| counts);
                 near.1.extend(effect.map(|effect| Near { effect, cv_rmse: trial.cv_rmse(), judgement }));
@@ -273,6 +273,27 @@ fn goes_smoothly(zero: &[(f64, f64)]) -> bool {
         let longer = ((z[2].0 - z[0].0) / usual).max(1.0);
         (z[2].1 - z[0].1).abs() <= MOST_STEP * longer * way
     })
+}
+
+/// A set in which each cause beyond what was there `already` follows the law that this base calls for, all else refitted. On another base one law may
+/// have been told from another by what that base took of them.
+pub(super) fn with_own_laws(
+    problem: &Problem<'_>,
+    set: Trial,
+    already: &[Cause],
+    noise: f64,
+    seed: u64,
+) -> Result<Trial, Error> {
+    let judge = Judge { problem, noise, seed, known: Mutex::default() };
+    let mut best = set;
+    for cause in beyond(&best.fit.hypothesis, already) {
+        let Some(less) = problem.fit(&best.fit.hypothesis.without(cause))? else { continue };
+        let with = judge.trials(&judge.scan(&less)?, cause)?;
+        if let Some(with) = with.filter(|with| score::is_worth(&best, with) && score::sensible(problem, with)) {
+            best = with;
+        }
+    }
+    Ok(best)
 }
 
 /// What may be added to a fit. A curve behind the hysteresis is not among it: this base has one of its own, and whether the user's
