@@ -19,7 +19,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{AT_REST, start_up_rows, started, windows};
+use crate::settle::{AT_REST, start_up_rows, windows};
 use crate::simulate::{Zero, simulate};
 
 /// How often the past of a record is asked for, each time with what was fitted to the rows that the last one explains.
@@ -377,7 +377,7 @@ pub(crate) fn fit_settled(
         all = run(samples, basis)?;
     }
     let (mut found, _) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
-    if started(samples, &samples.settling).contains(&true) {
+    if memory::asked(samples, &samples.settling).contains(&true) {
         // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
@@ -405,7 +405,7 @@ fn recalled(
     recalls: &dyn Fn(&Samples, &(Fitted, Vec<f64>), &[bool]) -> Result<Vec<Vec<f64>>, FitError>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
-    let asked = started(samples, &samples.settling);
+    let asked = memory::asked(samples, &samples.settling);
     if !asked.contains(&true) {
         return Ok(found.1);
     }

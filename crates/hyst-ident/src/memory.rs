@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::base::{Basis, Drag};
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
-use crate::settle::{AT_REST, centre, first_cycles, windows};
+use crate::settle::{AT_REST, centre, first_cycles, started, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -162,6 +162,12 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     let (low, high) = samples.input_range();
     let reach = low.abs().max(high.abs());
     samples.segments.iter().map(|s| samples.input[s.start].abs() > AT_REST * reach).collect()
+}
+
+/// Segments whose past is worth asking for before it is known what acts: a start-up shows, and they do not begin near 0 V, where what stands out is a
+/// transient or an effect that is missing.
+pub(crate) fn asked(samples: &Samples, settling: &[bool]) -> Vec<bool> {
+    away(samples).into_iter().zip(started(samples, settling)).map(|(away, starts)| starts && away).collect()
 }
 
 /// A drive with the past of each segment before it.

@@ -13,10 +13,6 @@ const SWEPT: f64 = 0.9;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
 
-/// And lasts as long as it exceeds that by so much: as many rows of noise again may be larger by chance.
-const EXCEEDS: f64 = 1.3;
-/// Power of the first half of a transient over that of its second half at least, until it has decayed to a third of what it was.
-const DECAYS: f64 = 2.0;
 /// Share of its range by which a drive has turned back when it counts as turned.
 const TURNED: f64 = 0.02;
 /// Share of the largest drive below which a segment begins at rest.
@@ -78,13 +74,13 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
         }
-        let last = rows.iter().rposition(|r| r.abs() > EXCEEDS * largest.max(4.0 * rms)).unwrap_or(0);
+        let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
         // At rest the memory is known: beyond the first branches, which may be virgin, what is left from before can only ring or creep, and decays.
         // What comes later, in a sweep that passes a mode, is the record's own.
         let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>();
         let (first, second) = rows[..=last].split_at(last.div_ceil(2));
         let at_rest = samples.input[s.start].abs() < AT_REST * low.abs().max(high.abs());
-        if at_rest && last > 2 * first_turn(&samples.input[s.clone()]) && power(first) < DECAYS * power(second) {
+        if at_rest && last > 2 * first_turn(&samples.input[s.clone()]) && power(first) < power(second) {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.

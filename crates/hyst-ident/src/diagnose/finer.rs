@@ -85,7 +85,11 @@ pub(super) fn refine(
     drop(first);
     let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file);
     let fitted = |h: &Hypothesis| Ok::<_, Error>(triangle.fit(h)?.and_then(|f| Trial::of(&triangle, f)));
-    let Some(mut best) = fitted(&rough.hypothesis)? else { return Ok(of(&found.best)) };
+    let from = [&found.best.fit.hypothesis, &rough.hypothesis];
+    let differ = from[0] != from[1];
+    let fits = from.into_iter().take(if differ { 2 } else { 1 }).map(fitted).collect::<Result<Vec<_>, _>>()?;
+    let best = fits.into_iter().flatten().min_by(|a, b| a.total().total_cmp(&b.total()));
+    let Some(mut best) = best else { return Ok(of(&found.best)) };
     if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
         return Ok(of(&found.best));
     }
@@ -119,10 +123,11 @@ pub(super) fn refine(
     Ok(of(&best))
 }
 
-/// A first fit of what was found on another base: a stop stands where this base meets it.
+/// A first fit of what was found on another base: a stop stands where this base meets it, if that is better.
 fn placed(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
+    let as_found = problem.fit_linear(found)?;
     let stop = if found.effects.saturation.is_some() { own_stop(problem, found)? } else { None };
-    stop.map_or_else(|| problem.fit_linear(found), |stop| Ok(Some(stop)))
+    Ok(as_found.into_iter().chain(stop).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
 /// The finer base without one cause, all else refitted; its parameters as they are where that already shows that it is not needed.

@@ -207,22 +207,34 @@ fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
     problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 
-/// Share of the rows in which a stop has to halve the motion at least, and how near to a hard limit the output has to come for that, as a share of the
-/// motion's span.
+/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the motion's span.
 const TOUCHED: f64 = 0.003;
 const NEAR_LIMIT: f64 = 0.05;
-/// Width of a knee, as a share of the range between the limits, from which on the law of a stop has ended at its bound.
+/// Width of a knee, as a share of the range between the limits, below which a rich base that bends is told from a stop, and from which on the law of
+/// one has ended at its bound.
+const SHARP_KNEE: f64 = 0.2;
 const WIDEST_KNEE: f64 = 0.45;
 
-/// Whether the output comes so near to one of the limits that it follows the motion by less than half, and does so in some rows.
-pub(super) fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
-    let shown = shown_motion(samples, fit);
-    let (low, high) = range(shown.iter().copied());
+/// Whether the output comes to one of the limits and stays there for some rows.
+fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
+    p.knee < SHARP_KNEE && comes_near(samples, fit, p, 0.0)
+}
+
+/// Whether it comes so near to one of the limits that it follows the motion by less than half, for some rows: a soft stop does, where the base does
+/// not bend in itself.
+pub(super) fn halves_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
     // In a knee of width w the slope is 1 − x² at the share x of it.
     let halved = (1.0 - 0.5f64.sqrt()) * p.knee * (p.high - p.low);
-    let near = halved.max(NEAR_LIMIT * (high - low));
+    p.knee < WIDEST_KNEE && comes_near(samples, fit, p, halved)
+}
+
+/// Whether some rows are nearer to a limit than a share of the motion's span, or than this \[y\].
+fn comes_near(samples: &Samples, fit: &Fitted, p: &SaturationParams, least: f64) -> bool {
+    let shown = shown_motion(samples, fit);
+    let (low, high) = range(shown.iter().copied());
+    let near = least.max(NEAR_LIMIT * (high - low));
     let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
-    p.knee < WIDEST_KNEE && touched as f64 > TOUCHED * shown.len() as f64
+    touched as f64 > TOUCHED * shown.len() as f64
 }
 
 #[cfg(test)]

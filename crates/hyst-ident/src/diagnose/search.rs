@@ -188,8 +188,8 @@ pub(super) fn further(
         near = (parent.clone(), Vec::new());
         for ((trial, judgement), (from, _, cause)) in trials.into_iter().zip(judged).zip(&jobs) {
             let (Some(trial), Some(judgement)) = (trial, judgement) else { continue };
-            // A set that is hardly better than a smaller one found before leads nowhere.
-            if !score::is_worth(&best, &trial) && !judgement.alone || !judgement.accepted() {
+            // A set that is worse than a smaller one found before leads nowhere.
+            if trial.total() >= best.total() || !judgement.accepted() {
                 let counts = judgement.is_sure() && from.fit.hypothesis.causes() == parent;
                 let effect = cause.effect().filter(|_| counts);
                 near.1.extend(effect.map(|effect| Near { effect, cv_rmse: trial.cv_rmse(), judgement }));

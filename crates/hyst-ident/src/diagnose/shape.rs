@@ -180,6 +180,10 @@ pub(super) fn shape(
         .map(|t| {
             let (without, closed) = t.anew.as_ref().map_or((plain, CLOSED), |(_, plain)| (plain, CLOSED_ANEW));
             let judgement = score::judge(problem, without, &t.trial, noise, seed);
+            // Behind this base, which does not bend, a soft stop counts too.
+            let stop = t.trial.fit.hypothesis.effects.saturation.filter(|_| t.effect == Effect::Saturation);
+            let stops = stop.map(|stop| score::halves_something(problem.samples, &t.trial.fit, &stop));
+            let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
                 && judgement.share >= TAKEN
                 && (t.trial.cv_rmse() <= closed * least || judgement.share >= NEARLY_ALL)
@@ -254,7 +258,7 @@ pub(super) fn own_stop(problem: &Problem<'_>, found: &Hypothesis) -> Result<Opti
     let as_found = problem.fit_linear(found)?;
     let stops = |f: &Fitted| {
         let stop = f.hypothesis.effects.saturation;
-        stop.is_some_and(|p| score::stops_something(problem.samples, f, &p))
+        stop.is_some_and(|p| score::halves_something(problem.samples, f, &p))
     };
     Ok(stopped(problem, &open)?
         .into_iter()

@@ -73,7 +73,8 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         Effect::Asymmetry => Vec::new(),
         Effect::Load => vec![with(&|e| e.load = Some(LoadParams { per_newton: 0.0 }))],
         Effect::Saturation => {
-            let stops = stops(samples, from).into_iter().flatten();
+            // A rich base that bends towards both ends may be no stop: that is asked of a base which has seen one.
+            let stops = stops(samples, from).into_iter().flat_map(|[upper, lower, _]| [upper, lower]);
             stops.map(|stop| with(&|e| e.saturation = Some(stop))).collect()
         }
         Effect::Temperature => {
