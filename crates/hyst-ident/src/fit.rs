@@ -22,6 +22,11 @@ use crate::samples::Samples;
 use crate::settle::{AT_REST, start_up_rows, windows};
 use crate::simulate::{Zero, simulate};
 
+/// A fit, and what it leaves in some rows or in every row \[y\].
+type Left = (Fitted, Vec<f64>);
+/// The past of each segment, as a fit with what it leaves in every row calls for it where it is asked for.
+type Recalls<'a> = dyn Fn(&Samples, &Left, &[bool]) -> Result<Vec<Vec<f64>>, FitError> + 'a;
+
 /// How often the past of a record is asked for, each time with what was fitted to the rows that the last one explains.
 const RECALLS: usize = 2;
 /// Cells along one edge of the Preisach triangle.
@@ -370,7 +375,7 @@ pub(crate) fn fit_settled(
     basis: &dyn Basis,
     options: &FitOptions,
     name: &dyn Fn() -> String,
-) -> Result<(Fitted, Vec<f64>), FitError> {
+) -> Result<Left, FitError> {
     let run = |samples: &Samples, basis: &dyn Basis| everywhere(samples, basis, options.zero_per_record, name);
     let mut all = run(samples, basis)?;
     if samples.mark_spikes(&all.1) {
@@ -381,7 +386,7 @@ pub(crate) fn fit_settled(
         // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
-        let recalls = |samples: &Samples, (fitted, residual): &(Fitted, Vec<f64>), asked: &[bool]| {
+        let recalls = |samples: &Samples, (fitted, residual): &Left, asked: &[bool]| {
             let blocks = Blocks::new(samples, BLOCKS, ROWS);
             let problem = Problem::new(samples, &plays, &blocks, options.zero_per_record);
             memory::recalled(&problem, fitted, residual, asked)
@@ -401,8 +406,8 @@ pub(crate) fn fit_settled(
 /// Finds what the actuator remembered when each segment began, as plays follow it: sets `samples.pasts`. Gives what they miss of each row.
 fn recalled(
     samples: &mut Samples,
-    run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
-    recalls: &dyn Fn(&Samples, &(Fitted, Vec<f64>), &[bool]) -> Result<Vec<Vec<f64>>, FitError>,
+    run: impl Fn(&Samples) -> Result<Left, FitError>,
+    recalls: &Recalls<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
     let asked = memory::asked(samples, &samples.settling);
@@ -449,10 +454,10 @@ fn recalled(
 /// for none. `beside` is what another base misses of each row.
 fn start_up_found(
     samples: &mut Samples,
-    all: (Fitted, Vec<f64>),
+    all: Left,
     beside: Option<&[f64]>,
-    run: impl Fn(&Samples) -> Result<(Fitted, Vec<f64>), FitError>,
-) -> Result<((Fitted, Vec<f64>), (Fitted, Vec<f64>)), FitError> {
+    run: impl Fn(&Samples) -> Result<Left, FitError>,
+) -> Result<(Left, Left), FitError> {
     let windows = windows(samples);
     let mut without = samples.clone();
     for (s, w) in samples.segments.iter().zip(&windows) {
@@ -492,7 +497,7 @@ fn everywhere(
     basis: &dyn Basis,
     zero_per_file: bool,
     name: &dyn Fn() -> String,
-) -> Result<(Fitted, Vec<f64>), FitError> {
+) -> Result<Left, FitError> {
     let blocks = Blocks::new(samples, BLOCKS, ROWS);
     let problem = Problem::new(samples, basis, &blocks, zero_per_file);
     let stage = |source| FitError::Stage { record: name(), source };
@@ -503,7 +508,7 @@ fn everywhere(
 }
 
 /// A fit and what it leaves in the rows that it used.
-fn within(samples: &Samples, (fitted, residual): (Fitted, Vec<f64>)) -> (Fitted, Vec<f64>) {
+fn within(samples: &Samples, (fitted, residual): Left) -> Left {
     let left = Blocks::new(samples, BLOCKS, ROWS).all_used(samples).map(|k| residual[k]).collect();
     (fitted, left)
 }
@@ -514,7 +519,7 @@ fn solved(
     basis: &dyn Basis,
     zero_per_file: bool,
     name: &dyn Fn() -> String,
-) -> Result<(Fitted, Vec<f64>), FitError> {
+) -> Result<Left, FitError> {
     Ok(within(samples, everywhere(samples, basis, zero_per_file, name)?))
 }
 
