@@ -19,7 +19,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{AT_REST, start_up_rows, windows};
+use crate::settle::{AT_REST, start_up_rows, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
 
 /// A fit, and what it leaves in some rows or in every row \[y\].
@@ -415,10 +415,7 @@ fn recalled(
         return Ok(found.1);
     }
     // A part of what came before is seen all through the record.
-    let mut rest = samples.clone();
-    for (segment, window) in samples.segments.iter().zip(windows(samples)) {
-        rest.settling[segment.start..segment.start + window].fill(true);
-    }
+    let rest = without_beginnings(samples);
     let histories =
         memory::with_histories(&rest, &asked, &mut |samples: &Samples| Ok::<_, FitError>(run(samples)?.0.squares))?;
     if histories.pasts != samples.pasts {
@@ -428,12 +425,7 @@ fn recalled(
         (found, late) = start_up_found(samples, all, None, &run)?;
     }
     for _ in 0..RECALLS {
-        let mut pasts = recalls(samples, &late, &asked)?;
-        pasts
-            .iter_mut()
-            .zip(&samples.pasts)
-            .filter(|(new, _)| new.is_empty())
-            .for_each(|(new, old)| new.clone_from(old));
+        let pasts = memory::kept(&samples.pasts, recalls(samples, &late, &asked)?);
         if pasts == samples.pasts {
             break;
         }
@@ -459,10 +451,7 @@ fn start_up_found(
     run: impl Fn(&Samples) -> Result<Left, FitError>,
 ) -> Result<(Left, Left), FitError> {
     let windows = windows(samples);
-    let mut without = samples.clone();
-    for (s, w) in samples.segments.iter().zip(&windows) {
-        without.settling[s.start..s.start + w].fill(true);
-    }
+    let without = without_beginnings(samples);
     let late = run(&without)?;
     let rms_late = |r: &[f64]| {
         let kept = r.iter().zip(&without.settling).filter(|(_, s)| !**s);

@@ -274,6 +274,11 @@ pub(crate) fn recalled(
     (0..asked.len()).map(of_segment).collect()
 }
 
+/// The `new` past of each segment, or the old one where there is none.
+pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    new.into_iter().zip(old).map(|(new, old)| if new.is_empty() { old.clone() } else { new }).collect()
+}
+
 /// The past after which least is left of the first rows; none unless what stands above the `level` of as many others falls to at most the share that
 /// [`HELPS`] says (all Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
 /// out any more.

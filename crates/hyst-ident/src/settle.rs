@@ -38,6 +38,15 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
+/// The same record without the rows in which a start-up can lie.
+pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
+    let mut rest = samples.clone();
+    for (segment, rows) in samples.segments.iter().zip(windows(samples)) {
+        rest.settling[segment.start..segment.start + rows].fill(true);
+    }
+    rest
+}
+
 /// Rows of each segment after which its drive has swept its range and passes its first value in the direction in which it began: what came
 /// before a record that begins in mid-cycle. None where it never does.
 pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {

@@ -11,25 +11,15 @@ use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
 use crate::base::{Drag, PiBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
-use crate::memory;
 use crate::model::{Effect, Model};
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_rows, unless_followed, windows};
-use crate::simulate::Simulation;
+use crate::settle::{Settled, start_up_rows, unless_followed};
+use crate::simulate::{Simulation, Zero, simulate};
 
 /// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
 const MAX_RISE: f64 = 1.05;
-
-/// How often a start is looked for, each time with what is known of it.
-const RECALLS: usize = 2;
-
-/// A record with the start of each segment, and what the own base with a curve leaves of it then, cross-validated \[y\].
-struct Start {
-    samples: Samples,
-    cv_rmse: f64,
-}
 
 /// What the own base was found to lack beside what was found before.
 #[derive(Default)]
@@ -40,6 +30,17 @@ pub(super) struct Shaped {
     pub(super) basis: Option<BasisOf>,
     /// What was found once more beside the curve, in the place of all that was found before.
     pub(super) searched: Option<Search>,
+}
+
+/// A model with what was found.
+pub(super) struct Extension {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) errors: BTreeMap<String, f64>,
+    /// The record with other starts of its segments, if it was fitted to that.
+    pub(super) begun: Option<Samples>,
+    pub(super) model: Model,
+    /// What it says of the record.
+    pub(super) after: Simulation,
 }
 
 /// A model and the record that it is extended on.
@@ -58,14 +59,14 @@ pub(super) struct Own<'a> {
 }
 
 impl<'a> Own<'a> {
-    fn stage(&self, source: Error) -> FitError {
+    pub(super) fn stage(&self, source: Error) -> FitError {
         FitError::Stage { record: self.train.name(), source }
     }
 
     /// Places a stop that was found where the own base meets it.
     pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
+        let problem = self.on(self.basis, &blocks).holding();
         if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
             self.take(Effect::Saturation, &fit, errors);
             *hypothesis = fit.hypothesis;
@@ -73,7 +74,8 @@ impl<'a> Own<'a> {
         Ok(())
     }
 
-    fn on<'b>(&self, basis: &'b BasisOf, blocks: &'b Blocks) -> Problem<'b>
+    /// A problem on a base, over the rows that count for the search.
+    pub(super) fn on<'b>(&self, basis: &'b BasisOf, blocks: &'b Blocks) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -84,96 +86,6 @@ impl<'a> Own<'a> {
     pub(super) fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
         let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
         errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
-    }
-
-    /// The record with the start of each segment as the own base shows it once it has the curve that it may lack: beneath what a missing curve leaves
-    /// everywhere no start stands out. None if that is as it was known.
-    pub(super) fn start_beside_a_curve(
-        &self,
-        hypothesis: &Hypothesis,
-        richest: f64,
-    ) -> Result<Option<Samples>, FitError> {
-        let behind = self.started(hypothesis, richest, Some(CurveSide::Output))?;
-        // A curve before the hysteresis has to be searched: only where one behind it leaves much.
-        let before = match &behind {
-            Some(behind) if behind.cv_rmse > shape::CLOSED * richest => {
-                self.started(hypothesis, richest, Some(CurveSide::Input))?
-            }
-            _ => None,
-        };
-        let better = [behind, before].into_iter().flatten().min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
-        Ok(better.map(|start| start.samples).filter(|start| self.is_another(start)))
-    }
-
-    /// The same as the own base shows it with what was found.
-    pub(super) fn start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
-        let start = self.started(hypothesis, richest, None)?;
-        Ok(start.map(|start| start.samples).filter(|start| self.is_another(start)))
-    }
-
-    fn is_another(&self, start: &Samples) -> bool {
-        start.settling != self.samples.settling || start.pasts != self.samples.pasts
-    }
-
-    /// The start of each segment, beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
-    fn started(
-        &self,
-        hypothesis: &Hypothesis,
-        richest: f64,
-        side: Option<CurveSide>,
-    ) -> Result<Option<Start>, FitError> {
-        let stage = |e| self.stage(e);
-        let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let plain = shape::plain(&self.on(self.basis, &blocks), hypothesis).map_err(stage)?;
-        if plain.is_none_or(|plain| shape::is_complete(&plain, richest)) {
-            return Ok(None);
-        }
-        // Near 0 V only where everything is known but the start.
-        let asked = match side {
-            Some(_) => memory::away(self.samples),
-            None => vec![true; self.samples.segments.len()],
-        };
-        // What a fit with another start leaves, what it leaves in each row, and the turns of the drive before that these call for.
-        let fitted = |samples: &Samples, recalls: bool| {
-            let blocks = Blocks::new(samples, BLOCKS, SHAPE_ROWS);
-            let problem = Problem::new(samples, self.basis.as_ref(), &blocks, self.per_record);
-            let Some(plain) = problem.fit_linear(hypothesis)? else { return Ok(None) };
-            let fit = match side {
-                Some(side) => shape::bent(&problem, hypothesis, &plain, side)?.map(|bent| bent.trial.fit),
-                None => Some(plain),
-            };
-            let Some(fit) = fit else { return Ok(None) };
-            let residual = problem.residual(&fit)?;
-            let asked: Vec<bool> = asked.iter().map(|asked| recalls && *asked).collect();
-            let pasts = memory::recalled(&problem, &fit, &residual, &asked)?;
-            Ok::<_, Error>(Trial::of(&problem, fit).map(|trial| (trial, residual, pasts)))
-        };
-        let squares = |samples: &Samples| {
-            let fitted = fitted(samples, false).map_err(stage)?;
-            Ok::<_, FitError>(fitted.map_or(f64::INFINITY, |(trial, ..)| trial.fit.squares))
-        };
-        // Of what came before, a part is seen all through the record: each history is judged by a fit of its own, to the rows in which no start-up can
-        // lie.
-        let mut late = self.samples.clone();
-        for (segment, rows) in self.samples.segments.iter().zip(windows(self.samples)) {
-            late.settling[segment.start..segment.start + rows].fill(true);
-        }
-        let mut known = memory::with_histories(&late, &asked, &mut |samples| squares(samples))?;
-        // Then the turns, as far as the first rows show them; what is left is a start-up.
-        let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
-        for _ in 0..RECALLS {
-            let Some((.., pasts)) = fitted(&known, true).map_err(stage)? else { break };
-            let mut next = known.clone();
-            next.pasts.iter_mut().zip(pasts).filter(|(_, new)| !new.is_empty()).for_each(|(old, new)| *old = new);
-            if next.pasts == known.pasts || all(&next)? >= all(&known)? {
-                break;
-            }
-            known = next;
-        }
-        let Some((trial, residual, _)) = fitted(&known, false).map_err(stage)? else { return Ok(None) };
-        let starting = start_up_rows(&known, &residual);
-        known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
-        Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
     }
 
     /// Looks on the own base for what only it can show: whether it lacks a curve. `known` is what the model held already, `hypothesis` what was found
@@ -266,7 +178,7 @@ impl<'a> Own<'a> {
         progress: &(dyn Fn(&str) + Sync),
     ) -> Result<Option<Search>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record);
+        let problem = self.on(self.basis, &blocks);
         let stage = |e| self.stage(e);
         let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
         // What a wandering or a slow amplifier leaves is no base's.
@@ -285,7 +197,7 @@ impl<'a> Own<'a> {
     /// it has and are no more: those were placed while the effects stood in the record.
     pub(super) fn on_better_plays(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, FINAL_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
+        let problem = self.on(self.basis, &blocks).holding();
         let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
         fit.map(|fit| self.rechosen(&problem, &fit)).transpose().map(Option::flatten)
     }
@@ -332,9 +244,51 @@ impl<'a> Own<'a> {
         Ok(Some(trial).filter(follows).map(|trial| trial.fit))
     }
 
+    /// The model with what was found beyond what is `known`: of several extensions the one that leaves least of the record, if it helps the model and
+    /// transfers. With the parameters of the rich base or those of the own one, and with the starts as they were known or as they show now; a start that
+    /// the model cannot be brought to says nothing.
+    pub(super) fn best(
+        &self,
+        known: &Hypothesis,
+        found: (&Hypothesis, &BTreeMap<String, f64>),
+        (richest, noise, seed): (f64, f64, u64),
+        zero: Zero,
+    ) -> Result<Extension, FitError> {
+        let begun = self.start(found.0, richest)?;
+        let mut extensions = Vec::new();
+        for begun in std::iter::once(None).chain(begun.map(Some)) {
+            let own = Own { samples: begun.as_ref().unwrap_or(self.samples), ..*self };
+            let of = |hypothesis: &Hypothesis, errors: BTreeMap<String, f64>| {
+                let model = own.extended(hypothesis, &errors)?;
+                let after = simulate(&model, self.train, zero)?;
+                Ok::<_, FitError>(Extension {
+                    hypothesis: hypothesis.clone(),
+                    errors,
+                    begun: begun.clone(),
+                    model,
+                    after,
+                })
+            };
+            extensions.push(of(found.0, found.1.clone())?);
+            if let Some(fit) = own.refound(known, found.0, richest, noise, seed)? {
+                extensions.push(of(&fit.hypothesis, uncertainty::standard_errors(&fit, self.samples.time[0]))?);
+            }
+        }
+        let left = |e: &Extension| e.after.errors.as_ref().map_or(f64::INFINITY, |errors| errors.rmse_all_rows);
+        extensions.sort_by(|a, b| left(a).total_cmp(&left(b)));
+        let mut best = 0;
+        for (at, e) in extensions.iter().enumerate() {
+            if self.is_helped(self.before, &e.after) && self.transfers(known, &e.hypothesis)? {
+                best = at;
+                break;
+            }
+        }
+        Ok(extensions.swap_remove(best))
+    }
+
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a
     /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again.
-    pub(super) fn extended(&self, hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>) -> Result<Model, FitError> {
+    fn extended(&self, hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>) -> Result<Model, FitError> {
         self.refitted(hypothesis, errors, true)
     }
 
@@ -407,7 +361,7 @@ impl<'a> Own<'a> {
     /// worse there is not handed out.
     pub(super) fn transfers(&self, start: &Hypothesis, found: &Hypothesis) -> Result<bool, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = Problem::new(self.samples, self.basis.as_ref(), &blocks, self.per_record).holding();
+        let problem = self.on(self.basis, &blocks).holding();
         // A wandering is no part of the model; the amplifier is the same for both.
         let model_of = |h: &Hypothesis| Hypothesis {
             zero_wanders: false,

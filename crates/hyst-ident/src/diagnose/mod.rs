@@ -8,7 +8,8 @@
 //!    and it must matter against the noise floor and against what is left (a tone of the sensor's own only against the noise floor).
 //! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and what else, and the own base whether it
 //!    lacks a curve.
-//! 4. **Extend** the user's own model with the effects found, all weights refitted.
+//! 4. **Extend** the user's own model with the effects found, all weights refitted; and their parameters, where that model follows as well as the
+//!    rich base, after it was asked again how each segment begins.
 
 mod advice;
 mod changed;
@@ -29,6 +30,7 @@ mod score;
 mod search;
 mod shape;
 mod spectrum;
+mod start;
 mod starts;
 mod suspects;
 mod tone;
@@ -44,19 +46,17 @@ pub use limits::Limit;
 pub use probability::Weighed;
 pub use suspects::{FOLLOWED, drive_options};
 
-use std::collections::BTreeMap;
-
 use extension::{Own, Shaped};
 
 use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
-use crate::nested::{Cause, Fitted, Hypothesis, Problem};
+use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
-use crate::simulate::{Simulation, Zero, simulate};
+use crate::simulate::{Zero, simulate};
 use trial::Trial;
 
 /// What a diagnosis may be told.
@@ -264,38 +264,9 @@ pub fn diagnose(
     let mut after = before.clone();
     let mut begun: Option<Samples> = None;
     if effects(&hypothesis) != effects(&start) {
-        let with = |hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>, begun: Option<&Samples>| {
-            let asked = Own { samples: begun.unwrap_or(asked.samples), ..asked };
-            let extended = asked.extended(hypothesis, errors)?;
-            let after = simulate(&extended, train, options.zero)?;
-            Ok::<_, FitError>((hypothesis.clone(), errors.clone(), begun.is_some(), extended, after))
-        };
-        let refound = |begun: Option<&Samples>| {
-            let asked = Own { samples: begun.unwrap_or(asked.samples), ..asked };
-            let fit = asked.refound(&start, &hypothesis, richest, found.noise, options.seed)?;
-            let of = |fit: Fitted| with(&fit.hypothesis, &uncertainty::standard_errors(&fit, samples.time[0]), begun);
-            fit.map(of).transpose()
-        };
-        // Nor was it seen how each segment begins while the effects stood in the record. A start that the model cannot be brought to says nothing.
-        begun = asked.start(&hypothesis, richest)?;
-        let mut extensions = vec![with(&hypothesis, &errors, None)?];
-        extensions.extend(refound(None)?);
-        if begun.is_some() {
-            extensions.push(with(&hypothesis, &errors, begun.as_ref())?);
-            extensions.extend(refound(begun.as_ref())?);
-        }
-        let left = |after: &Simulation| after.errors.as_ref().map_or(f64::INFINITY, |errors| errors.rmse_all_rows);
-        extensions.sort_by(|(.., a), (.., b)| left(a).total_cmp(&left(b)));
-        let mut best = 0;
-        for (at, (hypothesis, .., after)) in extensions.iter().enumerate() {
-            if asked.is_helped(&before, after) && asked.transfers(&start, hypothesis)? {
-                best = at;
-                break;
-            }
-        }
-        let as_begun;
-        (hypothesis, errors, as_begun, extended, after) = extensions.swap_remove(best);
-        begun = begun.filter(|_| as_begun);
+        let found_here = (&hypothesis, &errors);
+        let best = asked.best(&start, found_here, (richest, found.noise, options.seed), options.zero)?;
+        extension::Extension { hypothesis, errors, begun, model: extended, after } = best;
     }
     let asked = Own { samples: begun.as_ref().unwrap_or(asked.samples), ..asked };
 

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use hyst_core::{CurveSide, HARMONIC_PARTS};
+use nalgebra::DVector;
 
 use super::Hypothesis;
 
@@ -50,9 +51,23 @@ impl Layout {
     }
 
     /// The places of each kind, in order.
-    pub(super) fn kinds(&self) -> [Range<usize>; 9] {
+    fn kinds(&self) -> [Range<usize>; 9] {
         let Self { weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats } = self.clone();
         [weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats]
+    }
+
+    /// A solution in this layout as it stands in another one, and the places there that this one does not have, or has in another number.
+    pub(super) fn carried(&self, solution: &DVector<f64>, to: &Self) -> (DVector<f64>, Vec<usize>) {
+        let mut z = DVector::zeros(to.len());
+        let mut places = Vec::new();
+        for (from, to) in self.kinds().into_iter().zip(to.kinds()) {
+            if from.len() == to.len() {
+                z.rows_mut(to.start, to.len()).copy_from(&solution.rows(from.start, from.len()));
+            } else {
+                places.extend(to);
+            }
+        }
+        (z, places)
     }
 
     /// How many there are.

@@ -80,17 +80,8 @@ impl<'a> Vantage<'a> {
 
     /// The fit's linear unknowns in the layout of `h`, and the places of those that it does not have.
     fn solution(&self, h: &Hypothesis) -> (DVector<f64>, Vec<usize>) {
-        let (before, layout) = (self.problem.layout(&self.fit.hypothesis), self.problem.layout(h));
-        let mut z = DVector::zeros(layout.len());
-        let mut places = Vec::new();
-        for (from, to) in before.kinds().into_iter().zip(layout.kinds()) {
-            if from.len() == to.len() {
-                z.rows_mut(to.start, to.len()).copy_from(&self.fit.solution.rows(from.start, from.len()));
-            } else {
-                places.extend(to);
-            }
-        }
-        (z, places)
+        let before = self.problem.layout(&self.fit.hypothesis);
+        before.carried(&self.fit.solution, &self.problem.layout(h))
     }
 
     fn place(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Option<Place>, Error> {

@@ -235,7 +235,9 @@ impl<'a> Problem<'a> {
             unpredictable: OnceLock::new(),
             ..*self
         };
-        there.motion(&fit.hypothesis, &fit.solution)
+        // Fewer files have fewer zeros, which are no part of the motion.
+        let (solution, _) = self.layout(&fit.hypothesis).carried(&fit.solution, &there.layout(&fit.hypothesis));
+        there.motion(&fit.hypothesis, &solution)
     }
 
     /// The output of the operator alone, before any curve behind it.
