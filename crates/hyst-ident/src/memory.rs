@@ -372,6 +372,79 @@ mod tests {
     }
 
     #[test]
+    fn a_memory_keeps_the_turns_that_nothing_later_went_beyond() {
+        let kept = |drive: &[f64]| in_force(drive.iter());
+        assert_eq!(kept(&[1.0, 2.0, 5.0, 3.0, 4.0]), [5.0, 3.0, 4.0]);
+        // A loop that closes leaves nothing, wherever it stands in the drive.
+        assert_eq!(kept(&[5.0, 3.0, 4.0, 2.0, 4.5]), [5.0, 2.0, 4.5]);
+        assert_eq!(kept(&[5.0, 3.0, 4.0, 2.0, 6.0]), [6.0]);
+        assert_eq!(kept(&[]), [0.0; 0]);
+    }
+
+    /// What such a drive leaves is what the whole of it leaves.
+    #[test]
+    fn the_turns_in_force_stand_for_the_whole_drive() {
+        let drive: Vec<f64> =
+            (0..900).map(|k| 50.0 + 45.0 * (0.05 * f64::from(k)).sin() * (0.011 * f64::from(k)).cos()).collect();
+        let (u0, after) = (drive[899], [70.0, 30.0, 60.0]);
+        let whole: Vec<f64> = drive.iter().chain(&after).copied().collect();
+        let short: Vec<f64> = path(&in_force(drive.iter()), u0).into_iter().chain([u0]).chain(after).collect();
+        let plays = PiBasis { thresholds: vec![4.0, 11.0, 23.0, 46.0], floor: 0.0, falls: false };
+        let last = |drive: &[f64]| {
+            let columns = plays.columns(0..5, drive, std::slice::from_ref(&(0..drive.len())), &Drag::NONE);
+            columns.iter().map(|c| c[drive.len() - 1]).collect::<Vec<_>>()
+        };
+        assert_eq!(last(&whole), last(&short));
+    }
+
+    /// Two segments of one drive, the second from where the first has ended: that history is found among the others.
+    #[test]
+    fn a_segment_that_continues_the_one_before_is_told_from_one_after_a_rest() {
+        let u = |k: usize| 50.0 + 45.0 * (0.02 * k as f64).sin() * (1.0 - k as f64 / 1600.0);
+        let input: Vec<f64> = (0..1200).map(u).collect();
+        let whole = std::slice::from_ref(&(0..1200)).to_vec();
+        let plays = PiBasis { thresholds: vec![6.0, 15.0, 30.0, 40.0], floor: 0.0, falls: false };
+        let columns = plays.columns(0..5, &input, &whole, &Drag::NONE);
+        let output = (0..1200).map(|k| columns.iter().map(|c| 0.05 * c[k]).sum()).collect();
+        let samples = Samples {
+            segments: vec![0..700, 700..1200],
+            file_of_segment: vec![0, 0],
+            pasts: vec![Vec::new(); 2],
+            ..Samples::of_columns(1e-3, input, output)
+        };
+        let squares = |samples: &Samples| {
+            let Samples { input, segments, pasts, .. } = samples;
+            let columns = columns_after(&plays, input, segments, pasts);
+            (0..1200)
+                .map(|k| (samples.output[k] - columns.iter().map(|c| 0.05 * c[k]).sum::<f64>()).powi(2))
+                .sum::<f64>()
+        };
+        let best = with_histories(&samples, &[false, true], &mut |samples| Ok::<_, ()>(squares(samples))).unwrap();
+        assert_eq!(best.pasts, [Vec::new(), continued(&samples, 1).unwrap()]);
+        assert!(squares(&best) < 1e-3 * squares(&samples));
+        // Of another file nothing is continued.
+        assert!(continued(&Samples { file_of_segment: vec![0, 1], ..samples }, 1).is_none());
+    }
+
+    fn columns_after(plays: &PiBasis, drive: &[f64], segments: &[Range<usize>], pasts: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        columns(plays, 0..5, drive, segments, pasts, &Drag::NONE)
+    }
+
+    #[test]
+    fn a_past_near_rest_has_to_explain_all_that_stands_out() {
+        let pasts = || vec![vec![1.0], vec![2.0]];
+        let squares = |past: &Vec<f64>| match past.first() {
+            None => 100.0,
+            Some(past) if *past == 1.0 => 9.0,
+            Some(_) => 40.0,
+        };
+        assert_eq!(best(pasts(), 1.0, true, squares), [1.0]);
+        assert!(best(pasts(), 1.0, false, squares).is_empty(), "nine times the level");
+        assert_eq!(best(pasts(), 8.0, false, squares), [1.0]);
+        assert!(best(pasts(), 60.0, true, squares).is_empty(), "nothing stands out");
+    }
+
+    #[test]
     fn a_record_from_rest_needs_no_past() {
         let input: Vec<f64> = (0..2000).map(|k| 50.0 - 50.0 * (f64::from(k) / 80.0).cos()).collect();
         let plays = PiBasis { thresholds: vec![8.0, 17.0, 31.0], floor: 0.0, falls: false };

@@ -75,3 +75,21 @@ impl Layout {
         self.gain_hats.end
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hyst_core::LoadParams;
+
+    use super::*;
+    use crate::model::Effects;
+
+    #[test]
+    fn what_a_layout_lacks_is_told_and_the_rest_keeps_its_values() {
+        let load = Hypothesis::of(Effects { load: Some(LoadParams { per_newton: 0.0 }), ..Effects::default() });
+        let (three, one) = (Layout::of(&load, 2, 3), Layout::of(&load, 2, 1));
+        let z = DVector::from_vec(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        // Two weights, the zeros of three files, the load.
+        let (carried, places) = three.carried(&z, &one);
+        assert_eq!((carried.as_slice(), places.as_slice()), ([1.0, 2.0, 0.0, 6.0].as_slice(), [2].as_slice()));
+    }
+}
