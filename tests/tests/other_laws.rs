@@ -145,3 +145,70 @@ fn a_curve_before_the_hysteresis_is_an_asymmetry() {
     let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
     assert!(after < 0.2 * before, "{before} {after}");
 }
+
+/// A record of one segment at 500 Hz.
+fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: &dyn Fn(&[f64], &[f64]) -> Vec<f64>) -> Record {
+    let time: Vec<f64> = (0..rows).map(|k| k as f64 / 500.0).collect();
+    let input: Vec<f64> = time.iter().map(|t| drive(*t)).collect();
+    Record::from_samples(Columns {
+        name: name.into(),
+        output: Some((OutputUnit::Micrometre, of(&time, &input))),
+        time,
+        input: Some(input),
+        ..Columns::default()
+    })
+    .unwrap()
+}
+
+/// Fades from the middle of the range, as an actuator that was demagnetised there is driven; and swings without end.
+fn from_the_middle(of: &dyn Fn(&[f64], &[f64]) -> Vec<f64>) -> (Record, Record) {
+    let turn = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
+    let fades = |t: f64| 50.0 + 47.0 * (1.0 - t / 26.0) * turn(2.0, t);
+    let swings = |t: f64| 50.0 + 24.0 * turn(1.3, t) + 18.0 * turn(0.37, t);
+    (one_segment("fades", &fades, 12_000, of), one_segment("swings", &swings, 6000, of))
+}
+
+/// Plays that stand at the first voltage when the record begins, in shares of 100 V.
+fn rested(u: &[f64]) -> impl FnMut(&f64) -> f64 {
+    let mut plays = [0.01 * u[0]; 45];
+    move |u: &f64| {
+        plays.iter_mut().enumerate().for_each(|(i, p)| *p = hyst_core::play(*p, 0.01 * u, 0.011 * (i + 1) as f64));
+        0.7 * 0.01 * u + 0.01 * plays.iter().sum::<f64>()
+    }
+}
+
+/// Beneath what a missing curve leaves everywhere nobody sees that the device rested where the record begins; and wide plays never forget it there.
+#[test]
+fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
+    let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
+    let d = diagnosed(
+        Kind::Pi,
+        &from_the_middle(&|t, u| {
+            let (mut noise, mut rested) = (noise(t), rested(u));
+            let curve = |v: f64| 40.0 * (v + 0.25 * v * v);
+            u.iter().zip(t).map(|(u, t)| curve(rested(u)) + settles(*t) + noise()).collect()
+        }),
+    );
+    assert_eq!(names(&d), ["asymmetry", "drift"], "{:#?}", d.findings);
+    let drift = d.extended.effects.drift.unwrap();
+    assert!((drift.settling / 3.0 - 1.0).abs() < 0.03 && (drift.seconds / 6.0 - 1.0).abs() < 0.05, "{drift:?}");
+    let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
+    assert!(after < 0.1 * before, "{before} {after}");
+}
+
+/// A stop that bends softly at both ends turns a loop over into itself like any symmetric bend; but it halves what moves there.
+#[test]
+fn a_soft_stop_at_both_ends_is_a_saturation() {
+    let d = diagnosed(
+        Kind::Pi,
+        &from_the_middle(&|t, u| {
+            let (mut noise, mut rested) = (noise(t), rested(u));
+            let knee =
+                |x: f64| if x.abs() < 0.2 { x } else { x.signum() * (0.2 + 0.12 * ((x.abs() - 0.2) / 0.12).tanh()) };
+            u.iter().map(|u| 40.0 * (0.55 + knee(rested(u) - 0.55)) + noise()).collect()
+        }),
+    );
+    assert_eq!(names(&d), ["saturation"], "{:#?}", d.findings);
+    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+    assert!(after < 0.3 * before, "{before} {after}");
+}
