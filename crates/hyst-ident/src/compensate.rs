@@ -7,7 +7,7 @@ use hyst_core::{CompensatorOptions, CompensatorState, Env, Limited, Limits, Samp
 
 use crate::model::capacity::{CREEP, TAPS};
 use crate::model::{Compensator, InverseState, Model};
-use crate::record::Record;
+use crate::record::{Record, RecordError};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 use crate::simulate::other_unit;
@@ -74,6 +74,9 @@ pub struct Missed {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompensateError {
+    /// The reference cannot be used as it is.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// Beyond the stroke.
     #[error(
         "{record}: row {} (time {time:.6} s): {value:.6} {unit} is outside what the actuator reaches, {low:.6} to {high:.6} {unit}; scale or shift the reference", row + 1
@@ -209,6 +212,7 @@ impl Follower {
     /// # Errors
     /// See [`CompensateError`].
     pub fn new(model: &Model, reference: &Record, options: &CompensateOptions) -> Result<Self, CompensateError> {
+        reference.need_one_sample_period("a reference")?;
         let samples = Samples::from_record(reference).at_temperature(options.temperature);
         check(model, reference, &samples, options)?;
         let own = CompensatorOptions { bandwidth_hz: options.bandwidth_hz };

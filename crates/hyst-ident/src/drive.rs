@@ -5,10 +5,11 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
-use hyst_core::{Env, Stage};
+use hyst_core::{Env, Sampling, Stage};
 use serde::{Deserialize, Serialize};
 
 use crate::Samples;
+use crate::samples::PerSegment;
 
 /// Steps from one row to the next on a band-limited drive, linear within each. Through the samples themselves straight lines lose
 /// `(π f / rate)² / 3` of a frequency, 12 % at a fifth of the rate; these values make that up: 1e-4 is left up to 0.43 of the rate.
@@ -115,25 +116,26 @@ impl<'a> Drive<'a> {
         Self { history, ..self }
     }
 
-    /// Sample period that a stage has to be built for \[s\].
-    pub(crate) fn period(&self) -> f64 {
-        self.samples.period / self.steps as f64
+    /// A stage for each segment, as `build` makes it for a sample period.
+    pub(crate) fn stages<S, E>(&self, build: impl Fn(&Sampling) -> Result<S, E>) -> Result<PerSegment<S>, E> {
+        PerSegment::new(self.samples, |period| build(&Sampling { period: period / self.steps as f64 }))
     }
 
     /// Output of a stage over the rows, one segment after the other, each from rest under its first input or after its history.
-    pub(crate) fn run<S: Stage<f64>>(&self, stage: &S, out: &mut [f64]) {
-        self.run_from(stage, |state, _, env, u0| stage.reset(state, env, u0), out);
+    pub(crate) fn run<S: Stage<f64>>(&self, stages: &PerSegment<S>, out: &mut [f64]) {
+        self.run_from(stages, |state, i, env, u0| stages.of(i).reset(state, env, u0), out);
     }
 
     /// The same where `begin` says in what state each segment, by its number, begins under its first input.
     pub(crate) fn run_from<S: Stage<f64>>(
         &self,
-        stage: &S,
+        stages: &PerSegment<S>,
         begin: impl Fn(&mut S::State, usize, &Env<f64>, f64) -> f64,
         out: &mut [f64],
     ) {
-        let mut state = Box::new(stage.state());
+        let mut state = Box::new(stages.of(0).state());
         for (i, (segment, history)) in self.samples.segments.iter().zip(&self.history).enumerate() {
+            let stage = stages.of(i);
             let Some(first) = segment.clone().next() else { continue };
             out[first] = begin(&mut state, i, &self.samples.env(first), self.rows[first]);
             let before = first + 1..first + history;

@@ -17,7 +17,7 @@ use crate::memory;
 use crate::model::{Base, Channel, Effects, FittedOn, Kind, Model, ModelError, ZERO};
 use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
-use crate::record::Record;
+use crate::record::{Record, RecordError};
 use crate::samples::Samples;
 use crate::settle::{AT_REST, start_up_rows, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
@@ -44,6 +44,9 @@ pub(crate) const ROWS: usize = 40_000;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
+    /// The record cannot be used as it is.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// Not enough rows.
     #[error(
         "{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model"

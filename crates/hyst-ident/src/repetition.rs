@@ -19,7 +19,7 @@ pub(crate) fn only_loop(samples: &Samples) -> Option<f64> {
     let (low, high) = samples.input_range();
     let range = high - low;
     let (mut tops, mut bottoms, mut periods) = (Vec::new(), Vec::new(), Vec::new());
-    for segment in &samples.segments {
+    for (i, segment) in samples.segments.iter().enumerate() {
         let turns = turns(&samples.input[segment.clone()], TURN * range);
         // From rest and to rest is not the loop's.
         let inner = turns.get(1..turns.len().saturating_sub(1)).unwrap_or_default();
@@ -27,7 +27,7 @@ pub(crate) fn only_loop(samples: &Samples) -> Option<f64> {
             let u = samples.input[segment.start + row];
             if *top { tops.push(u) } else { bottoms.push(u) }
         }
-        periods.extend(inner.windows(3).map(|w| (w[2].0 - w[0].0) as f64));
+        periods.extend(inner.windows(3).map(|w| (w[2].0 - w[0].0) as f64 * samples.period_of(i) / samples.period));
     }
     let count = periods.len();
     if count < LEAST {

@@ -8,11 +8,13 @@ use crate::clipping::clipped_rows;
 use crate::record::Record;
 use crate::spikes::{spiked_residual, spiked_rows};
 
-/// Columns of one or more records with the same units and sample period.
+/// Columns of one or more records with the same units.
 #[derive(Clone, Debug)]
 pub struct Samples {
-    /// Sample period \[s\].
+    /// Shortest sample period \[s\].
     pub period: f64,
+    /// Sample period of each segment \[s\]; empty where all share the shortest.
+    pub(crate) periods: Vec<f64>,
     /// Lab clock \[s\].
     pub time: Vec<f64>,
     /// Input \[V\].
@@ -43,6 +45,7 @@ impl Samples {
         let blind = record.output().map_or_else(|| vec![false; record.rows()], |y| blind_rows(record, y));
         Self {
             period: record.sample_period(),
+            periods: own_periods(record.sample_periods()),
             time: record.time().to_vec(),
             input: record.input().to_vec(),
             output: record.output().unwrap_or_default().to_vec(),
@@ -84,8 +87,10 @@ impl Samples {
             end += self.segments[*s].len();
             end - self.segments[*s].len()..end
         };
+        let periods: Vec<f64> = keep.iter().map(|s| self.period_of(*s)).collect();
         Self {
-            period: self.period,
+            period: periods.iter().copied().reduce(f64::min).unwrap_or(self.period),
+            periods: own_periods(periods),
             segments: keep.iter().map(length).collect(),
             pasts: keep.iter().map(|s| self.pasts.get(*s).cloned().unwrap_or_default()).collect(),
             time: column(&self.time),
@@ -114,6 +119,7 @@ impl Samples {
         let rows = input.len();
         Self {
             period,
+            periods: Vec::new(),
             time: (0..rows).map(|k| k as f64 * period).collect(),
             falls: falls(&input, &output),
             input,
@@ -177,8 +183,73 @@ impl Samples {
 
     /// Length of the longest segment \[s\].
     pub fn longest_segment(&self) -> f64 {
-        self.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0) as f64 * self.period
+        let lengths = self.segments.iter().enumerate().map(|(i, rows)| rows.len() as f64 * self.period_of(i));
+        lengths.fold(0.0, f64::max)
     }
+
+    /// Length of all segments together, without the rests between them \[s\].
+    pub(crate) fn duration(&self) -> f64 {
+        self.segments.iter().enumerate().map(|(i, rows)| rows.len() as f64 * self.period_of(i)).sum()
+    }
+
+    /// Sample period of a segment \[s\].
+    pub(crate) fn period_of(&self, segment: usize) -> f64 {
+        self.periods.get(segment).copied().unwrap_or(self.period)
+    }
+
+    /// Sample period of a stretch of rows, by the segment in which it begins \[s\].
+    pub(crate) fn period_at(&self, row: usize) -> f64 {
+        if self.periods.is_empty() {
+            return self.period;
+        }
+        self.period_of(self.segments.iter().position(|rows| rows.contains(&row)).unwrap_or(0))
+    }
+
+    /// The sample period that most rows have \[s\].
+    pub(crate) fn usual_period(&self) -> f64 {
+        let of = |period: f64| (0..self.segments.len()).filter(move |i| self.period_of(*i) == period);
+        let rows = |period: &f64| of(*period).map(|i| self.segments[i].len()).sum::<usize>();
+        self.periods.iter().copied().max_by_key(rows).unwrap_or(self.period)
+    }
+
+    /// The same, without the segments that have another sample period than most rows: all columns stay as they are.
+    pub(crate) fn of_one_period(mut self) -> Self {
+        let usual = self.usual_period();
+        let other: Vec<bool> = (0..self.segments.len()).map(|i| self.period_of(i) != usual).collect();
+        fn keep<T>(column: &mut Vec<T>, other: &[bool]) {
+            let mut other = other.iter();
+            column.retain(|_| other.next() != Some(&true));
+        }
+        keep(&mut self.segments, &other);
+        keep(&mut self.pasts, &other);
+        keep(&mut self.file_of_segment, &other);
+        (self.period, self.periods) = (usual, Vec::new());
+        self
+    }
+}
+
+/// What is built for a sample period, for each segment of a record.
+#[derive(Debug)]
+pub(crate) struct PerSegment<S>(Vec<S>);
+
+impl<S> PerSegment<S> {
+    /// As `build` makes it for the sample period of a segment \[s\]; once where all segments share it.
+    pub(crate) fn new<E>(samples: &Samples, build: impl Fn(f64) -> Result<S, E>) -> Result<Self, E> {
+        match samples.periods.as_slice() {
+            [] => Ok(Self(vec![build(samples.period)?])),
+            periods => periods.iter().map(|period| build(*period)).collect::<Result<_, _>>().map(Self),
+        }
+    }
+
+    /// For this segment, by its number.
+    pub(crate) fn of(&self, segment: usize) -> &S {
+        self.0.get(segment).unwrap_or(&self.0[0])
+    }
+}
+
+/// Sample periods of segments; none where all are the same.
+fn own_periods(periods: Vec<f64>) -> Vec<f64> {
+    if periods.windows(2).all(|w| w[0] == w[1]) { Vec::new() } else { periods }
 }
 
 /// Rows in which the sensor stands at the end of its range, or spikes.

@@ -8,7 +8,7 @@ use crate::memory;
 use crate::metrics::Errors;
 use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
-use crate::samples::Samples;
+use crate::samples::{PerSegment, Samples};
 use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
 
 /// What is done with the sensor's zero.
@@ -96,10 +96,11 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     check(model, record, &samples)?;
     let passes = if options.periodic { Passes::Periodic } else { Passes::Once };
     let drive = Drive::new(&samples, model.between_samples, passes);
-    let chain = model.build(drive.period()).map_err(|source| FitError::Stage { record: record.name(), source })?;
-    let chain = Box::new(chain);
+    let chain = drive
+        .stages(|sampling| model.build(sampling.period))
+        .map_err(|source| FitError::Stage { record: record.name(), source })?;
     let mut predicted = vec![0.0; samples.len()];
-    drive.run(&*chain, &mut predicted);
+    drive.run(&chain, &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
     let mut in_mid_cycle = vec![false; samples.segments.len()];
@@ -119,14 +120,14 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts);
             if pasts.iter().any(|past| !past.is_empty()) {
                 let mut turned = vec![0.0; samples.len()];
-                drive().run_from(&*chain, |s, i, env, u0| chain.reset_after(s, env, u0, &pasts[i]), &mut turned);
+                drive().run_from(&chain, |s, i, env, u0| chain.of(i).reset_after(s, env, u0, &pasts[i]), &mut turned);
                 others.push(turned);
             }
             // ... or gone on as it does afterwards.
             let history = histories(&samples, &starts);
             if history.iter().any(|rows| *rows > 0) {
                 let mut cycled = vec![0.0; samples.len()];
-                drive().after(history).run(&*chain, &mut cycled);
+                drive().after(history).run(&chain, &mut cycled);
                 others.push(cycled);
             }
             for other in others {
@@ -178,7 +179,7 @@ fn recalled(
     samples: &Samples,
     residual: &[f64],
     drive: &Drive<'_>,
-    chain: &HostChain,
+    chain: &PerSegment<HostChain>,
     asked: &[bool],
 ) -> Vec<Vec<f64>> {
     let windows = windows(samples);
@@ -190,6 +191,7 @@ fn recalled(
         }
         let zero = residual[rows.start] - centred[rows.start];
         let squares = |past: &Vec<f64>| -> f64 {
+            let chain = chain.of(i);
             let output =
                 drive.beginning(i, windows[i], chain, |state, env, u0| chain.reset_after(state, env, u0, past));
             let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);

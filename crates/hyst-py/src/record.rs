@@ -159,10 +159,16 @@ impl Record {
         self.0.output_unit().map(OutputUnit::column)
     }
 
-    /// Sample period [s].
+    /// Sample period [s]; the shortest where segments differ.
     #[getter]
     fn period(&self) -> f64 {
         self.0.sample_period()
+    }
+
+    /// Sample period of each segment [s].
+    #[getter]
+    fn periods(&self) -> Vec<f64> {
+        self.0.sample_periods()
     }
 
     /// Names of the files that the rows come from.

@@ -8,7 +8,6 @@ mod surface;
 use std::ops::ControlFlow;
 
 use hyst_core::PiParams;
-use hyst_ident::BetweenSamples;
 use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
 use hyst_ident::fit::{Fit, FitOptions, fit_with};
 use hyst_ident::identify::{Determined, Estimate, TableEstimate, TradeOff};
@@ -17,6 +16,7 @@ use hyst_ident::model::{Base, Kind, Model};
 use hyst_ident::optimize::{Spread, Stopped};
 use hyst_ident::record::Record;
 use hyst_ident::simulate::{Zero, simulate};
+use hyst_ident::{BetweenSamples, range};
 use serde::Serialize;
 
 use crate::cli::{FitArgs, FitFrom};
@@ -221,13 +221,18 @@ fn identify(
 
 /// What the record looks like: a slip of a unit shows here.
 fn seen(record: &Record, model: &Model) -> String {
-    let (time, period) = (record.time(), record.sample_period());
-    let active = record.rows() as f64 * period;
+    let (time, periods) = (record.time(), record.sample_periods());
+    let active: f64 = record.segments().iter().zip(&periods).map(|(rows, period)| rows.len() as f64 * period).sum();
+    let rates = range(periods.iter().map(|period| 1.0 / period));
+    let rates = if rates.0 < rates.1 {
+        format!("{} to {}", text::short(rates.0), text::short(rates.1))
+    } else {
+        text::short(rates.0)
+    };
     let lab = time.last().copied().unwrap_or_default() - time.first().copied().unwrap_or_default();
     format!(
-        "record: {}, {} Hz, {} s of drive in {} s; input {} to {} {}, output {} to {} {}",
+        "record: {}, {rates} Hz, {} s of drive in {} s; input {} to {} {}, output {} to {} {}",
         text::count(record.segments().len(), "segment"),
-        text::short(1.0 / period),
         text::short(active),
         text::short(lab),
         text::short(model.input.low),

@@ -52,7 +52,8 @@ pub(super) fn run(args: &LoopArgs) -> CommandResult {
         Some(reference) => (reference.output().unwrap_or_default(), "reference"),
         None => (record.input(), record.input_column()),
     };
-    let found = corrected_loop(record.sample_period(), wanted, measured, args.frequency, args.phase.to_radians())?;
+    let period = record.need_one_sample_period("a hysteresis loop")?;
+    let found = corrected_loop(period, wanted, measured, args.frequency, args.phase.to_radians())?;
     if let Some(target) = &args.output {
         target.write(|out| csv(out, &found))?;
     }

@@ -1,5 +1,7 @@
 //! Drag on sliding plays, as [`hyst_core::ViscousPi`] has it: an overdrive `o = λ v + √(J v)` moves a play at the speed v.
 
+use crate::Samples;
+
 /// λ and J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct DragParams {
@@ -10,35 +12,48 @@ pub(crate) struct DragParams {
 }
 
 impl DragParams {
-    pub(crate) fn at(self, period: f64) -> Drag {
-        Drag { period, stiff: self.seconds + period, root: self.volt_seconds.sqrt(), none: self == Self::default() }
+    /// In each segment of a record.
+    pub(crate) fn over(self, samples: &Samples) -> Drag {
+        if self == Self::default() {
+            return Drag::NONE;
+        }
+        let at = |period: f64| Overdrive { period, stiff: self.seconds + period, root: self.volt_seconds.sqrt() };
+        match samples.periods.as_slice() {
+            [] => Drag(Some(at(samples.period)), Vec::new()),
+            periods => Drag(Some(at(samples.period)), periods.iter().map(|period| at(*period)).collect()),
+        }
     }
 }
 
+/// A drag at the sample period of each segment: that of any, or one for each; plays follow at once without.
+#[derive(Clone, Debug)]
+pub(crate) struct Drag(Option<Overdrive>, Vec<Overdrive>);
+
 /// A drag at a sample period.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drag {
+pub(crate) struct Overdrive {
     period: f64,
     /// λ + h
     stiff: f64,
     /// √J
     root: f64,
-    none: bool,
 }
 
 impl Drag {
     /// Plays that follow at once.
-    pub(crate) const NONE: Self = Self { period: 1.0, stiff: 1.0, root: 0.0, none: true };
+    pub(crate) const NONE: Self = Self(None, Vec::new());
 
-    /// Whether plays follow at once.
-    pub(crate) fn is_none(&self) -> bool {
-        self.none
+    /// In a segment, by its number; none where plays follow at once.
+    pub(crate) fn of(&self, segment: usize) -> Option<Overdrive> {
+        self.1.get(segment).copied().or(self.0)
     }
+}
 
+impl Overdrive {
     /// Where a play at `p` comes in a sample in which it would be at `to` without drag.
     pub(crate) fn towards(&self, p: f64, to: f64) -> f64 {
         let over = to - p;
-        if self.none || over == 0.0 {
+        if over == 0.0 {
             return to;
         }
         let o = over.abs();

@@ -1,14 +1,16 @@
 //! An operator that is kept as it is, as one column.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use hyst_core::{Error, Sampling};
+use hyst_core::Error;
 use nalgebra::DMatrix;
 
 use super::{Basis, Drag, turned};
 use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
 use crate::model::{Base, Model, Operator};
+use crate::samples::PerSegment;
 use crate::{BetweenSamples, Samples};
 
 /// Any operator with the parameters that it has: around it effects are looked for, in it nothing is refitted.
@@ -17,7 +19,7 @@ pub(crate) struct FixedBasis {
     pub(crate) base: Base,
     falls: bool,
     between: BetweenSamples,
-    operator: Box<Operator>,
+    operator: Arc<PerSegment<Operator>>,
     /// Segments and surroundings of the record that it is for.
     samples: Samples,
 }
@@ -30,13 +32,13 @@ impl FixedBasis {
     pub(crate) fn new(model: &Model, samples: &Samples) -> Result<Self, Error> {
         let (low, high) = samples.input_range();
         let between = model.between_samples;
-        let period = samples.period / between.steps() as f64;
-        let operator = Operator::new(&model.base, [low, high], &Sampling { period })?;
+        let drive = Drive::new(samples, between, Passes::Once);
+        let operator = drive.stages(|sampling| Operator::new(&model.base, [low, high], sampling))?;
         Ok(Self {
             base: model.base.clone(),
             falls: model.falls,
             between,
-            operator: Box::new(operator),
+            operator: Arc::new(operator),
             samples: samples.clone(),
         })
     }
@@ -47,7 +49,7 @@ impl Basis for FixedBasis {
         debug_assert_eq!(segments, self.samples.segments);
         let column = |_| {
             let mut column = vec![0.0; drive.len()];
-            Drive::of(&self.samples, drive, self.between, Passes::Once).run(&*self.operator, &mut column);
+            Drive::of(&self.samples, drive, self.between, Passes::Once).run(&self.operator, &mut column);
             column
         };
         turned(self.falls, of.map(column).collect())

@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn what_an_operator_gives_is_the_sum_of_its_columns() {
         let samples = samples();
-        let viscous = DragParams { seconds: 2e-3, volt_seconds: 1e-4 }.at(samples.period);
+        let viscous = DragParams { seconds: 2e-3, volt_seconds: 1e-4 }.over(&samples);
         let screening = ScreeningBasis::for_samples(&samples, true, None);
         agrees(&screening, &samples, &Drag::NONE);
         agrees(&screening, &samples, &viscous);

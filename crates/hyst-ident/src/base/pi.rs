@@ -175,38 +175,31 @@ pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], thresholds: &[f64]
 }
 
 fn beside<const N: usize>(
-    columns: [&mut Vec<f64>; N],
+    mut columns: [&mut Vec<f64>; N],
     drive: &[f64],
     segments: &[Range<usize>],
     r: [f64; N],
     drag: &Drag,
 ) {
-    if drag.is_none() {
-        follow(columns, drive, segments, r, |_, to| to);
-    } else {
-        follow(columns, drive, segments, r, |p, to| drag.towards(p, to));
+    for (i, segment) in segments.iter().enumerate() {
+        let out = columns.each_mut().map(|c| &mut c[segment.clone()]);
+        match drag.of(i) {
+            None => follow(out, &drive[segment.clone()], r, |_, to| to),
+            Some(drag) => follow(out, &drive[segment.clone()], r, |p, to| drag.towards(p, to)),
+        }
     }
 }
 
 /// `follows(p, to)` is where a play at p comes in a sample in which it would be at `to` without drag.
-fn follow<const N: usize>(
-    mut columns: [&mut Vec<f64>; N],
-    drive: &[f64],
-    segments: &[Range<usize>],
-    r: [f64; N],
-    follows: impl Fn(f64, f64) -> f64,
-) {
-    for segment in segments {
-        let mut out = columns.each_mut().map(|c| &mut c[segment.clone()]);
-        let mut p = [0.0; N];
-        for (k, u) in drive[segment.clone()].iter().enumerate() {
-            let mut to = p;
-            to.iter_mut().zip(&r).for_each(|(p, r)| *p = play(*p, *u, *r));
-            // The device has rested at its first input.
-            p = if k == 0 { to } else { std::array::from_fn(|j| follows(p[j], to[j])) };
-            for (out, p) in out.iter_mut().zip(p) {
-                out[k] = p;
-            }
+fn follow<const N: usize>(mut out: [&mut [f64]; N], drive: &[f64], r: [f64; N], follows: impl Fn(f64, f64) -> f64) {
+    let mut p = [0.0; N];
+    for (k, u) in drive.iter().enumerate() {
+        let mut to = p;
+        to.iter_mut().zip(&r).for_each(|(p, r)| *p = play(*p, *u, *r));
+        // The device has rested at its first input.
+        p = if k == 0 { to } else { std::array::from_fn(|j| follows(p[j], to[j])) };
+        for (out, p) in out.iter_mut().zip(p) {
+            out[k] = p;
         }
     }
 }

@@ -74,11 +74,11 @@ pub struct Rows<'a> {
 /// The rows of samples: rates from the sample period.
 pub fn rows_of(samples: &crate::Samples) -> Vec<Row> {
     let mut rows = Vec::with_capacity(samples.len());
-    for segment in &samples.segments {
+    for (i, segment) in samples.segments.iter().enumerate() {
         for k in segment.clone() {
             let input = samples.input[k];
             let before = if k == segment.start { input } else { samples.input[k - 1] };
-            let rate = (input - before) / samples.period;
+            let rate = (input - before) / samples.period_of(i);
             rows.push(Row { input, rate, temperature: samples.env(k).temperature });
         }
     }

@@ -205,7 +205,7 @@ impl<'a> Own<'a> {
     fn rechosen(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
         let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
-        let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
+        let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))
     }
 
@@ -377,7 +377,7 @@ impl<'a> Own<'a> {
     /// The record with what an amplifier makes of its drive that follows no steeper slope than this \[V/s\].
     pub(super) fn amplified(&self, v_per_s: f64) -> Record {
         let mut drive = self.train.input().to_vec();
-        limit_slope(&mut drive, self.train.segments(), v_per_s * self.samples.period);
+        limit_slope(&mut drive, &self.samples, v_per_s);
         self.train.driven_by(drive)
     }
 }

@@ -219,11 +219,13 @@ fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
 fn longest_hold(samples: &Samples) -> (f64, bool) {
     let (low, high) = samples.input_range();
     let still = |a: f64, b: f64| (a - b).abs() <= 1e-6 * (high - low);
-    let runs = samples.segments.iter().flat_map(|s| samples.input[s.clone()].chunk_by(|a, b| still(*a, *b)));
-    let rows = runs.map(<[f64]>::len).max().unwrap_or(0);
-    match rows > LEAST_HOLD {
-        true => (samples.period * (rows - 1) as f64, true),
-        false => (samples.longest_segment(), false),
+    let holds = samples.segments.iter().enumerate().flat_map(|(i, s)| {
+        let runs = samples.input[s.clone()].chunk_by(move |a, b| still(*a, *b)).map(<[f64]>::len);
+        runs.filter(|rows| *rows > LEAST_HOLD).map(move |rows| samples.period_of(i) * (rows - 1) as f64)
+    });
+    match holds.reduce(f64::max) {
+        Some(longest) => (longest, true),
+        None => (samples.longest_segment(), false),
     }
 }
 

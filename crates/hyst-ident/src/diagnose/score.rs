@@ -203,7 +203,7 @@ fn rings(mode: &ResonanceParams, longest: f64) -> bool {
 
 /// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
 fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
-    let resolution = 3.0 / (problem.samples.len() as f64 * problem.samples.period);
+    let resolution = 3.0 / problem.samples.duration();
     problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 

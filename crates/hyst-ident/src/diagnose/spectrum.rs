@@ -6,18 +6,19 @@ use realfft::RealFftPlanner;
 
 use crate::samples::Samples;
 
-/// Power spectrum summed over segments, each zero-padded to a common length; and the step \[Hz\].
+/// Power spectrum summed over segments, each zero-padded to a common duration; and the step \[Hz\]. A segment has none beyond half its sample rate.
 fn power(samples: &Samples, residual: &[f64]) -> (Vec<f64>, f64) {
-    let longest = samples.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(1);
-    let length = (2 * longest).next_power_of_two();
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
-    let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
-    let mut power = vec![0.0; output.len()];
-    for s in &samples.segments {
+    let seconds = samples.longest_segment().max(samples.period);
+    let length = ((2.0 * seconds / samples.period).round() as usize).next_power_of_two();
+    let step = 1.0 / (length as f64 * samples.period);
+    let mut planner = RealFftPlanner::<f64>::new();
+    let mut power = vec![0.0; length / 2 + 1];
+    for (i, s) in samples.segments.iter().enumerate() {
+        let fft = planner.plan_fft_forward(((1.0 / (step * samples.period_of(i))).round() as usize).max(s.len()));
+        let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
         let rows = &residual[s.clone()];
         let mean = rows.iter().sum::<f64>() / rows.len().max(1) as f64;
         let n = rows.len() as f64;
-        input.fill(0.0);
         for (k, (x, r)) in input.iter_mut().zip(rows).enumerate() {
             // Hann window: without it the slow part of the residual would spill over the band.
             let window = 0.5 - 0.5 * (2.0 * std::f64::consts::PI * (k as f64 + 0.5) / n).cos();
@@ -28,7 +29,7 @@ fn power(samples: &Samples, residual: &[f64]) -> (Vec<f64>, f64) {
             power.iter_mut().zip(&output).for_each(|(p, c)| *p += c.norm_sqr());
         }
     }
-    (power, 1.0 / (length as f64 * samples.period))
+    (power, step)
 }
 
 /// Height of each line over the median of its neighbourhood (a tenth of its frequency to each side).
@@ -98,11 +99,11 @@ pub(super) fn strongest(samples: &Samples, signal: &[f64]) -> Option<f64> {
 /// Σ residual² that a sine and cosine of this frequency take in these segments.
 pub(super) fn explained(samples: &Samples, segments: &[Range<usize>], residual: &[f64], hz: f64) -> f64 {
     let (mut ss, mut sc, mut cc, mut rs, mut rc) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for segment in segments {
+    for segment in segments.iter().filter(|segment| !segment.is_empty()) {
         // One sine and cosine per segment, then rotation: the grid inside a segment is even.
         let angle = |t: f64| 2.0 * std::f64::consts::PI * (hz * t).fract();
         let (mut s, mut c) = angle(samples.time[segment.start]).sin_cos();
-        let (ds, dc) = angle(samples.period).sin_cos();
+        let (ds, dc) = angle(samples.period_at(segment.start)).sin_cos();
         for r in &residual[segment.clone()] {
             ss += s * s;
             sc += s * c;
@@ -126,6 +127,7 @@ mod tests {
         let starts = [0.0, 5.3, 17.1];
         let mut samples = Samples {
             period: h,
+            periods: Vec::new(),
             time: Vec::new(),
             input: Vec::new(),
             output: Vec::new(),

@@ -146,7 +146,7 @@ const FAR_STOP: f64 = 3.0;
 /// Temperature at which the gain counts as 1: where the record began, to a tenth of a degree.
 pub(super) fn starting_temperature(samples: &Samples) -> f64 {
     let Some(t) = &samples.temperature else { return 0.0 };
-    let rows = ((1.0 / samples.period) as usize).clamp(1, t.len());
+    let rows = ((1.0 / samples.period_of(0)) as usize).clamp(1, t.len());
     let mean = t[..rows].iter().sum::<f64>() / rows as f64;
     (10.0 * mean).round() / 10.0
 }

@@ -95,6 +95,7 @@ impl From<DpmFit> for Fit {
 /// [`EverettError::OneRate`] if all segments have one rate; else as the fit of the classical part.
 pub fn fit_dpm(record: &Record, options: &FitOptions) -> Result<DpmFit, FitError> {
     let name = || record.name();
+    record.need_one_sample_period("a fit of a dynamic Preisach model")?;
     let mut samples = Samples::from_record(record);
     check(record, &samples, samples.falls)?;
     let rates: Vec<f64> = (0..samples.segments.len()).map(|s| rate(&samples, s)).collect();

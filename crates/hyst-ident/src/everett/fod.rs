@@ -57,6 +57,7 @@ pub struct FodReport {
 /// # Errors
 /// As [`Surface::measure`]; [`EverettError::NotMonotone`] with `as_measured` where the surface is not.
 pub fn fit_fod(record: &Record, options: &FodOptions) -> Result<FodFit, FitError> {
+    record.need_one_sample_period("a surface of first-order curves")?;
     let samples = Samples::from_record(record);
     check(record, &samples, samples.falls)?;
     let surface = Surface::measure(&record.name(), &samples, options.cells)?;

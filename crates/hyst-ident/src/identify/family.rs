@@ -1,6 +1,6 @@
 //! What a model has to say to be identified by search.
 
-use hyst_core::{Error, Stage};
+use hyst_core::{Error, Sampling, Stage};
 use nalgebra::DMatrix;
 
 use crate::drive::{Drive, Passes};
@@ -84,14 +84,25 @@ pub(crate) enum Beside {
     Convention,
 }
 
-/// Output of a stage over the rows, one segment after the other; the drive is linear between samples.
-pub(crate) fn run<S: Stage<f64>>(samples: &Samples, stage: &S, out: &mut [f64]) {
-    Drive::new(samples, BetweenSamples::Linear, Passes::Once).run(stage, out);
+/// Output of the stage that `build` makes for a sample period over the rows, one segment after the other; the drive is linear between samples.
+pub(crate) fn run<S: Stage<f64>>(
+    samples: &Samples,
+    build: impl Fn(&Sampling) -> Result<S, Error>,
+    out: &mut [f64],
+) -> Result<(), Error> {
+    let drive = Drive::new(samples, BetweenSamples::Linear, Passes::Once);
+    drive.run(&drive.stages(build)?, out);
+    Ok(())
 }
 
 /// [`run`] into a column.
-pub(crate) fn run_into<S: Stage<f64>>(samples: &Samples, stage: &S, columns: &mut DMatrix<f64>, column: usize) {
-    run(samples, stage, rows_of(columns, column));
+pub(crate) fn run_into<S: Stage<f64>>(
+    samples: &Samples,
+    build: impl Fn(&Sampling) -> Result<S, Error>,
+    columns: &mut DMatrix<f64>,
+    column: usize,
+) -> Result<(), Error> {
+    run(samples, build, rows_of(columns, column))
 }
 
 /// A column's rows.

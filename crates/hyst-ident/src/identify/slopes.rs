@@ -4,7 +4,7 @@
 //! product of several, or one of many that all follow from the same. So slopes are taken along the unknowns, and errors
 //! are carried over to the file by the slopes of that function (the delta method).
 
-use hyst_core::{Params, Sampling};
+use hyst_core::Params;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -275,7 +275,7 @@ impl Optimum<'_> {
     fn simulated(&self, base: &Base) -> Option<Vec<f64>> {
         let (low, high) = self.samples.input_range();
         let drive = Drive::new(self.samples, self.family.between_samples(), Passes::Once);
-        let operator = Operator::new(base, [low, high], &Sampling { period: drive.period() }).ok()?;
+        let operator = drive.stages(|sampling| Operator::new(base, [low, high], sampling)).ok()?;
         let mut y = vec![0.0; self.samples.len()];
         drive.run(&operator, &mut y);
         Some(self.projection.rows.iter().map(|k| y[*k]).collect())

@@ -28,6 +28,7 @@ fn record(
 ) -> (Samples, f64) {
     let mut samples = Samples {
         period,
+        periods: Vec::new(),
         time: Vec::new(),
         input: Vec::new(),
         output: Vec::new(),
@@ -51,9 +52,8 @@ fn record(
         samples.file_of_segment.push(0);
     }
     let (low, high) = samples.input_range();
-    let operator = Operator::new(base, [low, high], &Sampling { period }).unwrap();
     let mut y = vec![0.0; samples.len()];
-    family::run(&samples, &operator, &mut y);
+    family::run(&samples, |sampling| Operator::new(base, [low, high], sampling), &mut y).unwrap();
     let (least, most) = crate::samples::range(y.iter().copied());
     let sigma = 1e-3 * (most - least);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -202,9 +202,8 @@ fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
     assert_eq!(sign("epsilon"), sign("tau"));
     // Temperatures that it has not seen.
     let (other, _) = record(&Base::TdPi(truth), 4e-3, 2500, &[29.0, 35.0], drive, 11);
-    let operator = Operator::new(&found.base, [-200.0, 200.0], &Sampling { period: 4e-3 }).unwrap();
     let mut y = vec![0.0; other.len()];
-    family::run(&other, &operator, &mut y);
+    family::run(&other, |sampling| Operator::new(&found.base, [-200.0, 200.0], sampling), &mut y).unwrap();
     let zero = found.zeros[0];
     let squares: f64 = y.iter().zip(&other.output).map(|(a, b)| (a + zero - b).powi(2)).sum();
     assert!((squares / y.len() as f64).sqrt() < 1.05 * sigma);

@@ -38,6 +38,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
     let reach = taps.len() / 2;
     let mut kept = Samples {
         period: samples.period * factor as f64,
+        periods: samples.periods.iter().map(|period| period * factor as f64).collect(),
         time: Vec::new(),
         input: Vec::new(),
         output: Vec::new(),

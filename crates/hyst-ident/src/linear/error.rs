@@ -1,5 +1,7 @@
 //! Why a linear model or response cannot be had.
 
+use crate::Samples;
+
 /// Why a linear model or response cannot be had.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -25,6 +27,16 @@ pub enum LinearError {
         found: usize,
         /// What to do.
         remedy: &'static str,
+    },
+    /// Segments differ in their sample periods.
+    #[error(
+        "segments have sample periods of {first:.9} s and {other:.9} s, and one is needed; take those of one of them"
+    )]
+    MixedPeriods {
+        /// That of the first segment \[s\].
+        first: f64,
+        /// Another \[s\].
+        other: f64,
     },
     /// A column does not move.
     #[error("the {column} is constant; record while the actuator is driven")]
@@ -54,6 +66,15 @@ pub enum LinearError {
         /// What was found.
         reason: String,
     },
+}
+
+/// The segments of a linear model or response share one sample period.
+pub(super) fn require_one_period(samples: &Samples) -> Result<(), LinearError> {
+    let first = samples.period_of(0);
+    match samples.periods.iter().find(|period| **period != first) {
+        Some(other) => Err(LinearError::MixedPeriods { first, other: *other }),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn require(

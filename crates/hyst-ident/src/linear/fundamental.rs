@@ -8,7 +8,7 @@ use realfft::RealFftPlanner;
 use serde::Serialize;
 
 use super::LinearError;
-use super::error::require;
+use super::error::{require, require_one_period};
 use crate::Samples;
 
 /// The fundamental of a run of equal cycles.
@@ -52,6 +52,7 @@ const ROWS: f64 = 12.0;
 /// # Errors
 /// When no segment has three cycles of at least twelve rows.
 pub fn gain_map(samples: &Samples, hz: Option<f64>) -> Result<Vec<GainPoint>, LinearError> {
+    require_one_period(samples)?;
     if let Some(hz) = hz {
         require("hz", hz, hz.is_finite() && hz > 0.0, "a positive number")?;
     }

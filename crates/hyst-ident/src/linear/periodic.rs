@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 use realfft::RealFftPlanner;
 
-use super::error::require;
+use super::error::{require, require_one_period};
 use super::{FrequencyResponse, LinearError, Method, ResponseLine};
 use crate::Samples;
 
@@ -22,6 +22,7 @@ const EXCITED: f64 = 0.01;
 /// When the period is no whole number of rows, or fewer than two periods repeat.
 pub fn periodic_response(samples: &Samples, period_s: f64) -> Result<FrequencyResponse, LinearError> {
     require("period_s", period_s, period_s.is_finite() && period_s > 0.0, "a positive number of seconds")?;
+    require_one_period(samples)?;
     let rows = period_s / samples.period;
     let length = rows.round() as usize;
     let reason = |reason: String| LinearError::NotPeriodic { seconds: period_s, reason };

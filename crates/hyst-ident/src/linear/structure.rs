@@ -5,6 +5,7 @@ use super::{
     choose_order, decimate, fit_armax, periodic_response, response,
 };
 use crate::Samples;
+use crate::linear::error::require_one_period;
 
 /// How [`identify_structure`] works.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,6 +50,7 @@ pub struct Structure {
 /// # Errors
 /// As [`response`], [`periodic_response`], [`choose_order`] and [`fit_armax`].
 pub fn identify_structure(samples: &Samples, options: &StructureOptions) -> Result<Structure, LinearError> {
+    require_one_period(samples)?;
     let nyquist = 0.5 / samples.period;
     let welch = response(samples, &WelchOptions { window_s: options.window_s })?;
     let band_hz = options.band_hz.or_else(|| band_of(&welch)).unwrap_or(nyquist).min(nyquist);

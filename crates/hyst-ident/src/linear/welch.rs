@@ -7,7 +7,7 @@ use realfft::RealFftPlanner;
 use serde::Serialize;
 
 use super::LinearError;
-use super::error::require;
+use super::error::{require, require_one_period};
 use crate::Samples;
 
 /// The response at one frequency.
@@ -94,6 +94,7 @@ const WINDOWS: usize = 24;
 /// # Errors
 /// When a column is constant or fewer than two windows fit.
 pub fn response(samples: &Samples, options: &WelchOptions) -> Result<FrequencyResponse, LinearError> {
+    require_one_period(samples)?;
     let longest = samples.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
     let length = match options.window_s {
         Some(seconds) => {

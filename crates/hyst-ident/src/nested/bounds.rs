@@ -1,5 +1,7 @@
 //! Steps and bounds of the nonlinear parameters on a record.
 
+use std::ops::Range;
+
 use super::{Cause, Hypothesis, Unknown};
 use crate::Samples;
 use crate::lsq::Bounds;
@@ -88,8 +90,11 @@ pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
 /// Slopes \[V/s\] of an amplifier that follows next to nothing of the drive, and of one that follows all of it. A single jump may be far
 /// steeper than all else.
 pub(crate) fn slopes(samples: &Samples) -> (f64, f64) {
-    let rises = samples.segments.iter().flat_map(|s| samples.input[s.clone()].windows(2));
-    let steepest = rises.fold(0.0, |most: f64, w| most.max((w[1] - w[0]).abs())) / samples.period;
+    let steepest_of = |(i, rows): (usize, &Range<usize>)| {
+        let rises = samples.input[rows.clone()].windows(2);
+        rises.fold(0.0, |most: f64, w| most.max((w[1] - w[0]).abs())) / samples.period_of(i)
+    };
+    let steepest = samples.segments.iter().enumerate().map(steepest_of).fold(0.0, f64::max);
     (f64::min(range_of(samples) / samples.longest_segment(), steepest), steepest)
 }
 

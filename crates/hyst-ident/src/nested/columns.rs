@@ -98,7 +98,7 @@ impl Problem<'_> {
 
     /// The same, none of them kept.
     fn made<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
-        let drag = h.drag.map_or(Drag::NONE, |p| p.at(self.samples.period));
+        let drag = h.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         BaseColumns::Made { problem: self, drive: path.input_side(), pasts: path.pasts(), drag }
     }
 

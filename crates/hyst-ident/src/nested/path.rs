@@ -1,7 +1,6 @@
 //! The stages around the hysteresis, over whole columns.
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use hyst_core::{
     Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
@@ -13,19 +12,20 @@ use crate::Samples;
 use crate::base::BESIDE;
 use crate::model::InputSide;
 use crate::model::capacity::{CREEP, DELAY};
+use crate::samples::PerSegment;
 
 /// What leads to the hysteresis and what follows it, for one set of causes.
 pub(crate) struct SignalPath<'a> {
     samples: &'a Samples,
-    /// What the amplifier's output changes by in a sample at most \[V\].
-    most: Option<f64>,
-    delay: Option<Delay<f64, DELAY>>,
-    lag: Option<Lag<f64>>,
-    rate: Option<Rate<f64>>,
+    /// Slope that the amplifier follows at most \[V/s\].
+    slew_limit: Option<f64>,
+    delay: Option<PerSegment<Delay<f64, DELAY>>>,
+    lag: Option<PerSegment<Lag<f64>>>,
+    rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
     warmth: Option<Warmth>,
-    creep: Option<Creep<f64, CREEP>>,
-    resonances: Vec<Resonance<f64>>,
+    creep: Option<PerSegment<Creep<f64, CREEP>>>,
+    resonances: Vec<PerSegment<Resonance<f64>>>,
     stop: Option<Stop>,
 }
 
@@ -39,7 +39,6 @@ struct Stop {
 
 impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
-        let cx = Sampling { period: samples.period };
         let effects = &h.effects;
         let InputSide { delay, lag, rate, curve } = effects.input_side();
         let warmth = effects.temperature.as_ref().map(|p| warmth(samples, p)).transpose()?;
@@ -49,14 +48,14 @@ impl<'a> SignalPath<'a> {
         });
         Ok(Self {
             samples,
-            most: h.slew_limit.map(|v_per_s| v_per_s * samples.period),
-            delay: delay.map(|p| p.build(&cx)).transpose()?,
-            lag: lag.map(|p| p.build(&cx)).transpose()?,
-            rate: rate.map(|p| p.build(&cx)).transpose()?,
+            slew_limit: h.slew_limit,
+            delay: delay.map(|p| for_each(samples, &p)).transpose()?,
+            lag: lag.map(|p| for_each(samples, &p)).transpose()?,
+            rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
             warmth: warmth.flatten(),
-            creep: effects.creep.as_ref().map(|p| p.build(&cx)).transpose()?,
-            resonances: effects.resonances.iter().map(|p| p.build(&cx)).collect::<Result<_, _>>()?,
+            creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
+            resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
             stop: stop.transpose()?,
         })
     }
@@ -64,8 +63,8 @@ impl<'a> SignalPath<'a> {
     /// What the hysteresis is driven with.
     pub(crate) fn input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
-        if let Some(most) = self.most {
-            limit_slope(&mut drive, &self.samples.segments, most);
+        if let Some(v_per_s) = self.slew_limit {
+            limit_slope(&mut drive, self.samples, v_per_s);
         }
         if let Some(delay) = &self.delay {
             self.filter(delay, &mut [&mut drive]);
@@ -77,7 +76,7 @@ impl<'a> SignalPath<'a> {
             self.filter(rate, &mut [&mut drive]);
         }
         if let Some(curve) = &self.curve {
-            self.filter(curve, &mut [&mut drive]);
+            drive.iter_mut().for_each(|u| *u = curve.step(&mut (), &Env::default(), *u));
         }
         drive
     }
@@ -149,8 +148,9 @@ impl<'a> SignalPath<'a> {
         self.stop.as_ref().map_or(output, |s| s.inverse.step(&mut (), &Env::default(), output))
     }
 
-    fn creep<const N: usize>(&self, creep: &Creep<f64, CREEP>, columns: &mut [&mut [f64]; N]) {
-        for segment in self.samples.segments.iter().filter(|s| !s.is_empty()) {
+    fn creep<const N: usize>(&self, creep: &PerSegment<Creep<f64, CREEP>>, columns: &mut [&mut [f64]; N]) {
+        for (i, segment) in self.samples.segments.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
+            let creep = creep.of(i);
             let mut columns = columns.each_mut().map(|c| &mut c[segment.clone()]);
             let (mut state, first) = creep.reset_side_by_side(columns.each_ref().map(|c| c[0]));
             columns.iter_mut().zip(first).for_each(|(column, y)| column[0] = y);
@@ -161,10 +161,11 @@ impl<'a> SignalPath<'a> {
         }
     }
 
-    fn filter<G: Stage<f64>, const N: usize>(&self, stage: &G, columns: &mut [&mut [f64]; N]) {
+    fn filter<G: Stage<f64>, const N: usize>(&self, stages: &PerSegment<G>, columns: &mut [&mut [f64]; N]) {
         let env = Env::default();
-        let mut states: [G::State; N] = std::array::from_fn(|_| stage.state());
-        for segment in &self.samples.segments {
+        let mut states: [G::State; N] = std::array::from_fn(|_| stages.of(0).state());
+        for (i, segment) in self.samples.segments.iter().enumerate() {
+            let stage = stages.of(i);
             let mut columns = columns.each_mut().map(|c| &mut c[segment.clone()]);
             for (state, column) in states.iter_mut().zip(&mut columns) {
                 if let Some(first) = column.first_mut() {
@@ -193,22 +194,26 @@ pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<
     if samples.temperature.is_none() {
         return Ok(None);
     }
-    let stage: Temperature<f64> =
-        TemperatureParams { expansion: 1.0, ..*p }.build(&Sampling { period: samples.period })?;
-    let mut state = stage.state();
-    let rows = samples.segments.iter().flat_map(|s| s.clone().map(move |k| (k == s.start, k)));
-    let warmth = rows.map(|(first, k)| match first {
-        true => stage.reset_felt(&mut state, &samples.env(k)),
-        false => stage.step_felt(&mut state, &samples.env(k)),
+    let stages: PerSegment<Temperature<f64>> = for_each(samples, &TemperatureParams { expansion: 1.0, ..*p })?;
+    let mut state = stages.of(0).state();
+    let rows = samples.segments.iter().enumerate().flat_map(|(i, s)| s.clone().map(move |k| (i, k == s.start, k)));
+    let warmth = rows.map(|(i, first, k)| match first {
+        true => stages.of(i).reset_felt(&mut state, &samples.env(k)),
+        false => stages.of(i).step_felt(&mut state, &samples.env(k)),
     });
     let (factor, kelvin) = warmth.unzip();
     Ok(Some(Warmth { factor, kelvin }))
 }
 
-/// Makes of a drive what an amplifier puts out that changes by `most` a sample at most \[V\] and has rested at the first voltage of each
-/// segment.
-pub(crate) fn limit_slope(drive: &mut [f64], segments: &[Range<usize>], most: f64) {
-    for rows in segments {
+/// A stage of these parameters for each segment.
+fn for_each<S, P: Build<S, Context = Sampling>>(samples: &Samples, params: &P) -> Result<PerSegment<S>, Error> {
+    PerSegment::new(samples, |period| params.build(&Sampling { period }))
+}
+
+/// Makes of a drive what an amplifier puts out that changes by `v_per_s` at most \[V/s\] and has rested at the first voltage of each segment.
+pub(crate) fn limit_slope(drive: &mut [f64], samples: &Samples, v_per_s: f64) {
+    for (i, rows) in samples.segments.iter().enumerate() {
+        let most = v_per_s * samples.period_of(i);
         let drive = &mut drive[rows.clone()];
         let Some(mut now) = drive.first().copied() else { continue };
         for u in drive {

@@ -276,25 +276,23 @@ pub enum RecordError {
         /// The time found \[s\].
         found: String,
     },
-    /// Two segments are sampled at different rates.
+    /// Two segments are sampled at different rates, where one rate is needed.
     #[error(
-        "{file}, {place}, column \"{column}\": segment {label} has a sample period of {period:.9} s, but segment {other_label} one of {other_period:.9} s; resample one of them, or keep them in separate records"
+        "{file}: {why} needs one sample period, but segment {label} has {period:.9} s and segment {other_label} {other_period:.9} s; use the segments of one of them, in a file of their own"
     )]
     MixedPeriods {
-        /// The file.
+        /// The files.
         file: String,
-        /// The second of the two segments' first row.
-        place: Place,
-        /// The column's name in the file.
-        column: String,
-        /// The second of the two segments.
+        /// A segment.
         label: i64,
         /// Its sample period \[s\].
         period: f64,
-        /// The first of the two segments.
+        /// The first segment.
         other_label: i64,
         /// Its sample period \[s\].
         other_period: f64,
+        /// Who needs one.
+        why: String,
     },
     /// No segment has two rows, so that there is no sample period.
     #[error(

@@ -59,7 +59,7 @@ impl Printed {
     }
 }
 
-/// The sample period of a record.
+/// The sample period of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Period {
     /// The period \[s\].
@@ -73,8 +73,6 @@ pub(crate) struct Period {
 pub(crate) enum Fault {
     /// A row off its segment's grid.
     Uneven { row: usize, expected: f64 },
-    /// Two segments (by number) with their own periods.
-    Mixed { first: usize, second: usize, periods: (f64, f64) },
     /// No segment has two rows.
     TooShort,
 }
@@ -107,45 +105,99 @@ impl Fits {
     }
 }
 
-/// Finds the period of increasing times \[s\], or the first place where they are not even.
-pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Period, Fault> {
+/// Finds the period of each segment of increasing times \[s\], or the first place where they are not even. Segments whose times allow it share one
+/// period: the longer a segment is, the better it knows it.
+pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Vec<Period>, Fault> {
+    if let Some(period) = shared(time, segments, printed)? {
+        return Ok(vec![period; segments.len()]);
+    }
+    // The first group has the longest segment, and any that is too short to have a period of its own.
+    let mut by_length: Vec<usize> = (0..segments.len()).collect();
+    by_length.sort_by_key(|s| std::cmp::Reverse(segments[*s].len()));
+    let mut groups: Vec<(Fits, Vec<usize>)> = Vec::new();
+    for segment in by_length {
+        let t = &time[segments[segment].clone()];
+        let own = Tolerance::of(t, printed).fits(t);
+        match groups.iter_mut().find(|(fits, _)| !fits.and(own).is_empty()) {
+            Some((fits, group)) => {
+                *fits = fits.and(own);
+                group.push(segment);
+            }
+            None => groups.push((own, vec![segment])),
+        }
+    }
+    let mut periods = vec![None; segments.len()];
+    for (_, mut group) in groups {
+        group.sort_unstable();
+        let rows: Vec<Range<usize>> = group.iter().map(|s| segments[*s].clone()).collect();
+        let period = shared(time, &rows, printed)?;
+        for (segment, rows) in group.into_iter().zip(rows) {
+            periods[segment] = if period.is_some() { period } else { shared(time, &[rows], printed)? };
+        }
+    }
+    periods.into_iter().map(|period| period.ok_or(Fault::TooShort)).collect()
+}
+
+/// How far a row may be off its grid.
+struct Tolerance {
+    printed: Printed,
+    /// Beyond the printed digits \[s\].
+    slack: f64,
+}
+
+impl Tolerance {
+    /// Times summed up step by step drift off the grid by more than a rounding: a millionth of a period is no matter.
+    fn of(t: &[f64], printed: Printed) -> Self {
+        let guess = if t.len() < 2 { 0.0 } else { mean_step(t) };
+        Self { printed, slack: rounding(t) + 1e-6 * guess }
+    }
+
+    /// The periods that fit a segment's times.
+    fn fits(&self, t: &[f64]) -> Fits {
+        let mut own = Fits::ALL;
+        for (k, tk) in t.iter().enumerate().skip(1) {
+            let r = self.printed.resolution(*tk).max(self.printed.resolution(t[0]));
+            own.narrow(tk - t[0], r + self.slack, k as f64);
+        }
+        own
+    }
+}
+
+fn rounding(time: &[f64]) -> f64 {
+    4.0 * f64::EPSILON * time.iter().fold(0.0_f64, |m, t| m.max(t.abs()))
+}
+
+/// The period that segments share, none if they have none in common.
+fn shared(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Option<Period>, Fault> {
     let Some(longest) = segments.iter().filter(|rows| rows.len() >= 2).max_by_key(|rows| rows.len()) else {
         return Err(Fault::TooShort);
     };
     let guess = mean_step(&time[longest.clone()]);
-    let largest = time.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
-    let rounding = 4.0 * f64::EPSILON * largest;
-    // Times summed up step by step drift off the grid by more than a rounding: a millionth of a period is no matter.
-    let slack = rounding + 1e-6 * guess;
+    let rounding = rounding(time);
+    let loose = Tolerance { printed, slack: rounding + 1e-6 * guess };
+    let exact = Tolerance { printed, slack: rounding };
+    let (mut strict, mut all) = (Fits::ALL, Fits::ALL);
+    for rows in segments {
+        all = all.and(loose.fits(&time[rows.clone()]));
+        strict = strict.and(exact.fits(&time[rows.clone()]));
+    }
+    // Segments that have each a period but none in common differ in it, unless the rows of one are uneven by themselves.
+    let odd = |rows: &&Range<usize>| loose.fits(&time[rows.start..rows.end]).is_empty();
+    if all.is_empty() && !segments.iter().any(|rows| odd(&rows)) {
+        return Ok(None);
+    }
     if let Some(fault) = gap(time, segments, printed, guess) {
         return Err(fault);
     }
-
-    let mut strict = Fits::ALL;
-    let mut loose = Vec::with_capacity(segments.len());
-    for rows in segments {
-        let t = &time[rows.clone()];
-        let mut own = Fits::ALL;
-        for (k, tk) in t.iter().enumerate().skip(1) {
-            let r = printed.resolution(*tk).max(printed.resolution(t[0]));
-            own.narrow(tk - t[0], r + slack, k as f64);
-            strict.narrow(tk - t[0], r + rounding, k as f64);
-        }
-        if own.is_empty() {
-            return Err(uneven(t, printed, slack, rows.start));
-        }
-        loose.push(own);
-    }
-    let all = loose.iter().fold(Fits::ALL, |all, own| all.and(*own));
-    if all.is_empty() {
-        return Err(mixed(time, segments, &loose));
+    if let Some(rows) = segments.iter().find(odd) {
+        return Err(uneven(&time[rows.clone()], printed, loose.slack, rows.start));
     }
     let grid = Grid { time, segments, printed, rounding, strict };
     let value = grid.simplest(guess).clamp(all.low, all.high);
     if !(value > 0.0 && value.is_finite()) {
         return Err(Fault::TooShort);
     }
-    Ok(Period { value, fits: (all.low, all.high) })
+    Ok(Some(Period { value, fits: (all.low, all.high) }))
 }
 
 fn mean_step(t: &[f64]) -> f64 {
@@ -237,16 +289,6 @@ fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
     Fault::Uneven { row: first_row + k, expected: t[0] + k as f64 * h }
 }
 
-/// Names two segments whose periods exclude each other.
-fn mixed(time: &[f64], segments: &[Range<usize>], fits: &[Fits]) -> Fault {
-    let by = |key: fn(&Fits) -> f64| move |a: &usize, b: &usize| key(&fits[*a]).total_cmp(&key(&fits[*b]));
-    let slow = (0..fits.len()).max_by(by(|f| f.low)).unwrap_or(0);
-    let fast = (0..fits.len()).min_by(by(|f| f.high)).unwrap_or(0);
-    let (first, second) = (slow.min(fast), slow.max(fast));
-    let step = |s: usize| mean_step(&time[segments[s].clone()]);
-    Fault::Mixed { first, second, periods: (step(first), step(second)) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,7 +305,7 @@ mod tests {
 
     fn period_of(texts: &[String]) -> Result<Period, Fault> {
         let (time, figures) = printed(texts);
-        fit(&time, &one(time.len()), figures)
+        fit(&time, &one(time.len()), figures).map(|periods| periods[0])
     }
 
     fn fixed(rate: f64, rows: usize, decimals: usize) -> Vec<String> {
@@ -375,12 +417,16 @@ mod tests {
     }
 
     #[test]
-    fn segments_of_two_rates_are_told_apart() {
+    fn segments_of_two_rates_have_each_their_own() {
         let (mut time, figures) = printed(&fixed(1000.0, 100, 6));
-        time.extend((0..100).map(|k| 1.0 + k as f64 * 2e-3));
-        let fault = fit(&time, &[0..100, 100..200], figures).unwrap_err();
-        let Fault::Mixed { first: 0, second: 1, periods } = fault else { panic!("{fault:?}") };
-        assert!((periods.0 - 1e-3).abs() < 1e-12 && (periods.1 - 2e-3).abs() < 1e-12);
+        time.extend((0..100).map(|k| 1.0 + f64::from(k) * 2e-3));
+        time.extend((0..50).map(|k| 2.0 + f64::from(k) * 1e-3));
+        time.push(3.0);
+        let periods = fit(&time, &[0..100, 100..200, 200..250, 250..251], figures).unwrap();
+        assert_eq!(periods.iter().map(|p| p.value).collect::<Vec<_>>(), [1e-3, 2e-3, 1e-3, 1e-3]);
+        time[150] += 5e-4;
+        let fault = fit(&time, &[0..100, 100..200, 200..250, 250..251], figures);
+        assert!(matches!(fault, Err(Fault::Uneven { row: 150, .. })), "{fault:?}");
     }
 
     #[test]

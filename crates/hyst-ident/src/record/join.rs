@@ -1,5 +1,6 @@
 //! Joining the records of several files into one.
 
+use super::grid::Period;
 use super::{OutputUnit, Record, RecordError};
 
 impl Record {
@@ -8,7 +9,7 @@ impl Record {
     ///
     /// # Errors
     /// When there is no record, or two of them differ in the input's or output's column, in whether temperature or
-    /// load was measured, or in the sample period.
+    /// load was measured. Each keeps its sample period.
     pub fn join(records: Vec<Self>) -> Result<Self, RecordError> {
         let mut records = records.into_iter();
         let Some(mut all) = records.next() else {
@@ -42,26 +43,17 @@ impl Record {
                 return unlike(what, found, expected);
             }
         }
-        let (a, b) = (self.period.fits, next.period.fits);
-        if a.0.max(b.0) > a.1.min(b.1) {
-            let period = |r: &Self| format!("{:.9} s", r.period.value);
-            return unlike("the sample period (column \"time_s\")", period(next), period(self));
-        }
         Ok(())
     }
 
-    fn append(&mut self, next: Self) {
-        // The longer record knows the period better.
-        let (long, short) =
-            if next.rows() > self.rows() { (next.period, self.period) } else { (self.period, next.period) };
-        self.period.fits = (long.fits.0.max(short.fits.0), long.fits.1.min(short.fits.1));
-        self.period.value = long.value;
-
+    fn append(&mut self, mut next: Self) {
+        self.share_periods(&mut next);
         let (rows, files) = (self.rows(), self.sources.len());
         self.sources.extend(next.sources);
         self.labelled |= next.labelled;
         self.lost = self.lost.and(next.lost);
         self.labels.extend(next.labels);
+        self.periods.extend(next.periods);
         self.segments.extend(next.segments.into_iter().map(|s| s.start + rows..s.end + rows));
         self.file_of_segment.extend(next.file_of_segment.into_iter().map(|file| file + files));
         self.time.extend(next.time);
@@ -77,5 +69,20 @@ impl Record {
             all.extend(more);
         }
         self.text = None;
+    }
+
+    /// Gives periods of two records that may be the same to the printed digits one value: that of the longer record, which knows it better.
+    fn share_periods(&mut self, next: &mut Self) {
+        let next_is_longer = next.rows() > self.rows();
+        for mine in 0..self.periods.len() {
+            let known = self.periods[mine];
+            let of = |other: &Period| known.fits.0.max(other.fits.0) <= known.fits.1.min(other.fits.1);
+            let Some(other) = next.periods.iter().copied().find(of) else { continue };
+            let value = if next_is_longer { other.value } else { known.value };
+            let fits = (known.fits.0.max(other.fits.0), known.fits.1.min(other.fits.1));
+            for period in self.periods.iter_mut().chain(&mut next.periods).filter(|p| **p == known || **p == other) {
+                *period = Period { value, fits };
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@
 //! the device rests and its state resets between segments), `time_s|time_ms|time_us`, the input `voltage_v` (or
 //! another, as `force_in_n`), one output of `displacement_um|_nm|_mm` and `force_n`, and optionally
 //! `temperature_degc` and `load_n`. Further columns are carried through. Time goes on across segments; within a
-//! segment it is even to the last printed digit, and all segments share one sample period.
+//! segment it is even to the last printed digit; segments may differ in their sample period.
 //!
 //! Reading checks all of that, so that a [`Record`] in hand is sound: finite values, increasing time, at least one
 //! row, columns of one length.
@@ -71,7 +71,8 @@ pub struct Record {
     labels: Vec<i64>,
     segments: Vec<Range<usize>>,
     file_of_segment: Vec<usize>,
-    period: grid::Period,
+    /// Of each segment.
+    periods: Vec<grid::Period>,
     time: Vec<f64>,
     input_column: String,
     input: Option<Vec<f64>>,
@@ -169,7 +170,7 @@ impl Record {
                 found: seconds(time[row]),
             });
         }
-        let period = grid::fit(&time, &segments, printed).map_err(|fault| match fault {
+        let periods = grid::fit(&time, &segments, printed).map_err(|fault| match fault {
             Fault::Uneven { row, expected } => RecordError::UnevenTime {
                 file: file(),
                 place: place(row),
@@ -177,18 +178,9 @@ impl Record {
                 expected: seconds(expected),
                 found: seconds(time[row]),
             },
-            Fault::Mixed { first, second, periods } => RecordError::MixedPeriods {
-                file: file(),
-                place: place(segments[second].start),
-                column: column(),
-                label: labels[second],
-                period: periods.1,
-                other_label: labels[first],
-                other_period: periods.0,
-            },
             Fault::TooShort => RecordError::TooShort { file: file(), place: place(time.len() - 1), column: column() },
         })?;
-        for rows in &segments {
+        for (rows, period) in segments.iter().zip(&periods) {
             let start = time[rows.start];
             for (k, t) in time[rows.clone()].iter_mut().enumerate() {
                 *t = start + k as f64 * period.value;
@@ -203,7 +195,7 @@ impl Record {
             file_of_segment: vec![0; segments.len()],
             labels,
             segments,
-            period,
+            periods,
             time,
             input_column,
             input,
@@ -270,9 +262,33 @@ impl Record {
         files
     }
 
-    /// The time between two rows of a segment \[s\], as exactly as the printed digits tell.
+    /// The shortest time between two rows of any segment \[s\], as exactly as the printed digits tell.
     pub fn sample_period(&self) -> f64 {
-        self.period.value
+        self.periods.iter().map(|period| period.value).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The time between two rows of each segment \[s\].
+    pub fn sample_periods(&self) -> Vec<f64> {
+        self.periods.iter().map(|period| period.value).collect()
+    }
+
+    /// The sample period \[s\] for somebody who needs the same in all segments; `why` completes "needs one sample period".
+    ///
+    /// # Errors
+    /// When two segments differ in it.
+    pub fn need_one_sample_period(&self, why: &str) -> Result<f64, RecordError> {
+        let first = self.periods[0].value;
+        match self.periods.iter().position(|period| period.value != first) {
+            None => Ok(first),
+            Some(other) => Err(RecordError::MixedPeriods {
+                file: self.name(),
+                label: self.labels[other],
+                period: self.periods[other].value,
+                other_label: self.labels[0],
+                other_period: first,
+                why: why.to_owned(),
+            }),
+        }
     }
 
     /// Time of the lab's clock \[s\]. In each segment the first value is as printed and the others lie on the even grid

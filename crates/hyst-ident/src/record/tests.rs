@@ -270,16 +270,6 @@ fn uneven_time_is_refused_with_the_expected_and_the_found_time() {
 }
 
 #[test]
-fn segments_of_different_rates_are_refused() {
-    refused(
-        "segment,time_s,voltage_v\n0,0.00,0\n0,0.10,0\n0,0.20,0\n3,1.00,0\n3,1.20,0\n3,1.40,0\n",
-        Need::Input,
-        &["line 5", "\"time_s\"", "segment 3", "0.200000000 s", "segment 0", "0.100000000 s"],
-    );
-    refused("time_s,voltage_v\n0,0\n", Need::Input, &["line 2", "\"time_s\"", "two rows"]);
-}
-
-#[test]
 fn a_missing_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("absent.csv");
@@ -310,7 +300,6 @@ fn unlike_records_are_not_joined() {
         ("time_s,force_in_n,displacement_um\n0.0,0,0\n0.1,0,0\n", "the input column is \"force_in_n\""),
         ("time_s,voltage_v,displacement_nm\n0.0,0,0\n0.1,0,0\n", "the output column is \"displacement_nm\""),
         ("time_s,voltage_v,displacement_um,load_n\n0.0,0,0,0\n0.1,0,0,0\n", "\"load_n\" is measured"),
-        ("time_s,voltage_v,displacement_um\n0.0,0,0\n0.5,0,0\n", "the sample period (column \"time_s\") is 0.5"),
     ] {
         let records = [("one.csv", base), ("two.csv", other)].map(|(name, text)| {
             Record::parse(name, text.as_bytes(), &ColumnMap::default(), Need::InputAndOutput).unwrap()
@@ -321,6 +310,31 @@ fn unlike_records_are_not_joined() {
             "{message}"
         );
     }
+}
+
+#[test]
+fn a_row_alone_has_no_sample_period() {
+    refused("time_s,voltage_v\n0,0\n", Need::Input, &["line 2", "\"time_s\"", "two rows"]);
+}
+
+#[test]
+fn segments_and_files_keep_their_own_sample_periods() {
+    let two = "segment,time_s,voltage_v,displacement_um\n0,0.0,0,0\n0,0.1,1,1\n0,0.2,0,0\n1,5.0,0,0\n1,5.001,1,1\n1,5.002,0,0\n";
+    let one = "time_s,voltage_v,displacement_um\n0.0,0,0\n0.5,0,0\n";
+    let records = [("two.csv", two), ("one.csv", one)]
+        .map(|(name, text)| Record::parse(name, text.as_bytes(), &ColumnMap::default(), Need::InputAndOutput).unwrap());
+    assert_eq!(records[0].sample_periods(), [0.1, 0.001]);
+    assert_eq!(records[0].time(), [0.0, 0.1, 0.2, 5.0, 5.001, 5.002]);
+    let mut written = Vec::new();
+    records[0].write_csv(&mut written).unwrap();
+    assert_eq!(
+        Record::parse("two.csv", &written, &ColumnMap::default(), Need::InputAndOutput).unwrap().sample_periods(),
+        [0.1, 0.001]
+    );
+    let joined = Record::join(records.into()).unwrap();
+    assert_eq!((joined.sample_periods(), joined.sample_period()), (vec![0.1, 0.001, 0.5], 0.001));
+    let message = joined.need_one_sample_period("a reference").unwrap_err().to_string();
+    assert!(message.contains("segment 1 has 0.001000000 s and segment 0 0.100000000 s"), "{message}");
 }
 
 #[test]

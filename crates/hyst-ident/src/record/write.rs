@@ -194,26 +194,27 @@ impl Record {
     /// thousandth of a period where the period itself is not a short number.
     fn time_decimals(&self) -> usize {
         const MOST: usize = 17;
-        let h = self.sample_period();
-        let fine = (3.0 - h.log10()).ceil().clamp(3.0, MOST as f64) as usize;
+        let periods = self.sample_periods();
+        let fine = |h: f64| (3.0 - h.log10()).ceil().clamp(3.0, MOST as f64) as usize;
         let starts = self.segments.iter().map(|rows| decimals_of(self.time[rows.start]));
-        let least = starts.max().unwrap_or(0).max(decimals_of(h).min(fine)).clamp(3, MOST);
+        let steps = periods.iter().map(|h| decimals_of(*h).min(fine(*h)));
+        let least = starts.chain(steps).max().unwrap_or(0).clamp(3, MOST);
         let mut near = None;
         for decimals in least..=MOST {
-            let found = self.period_printed_with(decimals);
-            if found == Some(h) {
+            let Some(found) = self.periods_printed_with(decimals) else { continue };
+            if found == periods {
                 return decimals;
             }
             // A period that is no short number at all comes back to its last bits only.
-            if near.is_none() && found.is_some_and(|found| (found - h).abs() <= 1e-12 * h) {
+            if near.is_none() && found.iter().zip(&periods).all(|(found, h)| (found - h).abs() <= 1e-12 * h) {
                 near = Some(decimals);
             }
         }
         near.unwrap_or(MOST)
     }
 
-    /// The period that a reader of the times would find.
-    fn period_printed_with(&self, decimals: usize) -> Option<f64> {
+    /// The period of each segment that a reader of the times would find.
+    fn periods_printed_with(&self, decimals: usize) -> Option<Vec<f64>> {
         let mut printed = Printed::default();
         let mut text = String::new();
         let mut reprint = |t: &f64| {
@@ -224,7 +225,8 @@ impl Record {
             text.parse().unwrap_or(*t)
         };
         let times: Vec<f64> = self.time.iter().map(&mut reprint).collect();
-        grid::fit(&times, &self.segments, printed).ok().map(|period| period.value)
+        let found = grid::fit(&times, &self.segments, printed).ok()?;
+        Some(found.iter().map(|period| period.value).collect())
     }
 }
 

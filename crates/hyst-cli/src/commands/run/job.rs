@@ -486,7 +486,7 @@ impl Job {
         }
         let slew = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
         // A drive that was limited to this slew has been printed and read since.
-        let step = slew * drive.sample_period() * (1.0 + 1e-6);
+        let step = slew * drive.need_one_sample_period("a drive that a device plays")? * (1.0 + 1e-6);
         let steep = |row: &usize| (volts[row + 1] - volts[*row]).abs() > step;
         if let Some(row) = drive.segments().iter().find_map(|s| (s.start..s.end - 1).find(steep)) {
             let message =

@@ -30,7 +30,8 @@ impl Density {
     }
 
     fn with_windows(samples: &Samples, signal: &[f64], length: usize) -> Option<Self> {
-        let segments = super::settled_segments(samples);
+        let samples = samples.clone().of_one_period();
+        let segments = super::settled_segments(&samples);
         let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
         // Fast lengths, and never longer than a segment.
         let length = length.min(longest) / 2 * 2;

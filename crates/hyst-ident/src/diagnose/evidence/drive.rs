@@ -71,10 +71,10 @@ pub(super) fn holds(samples: &Samples) -> Vec<Hold> {
 /// Rate of the drive at every row \[input unit/s\], over four sample periods.
 pub(super) fn rates(samples: &Samples) -> Vec<f64> {
     let mut rates = vec![0.0; samples.len()];
-    for s in &samples.segments {
+    for (i, s) in samples.segments.iter().enumerate() {
         for k in s.clone() {
             let (a, b) = (k.saturating_sub(2).max(s.start), (k + 2).min(s.end - 1));
-            let seconds = b.saturating_sub(a).max(1) as f64 * samples.period;
+            let seconds = b.saturating_sub(a).max(1) as f64 * samples.period_of(i);
             rates[k] = (samples.input[b] - samples.input[a]) / seconds;
         }
     }

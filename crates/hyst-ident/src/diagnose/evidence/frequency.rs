@@ -52,7 +52,7 @@ pub(super) fn response_pictures(effect: Effect, model: &Model, scene: &Scene<'_>
         gain.points(role, name, over(&|l| l.gain));
     }
     let hz = phase.curves.first().map(|c| c.x.clone()).unwrap_or_default();
-    if let Some(named) = named(effect, model, &hz, scene.samples.period) {
+    if let Some(named) = named(effect, model, &hz, scene.samples.usual_period()) {
         let (gains, phases): (Vec<f64>, Vec<f64>) = named.into_iter().map(|h| (h.norm(), h.arg().to_degrees())).unzip();
         phase.line(Role::Reference, NAMED, &hz, &phases);
         gain.line(Role::Reference, NAMED, &hz, &gains);
@@ -88,8 +88,8 @@ fn named(effect: Effect, model: &Model, hz: &[f64], period: f64) -> Option<Vec<C
 
 /// Lines of the response that the drive excites and that are known well.
 fn lines(scene: &Scene<'_>, view: &View) -> Vec<ResponseLine> {
-    let mut samples = scene.samples.clone();
-    samples.segments = super::settled_segments(&scene.samples);
+    let mut samples = scene.samples.clone().of_one_period();
+    samples.segments = super::settled_segments(&samples);
     samples.input.clone_from(&view.predicted);
     // A record that is too short for it has no such picture.
     let found = response(&samples, &WelchOptions::default()).map(|r| r.lines).unwrap_or_default();
@@ -133,7 +133,7 @@ pub(super) fn spectrum(
     }
     let range = picture.curves.first().and_then(|c| c.x.first().copied().zip(c.x.last().copied()));
     if let Some((first, last)) = range.filter(|_| scene.noise > 0.0) {
-        let floor = white(scene.noise, scene.samples.period);
+        let floor = white(scene.noise, scene.samples.usual_period());
         picture.line(Role::Reference, "noise floor", &[first, last], &[floor, floor]);
     }
     picture
@@ -162,7 +162,7 @@ const EXPECTED: f64 = 3.0;
 /// What is left in rests after which the mode should ring most, averaged in step with it.
 pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Picture> {
     let (hz, damping) = *modes.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let period = scene.samples.period;
+    let period = scene.samples.usual_period();
     let decay = -OVER.ln() / (TAU * hz * damping.max(1e-3));
     let rows = (decay.min(CYCLES / hz) / period).ceil() as usize;
     if rows < 8 {
@@ -173,7 +173,10 @@ pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Pictu
     let expected =
         |h: &Hold| centred(window(h).map(|k| scene.with.predicted[k] - scene.without.predicted[k]).collect());
     let energy = |ring: &[f64]| ring.iter().map(|y| y * y).sum::<f64>() / rows as f64;
-    let long = |h: &Hold| h.rows.len() >= rows && !scene.samples.settling[h.rows.start];
+    let long = |h: &Hold| {
+        let samples = &scene.samples;
+        h.rows.len() >= rows && !samples.settling[h.rows.start] && samples.period_at(h.rows.start) == period
+    };
     let mut rests: Vec<(Hold, Vec<f64>)> =
         holds(&scene.samples).into_iter().filter(long).map(|h| (h.clone(), expected(&h))).collect();
     rests.sort_by(|a, b| energy(&b.1).total_cmp(&energy(&a.1)));

@@ -111,13 +111,13 @@ fn over_time(
         .skip(usize::from(!changed))
     {
         let (mut x, mut y) = (Vec::new(), Vec::new());
-        for s in &samples.segments {
+        for (i, s) in samples.segments.iter().enumerate() {
             for k in s.clone().filter(|k| !after.settling[*k]) {
                 x.push(clock[k]);
                 y.push(samples.output[k] - simulation.predicted[k]);
             }
             // The line is interrupted where the record is.
-            x.push(clock[s.end - 1] + 0.5 * samples.period);
+            x.push(clock[s.end - 1] + 0.5 * samples.period_of(i));
             y.push(f64::NAN);
         }
         picture.line(role, name, &x, &y);

@@ -16,9 +16,9 @@ const MOST_MEANS: f64 = 400.0;
 /// earlier steps average out. A record without rests shows its mean over time instead.
 pub(super) fn creep(scene: &Scene<'_>) -> Picture {
     let found = holds(&scene.samples);
-    let longest = found.iter().map(|h| h.rows.len()).max().unwrap_or(0);
+    let longest = found.iter().map(|h| h.rows.len() as f64 * periods(scene, h)).fold(0.0, f64::max);
     // The first stretch is where the others are counted from.
-    let bins = Bins::of_ratio(1.5, longest as f64, PER_DECADE);
+    let bins = Bins::of_ratio(1.5, longest, PER_DECADE);
     let (x, y) = (Axis::new("time since the drive stopped", "s").log(), Axis::new("goes on by", "% of the step"));
     let caption = "Average over all rests of the drive. Creep goes on for decades of time in the direction of the step: the curve \
         without it rises, the curve with it stays near zero.";
@@ -47,7 +47,8 @@ fn after_steps(scene: &Scene<'_>, found: &[Hold], bins: &Bins, view: &View) -> (
     let mut sums = vec![(0.0, 0.0, 0.0, 0.0); bins.count()];
     for hold in found.iter().filter(|h| !settling[h.rows.start]) {
         let step = scene.without.predicted[hold.rows.start] - scene.without.predicted[hold.before];
-        let means = bins.means(hold.rows.clone().map(|k| ((k - hold.rows.start + 1) as f64, view.residual[k])));
+        let since = |k: usize| (k - hold.rows.start + 1) as f64 * periods(scene, hold);
+        let means = bins.means(hold.rows.clone().map(|k| (since(k), view.residual[k])));
         let Some(start) = means.1.first().copied() else { continue };
         for (rows, residual) in means.0.into_iter().zip(means.1) {
             if let Some(sum) = bins.index(rows).and_then(|i| sums.get_mut(i)) {
@@ -57,6 +58,11 @@ fn after_steps(scene: &Scene<'_>, found: &[Hold], bins: &Bins, view: &View) -> (
     }
     let used = sums.into_iter().filter(|s| s.3 > 0.0);
     used.map(|(rows, n, rs, ss)| (rows / n * scene.samples.period, 100.0 * rs / ss)).unzip()
+}
+
+/// Time from row to row of a rest, in the record's shortest sample periods.
+fn periods(scene: &Scene<'_>, hold: &Hold) -> f64 {
+    scene.samples.period_at(hold.rows.start) / scene.samples.period
 }
 
 /// The sensor's zero over lab time.

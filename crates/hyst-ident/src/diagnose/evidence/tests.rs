@@ -15,6 +15,7 @@ use crate::record::Columns;
 pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
     let mut samples = Samples {
         period,
+        periods: Vec::new(),
         time: Vec::new(),
         input: Vec::new(),
         output: Vec::new(),

@@ -32,12 +32,12 @@ impl Family for ActivationFamily<'_> {
     }
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
-        for segment in &self.samples.segments {
+        for (i, segment) in self.samples.segments.iter().enumerate() {
             let mut before = self.samples.input[segment.start];
             for k in segment.clone() {
                 let u = self.samples.input[k];
                 columns[(k, 0)] = u;
-                columns[(k, 1)] = (u - before) / self.samples.period;
+                columns[(k, 1)] = (u - before) / self.samples.period_of(i);
                 columns[(k, 2)] = self.kind.value(values[0] * u);
                 before = u;
             }

@@ -46,10 +46,9 @@ impl Family for BoucWenFamily<'_> {
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
         let (beta, ratio, n) = self.shape(values);
-        let memory: BoucWen<f64> = BoucWenParams { k0: 0.0, alpha: 1.0, beta, gamma: ratio * beta, n }.build(&())?;
+        let params = BoucWenParams { k0: 0.0, alpha: 1.0, beta, gamma: ratio * beta, n };
         columns.column_mut(0).copy_from_slice(&self.samples.input);
-        run_into(self.samples, &memory, columns, 1);
-        Ok(())
+        run_into(self.samples, |_| Build::<BoucWen<f64>>::build(&params, &()), columns, 1)
     }
 
     fn base(&self, values: &[f64], linear: &[f64]) -> Base {

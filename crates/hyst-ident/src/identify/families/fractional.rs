@@ -21,10 +21,6 @@ impl<'a> LfdmFamily<'a> {
     pub(super) fn new(samples: &'a Samples) -> Self {
         Self { samples }
     }
-
-    fn sampling(&self) -> Sampling {
-        Sampling { period: self.samples.period }
-    }
 }
 
 /// c and the orders: the paper's bounds, c on a logarithmic scale.
@@ -48,8 +44,7 @@ impl Family for LfdmFamily<'_> {
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
         for (column, (a, b)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
             let p = LfdmParams { a, b, c: values[0], alpha: values[1], beta: values[2], order: GlOrder::First };
-            let model: Lfdm<f64, Memory> = p.build(&self.sampling())?;
-            run_into(self.samples, &model, columns, column);
+            run_into(self.samples, |sampling| Build::<Lfdm<f64, Memory>>::build(&p, sampling), columns, column)?;
         }
         Ok(())
     }
@@ -85,12 +80,11 @@ impl Family for IfmFamily<'_> {
     }
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
-        let cx = Sampling { period: self.samples.period };
         for (column, (a, b)) in [(1.0, 0.0), (0.0, 1.0)].into_iter().enumerate() {
             let (c, alpha, beta, tau) = (values[0], values[1], values[2], values[3]);
             let p = IfmParams { a, b, c, alpha, beta, tau, delta: 0.0, order: GlOrder::First };
-            let model: Box<Ifm<f64, Memory, DELAY>> = Box::new(p.build(&cx)?);
-            run_into(self.samples, &*model, columns, column);
+            let build = |sampling: &Sampling| Build::<Ifm<f64, Memory, DELAY>>::build(&p, sampling);
+            run_into(self.samples, build, columns, column)?;
         }
         columns.column_mut(2).copy_from_slice(&self.samples.input);
         Ok(())

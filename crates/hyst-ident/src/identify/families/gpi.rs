@@ -53,11 +53,12 @@ impl Family for GpiFamily<'_> {
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
         let none: &[f64] = &[];
-        let first: Gpi<f64, 1> = self.params(values, 1.0, none, none).build(&())?;
-        run_into(self.samples, &first, columns, 0);
+        let first = self.params(values, 1.0, none, none);
+        run_into(self.samples, |_| Build::<Gpi<f64, 1>>::build(&first, &()), columns, 0)?;
         for (i, r) in self.thresholds.iter().enumerate() {
-            let play: Gpi<f64, 1> = self.params(values, 0.0, &[*r][..], &[1.0][..]).build(&())?;
-            run_into(self.samples, &play, columns, i + 1);
+            let (thresholds, weights) = ([*r], [1.0]);
+            let play = self.params(values, 0.0, &thresholds[..], &weights[..]);
+            run_into(self.samples, |_| Build::<Gpi<f64, 1>>::build(&play, &()), columns, i + 1)?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Maxwell-slip banks and the electromechanical model: linear in the gains of their elements.
 
-use hyst_core::{Build, Error, MaxwellSlip, MaxwellSlipParams, Sampling, SlipReading, TdEm, TdEmParams};
+use hyst_core::{Build, Error, MaxwellSlip, MaxwellSlipParams, SlipReading, TdEm, TdEmParams};
 use nalgebra::DMatrix;
 
 use super::largest_input;
@@ -32,11 +32,9 @@ impl<'a> SlipFamily<'a> {
         let elements = elements.clamp(1, PLAYS);
         let element = |width: &f64| {
             let mut y = vec![0.0; samples.len()];
-            let element: Result<MaxwellSlip<f64, 1>, Error> =
-                MaxwellSlipParams { reading, widths: [*width], gains: [1.0] }.build(&());
-            if let Ok(element) = element {
-                run(samples, &element, &mut y);
-            }
+            let params = MaxwellSlipParams { reading, widths: [*width], gains: [1.0] };
+            // An element of no width gives nothing.
+            let _ = run(samples, |_| Build::<MaxwellSlip<f64, 1>>::build(&params, &()), &mut y);
             y
         };
         let slipping = |widths: &[f64]| widths.iter().map(element).collect();
@@ -68,9 +66,8 @@ impl Family for SlipFamily<'_> {
 
     fn columns(&self, _: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
         for (i, d) in self.widths.iter().enumerate() {
-            let element: MaxwellSlip<f64, 1> =
-                MaxwellSlipParams { reading: self.reading, widths: [*d], gains: [1.0] }.build(&())?;
-            run_into(self.samples, &element, columns, i);
+            let params = MaxwellSlipParams { reading: self.reading, widths: [*d], gains: [1.0] };
+            run_into(self.samples, |_| Build::<MaxwellSlip<f64, 1>>::build(&params, &()), columns, i)?;
         }
         Ok(())
     }
@@ -163,13 +160,11 @@ impl Family for TdEmFamily<'_> {
     }
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
-        let cx = Sampling { period: self.samples.period };
         for i in 0..self.elements {
             let mut p = self.params(values, Vec::new());
             p.slip.widths = vec![values[0] * (i as f64 + 1.0)];
             p.slip.gains = vec![1.0];
-            let element: TdEm<f64, 1> = p.build(&cx)?;
-            run_into(self.samples, &element, columns, i);
+            run_into(self.samples, |sampling| Build::<TdEm<f64, 1>>::build(&p, sampling), columns, i)?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The Bouc-Wen oscillator: nothing in it is linear, its static response sets the scales.
 
-use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error, Sampling};
+use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error};
 use nalgebra::DMatrix;
 
 use crate::drive::{Drive, Passes};
@@ -67,8 +67,8 @@ impl Family for OscillatorFamily<'_> {
     }
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
-        let model: BoucWenOscillator<f64> =
-            self.params(values, 1.0).build(&Sampling { period: self.drive.period() })?;
+        let params = self.params(values, 1.0);
+        let model = self.drive.stages(|sampling| Build::<BoucWenOscillator<f64>>::build(&params, sampling))?;
         self.drive.run(&model, rows_of(columns, 0));
         Ok(())
     }

@@ -60,9 +60,8 @@ impl Family for TdPiFamily<'_> {
     }
 
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error> {
-        let model: TdPi<f64, PLAYS> = self.params(values, 1.0).build(&())?;
-        run_into(self.samples, &model, columns, 0);
-        Ok(())
+        let params = self.params(values, 1.0);
+        run_into(self.samples, |_| Build::<TdPi<f64, PLAYS>>::build(&params, &()), columns, 0)
     }
 
     fn base(&self, values: &[f64], linear: &[f64]) -> Base {

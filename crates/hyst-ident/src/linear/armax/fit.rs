@@ -8,7 +8,7 @@ use super::prediction::{Shape, Signals};
 use super::start::LongArx;
 use crate::Samples;
 use crate::linear::LinearError;
-use crate::linear::error::require;
+use crate::linear::error::{require, require_one_period};
 
 /// The delay of the input.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +48,7 @@ const LAMBDA: f64 = 1e-6;
 /// # Errors
 /// When the order is out of range, a column is constant, there are too few rows, or no model of the order fits.
 pub fn fit_armax(samples: &Samples, options: &ArmaxOptions) -> Result<Armax, LinearError> {
+    require_one_period(samples)?;
     let delay = match options.delay {
         Delay::Auto => estimate_delay(samples)?,
         Delay::Rows(delay) => delay,
