@@ -38,6 +38,7 @@ mod samples;
 mod settle;
 pub mod simulate;
 mod spikes;
+mod tone_phase;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};

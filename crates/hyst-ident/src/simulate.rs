@@ -10,6 +10,7 @@ use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
 use crate::samples::{PerSegment, Samples};
 use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
+use crate::tone_phase;
 
 /// What is done with the sensor's zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,6 +73,8 @@ pub struct Simulation {
     pub zeros: Vec<f64>,
     /// Errors against the measured output, where there is one.
     pub errors: Option<Errors>,
+    /// Angle \[rad\] per file by which a tone of the model is ahead of the model's clock, as the first rows of the file show it; 0 where the clock goes on.
+    pub tone_ahead: Vec<f64>,
     /// Inputs beyond the model's own range.
     pub extrapolated: Extrapolated,
     /// Segments that do not begin at rest, but after turns of the drive that are not in the record, or as after their own first cycle.
@@ -87,7 +90,7 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
 }
 
 /// Runs a model over a record. Memory starts virgin in each segment; where the output shows that it did not and fewer rows are a start-up then, as
-/// after the segment's own first cycle. The drive goes on between samples as the model's file says.
+/// after the segment's own first cycle. A tone has the phase that the first rows of each file show. The drive goes on between samples as the model's file says.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
@@ -103,10 +106,23 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     drive.run(&chain, &mut predicted);
     let mut zeros = Vec::new();
     let mut errors = None;
+    let mut tone_ahead = vec![0.0; record.sources().len()];
     let mut in_mid_cycle = vec![false; samples.segments.len()];
     let mut settling = samples.settling.clone();
     if let Some(output) = record.output() {
-        let missed = |predicted: &[f64]| -> Vec<f64> { output.iter().zip(predicted).map(|(y, p)| y - p).collect() };
+        let tone = model.effects.interference.filter(|tone| tone.amplitude > 0.0);
+        let files = record.rows_of_files();
+        let less = |y: &[f64], p: &[f64]| -> Vec<f64> { y.iter().zip(p).map(|(y, p)| y - p).collect() };
+        // What a tone adds in a phase that is not that of the model's clock would hide how the memory begins.
+        let in_phase = |samples: &Samples, predicted: &[f64], settling: &[bool], ahead: &mut Vec<f64>| {
+            let Some(tone) = &tone else { return vec![0.0; output.len()] };
+            *ahead = tone_phase::ahead(samples, tone, &less(output, predicted), settling, &files);
+            tone_phase::change(samples, tone, ahead, &files)
+        };
+        let turned = in_phase(&samples, &predicted, &samples.settling, &mut tone_ahead);
+        samples.output = less(output, &turned);
+        let measured = samples.output.clone();
+        let missed = |predicted: &[f64]| less(&measured, predicted);
         let mut residual = missed(&predicted);
         samples.mark_spikes(&residual);
         settling = start_up_rows(&samples, &residual);
@@ -148,8 +164,14 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             residual = missed(&predicted);
             settling = start_up_rows(&samples, &residual);
         }
+        if tone.is_some() {
+            let turned = in_phase(&samples, &predicted, &settling, &mut tone_ahead);
+            predicted.iter_mut().zip(turned).for_each(|(p, turned)| *p += turned);
+            residual = less(output, &predicted);
+            settling = start_up_rows(&samples, &residual);
+        }
         if options.zero == Zero::PerRecord {
-            for rows in record.rows_of_files() {
+            for rows in files {
                 let settled = || rows.clone().filter(|k| !settling[*k]);
                 let mean = settled().map(|k| residual[k]).sum::<f64>() / settled().count().max(1) as f64;
                 predicted[rows.clone()].iter_mut().for_each(|p| *p += mean);
@@ -157,12 +179,12 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             }
         }
         errors = Some(
-            Errors::of(&samples.output, &predicted, &settling)
+            Errors::of(output, &predicted, &settling)
                 .map_err(|source| FitError::Compare { record: record.name(), source })?,
         );
     }
     let extrapolated = Extrapolated::of(model, &samples.input);
-    Ok(Simulation { predicted, settling, zeros, errors, extrapolated, in_mid_cycle })
+    Ok(Simulation { predicted, settling, zeros, errors, tone_ahead, extrapolated, in_mid_cycle })
 }
 
 /// Rows that may have passed before each segment in which a start-up shows.

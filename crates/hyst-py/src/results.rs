@@ -55,6 +55,12 @@ impl Simulation {
         self.simulated.zeros.clone()
     }
 
+    /// Angle [rad] per file by which the model's tone is ahead of the model's clock, as the first rows show it.
+    #[getter]
+    fn tone_ahead(&self) -> Vec<f64> {
+        self.simulated.tone_ahead.clone()
+    }
+
     /// Inputs beyond the model's ``input_range``: ``rows``, ``largest`` (how far the farthest lies beyond), ``row`` (which).
     #[getter]
     fn extrapolated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -26,6 +26,8 @@ struct Summary {
     between_samples: BetweenSamples,
     /// Constant that was added for the record, with `--zero per-record`.
     zeros: Vec<f64>,
+    /// Angle in rad by which the tone of the model is ahead of the model's clock: the first rows show it; 0 where the clock goes on.
+    tone_ahead_rad: f64,
     /// None without a measured output.
     errors: Option<Errors>,
     /// Inputs beyond the range of the record that the model was fitted to.
@@ -75,6 +77,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         periodic: args.periodic,
         between_samples: model.between_samples,
         zeros: simulated.zeros,
+        tone_ahead_rad: simulated.tone_ahead.first().copied().unwrap_or(0.0),
         errors: simulated.errors,
         // People and JSON count rows from 1, where there is one.
         extrapolated: text::from_one(simulated.extrapolated),
@@ -99,6 +102,12 @@ impl Summary {
                     text.push_str(&format!(
                         "\nsensor zero of the record: {} {unit} from the model's",
                         text::short(*zero)
+                    ));
+                }
+                if self.tone_ahead_rad != 0.0 {
+                    text.push_str(&format!(
+                        "\nphase of the tone, from the first rows: {}° from that of the model's clock",
+                        text::short(self.tone_ahead_rad.to_degrees())
                     ));
                 }
                 text
