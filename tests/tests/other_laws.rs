@@ -146,8 +146,11 @@ fn a_curve_before_the_hysteresis_is_an_asymmetry() {
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
+/// Output of a device for times and a drive.
+type Device<'a> = &'a dyn Fn(&[f64], &[f64]) -> Vec<f64>;
+
 /// A record of one segment at 500 Hz.
-fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: &dyn Fn(&[f64], &[f64]) -> Vec<f64>) -> Record {
+fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: Device<'_>) -> Record {
     let time: Vec<f64> = (0..rows).map(|k| k as f64 / 500.0).collect();
     let input: Vec<f64> = time.iter().map(|t| drive(*t)).collect();
     Record::from_samples(Columns {
@@ -161,7 +164,7 @@ fn one_segment(name: &str, drive: &dyn Fn(f64) -> f64, rows: usize, of: &dyn Fn(
 }
 
 /// Fades from the middle of the range, as an actuator that was demagnetised there is driven; and swings without end.
-fn from_the_middle(of: &dyn Fn(&[f64], &[f64]) -> Vec<f64>) -> (Record, Record) {
+fn from_the_middle(of: Device<'_>) -> (Record, Record) {
     let turn = |hz: f64, t: f64| (std::f64::consts::TAU * hz * t).sin();
     let fades = |t: f64| 50.0 + 47.0 * (1.0 - t / 26.0) * turn(2.0, t);
     let swings = |t: f64| 50.0 + 24.0 * turn(1.3, t) + 18.0 * turn(0.37, t);
@@ -211,4 +214,48 @@ fn a_soft_stop_at_both_ends_is_a_saturation() {
     assert_eq!(names(&d), ["saturation"], "{:#?}", d.findings);
     let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
     assert!(after < 0.3 * before, "{before} {after}");
+}
+
+/// A slow experiment and a fast one in one file, each at its own rate: what is slow shows in one and what is fast in the other.
+#[test]
+fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
+    let lag = 0.004_f64;
+    let settles = |t: f64| 2.0 * (1.0 - (-t / 20.0).exp());
+    // Plays behind a lag, passed in steps of 0.2 ms, each with the drive in its middle: with that at an end the lag would be half a step off.
+    let made = |name: &str, parts: [(f64, f64, f64, usize); 2]| {
+        let mut all = Columns { name: name.into(), segment: Some(Vec::new()), ..Columns::default() };
+        let (mut input, mut output, mut start) = (Vec::new(), Vec::new(), 0.0);
+        for (label, (period, hz, size, rows)) in (0..).zip(parts) {
+            // From one frequency to five times of it: a single one does not tell a lag from a dead time.
+            let swept = |t: f64| hz * t * (1.0 + 2.0 * t / (rows as f64 * period));
+            let drive = |t: f64| 0.5 * size * (1.0 - (std::f64::consts::TAU * swept(t)).cos());
+            let (first, began) = ([drive(0.0)], [start]);
+            let (mut rested, mut noise) = (rested(&first), noise(&began));
+            let (mut late, mut t) = (drive(0.0), 0.0);
+            for k in 0..rows {
+                while t < k as f64 * period - 1e-6 {
+                    t += 2e-4;
+                    late += (drive(t - 1e-4) - late) * (1.0 - (-2e-4 / lag).exp());
+                }
+                let shown = rested(&late);
+                all.time.push(start + k as f64 * period);
+                all.segment.as_mut().unwrap().push(label);
+                input.push(drive(k as f64 * period));
+                output.push(40.0 * shown + settles(start + k as f64 * period) + noise());
+            }
+            start += rows as f64 * period + 1.0;
+        }
+        (all.input, all.output) = (Some(input), Some((OutputUnit::Micrometre, output)));
+        Record::from_samples(all).unwrap()
+    };
+    let train = made("train", [(0.02, 0.1, 100.0, 2000), (1e-3, 7.0, 80.0, 4000)]);
+    let test = made("test", [(0.01, 0.4, 60.0, 1500), (2e-3, 3.0, 90.0, 1500)]);
+    assert_eq!(train.sample_periods(), [0.02, 1e-3]);
+    let d = diagnosed(Kind::Pi, &(train, test));
+    assert_eq!(names(&d), ["lag", "drift"], "{:#?}", d.findings);
+    let (found, drift) = (d.extended.effects.lag.unwrap(), d.extended.effects.drift.unwrap());
+    assert!((found.seconds / lag - 1.0).abs() < 0.05, "{found:?}");
+    assert!((drift.settling / 2.0 - 1.0).abs() < 0.1 && (drift.seconds / 20.0 - 1.0).abs() < 0.1, "{drift:?}");
+    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+    assert!(after < 0.2 * before, "{before} {after}");
 }

@@ -90,7 +90,7 @@ mod tests {
             harmonics: [0.05, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0],
         };
         let samples = Samples::of_columns(1e-3, vec![0.0; 4000], vec![0.0; 4000]);
-        let (files, settling) = ([0..4000], vec![false; 4000]);
+        let (files, settling) = (samples.segments.clone(), vec![false; 4000]);
         let slow = |t: f64| 0.5 + 0.3 * (3.0 * t).sin();
         for (turned, size) in [(0.0, 1.0), (1.1, 1.0), (-2.6, 1.2), (0.1, 1.0), (1.1, 0.3), (1.1, 0.0)] {
             let residual: Vec<f64> = samples

@@ -4,6 +4,7 @@ mod drag;
 mod fixed;
 mod pi;
 mod preisach;
+mod rated;
 mod screening;
 mod travel;
 
@@ -11,6 +12,7 @@ pub(crate) use drag::{Drag, DragParams};
 pub(crate) use fixed::FixedBasis;
 pub(crate) use pi::{PiBasis, SlidingPlays, play_column};
 pub(crate) use preisach::PreisachBasis;
+pub(crate) use rated::RatedBasis;
 pub(crate) use screening::{ROWS_PER_UNKNOWN, ScreeningBasis};
 
 use std::ops::Range;

@@ -377,7 +377,7 @@ impl<'a> Own<'a> {
     /// The record with what an amplifier makes of its drive that follows no steeper slope than this \[V/s\].
     pub(super) fn amplified(&self, v_per_s: f64) -> Record {
         let mut drive = self.train.input().to_vec();
-        limit_slope(&mut drive, &self.samples, v_per_s);
+        limit_slope(&mut drive, self.samples, v_per_s);
         self.train.driven_by(drive)
     }
 }

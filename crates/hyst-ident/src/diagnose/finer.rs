@@ -15,7 +15,7 @@ use super::shape::own_stop;
 use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
-use crate::base::{PreisachBasis, ScreeningBasis};
+use crate::base::{PreisachBasis, RatedBasis, ScreeningBasis};
 use crate::lsq::Blocks;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
@@ -65,6 +65,7 @@ pub(super) fn refine(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
     beside_nameless(problem, found, already)?;
+    beside_a_law_of_the_rate(problem, found, already, seed)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -237,6 +238,33 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
     beside(problem, found, already, &follows, &share)?;
     let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
     beside(problem, found, already, &still, &|_| BESIDE_WANDERING)
+}
+
+/// Takes back a creep beside a law of the rate that any other law of the rate takes as well.
+fn beside_a_law_of_the_rate(
+    problem: &Problem<'_>,
+    found: &mut Search,
+    already: &[Cause],
+    seed: u64,
+) -> Result<(), Error> {
+    let creep = Cause::Effect(Effect::Creep);
+    let h = found.best.fit.hypothesis.clone();
+    let new = beyond(&h, already);
+    if !new.contains(&creep) || !new.contains(&Cause::Effect(Effect::RateDependence)) {
+        return Ok(());
+    }
+    let Some(rated) = RatedBasis::around(problem.basis, problem.samples) else { return Ok(()) };
+    let any_law = Problem::new(problem.samples, &rated, problem.blocks, problem.zero_per_file);
+    let fitted = |h: &Hypothesis| Ok::<_, Error>(any_law.fit(h)?.and_then(|f| Trial::of(&any_law, f)));
+    let (Some(without), Some(with)) = (fitted(&h.without(creep))?, fitted(&h)?) else { return Ok(()) };
+    if score::judge(&any_law, &without, &with, found.noise, seed).accepted() {
+        return Ok(());
+    }
+    if let Some(trial) = problem.fit(&h.without(creep))?.and_then(|f| Trial::of(problem, f)) {
+        found.named.retain(|n| n.effect != Effect::Creep);
+        found.best = trial;
+    }
+    Ok(())
 }
 
 /// Takes back what explains less than a share of what was found does beyond `less`, which lacks something without a name.
