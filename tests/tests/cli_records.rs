@@ -12,7 +12,8 @@ fn refused(content: impl AsRef<[u8]>, parts: &[&str]) {
 fn refused_with(content: impl AsRef<[u8]>, options: &str, parts: &[&str]) {
     let lab = Lab::new();
     lab.write("bad.csv", content);
-    let message = lab.refuses(&format!("fit bad.csv --model pi -o model.json {options}"), 2);
+    let model = if options.contains("--model") { "" } else { "--model pi" };
+    let message = lab.refuses(&format!("fit bad.csv {model} -o model.json {options}"), 2);
     for part in parts {
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
     }
@@ -72,7 +73,8 @@ fn columns_that_are_missing_or_wrong() {
 fn two_outputs_are_one_too_many() {
     let rows: Vec<String> = rows(40).iter().map(|row| format!("{row},1.5")).collect();
     let header = "time_s,voltage_v,displacement_um,force_n";
-    refused(with_header(header, &rows), &["bad.csv, line 1", "displacement_um", "force_n", "--map"]);
+    let message = ["bad.csv, line 1", "displacement_um", "force_n", "--map", "the load that acts on the actuator: --map load_n=force_n"];
+    refused(with_header(header, &rows), &message);
 }
 
 #[test]
@@ -108,14 +110,18 @@ fn segments_that_make_no_sense() {
     };
     refused(labelled(|_| "x"), &["bad.csv, line 2, column \"segment\"", "not an integer"]);
     refused(labelled(|k| ["0", "1", "0", "0"][k / 10]), &["bad.csv, line 22, column \"segment\"", "returns"]);
-    let mut mixed = String::from("segment,time_s,voltage_v,displacement_um\n");
-    (0..20).for_each(|k| mixed.push_str(&format!("0,{:.3},{k},{k}\n", f64::from(k) * 0.002)));
-    (0..20).for_each(|k| mixed.push_str(&format!("1,{:.3},{k},{k}\n", 1.0 + f64::from(k) * 0.005)));
-    refused(mixed, &["bad.csv, line 22, column \"time_s\"", "segment 1", "period"]);
     refused(
         "segment,time_s,voltage_v,displacement_um\n0,0,1,1\n1,1,2,2\n",
         &["bad.csv, line 3", "no segment has two rows"],
     );
+}
+
+#[test]
+fn sample_periods_that_a_model_cannot_mix() {
+    let mut mixed = String::from("segment,time_s,voltage_v,displacement_um\n");
+    (0..200).for_each(|k| mixed.push_str(&format!("0,{:.3},{},{}\n", f64::from(k) * 0.002, k % 37, k % 37)));
+    (0..200).for_each(|k| mixed.push_str(&format!("1,{:.3},{},{}\n", 1.0 + f64::from(k) * 0.005, k % 41, k % 41)));
+    refused_with(&mixed, "--model dpm", &["bad.csv", "one sample period", "segment 1 has 0.005", "segment 0 0.002"]);
 }
 
 #[test]

@@ -359,6 +359,12 @@ impl<'a> Header<'a> {
                 role: role.words(),
                 first: self.names[first].clone(),
                 second: self.names[second].clone(),
+                hint: match (role, self.names[second].as_str()) {
+                    (Role::Output, "force_n") => {
+                        "; if \"force_n\" is the load that acts on the actuator: --map load_n=force_n"
+                    }
+                    _ => "",
+                },
             }),
             (first, _) => Ok(first.map(|at| (at, self.names[at].as_str()))),
         }

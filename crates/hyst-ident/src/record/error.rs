@@ -130,7 +130,7 @@ pub enum RecordError {
     },
     /// Two columns could play the same role.
     #[error(
-        "{file}, line 1, columns \"{first}\" and \"{second}\": both could be {role}; choose one with --map {first}={first}, or drop the other from the file"
+        "{file}, line 1, columns \"{first}\" and \"{second}\": both could be {role}; choose one with --map {first}={first}, or drop the other from the file{hint}"
     )]
     AmbiguousColumn {
         /// The file.
@@ -141,6 +141,8 @@ pub enum RecordError {
         first: String,
         /// The second candidate.
         second: String,
+        /// What else the second may be, or empty.
+        hint: &'static str,
     },
     /// `--map` names a column that the file does not have.
     #[error(
