@@ -15,6 +15,7 @@ pub mod compare;
 pub mod compensate;
 pub mod diagnose;
 pub mod digits;
+mod creep_rest;
 mod drive;
 pub mod everett;
 pub mod excite;

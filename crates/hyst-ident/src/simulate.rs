@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::creep_rest;
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::memory;
 use crate::metrics::Errors;
 use crate::model::{HostChain, Model};
 use crate::record::{OutputUnit, Record};
-use crate::samples::{PerSegment, Samples};
+use crate::samples::{PerSegment, Samples, range};
 use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
 use crate::tone_phase;
 
@@ -90,7 +91,8 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
 }
 
 /// Runs a model over a record. Memory starts virgin in each segment; where the output shows that it did not and fewer rows are a start-up then, as
-/// after the segment's own first cycle. A tone has the phase that the first rows of each file show. The drive goes on between samples as the model's file says.
+/// after the segment's own first cycle. A tone has the phase that the first rows of each file show, and a creep goes on from what they show
+/// of the time before. The drive goes on between samples as the model's file says.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
@@ -161,6 +163,15 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                     }
                 }
             }
+            residual = missed(&predicted);
+            settling = start_up_rows(&samples, &residual);
+        }
+        // And what was done before goes on in a creep.
+        if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic) {
+            let (low, high) = range(predicted.iter().copied());
+            let known = options.zero == Zero::None;
+            let rest = creep_rest::rest(&samples, creep, &residual, &settling, high - low, known);
+            predicted.iter_mut().zip(rest).for_each(|(p, rest)| *p += rest);
             residual = missed(&predicted);
             settling = start_up_rows(&samples, &residual);
         }

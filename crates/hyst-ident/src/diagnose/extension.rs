@@ -182,7 +182,7 @@ impl<'a> Own<'a> {
         let stage = |e| self.stage(e);
         let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
         // What a wandering or a slow amplifier leaves is no base's.
-        let nameless = found.causes().iter().any(|cause| cause.effect().is_none());
+        let nameless = found.causes().iter().any(|cause| cause.is_nameless());
         if nameless || shape::is_complete(&plain, richest) {
             return Ok(None);
         }

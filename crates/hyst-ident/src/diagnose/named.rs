@@ -314,9 +314,10 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             }
         }
         Effect::Drift => e.drift.iter().for_each(|p| {
-            if p.seconds == 0.0 {
+            if p.seconds == 0.0 || p.per_second != 0.0 {
                 put("drift", "per_second", p.per_second, &format!("{y}/s"));
-            } else {
+            }
+            if p.seconds > 0.0 {
                 put("drift", "settling", p.settling, y);
                 put("drift", "seconds", p.seconds, "s");
             }

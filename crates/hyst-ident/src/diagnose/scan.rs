@@ -7,7 +7,7 @@ use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
 use super::starts::{PER_DECADE, bank, starting_temperature, stops};
 use crate::model::{Effect, Effects};
-use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, SignalPath, Vantage, hat};
+use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, SignalPath, Vantage, hat, owed};
 use crate::samples::range;
 
 /// Share of the gain that an effect needs from which on a first-order gain is followed up.
@@ -74,6 +74,10 @@ impl<'a> Scan<'a> {
             Cause::Effect(effect) => self.columns(effect)?,
             Cause::ZeroWanders => Some(self.hats(&|_| 1.0)),
             Cause::GainWanders => Some(self.hats(&|k| self.motion[k])),
+            Cause::CreepGoesOn => {
+                let creep = self.from.hypothesis.effects.creep.as_ref();
+                Some(creep.map_or_else(Vec::new, |creep| owed::columns(self.problem.samples, creep)))
+            }
             Cause::SlewLimit => None,
         };
         // Of either sign: a fit may begin at the other.

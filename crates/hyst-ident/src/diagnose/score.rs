@@ -31,7 +31,7 @@ pub(super) const LEAST_OVER_NOISE: f64 = 0.5;
 /// Share of what stands above the noise floor that an effect must explain.
 const LEAST_SHARE: f64 = 0.3;
 /// Largest share of a motion that creep may add in the end.
-const MOST_CREEP: f64 = 0.3;
+const MOST_CREEP: f64 = 0.5;
 
 /// Slowest tone of a sensor \[Hz\]: what swings more slowly may as well be a force or the room.
 const SLOWEST_TONE: f64 = 2.0;

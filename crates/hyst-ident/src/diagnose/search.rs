@@ -209,7 +209,7 @@ pub(super) fn further(
         next.sort_by(|a, b| a.total().total_cmp(&b.total()));
         best = next[0].clone();
         // What has no name takes nearly anything with its many numbers, and may not put an end to the search among names.
-        let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.effect().is_none());
+        let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.is_nameless());
         let far = BEAM_WITHIN * best.total();
         let second = next.iter().skip(1).find(|t| nameless(&best) && !nameless(t));
         let second = second.or_else(|| next.iter().skip(1).find(|t| t.total() <= far)).cloned();
@@ -301,7 +301,7 @@ pub(super) fn with_own_laws(
 fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
     let effects = Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry).map(Cause::Effect);
     effects
-        .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::SlewLimit])
+        .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::CreepGoesOn, Cause::SlewLimit])
         .filter(|c| fit.hypothesis.has_room(*c) && hidden(*c, problem).is_none())
         .collect()
 }
@@ -384,7 +384,7 @@ fn swaps(
             let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
             // What has no name has to be worth its many numbers: not where an effect leaves it next to nothing to take.
-            let nameless = || cause.effect().is_none() && !judge.judge(&trial, best).accepted();
+            let nameless = || cause.is_nameless() && !judge.judge(&trial, best).accepted();
             let numbers = |trial: &Trial, cause: Cause| trial.fit.hypothesis.complexity(cause);
             let is_smaller = numbers(&trial, *other) < numbers(best, cause);
             // More numbers have to be worth as much as an effect: a law of several takes more of the base's misfit than one of one.

@@ -51,6 +51,7 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         Cause::Effect(effect) => effect,
         Cause::ZeroWanders => return Ok(vec![also(&|h| h.zero_wanders = true)]),
         Cause::GainWanders => return Ok(vec![also(&|h| h.gain_wanders = true)]),
+        Cause::CreepGoesOn => return Ok(vec![also(&|h| h.creep_goes_on = true)]),
         Cause::SlewLimit => {
             let limits = slew_limits(scan)?;
             return Ok(limits.into_iter().map(|v_per_s| also(&|h| h.slew_limit = Some(v_per_s))).collect());
@@ -90,12 +91,12 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
         Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
         Effect::Drift => {
-            // A line; or one that settles, in a quarter of the record or faster.
+            // A line; one that settles, in a quarter of the record or faster; or both: a course that gets slower and slower.
             let since_s = samples.time[0];
             let whole = samples.time[samples.len() - 1] - since_s;
-            let times = [0.0, 0.25 * whole, 0.06 * whole];
-            let drift = |seconds: f64| DriftParams { seconds, since_s, ..DriftParams::default() };
-            times.map(|seconds| with(&|e| e.drift = Some(drift(seconds)))).into()
+            let laws = [(0.0, 0.0), (0.0, 0.25 * whole), (0.0, 0.06 * whole), (f64::MIN_POSITIVE, 0.25 * whole)];
+            let drift = |(per_second, seconds)| DriftParams { per_second, seconds, since_s, ..DriftParams::default() };
+            laws.map(|law| with(&|e| e.drift = Some(drift(law)))).into()
         }
         Effect::Interference => {
             let found = tone(samples, &scan.residual);

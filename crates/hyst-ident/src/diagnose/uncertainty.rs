@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::lsq::Gram;
 use crate::model::Effect;
-use crate::nested::{Cause, Fitted, Layout};
+use crate::nested::{Cause, Fitted};
 
 /// Standard errors by which a parameter has to differ from the value at which its effect vanishes.
 const MIN_STD_ERRORS: f64 = 2.0;
@@ -112,7 +112,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     let of = |unknown: usize| Some(covariance_of(unknown, unknown)?.max(0.0).sqrt());
 
     let mut hypothesis = fit.hypothesis.clone();
-    let layout = Layout::of(&hypothesis, fit.weights.len(), fit.zeros.len());
+    let layout = fit.layout();
     let mut next = layout.len();
     let (mut creep, mut hz) = (Vec::new(), None);
     hypothesis.visit_nonlinear(&mut |p| {

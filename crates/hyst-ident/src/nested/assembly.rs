@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
+use hyst_core::{CreepParams, CurveSide, Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
-use super::{HATS, Hypothesis, Layout, Problem, SignalPath};
+use super::{HATS, Hypothesis, Layout, Problem, SignalPath, owed};
 use crate::lsq::{Gram, solve_near};
 
 /// Rounds in which what bends the output is solved, each linear around the one before.
@@ -55,7 +55,7 @@ pub(crate) fn hat(j: usize, share: f64) -> f64 {
 
 impl Problem<'_> {
     pub(super) fn layout(&self, h: &Hypothesis) -> Layout {
-        Layout::of(h, self.width, self.zeros())
+        Layout::of(h, self.width, self.zeros(), owed::count(self.samples))
     }
 
     /// Solves for the linear unknowns, from `near` if something is known that is nearly right.
@@ -129,6 +129,8 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
             motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
         }
+        let relaxations = self.owed(h).flat_map(|creep| owed::relaxations(self.samples, creep));
+        relaxations.zip(&z[layout.owed]).for_each(|(of, away)| of.add_to(&mut motion, *away));
         Point { operator, motion, solution: DVector::from_column_slice(z) }
     }
 
@@ -189,7 +191,7 @@ impl Problem<'_> {
         }
         put(width - 1, target);
         let total = Gram::of_all(&blocks, width);
-        let penalty = self.penalty(width - 1);
+        let penalty = self.penalty(h, width - 1);
         let near = point.as_ref().map(|p| &p.solution).or(near).filter(|z| z.len() == width - 1);
         let solution = solve_near(&total, Some(&penalty), &self.bounds(h), near)?;
         let objective = total.error(&solution) + (solution.transpose() * &penalty * &solution)[(0, 0)];
@@ -230,7 +232,15 @@ impl Problem<'_> {
                 columns.push((c, self.thinned(|k| hat(j, share(k)) * point.motion[k])));
             }
         }
+        for (c, column) in layout.owed.clone().zip(self.owed(h).flat_map(|creep| owed::columns(self.samples, creep))) {
+            columns.push((c, slowed(&column)));
+        }
         columns
+    }
+
+    /// The creep that goes on from before each segment, if there is one.
+    pub(super) fn owed<'h>(&self, h: &'h Hypothesis) -> impl Iterator<Item = &'h CreepParams<Vec<f64>>> {
+        h.effects.creep.iter().filter(|_| h.creep_goes_on)
     }
 
     /// What holds in the rows that count, block by block.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Fitted;
 use crate::Samples;
-use crate::lsq::{Blocks, Gram, solve_near};
+use crate::lsq::{Blocks, Bounds, Gram, solve_near};
 
 /// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
 pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
@@ -72,6 +72,9 @@ pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: 
     for i in nonlinear_from..columns - 1 {
         penalty[(i, i)] += 1e-6 * total.matrix[(i, i)];
     }
+    // How a segment begins is no law that other parts of the record could tell.
+    let mut bounds = fit.bounds.clone();
+    fit.layout().owed.for_each(|i| bounds[i] = Bounds::fixed(fit.solution[i]));
     let mut squares = vec![0.0; fit.grams.len()];
     let of_fold = |fold: &Vec<usize>| -> Option<Vec<(usize, f64)>> {
         let mut others = total.clone();
@@ -79,7 +82,7 @@ pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: 
             others.matrix -= &fit.grams[*b].matrix;
             others.rows -= fit.grams[*b].rows;
         }
-        let z = solve_near(&others, Some(&penalty), &fit.bounds, Some(&fit.solution))?;
+        let z = solve_near(&others, Some(&penalty), &bounds, Some(&fit.solution))?;
         let error = |b: usize| fit.grams[b].error(if unpredictable[b] { &fit.solution } else { &z });
         Some(fold.iter().map(|b| (*b, error(*b))).collect())
     };

@@ -17,6 +17,8 @@ pub(crate) enum Cause {
     ZeroWanders,
     /// The gain wanders in time.
     GainWanders,
+    /// The creep goes on from what was done before each segment began.
+    CreepGoesOn,
     /// The drive is not followed where it is steep: an amplifier whose current is limited.
     SlewLimit,
 }
@@ -26,8 +28,13 @@ impl Cause {
     pub(crate) fn effect(self) -> Option<Effect> {
         match self {
             Self::Effect(e) => Some(e),
-            Self::ZeroWanders | Self::GainWanders | Self::SlewLimit => None,
+            Self::ZeroWanders | Self::GainWanders | Self::CreepGoesOn | Self::SlewLimit => None,
         }
+    }
+
+    /// Whether it stands for what is on no list.
+    pub(crate) fn is_nameless(self) -> bool {
+        matches!(self, Self::ZeroWanders | Self::GainWanders | Self::SlewLimit)
     }
 }
 
@@ -42,6 +49,8 @@ pub(crate) struct Hypothesis {
     pub(crate) zero_wanders: bool,
     /// Whether the gain wanders.
     pub(crate) gain_wanders: bool,
+    /// Whether the creep, if there is one, goes on from before each segment.
+    pub(crate) creep_goes_on: bool,
     /// Steepest slope that the amplifier follows \[V/s\], if it has one.
     pub(crate) slew_limit: Option<f64>,
 }
@@ -74,6 +83,7 @@ impl Hypothesis {
         let mut causes: Vec<Cause> = list.into_iter().map(Cause::Effect).collect();
         causes.extend(self.zero_wanders.then_some(Cause::ZeroWanders));
         causes.extend(self.gain_wanders.then_some(Cause::GainWanders));
+        causes.extend(self.creep_goes_on.then_some(Cause::CreepGoesOn));
         causes.extend(self.slew_limit.map(|_| Cause::SlewLimit));
         causes
     }
@@ -85,6 +95,7 @@ impl Hypothesis {
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
+            Cause::CreepGoesOn => self.effects.creep.is_some() && !self.creep_goes_on,
             Cause::SlewLimit => self.slew_limit.is_none(),
         }
     }
@@ -94,7 +105,11 @@ impl Hypothesis {
         let mut less = self.clone();
         match cause {
             Cause::Effect(Effect::RateDependence) => (less.drag, less.effects.rate) = (None, None),
-            Cause::Effect(e) => less.effects = self.effects.without(e),
+            Cause::Effect(e) => {
+                less.effects = self.effects.without(e);
+                less.creep_goes_on &= less.effects.creep.is_some();
+            }
+            Cause::CreepGoesOn => less.creep_goes_on = false,
             Cause::ZeroWanders => less.zero_wanders = false,
             Cause::GainWanders => less.gain_wanders = false,
             Cause::SlewLimit => less.slew_limit = None,
@@ -107,13 +122,16 @@ impl Hypothesis {
         match cause {
             // A curve of time is free of the drive and imitates all that happens once in a record; a creep is tied to the drive.
             Cause::Effect(Effect::Drift) if self.effects.drift.is_some_and(|p| p.seconds > 0.0) => {
-                Effect::Creep.complexity() + 1
+                let goes_on = self.effects.drift.is_some_and(|p| p.per_second != 0.0);
+                Effect::Creep.complexity() + 1 + usize::from(goes_on)
             }
             Cause::Effect(Effect::Temperature) => {
                 let more = |p: TemperatureParams| usize::from(p.expansion != 0.0) + usize::from(p.seconds > 0.0);
                 Effect::Temperature.complexity() + self.effects.temperature.map_or(0, more)
             }
             Cause::Effect(e) => e.complexity(),
+            // No cause of its own: an actuator that creeps is seldom at rest when a record begins.
+            Cause::CreepGoesOn => 0,
             Cause::ZeroWanders | Cause::GainWanders => super::HATS,
             Cause::SlewLimit => 1,
         }

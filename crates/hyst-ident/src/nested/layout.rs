@@ -26,10 +26,13 @@ pub(crate) struct Layout {
     pub(crate) zones: Range<usize>,
     pub(crate) zero_hats: Range<usize>,
     pub(crate) gain_hats: Range<usize>,
+    /// What a creep still owes to the time before each segment.
+    pub(crate) owed: Range<usize>,
 }
 
 impl Layout {
-    pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize) -> Self {
+    /// Of a record in which a creep that goes on takes `owed` unknowns.
+    pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize, owed: usize) -> Self {
         let mut end = 0;
         let mut next = |count: usize| {
             end += count;
@@ -47,13 +50,14 @@ impl Layout {
             zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),
+            owed: next(some(h.creep_goes_on, owed)),
         }
     }
 
     /// The places of each kind, in order.
-    fn kinds(&self) -> [Range<usize>; 9] {
-        let Self { weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats } = self.clone();
-        [weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats]
+    fn kinds(&self) -> [Range<usize>; 10] {
+        let Self { weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats, owed } = self.clone();
+        [weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats, owed]
     }
 
     /// A solution in this layout as it stands in another one, and the places there that this one does not have, or has in another number.
@@ -72,7 +76,7 @@ impl Layout {
 
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
-        self.gain_hats.end
+        self.owed.end
     }
 }
 
@@ -86,7 +90,7 @@ mod tests {
     #[test]
     fn what_a_layout_lacks_is_told_and_the_rest_keeps_its_values() {
         let load = Hypothesis::of(Effects { load: Some(LoadParams { per_newton: 0.0 }), ..Effects::default() });
-        let (three, one) = (Layout::of(&load, 2, 3), Layout::of(&load, 2, 1));
+        let (three, one) = (Layout::of(&load, 2, 3, 0), Layout::of(&load, 2, 1, 0));
         let z = DVector::from_vec(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         // Two weights, the zeros of three files, the load.
         let (carried, places) = three.carried(&z, &one);

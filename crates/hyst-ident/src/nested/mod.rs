@@ -11,6 +11,7 @@ mod columns;
 mod cross_validation;
 mod hypothesis;
 mod layout;
+pub(crate) mod owed;
 mod path;
 mod probe;
 mod problem;

@@ -10,7 +10,7 @@ use super::assembly::{Assembly, Point};
 use super::bounds::{box_of, stepped};
 use super::columns::{may_be_kept, passes};
 use super::cross_validation::{cross_validate, folds_by_experiment, folds_interleaved, unpredictable};
-use super::{Cause, Hypothesis, Projector, SignalPath};
+use super::{Cause, Hypothesis, Layout, Projector, SignalPath, owed};
 use crate::Samples;
 use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bordered, Bounds, Gram, held, solve_near};
@@ -48,6 +48,8 @@ const STRETCHES: usize = 4;
 
 /// Highest frequency of a harmonic, in sample rates.
 const HIGHEST_TONE: f64 = 0.475;
+/// Weight of the expectation that a creep has come to rest, in that of the rows that show it.
+const OWED: f64 = 1e-3;
 /// Standard deviations of white noise that both parts of a harmonic together have to exceed.
 const MIN_HARMONIC: f64 = 4.0;
 
@@ -78,6 +80,13 @@ impl Fitted {
     /// Root mean square of what is left in the rows that count \[y\].
     pub(crate) fn rmse(&self) -> f64 {
         (self.squares / self.rows.max(1) as f64).sqrt()
+    }
+
+    /// Where each of its linear unknowns stands.
+    pub(crate) fn layout(&self) -> Layout {
+        let of = |owed| Layout::of(&self.hypothesis, self.weights.len(), self.zeros.len(), owed);
+        let linear = self.solution.len() - self.hypothesis.nonlinear().len();
+        of(linear - of(0).len())
     }
 }
 
@@ -147,7 +156,7 @@ impl<'a> Problem<'a> {
         let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
         base.map_or_else(
             || vec![false; self.blocks.rows.len()],
-            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(base.solution.len()), folds),
+            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(&Hypothesis::default(), base.solution.len()), folds),
         )
     }
 
@@ -174,9 +183,11 @@ impl<'a> Problem<'a> {
         let layout = self.layout(h);
         bounds.resize(layout.len(), Bounds::FREE);
         // A curve that falls would have no inverse.
-        bounds[layout.zones].fill(Bounds::above(-0.9));
-        if h.effects.drift.is_some_and(|p| p.seconds > 0.0) {
-            // A line beside it would only bend what settles: neither would be determined.
+        bounds[layout.zones.clone()].fill(Bounds::above(-0.9));
+        let farthest = owed::farthest(self.samples);
+        bounds[layout.owed.clone()].fill(Bounds { lower: -farthest, upper: farthest });
+        if h.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second == 0.0) {
+            // A law that only settles.
             bounds[layout.drift.start] = Bounds::fixed(0.0);
         }
         if let Some(tone) = &h.effects.interference {
@@ -208,11 +219,15 @@ impl<'a> Problem<'a> {
         bounds
     }
 
-    /// The base's penalty, zero for everything else.
-    pub(super) fn penalty(&self, unknowns: usize) -> DMatrix<f64> {
+    /// The base's penalty, that which keeps a creep's rest at zero where no row shows it, and zero for everything else.
+    pub(super) fn penalty(&self, h: &Hypothesis, unknowns: usize) -> DMatrix<f64> {
         let mut p = DMatrix::zeros(unknowns, unknowns);
         if let Some(own) = &self.penalty {
             p.view_mut((0, 0), own.shape()).copy_from(own);
+        }
+        let relaxations = self.owed(h).flat_map(|creep| owed::relaxations(self.samples, creep));
+        for (c, of) in self.layout(h).owed.zip(relaxations) {
+            p[(c, c)] = OWED * self.used.iter().flatten().map(|k| of.at(*k).powi(2)).sum::<f64>();
         }
         p
     }
@@ -378,7 +393,7 @@ impl<'a> Problem<'a> {
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let still = here.solution.clone().resize_vertically(n + q, 0.0);
         for _ in 0..5 {
-            let mut penalty = self.penalty(n + q);
+            let mut penalty = self.penalty(h, n + q);
             for i in n..n + q {
                 penalty[(i, i)] = *damping * total.matrix[(i, i)];
             }
@@ -407,7 +422,9 @@ impl<'a> Problem<'a> {
         let z = at.solution.as_slice();
         let mut zeros = z[layout.zeros.clone()].to_vec();
         if let Some(drift) = &mut h.effects.drift {
-            drift.per_second = z[layout.drift.start];
+            let goes_on = drift.per_second != 0.0;
+            let per_second = z[layout.drift.start];
+            drift.per_second = if goes_on && per_second == 0.0 { f64::MIN_POSITIVE } else { per_second };
             drift.settling = z[layout.drift.clone()].get(1).copied().unwrap_or(0.0);
             // The column started at the record's first instant, the stage's clock is the lab's.
             zeros.iter_mut().for_each(|x| *x -= z[layout.drift.start] * self.samples.time[0]);
@@ -438,6 +455,7 @@ impl<'a> Problem<'a> {
         let values = h.nonlinear();
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let unknowns = z.len() + values.len();
+        let penalty = self.penalty(&h, unknowns);
         Fitted {
             hypothesis: h,
             weights: z[layout.weights].to_vec(),
@@ -447,7 +465,7 @@ impl<'a> Problem<'a> {
             solution: at.solution.clone().resize_vertically(unknowns, 0.0),
             grams: self.grams(at, jacobian),
             bounds,
-            penalty: self.penalty(unknowns),
+            penalty,
         }
     }
 

@@ -1,0 +1,104 @@
+//! The rest of a creep that began before a record.
+//!
+//! A model's creep begins at rest. An actuator that was moved before the record began still creeps towards where it then stood: an element that
+//! is `x(0) − v(0)` away adds `c (x(0) − v(0)) exp(−t/τ)` to what it adds from rest. As the memory of the hysteresis and the phase of a tone, that is an
+//! initial condition: where the first rows of a segment show it, it is taken from them, and all later rows are predicted with it. One number stands for
+//! it: how far away the level was at which the actuator had rested, a time before the segment that lets the quick elements come to rest or does not.
+
+use std::ops::Range;
+
+use hyst_core::CreepParams;
+
+use crate::Samples;
+
+/// Share of a segment's rows that its beginning is, and fewest rows.
+const BEGINNING: usize = 10;
+const FEWEST: usize = 10;
+/// Share of the squares of the beginning that the rest has to take.
+const LEAST_SHARE: f64 = 0.5;
+
+/// What is left of a creep in each row, by what the first rows of each segment show; none where they do not show it. `residual` is what the model leaves
+/// from rest, `span` that of its motion \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
+pub(crate) fn rest(
+    samples: &Samples,
+    creep: &CreepParams<Vec<f64>>,
+    residual: &[f64],
+    settling: &[bool],
+    span: f64,
+    zero_is_known: bool,
+) -> Vec<f64> {
+    let mut rest = vec![0.0; samples.len()];
+    for (i, segment) in samples.segments.iter().enumerate() {
+        let Some(begins) = segment.clone().find(|k| !settling[*k]) else { continue };
+        let rows = begins..segment.end.min(begins + (segment.len() / BEGINNING).max(FEWEST));
+        let period = samples.period_of(i);
+        let moved_before = [0.0, rows.len() as f64 * period];
+        let shown = moved_before.map(|before| {
+            let at = |k: usize| left_of(creep, before + (k - segment.start) as f64 * period);
+            shown(residual, settling, rows.clone(), &at, zero_is_known).map(|(away, share)| (share, away, before))
+        });
+        let best = shown.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, away, before)) = best.filter(|(share, ..)| *share >= LEAST_SHARE) else { continue };
+        // It rested somewhere within its own motion.
+        let away = away.clamp(-span, span);
+        for k in segment.clone() {
+            rest[k] = away * left_of(creep, before + (k - segment.start) as f64 * period);
+        }
+    }
+    rest
+}
+
+/// What a step of one unit this time ago \[s\] still lacks.
+fn left_of(creep: &CreepParams<Vec<f64>>, seconds: f64) -> f64 {
+    creep.shares.iter().zip(&creep.seconds).map(|(c, tau)| c * (-seconds / tau).exp()).sum()
+}
+
+/// The factor at which a column takes most of the squares of some rows, and the share that it takes of them; beside a constant where the zero is not
+/// known.
+fn shown(
+    residual: &[f64],
+    settling: &[bool],
+    rows: Range<usize>,
+    column: &dyn Fn(usize) -> f64,
+    zero_is_known: bool,
+) -> Option<(f64, f64)> {
+    let rows: Vec<usize> = rows.filter(|k| !settling[*k]).collect();
+    let mean_of = |of: &dyn Fn(usize) -> f64| match zero_is_known {
+        true => 0.0,
+        false => rows.iter().map(|k| of(*k)).sum::<f64>() / rows.len() as f64,
+    };
+    let (shift, mean) = (mean_of(&|k| residual[k]), mean_of(column));
+    let (mut own, mut with, mut all) = (0.0, 0.0, 0.0);
+    for k in rows {
+        let (x, r) = (column(k) - mean, residual[k] - shift);
+        own += x * x;
+        with += x * r;
+        all += r * r;
+    }
+    (own > 0.0 && all > 0.0).then(|| (with / own, with * with / (own * all)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_rows_say_how_far_a_creep_was_from_rest() {
+        let creep = CreepParams { seconds: vec![0.5, 5.0, 50.0], shares: vec![0.01, 0.02, 0.02] };
+        let mut samples = Samples::of_columns(0.01, vec![0.0; 4000], vec![0.0; 4000]);
+        samples.segments = vec![0..2000, 2000..4000];
+        samples.file_of_segment = vec![0, 0];
+        let settling = vec![false; 4000];
+        let away = [30.0, 0.0];
+        let noise = |k: usize| 0.02 * (k as f64 * 1.7).sin();
+        let truth: Vec<f64> = (0..4000).map(|k| away[k / 2000] * left_of(&creep, 0.01 * (k % 2000) as f64)).collect();
+        for zero in [0.0, 0.3] {
+            let residual: Vec<f64> = truth.iter().enumerate().map(|(k, y)| y + noise(k) + zero).collect();
+            let rest = rest(&samples, &creep, &residual, &settling, 100.0, zero == 0.0);
+            let worst = rest.iter().zip(&truth).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+            assert!(worst < 0.05, "{worst}");
+        }
+        let nowhere = rest(&samples, &creep, &vec![0.5; 4000], &settling, 100.0, false);
+        assert!(nowhere.iter().all(|y| *y == 0.0));
+    }
+}
