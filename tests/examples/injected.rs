@@ -2,7 +2,8 @@
 //!
 //! Each effect is put into the output of the measured micromanipulator in two sizes, by equations that are not the models', and the record is
 //! fitted and diagnosed as the user would. What the record shows by itself (lag and creep) is expected beside it. A delay or lag adds to the lag
-//! that is there.
+//! that is there. Where the diagnosis says that the record cannot tell an effect from another, the name of either counts; the parameters are then
+//! those of the one that is named first, and are compared only if it is the injected one.
 
 use hyst_ident::diagnose::{DiagnoseOptions, Finding, Findings, diagnose};
 use hyst_ident::fit::{FitOptions, fit};
@@ -210,6 +211,12 @@ fn alike(one: Effect, other: Effect) -> bool {
     one == other || (late(one) && late(other))
 }
 
+/// Whether a finding is an effect, or one that the record cannot tell from it.
+fn stands_for(finding: &Finding, effect: Effect) -> bool {
+    let ties = finding.alternatives.iter().filter(|a| a.indistinguishable).map(|a| a.name);
+    std::iter::once(finding.name).chain(ties).any(|name| alike(effect, name))
+}
+
 /// A parameter of an effect, or of one that is alike, and its standard error.
 fn value(findings: &Findings, effect: Effect, name: &str) -> Option<(f64, f64)> {
     let found = findings.effects.iter().find(|f| alike(effect, f.name))?.parameters.get(name)?;
@@ -239,14 +246,22 @@ fn main() {
             })
             .expect("a changed record is sound");
             let findings = found(&record);
-            let is_told = |list: &[Effect], f: &Finding| list.iter().any(|e| alike(*e, f.name));
-            let named = changed.effects.iter().all(|e| findings.effects.iter().any(|f| alike(*e, f.name)));
-            let nothing_else = findings.effects.iter().all(|f| is_told(&own, f) || is_told(&changed.effects, f));
+            let is_told = |list: &[Effect], f: &Finding| list.iter().any(|e| stands_for(f, *e));
+            let named = changed.effects.iter().all(|e| findings.effects.iter().any(|f| stands_for(f, *e)));
+            let of_its_own =
+                |f: &Finding| is_told(&own, f) || by_itself.effects.iter().any(|by| stands_for(by, f.name));
+            let nothing_else = findings.effects.iter().all(|f| of_its_own(f) || is_told(&changed.effects, f));
             let mut told = Vec::new();
             let mut right = true;
             for (effect, parameter, truth) in &changed.truth {
                 // What is late adds to what is late already. A parameter that is not there is wrong.
                 let before = value(&by_itself, *effect, parameter).map_or(0.0, |v| v.0);
+                let named_as_another = !findings.effects.iter().any(|f| alike(*effect, f.name))
+                    && findings.effects.iter().any(|f| stands_for(f, *effect));
+                if named_as_another {
+                    told.push(format!("{parameter} not told: cannot be told apart here"));
+                    continue;
+                }
                 let Some((value, error)) = value(&findings, *effect, parameter) else {
                     right = false;
                     told.push(format!("no {parameter}"));

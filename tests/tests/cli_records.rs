@@ -73,7 +73,13 @@ fn columns_that_are_missing_or_wrong() {
 fn two_outputs_are_one_too_many() {
     let rows: Vec<String> = rows(40).iter().map(|row| format!("{row},1.5")).collect();
     let header = "time_s,voltage_v,displacement_um,force_n";
-    let message = ["bad.csv, line 1", "displacement_um", "force_n", "--map", "the load that acts on the actuator: --map load_n=force_n"];
+    let message = [
+        "bad.csv, line 1",
+        "displacement_um",
+        "force_n",
+        "--map",
+        "the load that acts on the actuator: --map load_n=force_n",
+    ];
     refused(with_header(header, &rows), &message);
 }
 

@@ -178,7 +178,7 @@ impl Limits<'_> {
             }
             Effect::Creep => {
                 let size = self.size(1e-3, 1.0, self.least, &|decade| {
-                    let bank = starts::bank(s, decade / starts::PER_DECADE);
+                    let bank = starts::bank(s, self.scan.problem.only_loop, decade / starts::PER_DECADE);
                     self.scan.behind(Effects { creep: Some(bank), ..Effects::default() })
                 })?;
                 Limit::of(size, "1", "share of a step by which the output goes on in each decade of time".into())

@@ -8,6 +8,7 @@ use super::score;
 use super::search::{DRIFT, Judge};
 use super::starts;
 use super::trial::Trial;
+use super::uncertainty::Undetermined;
 use crate::nested::{Cause, Hypothesis, Probe};
 
 /// Σ residual² of a probe, over that of the leader, up to which it is fitted in full: more than `BEAM_WITHIN` of the search, so that what is given up would not
@@ -25,11 +26,6 @@ enum Attempt {
     Known(Option<Box<Hypothesis>>),
     /// Where a probe from each start has led.
     Begun(Vec<Probe>),
-}
-
-/// Thermal expansion of a set \[y/K\].
-fn expansion(trial: &Trial) -> f64 {
-    trial.fit.hypothesis.effects.temperature.map_or(0.0, |p| p.expansion)
 }
 
 impl Judge<'_> {
@@ -120,7 +116,7 @@ impl Judge<'_> {
                 fitted.extend(as_it_is.and_then(|fit| Trial::of(self.problem, fit)));
             }
         }
-        let found = self.best_law(fitted)?;
+        let found = self.best_law(fitted);
         // What was given up, or stands as a probe left it, is not known to its end.
         if !overreaches
             && apart.iter().all(may_win)
@@ -133,10 +129,17 @@ impl Judge<'_> {
     }
 
     /// Which of the laws of one cause stands for it.
-    fn best_law(&self, mut fitted: Vec<Trial>) -> Result<Option<Trial>, Error> {
+    fn best_law(&self, mut fitted: Vec<Trial>) -> Option<Trial> {
         // A law whose parameters end at a bound stands for another that is simpler.
         if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
             fitted.retain(|trial| score::sensible(self.problem, trial));
+        }
+        // A drift that slows down without end has to show both that it settles and that it goes on.
+        let slows_down =
+            |trial: &Trial| trial.fit.hypothesis.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0);
+        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit).speaks_against(DRIFT, || false);
+        if fitted.iter().any(|trial| !slows_down(trial)) {
+            fitted.retain(|trial| !slows_down(trial) || !is_loose(trial));
         }
         // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());
@@ -149,21 +152,22 @@ impl Judge<'_> {
             });
             best = if better { Some(at) } else { best };
         }
-        let Some(best) = best else { return Ok(None) };
-        let chosen = if expansion(&fitted[best]) == 0.0 { best } else { self.unless_it_drifts(&fitted, best)? };
-        Ok(Some(fitted.swap_remove(chosen)))
+        best.map(|best| fitted.swap_remove(best))
     }
 
-    /// Which of the laws of a temperature: the one that expands, or the best that does not where a drift beside it does as well. A zero that moves
-    /// as steadily as the temperature may as well drift.
-    fn unless_it_drifts(&self, laws: &[Trial], expands: usize) -> Result<usize, Error> {
-        let still = (0..laws.len()).filter(|at| expansion(&laws[*at]) == 0.0);
-        let still = still.min_by(|a, b| laws[*a].total().total_cmp(&laws[*b].total()));
-        let Some(still) = still.filter(|at| laws[*at].fit.hypothesis.has_room(DRIFT)) else { return Ok(expands) };
-        // Searched and not looked up: what is known must not depend on which thread was first.
-        let scan = self.scan(&laws[still].fit)?;
-        let drifts = self.ended(&scan, DRIFT, &self.probes(&scan, DRIFT)?, f64::INFINITY)?;
-        let decided = drifts.is_none_or(|drifts| score::clearly_better(&drifts, &laws[expands], self.seed));
-        Ok(if decided { expands } else { still })
+    /// A set whose temperature expands, with a drift in the place of the expansion where that does as well: a zero that moves as steadily as the
+    /// temperature may as well drift. Asked once all else is known, since what is still missing hides which it is.
+    pub(super) fn drifts_instead(&self, set: &Trial) -> Result<Option<Trial>, Error> {
+        let mut still = set.fit.hypothesis.clone();
+        let Some(temperature) = still.effects.temperature.as_mut().filter(|p| p.expansion != 0.0) else {
+            return Ok(None);
+        };
+        temperature.expansion = 0.0;
+        if !still.has_room(DRIFT) {
+            return Ok(None);
+        }
+        let Some(still) = self.problem.fit(&still)? else { return Ok(None) };
+        let drifts = self.trials(&self.scan(&still)?, DRIFT)?;
+        Ok(drifts.filter(|drifts| !score::clearly_better(drifts, set, self.seed)))
     }
 }

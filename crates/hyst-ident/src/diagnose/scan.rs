@@ -107,7 +107,7 @@ impl<'a> Scan<'a> {
             }
             Effect::Creep => {
                 // Each element by itself: the search may take any of them.
-                let all = bank(s, 0.01 / PER_DECADE);
+                let all = bank(s, self.problem.only_loop, 0.01 / PER_DECADE);
                 let one = |i: usize| {
                     let shares = (0..all.shares.len()).map(|j| if i == j { all.shares[j] } else { 0.0 }).collect();
                     let creep = Some(hyst_core::CreepParams { shares, seconds: all.seconds.clone() });

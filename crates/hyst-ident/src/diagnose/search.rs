@@ -164,10 +164,13 @@ pub(super) fn further(
 
     let mut beam = vec![start.clone()];
     let mut best = start;
+    // The best set of what has a name.
+    let mut named = best.clone();
+    let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.is_nameless());
     // What came near to be added, and to which set.
     let mut near = (best.fit.hypothesis.causes(), Vec::new());
     for round in 1..=MOST {
-        if judge.nothing_to_gain(&best) {
+        if judge.nothing_to_gain(if nameless(&best) { &named } else { &best }) {
             break;
         }
         progress(&format!("searching for effects, round {round}"));
@@ -188,8 +191,9 @@ pub(super) fn further(
         near = (parent.clone(), Vec::new());
         for ((trial, judgement), (from, _, cause)) in trials.into_iter().zip(judged).zip(&jobs) {
             let (Some(trial), Some(judgement)) = (trial, judgement) else { continue };
-            // A set that is worse than a smaller one found before leads nowhere.
-            if trial.total() >= best.total() || !judgement.accepted() {
+            // A set that is worse than a smaller one found before leads nowhere; what has no name is no measure for what has.
+            let least = if nameless(&trial) { best.total() } else { named.total() };
+            if trial.total() >= least || !judgement.accepted() {
                 let counts = judgement.is_sure() && from.fit.hypothesis.causes() == parent;
                 let effect = cause.effect().filter(|_| counts);
                 near.1.extend(effect.map(|effect| Near { effect, cv_rmse: trial.cv_rmse(), judgement }));
@@ -207,17 +211,25 @@ pub(super) fn further(
             break;
         }
         next.sort_by(|a, b| a.total().total_cmp(&b.total()));
-        best = next[0].clone();
+        if next[0].total() < best.total() {
+            best = next[0].clone();
+        }
+        if let Some(better) = next.iter().find(|t| !nameless(t) && t.total() < named.total()) {
+            named = better.clone();
+        }
         // What has no name takes nearly anything with its many numbers, and may not put an end to the search among names.
-        let nameless = |t: &Trial| t.fit.hypothesis.causes().iter().any(|cause| cause.is_nameless());
         let far = BEAM_WITHIN * best.total();
-        let second = next.iter().skip(1).find(|t| nameless(&best) && !nameless(t));
+        let second = next.iter().skip(1).find(|t| nameless(&next[0]) && !nameless(t));
         let second = second.or_else(|| next.iter().skip(1).find(|t| t.total() <= far)).cloned();
         // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
         judge.noise = judge.noise.min(noise_floor(&problem.residual(&best.fit)?, &problem.samples.segments)).max(steps);
-        beam = std::iter::once(best.clone()).chain(second).collect();
+        beam = std::iter::once(next[0].clone()).chain(second).collect();
     }
 
+    // What has no name has to be worth its many numbers, against several effects as against one.
+    if nameless(&best) && !score::is_worth(&named, &best) {
+        best = named;
+    }
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,
     // so this ends.
     let mut left: Vec<Vec<Cause>> = Vec::new();
@@ -229,7 +241,7 @@ pub(super) fn further(
             None => {
                 progress("trying other effects in place of those found");
                 let (better, list) = swaps(&judge, &best, already, &left)?;
-                match better {
+                match better.map_or_else(|| judge.drifts_instead(&best), |better| Ok(Some(better)))? {
                     Some(better) => Some(better),
                     None => break list,
                 }
@@ -259,6 +271,10 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
     }
     let Some(still) = judge.refit(&h.without(Cause::ZeroWanders))? else { return Ok(None) };
     let Some(even) = judge.trials(&judge.scan(&still.fit)?, DRIFT)? else { return Ok(None) };
+    let drift = even.fit.hypothesis.effects.drift;
+    if drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0) {
+        return Ok(None);
+    }
     let takes_nearly_all = still.total() - even.total() >= EVEN * (still.total() - best.total());
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
 }

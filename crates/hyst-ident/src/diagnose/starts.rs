@@ -89,7 +89,9 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
             laws.map(|law| with(&|e| e.temperature = Some(of(law)))).collect()
         }
         // From nothing, and from an ordinary creep: lag and creep can hold each other in a local minimum.
-        Effect::Creep => [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, share)))).into(),
+        Effect::Creep => {
+            [0.0, 0.01].map(|share| with(&|e| e.creep = Some(bank(samples, problem.only_loop, share)))).into()
+        }
         Effect::Drift => {
             // A line; one that settles, in a quarter of the record or faster; or both: a course that gets slower and slower.
             let since_s = samples.time[0];
@@ -152,11 +154,12 @@ pub(super) fn starting_temperature(samples: &Samples) -> f64 {
     (10.0 * mean).round() / 10.0
 }
 
-/// Time constants from 30 samples (but not below a 400th of the longest segment) to three times the
-/// longest segment.
-pub(super) fn bank(samples: &Samples, share: f64) -> CreepBank {
+/// Time constants from 30 samples (but not below a 400th of the longest segment) to three times the longest segment. Where a record repeats
+/// one loop, from its period on: what goes on within it may as well be the loop's shape, or late.
+pub(super) fn bank(samples: &Samples, only_loop: Option<f64>, share: f64) -> CreepBank {
     let longest = samples.longest_segment();
-    let (first, last) = ((30.0 * samples.period).max(longest / 400.0), 3.0 * longest);
+    let loops = only_loop.map_or(0.0, |hz| (1.0 / hz).min(longest));
+    let (first, last) = ((30.0 * samples.period).max(longest / 400.0).max(loops), 3.0 * longest);
     let count = ((last / first).log10() * PER_DECADE).round().max(1.0) as usize;
     let seconds: Vec<f64> = (0..=count).map(|i| first * (last / first).powf(i as f64 / count as f64)).collect();
     CreepBank { shares: vec![share; seconds.len()], seconds }

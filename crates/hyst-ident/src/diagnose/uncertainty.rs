@@ -55,7 +55,10 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
         Effect::Load => e.load.is_some_and(|p| unsure("load.per_newton", p.per_newton)),
         Effect::Resonance => loose_mode.any(|loose| loose),
         Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
-            true => unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds),
+            true => {
+                let goes_on = p.per_second == 0.0 || !unsure("drift.per_second", p.per_second);
+                !goes_on || unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds)
+            }
             false => unsure("drift.per_second", p.per_second),
         }),
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),

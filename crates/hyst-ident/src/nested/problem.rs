@@ -156,7 +156,13 @@ impl<'a> Problem<'a> {
         let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
         base.map_or_else(
             || vec![false; self.blocks.rows.len()],
-            |base| unpredictable(&Gram::of_each(&base.blocks), &self.penalty(&Hypothesis::default(), base.solution.len()), folds),
+            |base| {
+                unpredictable(
+                    &Gram::of_each(&base.blocks),
+                    &self.penalty(&Hypothesis::default(), base.solution.len()),
+                    folds,
+                )
+            },
         )
     }
 
