@@ -18,6 +18,9 @@ const LOOPS: usize = 15;
 const VIRGIN: usize = 5;
 /// p₀ is at least this share of the mean gain: the inverse then amplifies by 20 at most.
 const FLOOR: f64 = 0.05;
+/// Largest weight of a play that only a first rise from rest moves, in mean gains. Nothing else than those rows tells its weight from the sensor's zero,
+/// and they may be a start-up.
+const STEEPEST: f64 = 2.0;
 /// Step of the difference quotients along a threshold, as a share of the input.
 const STEP: f64 = 1e-6;
 
@@ -26,6 +29,8 @@ const STEP: f64 = 1e-6;
 pub(crate) struct PiBasis {
     pub(crate) thresholds: Vec<f64>,
     pub(crate) floor: f64,
+    /// Threshold from which on only a first rise from rest moves a play.
+    pub(crate) virgin: f64,
     /// Whether the output falls where the operator rises: weights stay positive, columns change their sign.
     pub(crate) falls: bool,
 }
@@ -36,7 +41,8 @@ impl PiBasis {
     pub(crate) fn for_samples(samples: &Samples) -> Self {
         let (low, high) = samples.input_range();
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
-        Self { thresholds: even(samples, LOOPS, VIRGIN), floor: FLOOR * gain, falls: samples.falls }
+        let thresholds = even(samples, LOOPS, VIRGIN);
+        Self { thresholds, floor: FLOOR * gain, virgin: 0.5 * (high - low), falls: samples.falls }
     }
 
     /// The same with a share of the plays.
@@ -102,6 +108,10 @@ impl Basis for PiBasis {
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.thresholds.len() + 1];
         bounds[0] = Bounds::above(self.floor);
+        let steepest = STEEPEST * self.floor / FLOOR;
+        for (bound, _) in bounds[1..].iter_mut().zip(&self.thresholds).filter(|(_, r)| **r >= self.virgin) {
+            bound.upper = steepest;
+        }
         bounds
     }
 

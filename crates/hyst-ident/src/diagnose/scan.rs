@@ -74,9 +74,9 @@ impl<'a> Scan<'a> {
             Cause::Effect(effect) => self.columns(effect)?,
             Cause::ZeroWanders => Some(self.hats(&|_| 1.0)),
             Cause::GainWanders => Some(self.hats(&|k| self.motion[k])),
-            Cause::CreepGoesOn => {
-                let creep = self.from.hypothesis.effects.creep.as_ref();
-                Some(creep.map_or_else(Vec::new, |creep| owed::columns(self.problem.samples, creep)))
+            Cause::GoesOn => {
+                let h = Hypothesis { goes_on: true, ..self.from.hypothesis.clone() };
+                Some(owed::columns(self.problem.samples, &h))
             }
             Cause::SlewLimit => None,
         };

@@ -33,6 +33,8 @@ const LEAST_SHARE: f64 = 0.3;
 /// Largest share of a motion that creep may add in the end.
 const MOST_CREEP: f64 = 0.5;
 
+/// Time constant, in durations of the record, from which on what settles is a drift: what is over sooner may be how the record began.
+const LEAST_SETTLING: f64 = 0.04;
 /// Slowest tone of a sensor \[Hz\]: what swings more slowly may as well be a force or the room.
 const SLOWEST_TONE: f64 = 2.0;
 /// How exactly the frequency of a loop is known, as a share.
@@ -180,6 +182,7 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.lag.is_none_or(|p| time(p.seconds))
         && e.rate.is_none_or(|p| p.volts > 0.0)
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
+        && e.drift.is_none_or(|p| p.seconds == 0.0 || p.seconds > LEAST_SETTLING * samples.duration())
         && e.saturation.is_none_or(|p| stops_something(samples, &trial.fit, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)

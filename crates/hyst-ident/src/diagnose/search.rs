@@ -317,7 +317,7 @@ pub(super) fn with_own_laws(
 fn candidates(problem: &Problem<'_>, fit: &Fitted) -> Vec<Cause> {
     let effects = Effect::ALL.into_iter().filter(|e| *e != Effect::Asymmetry).map(Cause::Effect);
     effects
-        .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::CreepGoesOn, Cause::SlewLimit])
+        .chain([Cause::ZeroWanders, Cause::GainWanders, Cause::GoesOn, Cause::SlewLimit])
         .filter(|c| fit.hypothesis.has_room(*c) && hidden(*c, problem).is_none())
         .collect()
 }

@@ -51,7 +51,7 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
         Cause::Effect(effect) => effect,
         Cause::ZeroWanders => return Ok(vec![also(&|h| h.zero_wanders = true)]),
         Cause::GainWanders => return Ok(vec![also(&|h| h.gain_wanders = true)]),
-        Cause::CreepGoesOn => return Ok(vec![also(&|h| h.creep_goes_on = true)]),
+        Cause::GoesOn => return Ok(vec![also(&|h| h.goes_on = true)]),
         Cause::SlewLimit => {
             let limits = slew_limits(scan)?;
             return Ok(limits.into_iter().map(|v_per_s| also(&|h| h.slew_limit = Some(v_per_s))).collect());

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use hyst_core::{CreepParams, CurveSide, Error, HARMONIC_PARTS};
+use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::BaseColumns;
@@ -55,7 +55,7 @@ pub(crate) fn hat(j: usize, share: f64) -> f64 {
 
 impl Problem<'_> {
     pub(super) fn layout(&self, h: &Hypothesis) -> Layout {
-        Layout::of(h, self.width, self.zeros(), owed::count(self.samples))
+        Layout::of(h, self.width, self.zeros(), owed::count(self.samples, h))
     }
 
     /// Solves for the linear unknowns, from `near` if something is known that is nearly right.
@@ -129,7 +129,7 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (z[layout.expansion].first(), path.expansion()) {
             motion.iter_mut().zip(&shift).for_each(|(m, d)| *m += c * d);
         }
-        let relaxations = self.owed(h).flat_map(|creep| owed::relaxations(self.samples, creep));
+        let relaxations = owed::relaxations(self.samples, h).into_iter();
         relaxations.zip(&z[layout.owed]).for_each(|(of, away)| of.add_to(&mut motion, *away));
         Point { operator, motion, solution: DVector::from_column_slice(z) }
     }
@@ -232,15 +232,10 @@ impl Problem<'_> {
                 columns.push((c, self.thinned(|k| hat(j, share(k)) * point.motion[k])));
             }
         }
-        for (c, column) in layout.owed.clone().zip(self.owed(h).flat_map(|creep| owed::columns(self.samples, creep))) {
+        for (c, column) in layout.owed.clone().zip(owed::columns(self.samples, h)) {
             columns.push((c, slowed(&column)));
         }
         columns
-    }
-
-    /// The creep that goes on from before each segment, if there is one.
-    pub(super) fn owed<'h>(&self, h: &'h Hypothesis) -> impl Iterator<Item = &'h CreepParams<Vec<f64>>> {
-        h.effects.creep.iter().filter(|_| h.creep_goes_on)
     }
 
     /// What holds in the rows that count, block by block.

@@ -140,7 +140,7 @@ pub(super) fn stepped(
                     (Effect::Saturation, "low" | "high") => 1e-5 * span,
                     _ => 1e-5,
                 },
-                Cause::ZeroWanders | Cause::GainWanders | Cause::CreepGoesOn => 0.0,
+                Cause::ZeroWanders | Cause::GainWanders | Cause::GoesOn => 0.0,
             };
             // Downwards where the upper bound is near: beyond it the stage may not exist.
             let step = if *p.value + step > p.upper { -step } else { step };

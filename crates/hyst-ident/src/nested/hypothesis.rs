@@ -17,8 +17,8 @@ pub(crate) enum Cause {
     ZeroWanders,
     /// The gain wanders in time.
     GainWanders,
-    /// The creep goes on from what was done before each segment began.
-    CreepGoesOn,
+    /// What is slow, a creep or the warming of the actuator, goes on from what was before each segment.
+    GoesOn,
     /// The drive is not followed where it is steep: an amplifier whose current is limited.
     SlewLimit,
 }
@@ -28,7 +28,7 @@ impl Cause {
     pub(crate) fn effect(self) -> Option<Effect> {
         match self {
             Self::Effect(e) => Some(e),
-            Self::ZeroWanders | Self::GainWanders | Self::CreepGoesOn | Self::SlewLimit => None,
+            Self::ZeroWanders | Self::GainWanders | Self::GoesOn | Self::SlewLimit => None,
         }
     }
 
@@ -49,8 +49,8 @@ pub(crate) struct Hypothesis {
     pub(crate) zero_wanders: bool,
     /// Whether the gain wanders.
     pub(crate) gain_wanders: bool,
-    /// Whether the creep, if there is one, goes on from before each segment.
-    pub(crate) creep_goes_on: bool,
+    /// Whether what is slow goes on from before each segment.
+    pub(crate) goes_on: bool,
     /// Steepest slope that the amplifier follows \[V/s\], if it has one.
     pub(crate) slew_limit: Option<f64>,
 }
@@ -83,9 +83,19 @@ impl Hypothesis {
         let mut causes: Vec<Cause> = list.into_iter().map(Cause::Effect).collect();
         causes.extend(self.zero_wanders.then_some(Cause::ZeroWanders));
         causes.extend(self.gain_wanders.then_some(Cause::GainWanders));
-        causes.extend(self.creep_goes_on.then_some(Cause::CreepGoesOn));
+        causes.extend(self.goes_on.then_some(Cause::GoesOn));
         causes.extend(self.slew_limit.map(|_| Cause::SlewLimit));
         causes
+    }
+
+    /// Whether something has states that need not be at rest when a segment begins, and that a record may show.
+    fn is_slow(&self) -> bool {
+        self.effects.creep.is_some() || self.expands_late().is_some()
+    }
+
+    /// Time by which an expansion comes later than the temperature \[s\].
+    pub(super) fn expands_late(&self) -> Option<f64> {
+        self.effects.temperature.filter(|p| p.expansion != 0.0 && p.seconds > 0.0).map(|p| p.seconds)
     }
 
     /// Whether there is room for (another) one.
@@ -95,7 +105,7 @@ impl Hypothesis {
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
-            Cause::CreepGoesOn => self.effects.creep.is_some() && !self.creep_goes_on,
+            Cause::GoesOn => self.is_slow() && !self.goes_on,
             Cause::SlewLimit => self.slew_limit.is_none(),
         }
     }
@@ -107,9 +117,9 @@ impl Hypothesis {
             Cause::Effect(Effect::RateDependence) => (less.drag, less.effects.rate) = (None, None),
             Cause::Effect(e) => {
                 less.effects = self.effects.without(e);
-                less.creep_goes_on &= less.effects.creep.is_some();
+                less.goes_on &= less.is_slow();
             }
-            Cause::CreepGoesOn => less.creep_goes_on = false,
+            Cause::GoesOn => less.goes_on = false,
             Cause::ZeroWanders => less.zero_wanders = false,
             Cause::GainWanders => less.gain_wanders = false,
             Cause::SlewLimit => less.slew_limit = None,
@@ -130,8 +140,8 @@ impl Hypothesis {
                 Effect::Temperature.complexity() + self.effects.temperature.map_or(0, more)
             }
             Cause::Effect(e) => e.complexity(),
-            // No cause of its own: an actuator that creeps is seldom at rest when a record begins.
-            Cause::CreepGoesOn => 0,
+            // No cause of its own: an actuator is seldom at rest when a record begins.
+            Cause::GoesOn => 0,
             Cause::ZeroWanders | Cause::GainWanders => super::HATS,
             Cause::SlewLimit => 1,
         }

@@ -26,12 +26,12 @@ pub(crate) struct Layout {
     pub(crate) zones: Range<usize>,
     pub(crate) zero_hats: Range<usize>,
     pub(crate) gain_hats: Range<usize>,
-    /// What a creep still owes to the time before each segment.
+    /// What is still owed to the time before each segment.
     pub(crate) owed: Range<usize>,
 }
 
 impl Layout {
-    /// Of a record in which a creep that goes on takes `owed` unknowns.
+    /// Of a record in which what goes on from before takes `owed` unknowns.
     pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize, owed: usize) -> Self {
         let mut end = 0;
         let mut next = |count: usize| {
@@ -50,7 +50,7 @@ impl Layout {
             zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),
-            owed: next(some(h.creep_goes_on, owed)),
+            owed: next(some(h.goes_on, owed)),
         }
     }
 

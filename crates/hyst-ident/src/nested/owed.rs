@@ -1,13 +1,13 @@
-//! What a creep still owes to the time before a segment.
+//! What is still owed to the time before a segment.
 //!
 //! An element of a creep that was not at rest when a segment began, `x(0) ≠ v(0)`, adds `c (x(0) − v(0)) exp(−t/τ)` to what it adds from
 //! rest. Nothing that the record holds says how far each was away: these are unknowns of their own, but each element was somewhere within the motion. Few
-//! unknowns for each segment stand for all elements, since those of neighbouring time constants were in neighbouring places.
+//! unknowns for each segment stand for all elements, since those of neighbouring time constants were in neighbouring places. In the same way an actuator need
+//! not have had the temperature that the thermometer showed first: a late expansion adds `ε (x(0) − T(0)) exp(−t/τ)`.
 
 use std::ops::Range;
 
-use hyst_core::CreepParams;
-
+use super::Hypothesis;
 use crate::Samples;
 use crate::samples::range;
 
@@ -46,41 +46,46 @@ impl Relaxation {
 }
 
 /// How many there are in a record.
-pub(super) fn count(samples: &Samples) -> usize {
-    BANDS * samples.segments.len().min(MOST_SEGMENTS)
+pub(super) fn count(samples: &Samples, h: &Hypothesis) -> usize {
+    let bands = if h.effects.creep.is_some() { BANDS } else { 0 } + usize::from(h.expands_late().is_some());
+    bands * samples.segments.len().min(MOST_SEGMENTS)
 }
 
-/// All of a record, segment by segment.
-pub(super) fn relaxations(samples: &Samples, creep: &CreepParams<Vec<f64>>) -> Vec<Relaxation> {
+/// All of a record where something goes on, segment by segment: those of a creep, then those of a warming.
+pub(super) fn relaxations(samples: &Samples, h: &Hypothesis) -> Vec<Relaxation> {
+    if !h.goes_on {
+        return Vec::new();
+    }
     let mut longest: Vec<(usize, f64)> =
         samples.segments.iter().enumerate().map(|(i, s)| (i, s.len() as f64 * samples.period_of(i))).collect();
     longest.sort_by(|a, b| b.1.total_cmp(&a.1));
     longest.truncate(MOST_SEGMENTS);
     longest.sort_by_key(|(i, _)| *i);
-    let elements: Vec<(f64, f64)> = creep.shares.iter().copied().zip(creep.seconds.iter().copied()).collect();
-    let of = |(i, _): (usize, f64)| {
-        let rows = samples.segments[i].clone();
-        (0..BANDS).map(move |band| (i, rows.clone(), band))
-    };
-    let relaxation = |(i, rows, band): (usize, Range<usize>, usize)| {
+    let mut bands: Vec<Vec<(f64, f64)>> = Vec::new();
+    if let Some(creep) = &h.effects.creep {
+        let elements: Vec<(f64, f64)> = creep.shares.iter().copied().zip(creep.seconds.iter().copied()).collect();
         let n = elements.len();
-        let own = &elements[band * n / BANDS..(band + 1) * n / BANDS];
-        Relaxation { rows, elements: own.iter().map(|(c, tau)| (*c, tau / samples.period_of(i))).collect() }
+        bands.extend((0..BANDS).map(|band| elements[band * n / BANDS..(band + 1) * n / BANDS].to_vec()));
+    }
+    bands.extend(h.expands_late().map(|seconds| vec![(1.0, seconds)]));
+    let relaxation = |i: usize, band: &[(f64, f64)]| {
+        let in_rows = |(c, tau): &(f64, f64)| (*c, tau / samples.period_of(i));
+        Relaxation { rows: samples.segments[i].clone(), elements: band.iter().map(in_rows).collect() }
     };
-    longest.into_iter().flat_map(of).map(relaxation).collect()
+    bands.iter().flat_map(|band| longest.iter().map(|(i, _)| relaxation(*i, band))).collect()
 }
 
 /// What each adds in each row.
-pub(crate) fn columns(samples: &Samples, creep: &CreepParams<Vec<f64>>) -> Vec<Vec<f64>> {
+pub(crate) fn columns(samples: &Samples, h: &Hypothesis) -> Vec<Vec<f64>> {
     let column = |of: &Relaxation| {
         let mut column = vec![0.0; samples.len()];
         of.add_to(&mut column, 1.0);
         column
     };
-    relaxations(samples, creep).iter().map(column).collect()
+    relaxations(samples, h).iter().map(column).collect()
 }
 
-/// How far an element was away at most, as far as the sensor has shown \[y\].
+/// How far an element was away at most, or by how much the output was, as far as the sensor has shown \[y\].
 pub(super) fn farthest(samples: &Samples) -> f64 {
     let (low, high) = range(samples.output.iter().copied());
     high - low
@@ -89,6 +94,8 @@ pub(super) fn farthest(samples: &Samples) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Effects;
+    use hyst_core::CreepParams;
 
     #[test]
     fn elements_that_were_away_add_up_to_what_a_creep_adds_that_was() {
@@ -96,15 +103,15 @@ mod tests {
         samples.segments = vec![0..100, 100..300];
         samples.file_of_segment = vec![0, 0];
         let creep = CreepParams { seconds: vec![0.5, 2.0, 7.0, 30.0], shares: vec![0.01, 0.02, 0.03, 0.04] };
-        let all = columns(&samples, &creep);
-        assert_eq!((all.len(), count(&samples)), (2 * BANDS, 2 * BANDS));
+        let h = Hypothesis { goes_on: true, ..Hypothesis::of(Effects { creep: Some(creep.clone()), ..Effects::default() }) };
+        let all = columns(&samples, &h);
+        assert_eq!((all.len(), count(&samples, &h)), (2 * BANDS, 2 * BANDS));
         let whole = |t: f64| creep.seconds.iter().zip(&creep.shares).map(|(tau, c)| c * (-t / tau).exp()).sum::<f64>();
         for k in 0..300 {
             let passed = if k < 100 { k } else { k - 100 };
-            let own = &all[if k < 100 { 0..BANDS } else { BANDS..2 * BANDS }];
-            let sum: f64 = own.iter().map(|c| c[k]).sum();
+            let sum: f64 = all.iter().map(|c| c[k]).sum();
             assert!((sum - whole(0.1 * passed as f64)).abs() < 1e-12);
-            let at: f64 = relaxations(&samples, &creep).iter().map(|r| r.at(k)).sum();
+            let at: f64 = relaxations(&samples, &h).iter().map(|r| r.at(k)).sum();
             assert!((at - sum).abs() < 1e-12);
         }
     }

@@ -231,7 +231,7 @@ impl<'a> Problem<'a> {
         if let Some(own) = &self.penalty {
             p.view_mut((0, 0), own.shape()).copy_from(own);
         }
-        let relaxations = self.owed(h).flat_map(|creep| owed::relaxations(self.samples, creep));
+        let relaxations = owed::relaxations(self.samples, h);
         for (c, of) in self.layout(h).owed.zip(relaxations) {
             p[(c, c)] = OWED * self.used.iter().flatten().map(|k| of.at(*k).powi(2)).sum::<f64>();
         }
