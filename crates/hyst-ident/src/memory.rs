@@ -328,7 +328,8 @@ mod tests {
         };
         let input: Vec<f64> = turns.windows(2).flat_map(leg).collect();
         let whole = std::slice::from_ref(&(0..input.len())).to_vec();
-        let plays = PiBasis { thresholds: vec![8.0, 17.0, 31.0, 42.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
+        let plays =
+            PiBasis { thresholds: vec![8.0, 17.0, 31.0, 42.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
         let past = path(&PAST[1..], 45.0);
         let columns = columns(&plays, 0..5, &input, &whole, &[past], &Drag::NONE);
         let noise = |k: usize| 0.005 * (1e3 * (k as f64).sin()).sin();
@@ -389,7 +390,8 @@ mod tests {
         let (u0, after) = (drive[899], [70.0, 30.0, 60.0]);
         let whole: Vec<f64> = drive.iter().chain(&after).copied().collect();
         let short: Vec<f64> = path(&in_force(drive.iter()), u0).into_iter().chain([u0]).chain(after).collect();
-        let plays = PiBasis { thresholds: vec![4.0, 11.0, 23.0, 46.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
+        let plays =
+            PiBasis { thresholds: vec![4.0, 11.0, 23.0, 46.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
         let last = |drive: &[f64]| {
             let columns = plays.columns(0..5, drive, std::slice::from_ref(&(0..drive.len())), &Drag::NONE);
             columns.iter().map(|c| c[drive.len() - 1]).collect::<Vec<_>>()
@@ -403,7 +405,8 @@ mod tests {
         let u = |k: usize| 50.0 + 45.0 * (0.02 * k as f64).sin() * (1.0 - k as f64 / 1600.0);
         let input: Vec<f64> = (0..1200).map(u).collect();
         let whole = std::slice::from_ref(&(0..1200)).to_vec();
-        let plays = PiBasis { thresholds: vec![6.0, 15.0, 30.0, 40.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
+        let plays =
+            PiBasis { thresholds: vec![6.0, 15.0, 30.0, 40.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
         let columns = plays.columns(0..5, &input, &whole, &Drag::NONE);
         let output = (0..1200).map(|k| columns.iter().map(|c| 0.05 * c[k]).sum()).collect();
         let samples = Samples {

@@ -103,7 +103,10 @@ mod tests {
         samples.segments = vec![0..100, 100..300];
         samples.file_of_segment = vec![0, 0];
         let creep = CreepParams { seconds: vec![0.5, 2.0, 7.0, 30.0], shares: vec![0.01, 0.02, 0.03, 0.04] };
-        let h = Hypothesis { goes_on: true, ..Hypothesis::of(Effects { creep: Some(creep.clone()), ..Effects::default() }) };
+        let h = Hypothesis {
+            goes_on: true,
+            ..Hypothesis::of(Effects { creep: Some(creep.clone()), ..Effects::default() })
+        };
         let all = columns(&samples, &h);
         assert_eq!((all.len(), count(&samples, &h)), (2 * BANDS, 2 * BANDS));
         let whole = |t: f64| creep.seconds.iter().zip(&creep.shares).map(|(tau, c)| c * (-t / tau).exp()).sum::<f64>();
