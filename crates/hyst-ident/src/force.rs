@@ -87,7 +87,7 @@ pub fn estimate_force(
 ) -> Result<EstimatedForce, ForceError> {
     let model = Model { effects: model.effects.without(Effect::Load), ..model.clone() };
     let free = |record: &Record| -> Result<_, ForceError> {
-        let options = SimulateOptions { temperature: options.temperature, ..SimulateOptions::default() };
+        let options = SimulateOptions { temperature: options.temperature, at_rest: true, ..SimulateOptions::default() };
         let simulated = simulate_with(&model, record, &options)?;
         let no_output = || ForceError::NoOutput { record: record.name(), column: model.output.column.clone() };
         Ok((simulated, record.output().ok_or_else(no_output)?.to_vec()))

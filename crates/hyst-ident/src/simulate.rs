@@ -33,6 +33,8 @@ pub struct SimulateOptions {
     pub temperature: Option<f64>,
     /// Whether each segment is one period of a steady state: it is passed twice through the model, and the second pass counts.
     pub periodic: bool,
+    /// Whether a creep begins at rest whatever the first rows show: where a force that the model is not told of moves the output too.
+    pub at_rest: bool,
 }
 
 /// Inputs beyond those that a model was fitted to: what it says of them, its record did not show.
@@ -167,7 +169,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             settling = start_up_rows(&samples, &residual);
         }
         // And what was done before goes on in a creep.
-        if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic) {
+        if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic && !options.at_rest) {
             let (low, high) = range(predicted.iter().copied());
             let known = options.zero == Zero::None;
             let rest = creep_rest::rest(&samples, creep, &residual, &settling, high - low, known);

@@ -188,7 +188,12 @@ impl Model {
         periodic: bool,
     ) -> PyResult<Simulation> {
         let (record, zero) = (any_record(py, record, "input")?, zero_of(zero)?);
-        let options = SimulateOptions { zero, temperature: finite("temperature", temperature)?, periodic };
+        let options = SimulateOptions {
+            zero,
+            temperature: finite("temperature", temperature)?,
+            periodic,
+            ..SimulateOptions::default()
+        };
         let simulated = py.detach(|| simulate_with(&self.0, &record, &options)).map_err(errors::fit)?;
         let (beyond, (low, high)) = (simulated.extrapolated, self.input_range());
         if beyond.rows > 0 {

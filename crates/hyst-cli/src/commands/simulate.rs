@@ -45,7 +45,11 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     let record = input::record(&args.input, &args.map.map, Need::Input)?;
     let zero = args.zero.get();
     let temperature = input::temperature(args.temperature, &model, &record);
-    let simulated = simulate_with(&model, &record, &SimulateOptions { zero, temperature, periodic: args.periodic })?;
+    let simulated = simulate_with(
+        &model,
+        &record,
+        &SimulateOptions { zero, temperature, periodic: args.periodic, ..SimulateOptions::default() },
+    )?;
 
     let replaced = input::present(&args.input, &[&predicted_column, "settling"])?;
     let extra =
