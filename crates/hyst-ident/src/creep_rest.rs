@@ -17,8 +17,16 @@ const FEWEST: usize = 10;
 /// Share of the squares of the beginning that the rest has to take.
 const LEAST_SHARE: f64 = 0.5;
 
-/// What is left of a creep in each row, by what the first rows of each segment show; none where they do not show it. `residual` is what the model leaves
-/// from rest, `span` that of its motion \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
+/// What is left of a creep.
+pub(crate) struct Rest {
+    /// What it adds in each row \[y\].
+    pub(crate) added: Vec<f64>,
+    /// How far away the level was at which the actuator had rested before each segment \[y\]; 0 where the first rows do not show that it was.
+    pub(crate) away: Vec<f64>,
+}
+
+/// What is left of a creep, by what the first rows of each segment show. `residual` is what the model leaves from rest, `span` that of its motion
+/// \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
 pub(crate) fn rest(
     samples: &Samples,
     creep: &CreepParams<Vec<f64>>,
@@ -26,8 +34,8 @@ pub(crate) fn rest(
     settling: &[bool],
     span: f64,
     zero_is_known: bool,
-) -> Vec<f64> {
-    let mut rest = vec![0.0; samples.len()];
+) -> Rest {
+    let mut rest = Rest { added: vec![0.0; samples.len()], away: vec![0.0; samples.segments.len()] };
     for (i, segment) in samples.segments.iter().enumerate() {
         let Some(begins) = segment.clone().find(|k| !settling[*k]) else { continue };
         let rows = begins..segment.end.min(begins + (segment.len() / BEGINNING).max(FEWEST));
@@ -41,8 +49,9 @@ pub(crate) fn rest(
         let Some((_, away, before)) = best.filter(|(share, ..)| *share >= LEAST_SHARE) else { continue };
         // It rested somewhere within its own motion.
         let away = away.clamp(-span, span);
+        rest.away[i] = away;
         for k in segment.clone() {
-            rest[k] = away * left_of(creep, before + (k - segment.start) as f64 * period);
+            rest.added[k] = away * left_of(creep, before + (k - segment.start) as f64 * period);
         }
     }
     rest
@@ -95,10 +104,11 @@ mod tests {
         for zero in [0.0, 0.3] {
             let residual: Vec<f64> = truth.iter().enumerate().map(|(k, y)| y + noise(k) + zero).collect();
             let rest = rest(&samples, &creep, &residual, &settling, 100.0, zero == 0.0);
-            let worst = rest.iter().zip(&truth).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+            assert!((rest.away[0] / 30.0 - 1.0).abs() < 0.05 && rest.away[1] == 0.0, "{:?}", rest.away);
+            let worst = rest.added.iter().zip(&truth).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
             assert!(worst < 0.05, "{worst}");
         }
         let nowhere = rest(&samples, &creep, &vec![0.5; 4000], &settling, 100.0, false);
-        assert!(nowhere.iter().all(|y| *y == 0.0));
+        assert!(nowhere.added.iter().all(|y| *y == 0.0));
     }
 }

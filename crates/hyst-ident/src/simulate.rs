@@ -78,6 +78,9 @@ pub struct Simulation {
     pub errors: Option<Errors>,
     /// Angle \[rad\] per file by which a tone of the model is ahead of the model's clock, as the first rows of the file show it; 0 where the clock goes on.
     pub tone_ahead: Vec<f64>,
+    /// How far away from the first motion of each segment the level was at which the actuator had rested before \[output unit\], as the first rows show
+    /// it by what a creep of the model still adds; 0 where it begins at rest.
+    pub creep_away: Vec<f64>,
     /// Inputs beyond the model's own range.
     pub extrapolated: Extrapolated,
     /// Segments that do not begin at rest, but after turns of the drive that are not in the record, or as after their own first cycle.
@@ -111,6 +114,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     let mut zeros = Vec::new();
     let mut errors = None;
     let mut tone_ahead = vec![0.0; record.sources().len()];
+    let mut creep_away = vec![0.0; samples.segments.len()];
     let mut in_mid_cycle = vec![false; samples.segments.len()];
     let mut settling = samples.settling.clone();
     if let Some(output) = record.output() {
@@ -173,7 +177,8 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let (low, high) = range(predicted.iter().copied());
             let known = options.zero == Zero::None;
             let rest = creep_rest::rest(&samples, creep, &residual, &settling, high - low, known);
-            predicted.iter_mut().zip(rest).for_each(|(p, rest)| *p += rest);
+            predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
+            creep_away = rest.away;
             residual = missed(&predicted);
             settling = start_up_rows(&samples, &residual);
         }
@@ -197,7 +202,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         );
     }
     let extrapolated = Extrapolated::of(model, &samples.input);
-    Ok(Simulation { predicted, settling, zeros, errors, tone_ahead, extrapolated, in_mid_cycle })
+    Ok(Simulation { predicted, settling, zeros, errors, tone_ahead, creep_away, extrapolated, in_mid_cycle })
 }
 
 /// Rows that may have passed before each segment in which a start-up shows.

@@ -61,6 +61,13 @@ impl Simulation {
         self.simulated.tone_ahead.clone()
     }
 
+    /// How far away from the first motion of each segment the actuator had rested before [output unit], as the first rows show it by a
+    /// creep that goes on; 0 from rest.
+    #[getter]
+    fn creep_away(&self) -> Vec<f64> {
+        self.simulated.creep_away.clone()
+    }
+
     /// Inputs beyond the model's ``input_range``: ``rows``, ``largest`` (how far the farthest lies beyond), ``row`` (which).
     #[getter]
     fn extrapolated<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

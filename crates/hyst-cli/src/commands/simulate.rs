@@ -28,6 +28,9 @@ struct Summary {
     zeros: Vec<f64>,
     /// Angle in rad by which the tone of the model is ahead of the model's clock: the first rows show it; 0 where the clock goes on.
     tone_ahead_rad: f64,
+    /// How far away from the first motion of each segment the actuator had rested before, in the output's unit: the first rows show by how much a creep goes
+    /// on; 0 from rest.
+    creep_away: Vec<f64>,
     /// None without a measured output.
     errors: Option<Errors>,
     /// Inputs beyond the range of the record that the model was fitted to.
@@ -82,6 +85,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         between_samples: model.between_samples,
         zeros: simulated.zeros,
         tone_ahead_rad: simulated.tone_ahead.first().copied().unwrap_or(0.0),
+        creep_away: simulated.creep_away,
         errors: simulated.errors,
         // People and JSON count rows from 1, where there is one.
         extrapolated: text::from_one(simulated.extrapolated),
@@ -112,6 +116,13 @@ impl Summary {
                     text.push_str(&format!(
                         "\nphase of the tone, from the first rows: {}° from that of the model's clock",
                         text::short(self.tone_ahead_rad.to_degrees())
+                    ));
+                }
+                let going_on = self.creep_away.iter().filter(|away| **away != 0.0).count();
+                if going_on > 0 {
+                    text.push_str(&format!(
+                        "\ncreep from before the record, from the first rows: in {going_on} of {}",
+                        text::count(self.creep_away.len(), "segment")
                     ));
                 }
                 text

@@ -18,8 +18,6 @@ use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Simulation, Zero, simulate};
 
-/// Error of a model fitted from rest, over that of one fitted as going on from before, up to which it is handed out.
-const FROM_REST: f64 = 1.1;
 /// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
 const MAX_RISE: f64 = 1.05;
 
@@ -272,18 +270,11 @@ impl<'a> Own<'a> {
                 })
             };
             extensions.push(of(found.0, found.1.clone())?);
-            // A model is run from rest: where it follows as well when it was fitted so, that is the one.
-            if found.0.goes_on {
-                extensions.push(of(&Hypothesis { goes_on: false, ..found.0.clone() }, found.1.clone())?);
-            }
             if let Some(fit) = own.refound(known, found.0, richest, noise, seed)? {
                 extensions.push(of(&fit.hypothesis, uncertainty::standard_errors(&fit, self.samples.time[0]))?);
             }
         }
-        let left = |e: &Extension| {
-            let left = e.after.errors.as_ref().map_or(f64::INFINITY, |errors| errors.rmse_all_rows);
-            if e.hypothesis.goes_on { FROM_REST * left } else { left }
-        };
+        let left = |e: &Extension| e.after.errors.as_ref().map_or(f64::INFINITY, |errors| errors.rmse_all_rows);
         extensions.sort_by(|a, b| left(a).total_cmp(&left(b)));
         let mut best = 0;
         for (at, e) in extensions.iter().enumerate() {

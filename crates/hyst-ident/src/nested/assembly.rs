@@ -191,7 +191,7 @@ impl Problem<'_> {
         }
         put(width - 1, target);
         let total = Gram::of_all(&blocks, width);
-        let penalty = self.penalty(h, width - 1);
+        let penalty = self.penalty(h, &total, width - 1);
         let near = point.as_ref().map(|p| &p.solution).or(near).filter(|z| z.len() == width - 1);
         let solution = solve_near(&total, Some(&penalty), &self.bounds(h), near)?;
         let objective = total.error(&solution) + (solution.transpose() * &penalty * &solution)[(0, 0)];

@@ -24,15 +24,6 @@ pub(super) struct Relaxation {
 }
 
 impl Relaxation {
-    /// What they add in a row for each unit that they were away.
-    pub(super) fn at(&self, row: usize) -> f64 {
-        if !self.rows.contains(&row) {
-            return 0.0;
-        }
-        let passed = (row - self.rows.start) as f64;
-        self.elements.iter().map(|(c, rows)| c * (-passed / rows).exp()).sum()
-    }
-
     /// Adds what they add when they were `away`.
     pub(super) fn add_to(&self, motion: &mut [f64], away: f64) {
         for (c, rows) in self.elements.iter().filter(|_| away != 0.0) {
@@ -114,8 +105,6 @@ mod tests {
             let passed = if k < 100 { k } else { k - 100 };
             let sum: f64 = all.iter().map(|c| c[k]).sum();
             assert!((sum - whole(0.1 * passed as f64)).abs() < 1e-12);
-            let at: f64 = relaxations(&samples, &h).iter().map(|r| r.at(k)).sum();
-            assert!((at - sum).abs() < 1e-12);
         }
     }
 }

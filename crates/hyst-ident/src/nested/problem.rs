@@ -48,7 +48,7 @@ const STRETCHES: usize = 4;
 
 /// Highest frequency of a harmonic, in sample rates.
 const HIGHEST_TONE: f64 = 0.475;
-/// Weight of the expectation that a creep has come to rest, in that of the rows that show it.
+/// Weight of the expectation that all was at rest, in that of the rows that show it was not.
 const OWED: f64 = 1e-3;
 /// Standard deviations of white noise that both parts of a harmonic together have to exceed.
 const MIN_HARMONIC: f64 = 4.0;
@@ -64,7 +64,7 @@ pub(crate) struct Fitted {
     pub(crate) squares: f64,
     pub(crate) rows: usize,
     /// Normal equations of each block at the solution. Columns: the linear unknowns in the order of their
-    /// [`Layout`](super::Layout), change of every nonlinear parameter, and the measured output.
+    /// [`Layout`], change of every nonlinear parameter, and the measured output.
     pub(crate) grams: Vec<Gram>,
     pub(crate) solution: DVector<f64>,
     pub(crate) bounds: Vec<Bounds>,
@@ -159,7 +159,7 @@ impl<'a> Problem<'a> {
             |base| {
                 unpredictable(
                     &Gram::of_each(&base.blocks),
-                    &self.penalty(&Hypothesis::default(), base.solution.len()),
+                    &self.penalty(&Hypothesis::default(), &base.total, base.solution.len()),
                     folds,
                 )
             },
@@ -190,8 +190,10 @@ impl<'a> Problem<'a> {
         bounds.resize(layout.len(), Bounds::FREE);
         // A curve that falls would have no inverse.
         bounds[layout.zones.clone()].fill(Bounds::above(-0.9));
-        let farthest = owed::farthest(self.samples);
-        bounds[layout.owed.clone()].fill(Bounds { lower: -farthest, upper: farthest });
+        if h.goes_on {
+            let farthest = owed::farthest(self.samples);
+            bounds[layout.owed.clone()].fill(Bounds { lower: -farthest, upper: farthest });
+        }
         if h.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second == 0.0) {
             // A law that only settles.
             bounds[layout.drift.start] = Bounds::fixed(0.0);
@@ -225,15 +227,14 @@ impl<'a> Problem<'a> {
         bounds
     }
 
-    /// The base's penalty, that which keeps a creep's rest at zero where no row shows it, and zero for everything else.
-    pub(super) fn penalty(&self, h: &Hypothesis, unknowns: usize) -> DMatrix<f64> {
+    /// The base's penalty, that which keeps what goes on from before at zero where no row shows it, and zero for everything else.
+    pub(super) fn penalty(&self, h: &Hypothesis, total: &Gram, unknowns: usize) -> DMatrix<f64> {
         let mut p = DMatrix::zeros(unknowns, unknowns);
         if let Some(own) = &self.penalty {
             p.view_mut((0, 0), own.shape()).copy_from(own);
         }
-        let relaxations = owed::relaxations(self.samples, h);
-        for (c, of) in self.layout(h).owed.zip(relaxations) {
-            p[(c, c)] = OWED * self.used.iter().flatten().map(|k| of.at(*k).powi(2)).sum::<f64>();
+        for c in self.layout(h).owed {
+            p[(c, c)] = OWED * total.matrix[(c, c)];
         }
         p
     }
@@ -399,7 +400,7 @@ impl<'a> Problem<'a> {
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let still = here.solution.clone().resize_vertically(n + q, 0.0);
         for _ in 0..5 {
-            let mut penalty = self.penalty(h, n + q);
+            let mut penalty = self.penalty(h, total, n + q);
             for i in n..n + q {
                 penalty[(i, i)] = *damping * total.matrix[(i, i)];
             }
@@ -461,7 +462,7 @@ impl<'a> Problem<'a> {
         let values = h.nonlinear();
         bounds.extend(values.iter().map(|(v, b)| Bounds { lower: b.lower - v, upper: b.upper - v }));
         let unknowns = z.len() + values.len();
-        let penalty = self.penalty(&h, unknowns);
+        let penalty = self.penalty(&h, &at.total, unknowns);
         Fitted {
             hypothesis: h,
             weights: z[layout.weights].to_vec(),

@@ -339,6 +339,7 @@ fn what_is_left_is_found_where_it_is() {
         errors: None,
         extrapolated: Default::default(),
         tone_ahead: Vec::new(),
+        creep_away: Vec::new(),
         in_mid_cycle: Vec::new(),
     };
     // The first segment, at rest, is noise alone.
