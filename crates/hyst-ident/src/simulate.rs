@@ -176,11 +176,19 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic && !options.at_rest) {
             let (low, high) = range(predicted.iter().copied());
             let known = options.zero == Zero::None;
-            let rest = creep_rest::rest(&samples, creep, &residual, &settling, high - low, known);
+            // What goes on looks like a start-up itself: the rows that were taken for one may be those that show it.
+            let shown_by = |hidden: &[bool]| {
+                let rest = creep_rest::rest(&samples, creep, &residual, hidden, high - low, known);
+                let left: Vec<f64> = residual.iter().zip(&rest.added).map(|(r, added)| r - added).collect();
+                let settling = start_up_rows(&samples, &left);
+                (rest, left, settling)
+            };
+            let starting = |of: &[bool]| of.iter().filter(|s| **s).count();
+            let [after, from_first] = [&settling, &samples.settling].map(|hidden| shown_by(hidden));
+            let (rest, left, now) = if starting(&from_first.2) < starting(&after.2) { from_first } else { after };
             predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
             creep_away = rest.away;
-            residual = missed(&predicted);
-            settling = start_up_rows(&samples, &residual);
+            (residual, settling) = (left, now);
         }
         if tone.is_some() {
             let turned = in_phase(&samples, &predicted, &settling, &mut tone_ahead);

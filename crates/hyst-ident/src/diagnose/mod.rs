@@ -16,6 +16,7 @@ mod changed;
 mod colour;
 mod evidence;
 mod extension;
+mod few_unknowns;
 mod findings;
 mod finer;
 mod history;
@@ -48,7 +49,7 @@ pub use suspects::{FOLLOWED, drive_options};
 
 use extension::{Own, Shaped};
 
-use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
+use crate::base::{Basis, DragParams, PiBasis, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
@@ -140,20 +141,30 @@ pub fn diagnose(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
+    let few = match &own {
+        BasisOf::Fixed(_) => BasisOf::Pi(PiBasis::for_samples(&samples)),
+        own => own.clone(),
+    };
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
         let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
+        let own = Problem::new(samples, few.as_ref(), &blocks, per_record);
+        let anew = few_unknowns::search(&own, &found, from, &start.causes(), options.seed, progress).map_err(stage)?;
+        let (problem, searched_on, found) = match anew {
+            Some(anew) => (own, few.as_ref(), anew),
+            None => (problem, &screening as &dyn Basis, found),
+        };
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
-        Ok::<_, FitError>((found, start_up_rows(samples, &residual)))
+        Ok::<_, FitError>((found, start_up_rows(samples, &residual), searched_on))
     };
-    let (mut found, starting) = searched(&samples, &start)?;
+    let (mut found, starting, mut searched_on) = searched(&samples, &start)?;
     // A transient may stand out only once what else was missing is found.
     if samples.settling.iter().zip(&starting).any(|(known, starts)| *starts && !*known) {
         progress("searching again without the start-up rows that have come to light");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
-        found = searched(&samples, &found.best.fit.hypothesis)?.0;
+        (found, _, searched_on) = searched(&samples, &found.best.fit.hypothesis)?;
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
@@ -161,7 +172,7 @@ pub fn diagnose(
         let known = Settled { fit: found.best.fit.clone(), settling: samples.settling.clone() };
         let followed = unless_followed(&samples, known, &mut |settling: &[bool]| {
             seen.settling.copy_from_slice(settling);
-            let problem = Problem::new(&seen, &screening, &blocks, per_record);
+            let problem = Problem::new(&seen, searched_on, &blocks, per_record);
             let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? else { return Ok(None) };
             let starting = start_up_rows(&seen, &problem.residual(&fit).map_err(stage)?);
             Ok::<_, FitError>(Some((fit, starting)))
@@ -169,12 +180,12 @@ pub fn diagnose(
         if followed.settling != samples.settling {
             progress("searching again with the rows that are no start-up once it is known what acts");
             samples.settling = followed.settling;
-            found = searched(&samples, &found.best.fit.hypothesis)?.0;
+            (found, _, searched_on) = searched(&samples, &found.best.fit.hypothesis)?;
         }
     }
 
     progress("asking a finer base whether it needs what was found");
-    let problem = Problem::new(&samples, &screening, &blocks, per_record);
+    let problem = Problem::new(&samples, searched_on, &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: mut richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
     // Its parameters are those of the drift alone; the zero wanders beyond it, and that is told.

@@ -138,7 +138,12 @@ pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
 
 /// Whether the second predicts better by as much as an effect has to.
 pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
-    second.cv_rmse() <= (1.0 - LEAST_FALL) * first.cv_rmse()
+    is_less(first.cv_rmse(), second.cv_rmse())
+}
+
+/// Whether the second error is less than the first by as much as an effect has to lower it.
+pub(super) fn is_less(first: f64, second: f64) -> bool {
+    second <= (1.0 - LEAST_FALL) * first
 }
 
 /// Whether the second predicts so much better that it is needed, however little its parameters are known.
@@ -206,7 +211,8 @@ fn rings(mode: &ResonanceParams, longest: f64) -> bool {
 
 /// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
 fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
-    let resolution = 3.0 / problem.samples.duration();
+    // Over the record its phase then turns by less than once against the loop.
+    let resolution = 1.0 / problem.samples.duration();
     problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
 }
 

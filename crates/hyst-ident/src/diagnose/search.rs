@@ -21,7 +21,7 @@ const BEAM_WITHIN: f64 = 3.0;
 const ALIKE: f64 = 1.1;
 /// What a drag beside a creep adds, in noise floors, up to which a faster creep is tried instead.
 const SMALL_DRAG: f64 = 2.0;
-/// Share of what a wandering zero explains that a drift has to explain to be named in its place.
+/// Share of what a wandering explains that what has a name has to explain to be named in its place.
 const EVEN: f64 = 0.9;
 /// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
 const MOST_STEP: f64 = 0.25;
@@ -162,6 +162,7 @@ pub(super) fn further(
         return Ok(Search { best: nothing, named: Vec::new(), noise, near: Vec::new(), beside_wandering: None });
     };
 
+    let first = start.total();
     let mut beam = vec![start.clone()];
     let mut best = start;
     // The best set of what has a name.
@@ -226,8 +227,10 @@ pub(super) fn further(
         beam = std::iter::once(next[0].clone()).chain(second).collect();
     }
 
-    // What has no name has to be worth its many numbers, against several effects as against one.
-    if nameless(&best) && !score::is_worth(&named, &best) {
+    // What has no name has to be worth its many numbers, against several effects as against one. It takes what they miss of each other too: where they
+    // explain nearly as much, it is not needed.
+    let explains = |set: &Trial| first - set.total();
+    if nameless(&best) && (!score::is_worth(&named, &best) || explains(&named) >= EVEN * explains(&best)) {
         best = named;
     }
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,

@@ -98,6 +98,11 @@ struct Judged<'a> {
     accepted: bool,
 }
 
+/// Whether an error is near the noise floor.
+pub(super) fn is_near(cv_rmse: f64, noise: f64) -> bool {
+    cv_rmse <= NEAR_NOISE * noise
+}
+
 /// The own base with what was found; none if it cannot be solved.
 pub(super) fn plain(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Trial>, Error> {
     Ok(problem.fit_linear(found)?.and_then(|f| Trial::of(problem, f)))
