@@ -259,3 +259,74 @@ fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
     let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
     assert!(after < 0.2 * before, "{before} {after}");
 }
+
+/// Relays that switch in three lumps, driven by stairs and a slow walk of few turns. A rich base fits a part of each of three effects and predicts
+/// badly; none shows by itself on it.
+#[test]
+fn three_effects_are_found_together_in_a_record_of_few_turns() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut spread = |middle: f64, by: f64| middle + by * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
+    let lumps = [(35.0, 10.0), (60.0, 6.0), (72.0, 18.0)];
+    let relays: Vec<(f64, f64)> = (0..3000)
+        .map(|i| {
+            let (middle, half) = lumps[i % 3];
+            let (middle, half) = (spread(middle, 4.0), spread(half, 2.0).abs());
+            (middle - half, middle + half)
+        })
+        .collect();
+    let degc = |t: f64| 22.0 + 4.0 * (0.05 * t).sin() + 3.0 * (0.083 * t).sin();
+    // As it creeps, warms up and is disturbed from outside.
+    let device = |t: &[f64], u: &[f64]| -> Vec<f64> {
+        let (mut noise, mut at) = (noise(t), vec![0.0; relays.len()]);
+        let taus: Vec<f64> = (0..8).map(|i| 0.2 * 3f64.powi(i)).collect();
+        let mut slow = [0.0; 8];
+        let mut shown = |u: f64, t: f64| {
+            for (s, (down, up)) in at.iter_mut().zip(&relays) {
+                *s = if u > *up {
+                    1.0
+                } else if u < *down {
+                    0.0
+                } else {
+                    *s
+                };
+            }
+            let moved = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
+            let follow = |(slow, tau): (&mut f64, &f64)| {
+                *slow += (1.0 - (-0.01 / tau).exp()) * (moved - *slow);
+                *slow
+            };
+            let crept: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
+            let hum = 0.06 * (std::f64::consts::TAU * 17.3 * t).sin();
+            moved + 0.02 * crept + 0.1 * (degc(t) - degc(0.0)) + hum
+        };
+        u.iter().zip(t).map(|(u, t)| shown(*u, *t) + noise()).collect()
+    };
+    let made = |name: &str, seed: u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let stairs = [20.0, 40.0, 60.0, 80.0, 100.0, 75.0, 50.0, 25.0, 0.0];
+        let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 300]).collect();
+        let (mut at, mut to) = (0.0, 90.0);
+        while input.len() < 9000 {
+            let step = f64::clamp(to - at, -0.08, 0.08);
+            at += step;
+            if step == 0.0 {
+                to = 100.0 * rng.random::<f64>();
+            }
+            input.push(at);
+        }
+        let time: Vec<f64> = (0..input.len()).map(|k| 0.01 * k as f64).collect();
+        Record::from_samples(Columns {
+            name: name.into(),
+            output: Some((OutputUnit::Micrometre, device(&time, &input))),
+            temperature: Some(time.iter().map(|t| degc(*t)).collect()),
+            time,
+            input: Some(input),
+            ..Columns::default()
+        })
+        .unwrap()
+    };
+    let d = diagnosed(Kind::Preisach, &(made("train", 1), made("test", 2)));
+    assert_eq!(names(&d), ["temperature", "creep", "interference"], "{:#?}", d.findings);
+    let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+    assert!(after < 0.5 * before, "{before} {after}");
+}

@@ -10,6 +10,8 @@ use crate::samples::range;
 
 /// Share of a segment's swing after which its memory no longer depends on the past.
 const SWEPT: f64 = 0.9;
+/// Share of a segment's swing that the rows that are no start-up have to sweep.
+const SEEN_AGAIN: f64 = 0.98;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
 
@@ -36,6 +38,28 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
         (2 * swept.unwrap_or(0)).min(u.len() / 2)
     };
     samples.segments.iter().map(window).collect()
+}
+
+/// Rows of each segment after which this and the other segments still sweep its range: of a drive that comes once nothing else in the record tells
+/// what it does, and what is missed there may not be left out as a start-up.
+fn seen_again(samples: &Samples) -> Vec<usize> {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let own: Vec<(f64, f64)> =
+        samples.segments.iter().map(|s| range(samples.input[s.clone()].iter().copied())).collect();
+    let sweep = |all: &mut (f64, f64), own: &(f64, f64)| Some(std::mem::replace(all, wider(*all, *own)));
+    let before = own.iter().scan(none, sweep);
+    let mut after: Vec<(f64, f64)> = own.iter().rev().scan(none, sweep).collect();
+    after.reverse();
+    let rows = |(((before, after), s), (low, high)): (((_, _), &std::ops::Range<usize>), &(f64, f64))| {
+        let mut seen = wider(before, after);
+        let again = samples.input[s.clone()].iter().rposition(|u| {
+            seen = wider(seen, (*u, *u));
+            seen.1.min(*high) - seen.0.max(*low) >= SEEN_AGAIN * (high - low)
+        });
+        again.unwrap_or(0)
+    };
+    before.zip(after).zip(&samples.segments).zip(&own).map(rows).collect()
 }
 
 /// The same record without the rows in which a start-up can lie.
@@ -78,7 +102,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
     let mut settling = blind.clone();
     let (low, high) = samples.input_range();
-    for (s, window) in samples.segments.iter().zip(&windows) {
+    for ((s, window), seen_again) in samples.segments.iter().zip(&windows).zip(seen_again(samples)) {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
@@ -93,7 +117,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
-        let end = (last + last / 2 + 1).min(rows.len());
+        let end = (last + last / 2 + 1).min(rows.len()).min(seen_again);
         settling[s.start..s.start + end].fill(true);
     }
     settling

@@ -183,9 +183,15 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                 let settling = start_up_rows(&samples, &left);
                 (rest, left, settling)
             };
-            let starting = |of: &[bool]| of.iter().filter(|s| **s).count();
             let [after, from_first] = [&settling, &samples.settling].map(|hidden| shown_by(hidden));
-            let (rest, left, now) = if starting(&from_first.2) < starting(&after.2) { from_first } else { after };
+            let starting = |of: &[bool]| of.iter().filter(|s| **s).count();
+            // Nor may it miss more of what is followed without them.
+            let squares = |left: &[f64]| -> f64 {
+                let followed = left.iter().zip(&after.2).filter(|(_, settling)| !**settling);
+                followed.map(|(r, _)| r * r).sum()
+            };
+            let is_better = starting(&from_first.2) < starting(&after.2) && squares(&from_first.1) <= squares(&after.1);
+            let (rest, left, now) = if is_better { from_first } else { after };
             predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
             creep_away = rest.away;
             (residual, settling) = (left, now);

@@ -20,6 +20,8 @@ use crate::simulate::{Simulation, Zero, simulate};
 
 /// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
 const MAX_RISE: f64 = 1.05;
+/// The same over all rows, start-ups too: no model says much of what began before the record, but none may go anywhere there.
+const MAX_RISE_AT_ALL: f64 = 4.0;
 
 /// What the own base was found to lack beside what was found before.
 #[derive(Default)]
@@ -340,7 +342,8 @@ impl<'a> Own<'a> {
 
     /// Whether it errs less `after` than `before`, over the rows that count for the search: a model that misses a stop, say, takes
     /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
-    /// In any case it may not err more, by [`MAX_RISE`], over the rows that are a start-up for neither.
+    /// In any case it may not err more, by [`MAX_RISE`], over the rows that are a start-up for neither, nor by [`MAX_RISE_AT_ALL`] over all that the
+    /// sensor shows.
     pub(super) fn is_helped(&self, before: &Simulation, after: &Simulation) -> bool {
         let samples = self.samples;
         let errs_less = |counts: &dyn Fn(usize) -> bool| {
@@ -349,12 +352,16 @@ impl<'a> Own<'a> {
             squares(after) < squares(before)
         };
         let both = |k: usize| !before.settling[k] && !after.settling[k];
-        let squares = |s: &Simulation| {
-            let rows = (0..samples.len()).filter(|k| both(*k));
-            rows.map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>()
+        let rises_by = |most: f64, counts: &dyn Fn(usize) -> bool| {
+            let squares = |s: &Simulation| {
+                let rows = (0..samples.len()).filter(|k| counts(*k));
+                rows.map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>()
+            };
+            squares(after) > most * most * squares(before)
         };
         (errs_less(&|_| true) || errs_less(&|k| !after.settling[k]))
-            && squares(after) <= MAX_RISE * MAX_RISE * squares(before)
+            && !rises_by(MAX_RISE, &both)
+            && !rises_by(MAX_RISE_AT_ALL, &|k| !samples.blind[k])
     }
 
     /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does

@@ -138,12 +138,7 @@ pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
 
 /// Whether the second predicts better by as much as an effect has to.
 pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
-    is_less(first.cv_rmse(), second.cv_rmse())
-}
-
-/// Whether the second error is less than the first by as much as an effect has to lower it.
-pub(super) fn is_less(first: f64, second: f64) -> bool {
-    second <= (1.0 - LEAST_FALL) * first
+    second.cv_rmse() <= (1.0 - LEAST_FALL) * first.cv_rmse()
 }
 
 /// Whether the second predicts so much better that it is needed, however little its parameters are known.

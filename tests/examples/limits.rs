@@ -1,0 +1,229 @@
+//! Whether an effect is named from the limit of detection on that a diagnosis tells, and seldom at a third of it:
+//! `cargo run --release -p hyst-tests --example limits -- [TRIALS] [SEED]`.
+//!
+//! Actuators of seven hysteresis laws without any effect are measured, fitted and diagnosed. Of the limits that this gives one is taken in each trial, and
+//! the effect is put into the same record in that size and in a third of it; each changed record is fitted and diagnosed as a user would. What an
+//! effect adds is computed from what the fitted model says of the motion, by equations that are not the models', so that the noise stays as it was. A
+//! limit of the rate is not tried: it acts on the drive before a memory that only the device has.
+
+use std::f64::consts::TAU;
+
+use hyst_ident::diagnose::{DiagnoseOptions, Limit, diagnose};
+use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::model::Effect;
+use hyst_ident::record::{Columns, OutputUnit, Record};
+use hyst_ident::simulate::{Zero, simulate};
+use hyst_tests::other_physics::Actuator;
+use rayon::prelude::*;
+
+/// Effects that are tried, in turn.
+const TRIED: [Effect; 9] = [
+    Effect::Delay,
+    Effect::Lag,
+    Effect::Creep,
+    Effect::Drift,
+    Effect::Interference,
+    Effect::Resonance,
+    Effect::Saturation,
+    Effect::Temperature,
+    Effect::Load,
+];
+
+/// Share of the limit of the smaller size.
+const BELOW: f64 = 1.0 / 3.0;
+
+/// A record, with the motion that a model says of it.
+struct Measured {
+    record: Record,
+    motion: Vec<f64>,
+}
+
+impl Measured {
+    /// Rows of each segment.
+    fn segments(&self) -> &[std::ops::Range<usize>] {
+        self.record.segments()
+    }
+
+    /// What a filter that is made anew for each segment makes of the motion.
+    fn filtered<F: FnMut(f64) -> f64>(&self, filter: impl Fn(f64) -> F) -> Vec<f64> {
+        let of = |rows: &std::ops::Range<usize>| {
+            let mut filter = filter(self.motion[rows.start]);
+            self.motion[rows.clone()].iter().map(|y| filter(*y)).collect::<Vec<f64>>()
+        };
+        self.segments().iter().flat_map(of).collect()
+    }
+
+    /// The motion with an effect of a size; `hz` is the frequency that the limit names. None for what is not tried.
+    fn with(&self, effect: Effect, size: f64, hz: f64) -> Option<Vec<f64>> {
+        let (h, time) = (self.record.sample_period(), self.record.time());
+        let whole = time[time.len() - 1] - time[0];
+        let each = |of: &dyn Fn(usize) -> f64| (0..time.len()).map(|k| self.motion[k] + of(k)).collect::<Vec<f64>>();
+        Some(match effect {
+            Effect::Delay => self.filtered(|first| {
+                let mut past = vec![first];
+                move |y| {
+                    past.push(y);
+                    let at = ((past.len() - 1) as f64 - size / h).max(0.0);
+                    let (i, part) = (at as usize, at.fract());
+                    past[i] * (1.0 - part) + past[(i + 1).min(past.len() - 1)] * part
+                }
+            }),
+            Effect::Lag => self.filtered(|first| {
+                let mut at = first;
+                move |y| {
+                    at += (1.0 - (-h / size).exp()) * (y - at);
+                    at
+                }
+            }),
+            Effect::Creep => self.filtered(|first| {
+                // Three relaxations a decade, from a few samples to the whole record.
+                let decades = (whole / (4.0 * h)).log10();
+                let taus: Vec<f64> =
+                    (0..(3.0 * decades) as i32).map(|i| 4.0 * h * 10f64.powf(f64::from(i) / 3.0)).collect();
+                let mut states = vec![first; taus.len()];
+                move |y| {
+                    let follow = |(state, tau): (&mut f64, &f64)| {
+                        *state += (1.0 - (-h / tau).exp()) * (y - *state);
+                        *state - first
+                    };
+                    y + size / 3.0 * states.iter_mut().zip(&taus).map(follow).sum::<f64>()
+                }
+            }),
+            Effect::Resonance => self.filtered(|first| {
+                // A share goes through a mode of damping 0.02, in small steps.
+                let (omega, mut at, mut speed, mut before) = (TAU * hz, first, 0.0, first);
+                move |y| {
+                    const STEPS: u32 = 40;
+                    for i in 1..=STEPS {
+                        let u = before + (y - before) * f64::from(i) / f64::from(STEPS);
+                        speed += h / f64::from(STEPS) * (omega * omega * (u - at) - 0.04 * omega * speed);
+                        at += h / f64::from(STEPS) * speed;
+                    }
+                    before = y;
+                    y + size * (at - y)
+                }
+            }),
+            Effect::Drift => each(&|k| size * (time[k] - time[0]) / whole),
+            Effect::Interference => each(&|k| size * (TAU * hz * time[k] + 1.0).sin()),
+            Effect::Saturation => {
+                let top = self.motion.iter().fold(f64::MIN, |top, y| top.max(*y));
+                self.motion.iter().map(|y| y.min(top - size)).collect()
+            }
+            Effect::Temperature => {
+                let degc = self.record.temperature()?;
+                let mean = degc.iter().sum::<f64>() / degc.len() as f64;
+                each(&|k| size * (degc[k] - mean) * self.motion[k])
+            }
+            Effect::Load => {
+                let newtons = self.record.load()?;
+                each(&|k| size * newtons[k])
+            }
+            _ => return None,
+        })
+    }
+
+    /// The record with that motion.
+    fn changed(&self, motion: &[f64]) -> Record {
+        let r = &self.record;
+        let output = r.output().unwrap_or_default();
+        let output = output.iter().zip(motion.iter().zip(&self.motion)).map(|(y, (with, without))| y + with - without);
+        let mut labels = Vec::with_capacity(r.rows());
+        (0_i64..).zip(self.segments()).for_each(|(i, rows)| labels.extend(std::iter::repeat_n(i, rows.len())));
+        Record::from_samples(Columns {
+            name: "changed".into(),
+            segment: Some(labels),
+            time: r.time().to_vec(),
+            input: Some(r.input().to_vec()),
+            output: Some((OutputUnit::Micrometre, output.collect())),
+            temperature: r.temperature().map(<[f64]>::to_vec),
+            load: r.load().map(<[f64]>::to_vec),
+            ..Columns::default()
+        })
+        .expect("a sound record stays one")
+    }
+}
+
+/// The frequency that the meaning of a limit names \[Hz\]; 0 for none.
+fn frequency(meaning: &str) -> f64 {
+    let before = meaning.split(" Hz").next().filter(|before| before.len() < meaning.len());
+    before.and_then(|before| before.rsplit(' ').next()?.parse().ok()).unwrap_or(0.0)
+}
+
+/// What came of a trial.
+struct Outcome {
+    actuator: Actuator,
+    effect: Effect,
+    size: f64,
+    unit: String,
+    /// Whether it was named at the limit and at a share of it.
+    named: [bool; 2],
+}
+
+/// One trial, with the first of the effects from `number` on that this record has a limit for; none if an actuator without an effect got a name, or has no limit.
+fn run(seed: u64, number: u64) -> Option<Outcome> {
+    let actuator = Actuator::draw(seed, number).bare();
+    let record = actuator.record(0, "train");
+    let fitted = |record: &Record| fit(record, actuator.kind, &FitOptions::default()).ok();
+    let diagnosed = |record: &Record| {
+        let model = fitted(record)?;
+        Some((diagnose(record, None, &model, &DiagnoseOptions::default(), &|_| {}).ok()?, model))
+    };
+    let (found, model) = diagnosed(&record)?;
+    let motion = simulate(&model, &record, Zero::None).ok()?.predicted;
+    if !found.findings.effects.is_empty() {
+        return None;
+    }
+    let measured = Measured { record, motion };
+    let tried = |i: usize| TRIED[(number as usize + i) % TRIED.len()];
+    let limited = (0..TRIED.len()).find_map(|i| match found.findings.limits.get(&tried(i))? {
+        Limit::Size { size, unit, meaning } => Some((tried(i), *size, unit.clone(), frequency(meaning))),
+        Limit::NotVisible { .. } => None,
+    });
+    let (effect, size, unit, hz) = limited?;
+    let named = [1.0, BELOW].map(|share| {
+        let Some(motion) = measured.with(effect, share * size, hz) else { return false };
+        let effects = diagnosed(&measured.changed(&motion)).map(|(found, _)| found.findings.effects);
+        // A tie that is declared is right with either name.
+        effects.unwrap_or_default().iter().any(|finding| {
+            let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
+            finding.name == effect || finding.alternatives.iter().any(tied)
+        })
+    });
+    Some(Outcome { actuator, effect, size, unit, named })
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
+    let (trials, seed) = (number(0, 100) as usize, number(1, 1));
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    let mut next = 0;
+    while outcomes.len() < trials {
+        let some: Vec<u64> = (next..next + 8).collect();
+        next += 8;
+        let done: Vec<Outcome> = some.par_iter().filter_map(|i| run(seed, *i)).collect();
+        for o in done.into_iter().take(trials - outcomes.len()) {
+            let said = |named: bool| if named { "named" } else { "not" };
+            println!(
+                "{:3} {:?} {}: {} of {:.3e} {}: {}; a third of it: {}",
+                outcomes.len(),
+                o.actuator.law,
+                o.actuator.kind.name(),
+                o.effect,
+                o.size,
+                o.unit,
+                said(o.named[0]),
+                said(o.named[1])
+            );
+            outcomes.push(o);
+        }
+    }
+    for (i, what) in ["at the limit", "at a third of it"].into_iter().enumerate() {
+        let count = |of: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| of(o)).count();
+        println!("{what}: named in {} of {}", count(&|o| o.named[i]), outcomes.len());
+        for effect in TRIED {
+            let (named, all) = (count(&|o| o.effect == effect && o.named[i]), count(&|o| o.effect == effect));
+            println!("  {effect}: {named} of {all}");
+        }
+    }
+}
