@@ -2,6 +2,7 @@
 
 use hyst_core::Error;
 
+use super::criteria::DIFFERS;
 use super::findings::BaseAdvice;
 use super::trial::Trial;
 use crate::base::Basis;
@@ -13,8 +14,6 @@ use crate::samples::Samples;
 
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
-/// Error of another kind over that of the own one from which on it is the better one.
-const BETTER: f64 = 0.9;
 
 /// The kind of model with convex weights that predicts left-out parts of the record best with what was found, where it is clearly better than
 /// the own base.
@@ -36,7 +35,7 @@ pub(super) fn base_advice(
     let mut best: Option<BaseAdvice> = None;
     for model in [Kind::Pi, Kind::Preisach].into_iter().filter(|kind| *kind != own.0) {
         let error = cv_rmse(basis_for(model, samples)?.as_ref()).map_err(stage)?;
-        let least = best.as_ref().map_or(BETTER * own_cv_rmse, |b| b.cv_rmse);
+        let least = best.as_ref().map_or((1.0 - DIFFERS) * own_cv_rmse, |b| b.cv_rmse);
         if let Some(cv_rmse) = error.filter(|e| *e < least) {
             best = Some(BaseAdvice { model, cv_rmse, own_cv_rmse });
         }

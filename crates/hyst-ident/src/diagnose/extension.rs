@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use hyst_core::{CurveSide, Error};
 
+use super::criteria::NEARLY_ALL;
 use super::search::{Named, Search, further, with_own_laws};
 use super::shape::Bent;
 use super::trial::Trial;
@@ -191,7 +192,7 @@ impl<'a> Own<'a> {
         let (before, floor) = (plain.total(), plain.fit.rows as f64 * noise * noise);
         let search = further(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
         let closes = search.best.cv_rmse() <= shape::CLOSED_ANEW * richest
-            && before - search.best.total() >= shape::TAKEN * (before - floor);
+            && before - search.best.total() >= NEARLY_ALL * (before - floor);
         Ok(Some(search).filter(|s| closes && !s.named.is_empty()))
     }
 

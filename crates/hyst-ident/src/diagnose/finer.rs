@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use hyst_core::Error;
 
+use super::criteria::DIFFERS;
 use super::scan::Scan;
 use super::score;
 use super::search::{Search, beyond, further};
@@ -22,12 +23,6 @@ use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
-/// An RMSE of this many noise floors counts as the floor.
-pub(super) const AT_FLOOR: f64 = 1.3;
-/// An RMSE of this many noise floors leaves a finer base nothing to find.
-const NOTHING_LEFT: f64 = 1.1;
-/// Error from which on the finer base is the better one.
-const BETTER: f64 = 0.9;
 /// Error from which on it is searched anew: it sees what the base of the search cannot.
 const FAR_BETTER: f64 = 0.7;
 /// What it leaves, in noise floors, from which on something may hide in it that is worth the time: less is mostly its own.
@@ -72,7 +67,7 @@ pub(super) fn refine(
         cv_rmse: trial.cv_rmse(),
     };
     // The triangle has no drag.
-    if found.best.cv_rmse() <= NOTHING_LEFT * found.noise || found.best.fit.hypothesis.drag.is_some() {
+    if found.best.cv_rmse() <= (1.0 + DIFFERS) * found.noise || found.best.fit.hypothesis.drag.is_some() {
         return Ok(of(&found.best));
     }
     let blocks = Blocks::new(samples, problem.blocks.rows.len(), ROWS);
@@ -91,7 +86,7 @@ pub(super) fn refine(
     let fits = from.into_iter().take(if differ { 2 } else { 1 }).map(fitted).collect::<Result<Vec<_>, _>>()?;
     let best = fits.into_iter().flatten().min_by(|a, b| a.total().total_cmp(&b.total()));
     let Some(mut best) = best else { return Ok(of(&found.best)) };
-    if best.cv_rmse() >= BETTER * found.best.cv_rmse() {
+    if best.cv_rmse() >= (1.0 - DIFFERS) * found.best.cv_rmse() {
         return Ok(of(&found.best));
     }
     if best.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()

@@ -14,6 +14,7 @@
 mod advice;
 mod changed;
 mod colour;
+mod criteria;
 mod evidence;
 mod extension;
 mod few_unknowns;

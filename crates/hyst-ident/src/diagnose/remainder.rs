@@ -1,7 +1,7 @@
 //! What is left when every effect that was found has been added.
 
+use super::criteria::{FAR_APART, NEARLY_ALL};
 use super::findings::{Remainder, RemainderKind};
-use super::finer::AT_FLOOR;
 use super::search::Search;
 use super::{colour, history};
 use crate::digits::short;
@@ -12,8 +12,6 @@ use crate::simulate::Simulation;
 
 /// A richer base that takes this share of the variance above the floor shows a lack of capacity.
 pub(super) const RICHER: f64 = 0.5;
-/// Share that counts as nearly all.
-const NEARLY_ALL: f64 = 0.9;
 /// Share from which on what a richer base takes is told.
 const MENTIONED: f64 = 0.1;
 
@@ -77,7 +75,7 @@ pub(super) fn judge(
         let what = format!("{:.2} % of span: {}", percent(rmse), nameless.join("; "));
         return left(RemainderKind::Unexplained, what);
     }
-    if rmse <= AT_FLOOR * found.noise {
+    if rmse <= FAR_APART * found.noise {
         return left(
             RemainderKind::None,
             format!(
@@ -115,7 +113,7 @@ pub(super) fn judge(
         }
     }
     let map = "a map of the input's history that this base is too coarse for";
-    let (kind, rest) = if taken >= NEARLY_ALL || (taken >= RICHER && richest <= AT_FLOOR * found.noise) {
+    let (kind, rest) = if taken >= NEARLY_ALL || (taken >= RICHER && richest <= FAR_APART * found.noise) {
         (RemainderKind::BaseCapacity, format!("nearly all of it is {map}"))
     } else if taken >= RICHER {
         let rest = format!(

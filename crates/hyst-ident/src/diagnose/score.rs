@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use hyst_core::{ResonanceParams, SaturationParams};
 
+use super::criteria::{DIFFERS, FAR_APART};
 use super::tone::stands_alone;
 use super::trial::Trial;
 use crate::Samples;
@@ -22,10 +23,6 @@ const CONFIDENCE: f64 = 0.99;
 const NO_LOSS: f64 = 0.1;
 /// Share of draws in which what is clearly better has to be better.
 const CLEARLY: f64 = 0.95;
-/// Ratio of errors beyond which two sets are told apart, however few blocks do it.
-const MOST_APART: f64 = 1.3;
-/// RMSE must fall at least by this share.
-const LEAST_FALL: f64 = 0.1;
 /// What an effect adds must be at least this many noise floors (root mean square).
 pub(super) const LEAST_OVER_NOISE: f64 = 0.5;
 /// Share of what stands above the noise floor that an effect must explain.
@@ -80,7 +77,7 @@ impl Judgement {
     }
 
     fn explains(&self) -> bool {
-        self.ratio <= 1.0 - LEAST_FALL && self.share >= LEAST_SHARE
+        self.ratio <= 1.0 - DIFFERS && self.share >= LEAST_SHARE
     }
 }
 
@@ -88,7 +85,7 @@ impl Judgement {
 /// [`Judgement`] come to.
 pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
-    let of_fall = left * (1.0 / (1.0 - LEAST_FALL).powi(2) - 1.0);
+    let of_fall = left * (1.0 / (1.0 - DIFFERS).powi(2) - 1.0);
     let of_share = (left - floor).max(0.0) * LEAST_SHARE / (1.0 - LEAST_SHARE);
     (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall).max(of_share)
 }
@@ -96,7 +93,7 @@ pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
 /// Gain from which on an effect may be accepted beside a fit that leaves this much of Σ residual² without it.
 pub(super) fn least_gain_from(rows: f64, before: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
-    let of_fall = before * (1.0 - (1.0 - LEAST_FALL).powi(2));
+    let of_fall = before * (1.0 - (1.0 - DIFFERS).powi(2));
     let of_share = (before - floor).max(0.0) * LEAST_SHARE;
     (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall.min(of_share))
 }
@@ -138,17 +135,17 @@ pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
 
 /// Whether the second predicts better by as much as an effect has to.
 pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
-    second.cv_rmse() <= (1.0 - LEAST_FALL) * first.cv_rmse()
+    second.cv_rmse() <= (1.0 - DIFFERS) * first.cv_rmse()
 }
 
 /// Whether the second predicts so much better that it is needed, however little its parameters are known.
 pub(super) fn is_far_better(first: &Trial, second: &Trial) -> bool {
-    first.cv_rmse() > MOST_APART * second.cv_rmse()
+    first.cv_rmse() > FAR_APART * second.cv_rmse()
 }
 
 /// Whether neither predicts clearly better than the other.
 pub(super) fn undecided(a: &Trial, b: &Trial, seed: u64) -> bool {
-    let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > MOST_APART.ln();
+    let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > FAR_APART.ln();
     !apart && !clearly_better(a, b, seed) && !clearly_better(b, a, seed)
 }
 

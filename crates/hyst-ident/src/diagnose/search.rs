@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use hyst_core::Error;
 use rayon::prelude::*;
 
+use super::criteria::{DIFFERS, NEARLY_ALL};
 use super::probability::Evidence;
 use super::scan::Scan;
 use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
@@ -17,12 +18,8 @@ use crate::noise::{noise_floor, quantisation};
 
 /// Σ residual², over that of the best set, beyond which a second one is not carried on beside it.
 const BEAM_WITHIN: f64 = 3.0;
-/// Error, over that of what is named, up to which what is late otherwise is alike in one loop.
-const ALIKE: f64 = 1.1;
 /// What a drag beside a creep adds, in noise floors, up to which a faster creep is tried instead.
 const SMALL_DRAG: f64 = 2.0;
-/// Share of what a wandering explains that what has a name has to explain to be named in its place.
-const EVEN: f64 = 0.9;
 /// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
 const MOST_STEP: f64 = 0.25;
 /// Effects that make the drive arrive late, and the share of what one of them explains (variance) that another beside it has to explain.
@@ -230,7 +227,7 @@ pub(super) fn further(
     // What has no name has to be worth its many numbers, against several effects as against one. It takes what they miss of each other too: where they
     // explain nearly as much, it is not needed.
     let explains = |set: &Trial| first - set.total();
-    if nameless(&best) && (!score::is_worth(&named, &best) || explains(&named) >= EVEN * explains(&best)) {
+    if nameless(&best) && (!score::is_worth(&named, &best) || explains(&named) >= NEARLY_ALL * explains(&best)) {
         best = named;
     }
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,
@@ -278,7 +275,7 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
     if drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0) {
         return Ok(None);
     }
-    let takes_nearly_all = still.total() - even.total() >= EVEN * (still.total() - best.total());
+    let takes_nearly_all = still.total() - even.total() >= NEARLY_ALL * (still.total() - best.total());
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
 }
 
@@ -398,7 +395,7 @@ fn swaps(
             // A tone that merely stands alone takes nobody's place.
             let accepted = judgement.explains_enough();
             // In one loop all that is late is alike.
-            let alike = one_loop && is_late(*other) && trial.cv_rmse() < ALIKE * best.cv_rmse();
+            let alike = one_loop && is_late(*other) && trial.cv_rmse() < (1.0 + DIFFERS) * best.cv_rmse();
             let tie = judgement.sensible && (alike || tie(judge, best, &trial));
             let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));

@@ -6,22 +6,19 @@
 
 use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
 
+use super::criteria::{DIFFERS, NEARLY_ALL};
 use super::search::{Instead, MIN_SHARE_OF_KIND, Named};
 use super::trial::Trial;
 use super::{score, starts};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, dead_zone};
 
-/// Error of the own base over that of the rich one from which on something is missing.
-const MISSING: f64 = 1.1;
 /// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
 pub(super) const CLOSED: f64 = 1.7;
 /// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
 pub(super) const CLOSED_ANEW: f64 = 1.25;
-/// Share of what stands above the noise floor that it has to take.
-pub(super) const TAKEN: f64 = 0.9;
-/// And from which on it is the curve that was missing, whatever else is left.
-const NEARLY_ALL: f64 = 0.98;
+/// Share of what stands above the noise floor from which on it is the curve that was missing, whatever else is left.
+const ALL: f64 = 0.98;
 /// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
 /// operators are too coarse for.
 const LOPSIDED: f64 = 0.25;
@@ -54,7 +51,7 @@ impl Curved {
     /// Whether it takes so much of what the base leaves above the noise without a curve that the rest may be no more than what the curve has bent.
     pub(super) fn takes(&self, plain: &Trial, noise: f64) -> bool {
         let above = plain.total() - plain.fit.rows as f64 * noise * noise;
-        self.is_lopsided && plain.total() - self.trial.total() >= TAKEN * above
+        self.is_lopsided && plain.total() - self.trial.total() >= NEARLY_ALL * above
     }
 }
 
@@ -110,7 +107,7 @@ pub(super) fn plain(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<
 
 /// Whether it misses nothing that the rich one shows.
 pub(super) fn is_complete(plain: &Trial, richest: f64) -> bool {
-    plain.cv_rmse() <= MISSING * richest
+    plain.cv_rmse() <= (1.0 + DIFFERS) * richest
 }
 
 /// The same with a curve on this side of it; none if there is one already.
@@ -190,8 +187,8 @@ pub(super) fn shape(
             let stops = stop.map(|stop| score::halves_something(problem.samples, &t.trial.fit, &stop));
             let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
-                && judgement.share >= TAKEN
-                && (t.trial.cv_rmse() <= closed * least || judgement.share >= NEARLY_ALL)
+                && judgement.share >= NEARLY_ALL
+                && (t.trial.cv_rmse() <= closed * least || judgement.share >= ALL)
                 && t.is_of_its_kind;
             Judged { tried: t, judgement, accepted }
         })
