@@ -292,7 +292,7 @@ fn three_effects_are_found_together_in_a_record_of_few_turns() {
             }
             let moved = 0.06 * u + 8.0 * at.iter().sum::<f64>() / relays.len() as f64;
             let follow = |(slow, tau): (&mut f64, &f64)| {
-                *slow += (1.0 - (-0.01 / tau).exp()) * (moved - *slow);
+                *slow += (1.0 - (-0.02 / tau).exp()) * (moved - *slow);
                 *slow
             };
             let crept: f64 = slow.iter_mut().zip(&taus).map(follow).sum();
@@ -304,17 +304,17 @@ fn three_effects_are_found_together_in_a_record_of_few_turns() {
     let made = |name: &str, seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let stairs = [20.0, 40.0, 60.0, 80.0, 100.0, 75.0, 50.0, 25.0, 0.0];
-        let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 300]).collect();
+        let mut input: Vec<f64> = stairs.iter().flat_map(|u| [*u; 150]).collect();
         let (mut at, mut to) = (0.0, 90.0);
-        while input.len() < 9000 {
-            let step = f64::clamp(to - at, -0.08, 0.08);
+        while input.len() < 4500 {
+            let step = f64::clamp(to - at, -0.16, 0.16);
             at += step;
             if step == 0.0 {
                 to = 100.0 * rng.random::<f64>();
             }
             input.push(at);
         }
-        let time: Vec<f64> = (0..input.len()).map(|k| 0.01 * k as f64).collect();
+        let time: Vec<f64> = (0..input.len()).map(|k| 0.02 * k as f64).collect();
         Record::from_samples(Columns {
             name: name.into(),
             output: Some((OutputUnit::Micrometre, device(&time, &input))),

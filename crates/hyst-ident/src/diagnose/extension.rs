@@ -353,16 +353,16 @@ impl<'a> Own<'a> {
             squares(after) < squares(before)
         };
         let both = |k: usize| !before.settling[k] && !after.settling[k];
-        let rises_by = |most: f64, counts: &dyn Fn(usize) -> bool| {
+        let stays_within = |most: f64, counts: &dyn Fn(usize) -> bool| {
             let squares = |s: &Simulation| {
                 let rows = (0..samples.len()).filter(|k| counts(*k));
                 rows.map(|k| (samples.output[k] - s.predicted[k]).powi(2)).sum::<f64>()
             };
-            squares(after) > most * most * squares(before)
+            squares(after) <= most * most * squares(before)
         };
         (errs_less(&|_| true) || errs_less(&|k| !after.settling[k]))
-            && !rises_by(MAX_RISE, &both)
-            && !rises_by(MAX_RISE_AT_ALL, &|k| !samples.blind[k])
+            && stays_within(MAX_RISE, &both)
+            && stays_within(MAX_RISE_AT_ALL, &|k| !samples.blind[k])
     }
 
     /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does

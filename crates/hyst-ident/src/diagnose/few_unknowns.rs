@@ -30,5 +30,5 @@ pub(super) fn search(
     let seen = further(few, from, already, found.noise, seed, progress)?;
     // By what was found there, not by the base alone.
     let predicts = [&found.best, &as_found].into_iter().all(|other| score::is_far_better(other, &seen.best));
-    Ok(Some(seen).filter(|_| predicts))
+    Ok(Some(seen).filter(|seen| predicts && !seen.named.is_empty()))
 }
