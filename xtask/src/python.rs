@@ -38,9 +38,9 @@ pub(crate) fn check() -> Outcome {
         let mut command = Command::new(program);
         command.current_dir(root).args(arguments).env("HYST_LOGS", &logs);
         // An environment of the caller's must not lend its packages.
+        command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
         // The other checks have compiled nearly all of it in this profile already.
         command.env("MATURIN_PEP517_ARGS", "--profile dev");
-        command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
         match command.status() {
             Ok(status) => status.success(),
             Err(error) => {
