@@ -143,11 +143,14 @@ impl Measured {
     }
 }
 
-/// The frequency that the meaning of a limit names \[Hz\]; 0 for none.
-fn frequency(meaning: &str) -> f64 {
-    let before = meaning.split(" Hz").next().filter(|before| before.len() < meaning.len());
-    before.and_then(|before| before.rsplit(' ').next()?.parse().ok()).unwrap_or(0.0)
+/// The frequency that the meaning of a limit names \[Hz\].
+fn frequency(meaning: &str) -> Option<f64> {
+    let (before, _) = meaning.split_once(" Hz")?;
+    before.rsplit(' ').next()?.parse().ok()
 }
+
+/// Trials in a row without an outcome after which no more are begun.
+const MOST_WITHOUT: u64 = 64;
 
 /// What came of a trial.
 struct Outcome {
@@ -169,22 +172,30 @@ fn run(seed: u64, number: u64) -> Option<Outcome> {
         Some((diagnose(record, None, &model, &DiagnoseOptions::default(), &|_| {}).ok()?, model))
     };
     let (found, model) = diagnosed(&record)?;
-    let motion = simulate(&model, &record, Zero::None).ok()?.predicted;
+    // The sensor's zero is no motion.
+    let motion: Vec<f64> =
+        simulate(&model, &record, Zero::None).ok()?.predicted.iter().map(|y| y - model.zero).collect();
     if !found.findings.effects.is_empty() {
         return None;
     }
     let measured = Measured { record, motion };
     let tried = |i: usize| TRIED[(number as usize + i) % TRIED.len()];
     let limited = (0..TRIED.len()).find_map(|i| match found.findings.limits.get(&tried(i))? {
-        Limit::Size { size, unit, meaning } => Some((tried(i), *size, unit.clone(), frequency(meaning))),
+        Limit::Size { size, unit, meaning } => Some((tried(i), *size, unit.clone(), meaning.clone())),
         Limit::NotVisible { .. } => None,
     });
-    let (effect, size, unit, hz) = limited?;
+    let (effect, size, unit, meaning) = limited?;
+    let hz = match effect {
+        Effect::Interference | Effect::Resonance => {
+            frequency(&meaning).expect("the limit of a tone or a mode names its frequency")
+        }
+        _ => 0.0,
+    };
     let named = [1.0, BELOW].map(|share| {
-        let Some(motion) = measured.with(effect, share * size, hz) else { return false };
-        let effects = diagnosed(&measured.changed(&motion)).map(|(found, _)| found.findings.effects);
+        let motion = measured.with(effect, share * size, hz).expect("what has a limit can be put in");
+        let (found, _) = diagnosed(&measured.changed(&motion)).expect("a record of the same rows is diagnosed as well");
         // A tie that is declared is right with either name.
-        effects.unwrap_or_default().iter().any(|finding| {
+        found.findings.effects.iter().any(|finding| {
             let tied = |a: &hyst_ident::diagnose::Alternative| a.indistinguishable && a.name == effect;
             finding.name == effect || finding.alternatives.iter().any(tied)
         })
@@ -197,8 +208,8 @@ fn main() {
     let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
     let (trials, seed) = (number(0, 100) as usize, number(1, 1));
     let mut outcomes: Vec<Outcome> = Vec::new();
-    let mut next = 0;
-    while outcomes.len() < trials {
+    let (mut next, mut last) = (0, 0);
+    while outcomes.len() < trials && next - last < MOST_WITHOUT {
         let some: Vec<u64> = (next..next + 8).collect();
         next += 8;
         let done: Vec<Outcome> = some.par_iter().filter_map(|i| run(seed, *i)).collect();
@@ -216,6 +227,7 @@ fn main() {
                 said(o.named[1])
             );
             outcomes.push(o);
+            last = next;
         }
     }
     for (i, what) in ["at the limit", "at a third of it"].into_iter().enumerate() {

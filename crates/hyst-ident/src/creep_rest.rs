@@ -25,6 +25,34 @@ pub(crate) struct Rest {
     pub(crate) away: Vec<f64>,
 }
 
+impl Rest {
+    /// Takes that of the other for each segment in which fewer rows are a start-up with it and which it follows as well in the rows that are a
+    /// start-up for neither; whether there is any. Each comes with its residual and its start-up rows.
+    pub(crate) fn take_better(
+        &mut self,
+        other: &Self,
+        samples: &Samples,
+        [(own_residual, own_starts), (residual, starts)]: [(&[f64], &[bool]); 2],
+    ) -> bool {
+        let mut any = false;
+        for (i, segment) in samples.segments.iter().enumerate() {
+            let count = |starts: &[bool]| starts[segment.clone()].iter().filter(|s| **s).count();
+            let rows = || segment.clone().filter(|k| !own_starts[*k] && !starts[*k]);
+            // About the mean: a sensor's zero says nothing of either.
+            let scatter = |residual: &[f64]| {
+                let mean = rows().map(|k| residual[k]).sum::<f64>() / rows().count().max(1) as f64;
+                rows().map(|k| (residual[k] - mean).powi(2)).sum::<f64>()
+            };
+            if count(starts) < count(own_starts) && scatter(residual) <= scatter(own_residual) {
+                self.away[i] = other.away[i];
+                self.added[segment.clone()].copy_from_slice(&other.added[segment.clone()]);
+                any = true;
+            }
+        }
+        any
+    }
+}
+
 /// What is left of a creep, by what the first rows of each segment show. `residual` is what the model leaves from rest, `span` that of its motion
 /// \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
 pub(crate) fn rest(
@@ -90,6 +118,27 @@ fn shown(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_segment_takes_the_rest_that_follows_it() {
+        let mut samples = Samples::of_columns(0.01, vec![0.0; 40], vec![0.0; 40]);
+        samples.segments = vec![0..20, 20..40];
+        let rest = |away: [f64; 2]| Rest { added: (0..40).map(|k| away[k / 20]).collect(), away: away.to_vec() };
+        let starts = |rows: [usize; 2]| (0..40).map(|k| k % 20 < rows[k / 20]).collect::<Vec<bool>>();
+        // A ramp of this height a row about any level.
+        let ramps = |of: [f64; 2]| (0..40).map(|k| 5.0 + of[k / 20] * (k % 20) as f64).collect::<Vec<f64>>();
+        let mut own = rest([1.0, 2.0]);
+        let is_other = own.take_better(
+            &rest([3.0, 4.0]),
+            &samples,
+            [(&ramps([1.0, 1.0]), &starts([5, 5])), (&ramps([0.9, 1.1]), &starts([0, 0]))],
+        );
+        assert!(is_other);
+        assert_eq!((own.away[0], own.added[0]), (3.0, 3.0), "fewer rows are a start-up, and it errs less");
+        assert_eq!((own.away[1], own.added[39]), (2.0, 2.0), "it errs more");
+        let same = [(&ramps([1.0, 1.0])[..], &starts([0, 5])[..]), (&ramps([0.5, 0.5]), &starts([0, 5]))];
+        assert!(!own.take_better(&rest([7.0, 7.0]), &samples, same), "as many rows are a start-up");
+    }
 
     #[test]
     fn the_first_rows_say_how_far_a_creep_was_from_rest() {

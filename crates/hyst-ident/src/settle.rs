@@ -4,13 +4,15 @@
 //! ringing, or with an unknown memory. What was left decays, or is wiped out once the input has swept
 //! its range; until then a misfit says nothing about the model.
 
+use std::ops::Range;
+
 use crate::Samples;
 use crate::nested::Fitted;
 use crate::samples::range;
 
 /// Share of a segment's swing after which its memory no longer depends on the past.
 const SWEPT: f64 = 0.9;
-/// Share of a segment's swing that the rows that are no start-up have to sweep.
+/// Share of the levels of a segment that the rows of a fit have to pass.
 const SEEN_AGAIN: f64 = 0.98;
 /// A start-up must exceed the largest residual of the rest this many times to be called one.
 const CLEARLY: f64 = 3.0;
@@ -27,7 +29,7 @@ const EXACT: f64 = 1e-6;
 /// Rows of each segment in which a start-up transient can lie: until the input has swept its range,
 /// once more as long, and at most half of the segment.
 pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
-    let window = |s: &std::ops::Range<usize>| {
+    let window = |s: &Range<usize>| {
         let u = &samples.input[s.clone()];
         let (low, high) = range(u.iter().copied());
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -40,26 +42,72 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
-/// Rows of each segment after which this and the other segments still sweep its range: of a drive that comes once nothing else in the record tells
-/// what it does, and what is missed there may not be left out as a start-up.
-fn seen_again(samples: &Samples) -> Vec<usize> {
-    let none = (f64::INFINITY, f64::NEG_INFINITY);
-    let wider = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    let own: Vec<(f64, f64)> =
-        samples.segments.iter().map(|s| range(samples.input[s.clone()].iter().copied())).collect();
-    let sweep = |all: &mut (f64, f64), own: &(f64, f64)| Some(std::mem::replace(all, wider(*all, *own)));
-    let before = own.iter().scan(none, sweep);
-    let mut after: Vec<(f64, f64)> = own.iter().rev().scan(none, sweep).collect();
-    after.reverse();
-    let rows = |(((before, after), s), (low, high)): (((_, _), &std::ops::Range<usize>), &(f64, f64))| {
-        let mut seen = wider(before, after);
-        let again = samples.input[s.clone()].iter().rposition(|u| {
-            seen = wider(seen, (*u, *u));
-            seen.1.min(*high) - seen.0.max(*low) >= SEEN_AGAIN * (high - low)
-        });
-        again.unwrap_or(0)
+/// Levels of the input that are told apart when it is asked where a record has been.
+const LEVELS: usize = 256;
+
+/// The levels of the input that some rows pass.
+#[derive(Clone, Copy)]
+struct Levels([bool; LEVELS]);
+
+impl Levels {
+    const NONE: Self = Self([false; LEVELS]);
+
+    /// The level of an input, of those between `low` and `high`.
+    fn index(u: f64, (low, high): (f64, f64)) -> usize {
+        // A conversion from float saturates, and takes what is no number for 0.
+        (((u - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1)
+    }
+
+    /// Adds all levels between two.
+    fn pass(&mut self, from: usize, to: usize) {
+        self.0[from.min(to)..=from.max(to)].fill(true);
+    }
+
+    fn and(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] || other.0[i]))
+    }
+
+    /// Share of the levels `of` a segment that are among these.
+    fn share(&self, of: &Self) -> f64 {
+        let all = of.0.iter().filter(|l| **l).count();
+        let both = of.0.iter().zip(&self.0).filter(|(of, own)| **of && **own).count();
+        both as f64 / all.max(1) as f64
+    }
+}
+
+/// The last row of each segment from which the rest of it, together with the rows of the other segments that cannot be a start-up, still passes
+/// [`SEEN_AGAIN`] of its levels. A fit needs these rows: a drive that comes only once shows there alone what the actuator does.
+fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
+    let span = samples.input_range();
+    // Pairs of rows that the sensor shows, by the later one.
+    let steps = |rows: Range<usize>| {
+        let shown = rows.clone().skip(1).filter(|k| !samples.blind[*k] && !samples.blind[*k - 1]);
+        shown.map(|k| (k, Levels::index(samples.input[k - 1], span), Levels::index(samples.input[k], span)))
     };
-    before.zip(after).zip(&samples.segments).zip(&own).map(rows).collect()
+    let passed = |rows: Range<usize>| {
+        let mut levels = Levels::NONE;
+        steps(rows).for_each(|(_, from, to)| levels.pass(from, to));
+        levels
+    };
+    let known: Vec<Levels> = samples.segments.iter().zip(windows).map(|(s, w)| passed(s.start + w..s.end)).collect();
+    let gather = |all: &mut Levels, own: &Levels| Some(std::mem::replace(all, all.and(own)));
+    let before = known.iter().scan(Levels::NONE, gather);
+    let mut after: Vec<Levels> = known.iter().rev().scan(Levels::NONE, gather).collect();
+    after.reverse();
+    let rows = |((before, after), s): ((Levels, &Levels), &Range<usize>)| {
+        let own = passed(s.clone());
+        let mut seen = before.and(after);
+        let mut share = seen.share(&own);
+        let again = steps(s.clone()).collect::<Vec<_>>().into_iter().rev().find(|(_, from, to)| {
+            if !seen.0[*from] || !seen.0[*to] {
+                seen.pass(*from, *to);
+                share = seen.share(&own);
+            }
+            share >= SEEN_AGAIN
+        });
+        again.map_or(0, |(k, ..)| k - 1 - s.start)
+    };
+    before.zip(&after).zip(&samples.segments).map(rows).collect()
 }
 
 /// The same record without the rows in which a start-up can lie.
@@ -74,7 +122,7 @@ pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
 /// Rows of each segment after which its drive has swept its range and passes its first value in the direction in which it began: what came
 /// before a record that begins in mid-cycle. None where it never does.
 pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
-    let cycle = |s: &std::ops::Range<usize>| {
+    let cycle = |s: &Range<usize>| {
         let u = &samples.input[s.clone()];
         let (low, high) = range(u.iter().copied());
         let start = *u.first()?;
@@ -91,10 +139,22 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
 
 /// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let (windows, blind) = (windows(samples), &samples.blind);
-    let centred = centre(samples, residual, &windows, blind);
+    let windows = windows(samples);
+    marked(samples, residual, &windows, &windows)
+}
+
+/// The same, except for the rows that a fit cannot do without: after the start-up rows the record still sweeps the range of each segment.
+pub(crate) fn rows_left_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    let windows = windows(samples);
+    marked(samples, residual, &windows, &seen_again(samples, &windows))
+}
+
+/// Marks the start-up rows of each segment within its window, at most this many.
+fn marked(samples: &Samples, residual: &[f64], windows: &[usize], most: &[usize]) -> Vec<bool> {
+    let blind = &samples.blind;
+    let centred = centre(samples, residual, windows, blind);
     let outside = || {
-        let rows = samples.segments.iter().zip(&windows).flat_map(|(s, w)| s.start + w..s.end);
+        let rows = samples.segments.iter().zip(windows).flat_map(|(s, w)| s.start + w..s.end);
         rows.filter(|k| !blind[*k]).map(|k| centred[k])
     };
     let n = outside().count().max(1) as f64;
@@ -102,7 +162,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
     let mut settling = blind.clone();
     let (low, high) = samples.input_range();
-    for ((s, window), seen_again) in samples.segments.iter().zip(&windows).zip(seen_again(samples)) {
+    for ((s, window), most) in samples.segments.iter().zip(windows).zip(most) {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
@@ -117,7 +177,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
-        let end = (last + last / 2 + 1).min(rows.len()).min(seen_again);
+        let end = (last + last / 2 + 1).min(rows.len()).min(*most);
         settling[s.start..s.start + end].fill(true);
     }
     settling
@@ -125,7 +185,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
 
 /// Segments in which rows are a start-up.
 pub(crate) fn started(samples: &Samples, settling: &[bool]) -> Vec<bool> {
-    let starts = |s: &std::ops::Range<usize>| s.clone().any(|k| settling[k] && !samples.blind[k]);
+    let starts = |s: &Range<usize>| s.clone().any(|k| settling[k] && !samples.blind[k]);
     samples.segments.iter().map(starts).collect()
 }
 
@@ -222,6 +282,37 @@ mod tests {
         assert_eq!(missed(|k| (-((k - 900.0) / 150.0).powi(2)).exp()), 0);
         // The first branch alone, before the drive turns.
         assert!(missed(|k| (-((k - 30.0) / 10.0).powi(2)).exp()) > 30);
+    }
+
+    /// Rows of each segment that may be left out where the drive goes through these corners, ten rows between two; `hidden` are blind.
+    fn needed_from(corners: &[&[f64]], hidden: Range<usize>) -> Vec<usize> {
+        let line = |w: &[f64]| (0..10).map(|i| w[0] + (w[1] - w[0]) * f64::from(i) / 10.0).collect::<Vec<_>>();
+        let mut segments = Vec::new();
+        let mut input: Vec<f64> = Vec::new();
+        for corners in corners {
+            let start = input.len();
+            corners.windows(2).for_each(|w| input.extend(line(w)));
+            input.extend(corners.last());
+            segments.push(start..input.len());
+        }
+        let mut samples = Samples::of_columns(1e-3, input.clone(), input);
+        samples.file_of_segment = vec![0; segments.len()];
+        samples.pasts = vec![Vec::new(); segments.len()];
+        samples.segments = segments;
+        samples.blind[hidden].fill(true);
+        seen_again(&samples, &windows(&samples))
+    }
+
+    #[test]
+    fn a_fit_keeps_what_a_record_sweeps_once() {
+        assert_eq!(needed_from(&[&[0.0, 1.0]], 0..0), [0], "one ramp");
+        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0, 0.0]], 0..0), [30], "the last fall is enough");
+        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0, 0.0]], 12..41), [0], "of what is seen again nothing shows");
+        // Each of two segments that sweep once is all start-up window but for its second half.
+        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0], &[0.0, 1.0, 0.0]], 0..0), [19, 19], "either of two falls");
+        assert_eq!(needed_from(&[&[0.0, 1.0], &[0.0, 1.0]], 0..0), [0, 0], "of the lower halves nothing else shows");
+        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0], &[4.0, 5.0, 4.0, 5.0]], 0..0), [20, 20], "apart");
+        assert_eq!(needed_from(&[&[2.0, 2.0]], 0..0), [9], "a constant drive");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::creep_rest;
+use crate::creep_rest::{self, Rest};
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::memory;
@@ -78,8 +78,8 @@ pub struct Simulation {
     pub errors: Option<Errors>,
     /// Angle \[rad\] per file by which a tone of the model is ahead of the model's clock, as the first rows of the file show it; 0 where the clock goes on.
     pub tone_ahead: Vec<f64>,
-    /// How far away from the first motion of each segment the level was at which the actuator had rested before \[output unit\], as the first rows show
-    /// it by what a creep of the model still adds; 0 where it begins at rest.
+    /// Level at which the actuator rested before each segment minus the motion in its first row \[output unit\], where a creep of the model from
+    /// that level shows in the first rows; 0 where the segment begins at rest.
     pub creep_away: Vec<f64>,
     /// Inputs beyond the model's own range.
     pub extrapolated: Extrapolated,
@@ -176,22 +176,25 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic && !options.at_rest) {
             let (low, high) = range(predicted.iter().copied());
             let known = options.zero == Zero::None;
+            let rest_shown_by =
+                |hidden: &[bool]| creep_rest::rest(&samples, creep, &residual, hidden, high - low, known);
+            let mut rest = rest_shown_by(&settling);
+            let less_rest = |rest: &Rest| -> Vec<f64> {
+                let left = residual.iter().zip(&rest.added).map(|(r, added)| r - added);
+                left.collect()
+            };
+            let mut left = less_rest(&rest);
+            let mut now = start_up_rows(&samples, &left);
             // What goes on looks like a start-up itself: the rows that were taken for one may be those that show it.
-            let shown_by = |hidden: &[bool]| {
-                let rest = creep_rest::rest(&samples, creep, &residual, hidden, high - low, known);
-                let left: Vec<f64> = residual.iter().zip(&rest.added).map(|(r, added)| r - added).collect();
-                let settling = start_up_rows(&samples, &left);
-                (rest, left, settling)
-            };
-            let [after, from_first] = [&settling, &samples.settling].map(|hidden| shown_by(hidden));
-            let starting = |of: &[bool]| of.iter().filter(|s| **s).count();
-            // Nor may it miss more of what is followed without them.
-            let squares = |left: &[f64]| -> f64 {
-                let followed = left.iter().zip(&after.2).filter(|(_, settling)| !**settling);
-                followed.map(|(r, _)| r * r).sum()
-            };
-            let is_better = starting(&from_first.2) < starting(&after.2) && squares(&from_first.1) <= squares(&after.1);
-            let (rest, left, now) = if is_better { from_first } else { after };
+            if settling != samples.settling {
+                let from_first = rest_shown_by(&samples.settling);
+                let others = less_rest(&from_first);
+                let starting = start_up_rows(&samples, &others);
+                if rest.take_better(&from_first, &samples, [(&left, &now), (&others, &starting)]) {
+                    left = less_rest(&rest);
+                    now = start_up_rows(&samples, &left);
+                }
+            }
             predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
             creep_away = rest.away;
             (residual, settling) = (left, now);

@@ -118,11 +118,13 @@ impl Summary {
                         text::short(self.tone_ahead_rad.to_degrees())
                     ));
                 }
-                let going_on = self.creep_away.iter().filter(|away| **away != 0.0).count();
-                if going_on > 0 {
+                let crept: Vec<f64> = self.creep_away.iter().copied().filter(|away| *away != 0.0).collect();
+                if let Some(largest) = crept.iter().copied().reduce(|a, b| if b.abs() > a.abs() { b } else { a }) {
                     text.push_str(&format!(
-                        "\ncreep from before the record, from the first rows: in {going_on} of {}",
-                        text::count(self.creep_away.len(), "segment")
+                        "\ncreep continues from before the record in {} of {}: the actuator rested {} {unit} from where it starts",
+                        crept.len(),
+                        text::count(self.creep_away.len(), "segment"),
+                        text::short(largest)
                     ));
                 }
                 text

@@ -50,14 +50,14 @@ pub use suspects::{FOLLOWED, drive_options};
 
 use extension::{Own, Shaped};
 
-use crate::base::{Basis, DragParams, PiBasis, ROWS_PER_UNKNOWN, ScreeningBasis};
+use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, start_up_rows, unless_followed};
+use crate::settle::{Settled, rows_left_out, unless_followed};
 use crate::simulate::{Zero, simulate};
 use trial::Trial;
 
@@ -142,30 +142,32 @@ pub fn diagnose(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    let few = match &own {
-        BasisOf::Fixed(_) => BasisOf::Pi(PiBasis::for_samples(&samples)),
-        own => own.clone(),
-    };
+    // An operator that is not refitted has no unknowns that could be fewer.
+    let few = (!matches!(own, BasisOf::Fixed(_))).then(|| own.as_ref());
+    let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
         let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
-        let own = Problem::new(samples, few.as_ref(), &blocks, per_record);
-        let anew = few_unknowns::search(&own, &found, from, &start.causes(), options.seed, progress).map_err(stage)?;
-        let (problem, searched_on, found) = match anew {
-            Some(anew) => (own, few.as_ref(), anew),
-            None => (problem, &screening as &dyn Basis, found),
-        };
+        let (mut problem, mut found, mut on_own) = (problem, found, false);
+        if let Some(few) = few {
+            let own = Problem::new(samples, few, &blocks, per_record);
+            let start = (from, start.causes());
+            let anew = few_unknowns::search(&own, &found, start, options.seed, progress).map_err(stage)?;
+            if let Some(anew) = anew {
+                (problem, found, on_own) = (own, anew, true);
+            }
+        }
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
-        Ok::<_, FitError>((found, start_up_rows(samples, &residual), searched_on))
+        Ok::<_, FitError>((found, rows_left_out(samples, &residual), on_own))
     };
-    let (mut found, starting, mut searched_on) = searched(&samples, &start)?;
+    let (mut found, starting, mut on_own) = searched(&samples, &start)?;
     // A transient may stand out only once what else was missing is found.
     if samples.settling.iter().zip(&starting).any(|(known, starts)| *starts && !*known) {
         progress("searching again without the start-up rows that have come to light");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
-        (found, _, searched_on) = searched(&samples, &found.best.fit.hypothesis)?;
+        (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
@@ -173,22 +175,28 @@ pub fn diagnose(
         let known = Settled { fit: found.best.fit.clone(), settling: samples.settling.clone() };
         let followed = unless_followed(&samples, known, &mut |settling: &[bool]| {
             seen.settling.copy_from_slice(settling);
-            let problem = Problem::new(&seen, searched_on, &blocks, per_record);
+            let problem = Problem::new(&seen, base_of(on_own), &blocks, per_record);
             let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? else { return Ok(None) };
-            let starting = start_up_rows(&seen, &problem.residual(&fit).map_err(stage)?);
+            let starting = rows_left_out(&seen, &problem.residual(&fit).map_err(stage)?);
             Ok::<_, FitError>(Some((fit, starting)))
         })?;
         if followed.settling != samples.settling {
             progress("searching again with the rows that are no start-up once it is known what acts");
             samples.settling = followed.settling;
-            (found, _, searched_on) = searched(&samples, &found.best.fit.hypothesis)?;
+            (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
         }
     }
 
     progress("asking a finer base whether it needs what was found");
-    let problem = Problem::new(&samples, searched_on, &blocks, per_record);
+    let problem = Problem::new(&samples, base_of(on_own), &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: mut richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
+    // A base of few unknowns was searched: a rich one may still follow better what was found there.
+    if on_own {
+        let rich = Problem::new(&samples, &screening, &blocks, per_record);
+        let fit = rich.fit_linear(&hypothesis).map_err(stage)?;
+        richest = fit.and_then(|f| Trial::of(&rich, f)).map_or(richest, |rich| richest.min(rich.cv_rmse()));
+    }
     // Its parameters are those of the drift alone; the zero wanders beyond it, and that is told.
     if let Some(least) = found.beside_wandering.filter(|_| hypothesis.effects.drift.is_some()) {
         hypothesis.zero_wanders = true;

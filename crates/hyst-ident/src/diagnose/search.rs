@@ -159,7 +159,6 @@ pub(super) fn further(
         return Ok(Search { best: nothing, named: Vec::new(), noise, near: Vec::new(), beside_wandering: None });
     };
 
-    let first = start.total();
     let mut beam = vec![start.clone()];
     let mut best = start;
     // The best set of what has a name.
@@ -224,11 +223,15 @@ pub(super) fn further(
         beam = std::iter::once(next[0].clone()).chain(second).collect();
     }
 
-    // What has no name has to be worth its many numbers, against several effects as against one. It takes what they miss of each other too: where they
-    // explain nearly as much, it is not needed.
-    let explains = |set: &Trial| first - set.total();
-    if nameless(&best) && (!score::is_worth(&named, &best) || explains(&named) >= NEARLY_ALL * explains(&best)) {
-        best = named;
+    // What has no name has to be worth its many numbers, against several effects as against one. Where effects that were found without it take
+    // nearly all that it takes beside its own, it took what they miss of each other.
+    if nameless(&best) {
+        let names_alone = best.fit.hypothesis.causes().into_iter().filter(|c| c.is_nameless());
+        let bare = judge.refit(&names_alone.fold(best.fit.hypothesis.clone(), |h, c| h.without(c)))?;
+        let takes_nearly_all = |bare: Trial| nearly_all(bare.total(), named.total(), best.total());
+        if !score::is_worth(&named, &best) || bare.is_some_and(takes_nearly_all) {
+            best = named;
+        }
     }
     // Elimination and swaps until neither changes anything. A set that was left is never entered again,
     // so this ends.
@@ -275,8 +278,13 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
     if drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0) {
         return Ok(None);
     }
-    let takes_nearly_all = still.total() - even.total() >= NEARLY_ALL * (still.total() - best.total());
+    let takes_nearly_all = nearly_all(still.total(), even.total(), best.total());
     Ok((takes_nearly_all && judge.judge(&still, &even).accepted()).then_some(even))
+}
+
+/// Whether one set takes nearly all that another takes of what is left without either (Σ residual²).
+fn nearly_all(without: f64, one: f64, other: f64) -> bool {
+    without - one >= NEARLY_ALL * (without - other)
 }
 
 /// Whether a zero that wanders through these times and heights makes no large part of its way at once; over a gap between segments it may make
@@ -470,6 +478,14 @@ mod tests {
         } else {
             0.1 * t
         })));
+    }
+
+    #[test]
+    fn a_strong_effect_does_not_answer_for_what_another_takes() {
+        // Of 1000 a creep leaves 50, and a wandering zero beside it 10: the creep takes nothing of what the zero takes.
+        assert!(!nearly_all(50.0, 50.0, 10.0));
+        // Beside a base that holds nothing else, three names take what the wandering took.
+        assert!(nearly_all(1000.0, 12.0, 10.0));
     }
 
     #[test]
