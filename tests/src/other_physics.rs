@@ -36,11 +36,14 @@ impl Law {
     fn follow(self, x: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
         let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
         let small_steps = |mut rate: Box<dyn FnMut(f64, f64, f64) -> f64>, start: f64| -> Vec<f64> {
-            const STEPS: u32 = 12;
+            // As many as a stair needs, too: a law is stiff where its loop is narrow.
+            const FEWEST: f64 = 12.0;
+            const LARGEST: f64 = 0.002;
             let (mut z, mut from) = (start, -1.0);
             let follow = |to: &f64| {
-                let step = (to - from) / f64::from(STEPS);
-                for i in 0..STEPS {
+                let steps = ((to - from).abs() / LARGEST).ceil().max(FEWEST);
+                let step = (to - from) / steps;
+                for i in 0..steps as u32 {
                     z += rate(from + step * (f64::from(i) + 0.5), z, step);
                 }
                 from = *to;

@@ -10,6 +10,7 @@ use std::ops::Range;
 use hyst_core::CreepParams;
 
 use crate::Samples;
+use crate::settle::windows;
 
 /// Share of a segment's rows that its beginning is, and fewest rows.
 const BEGINNING: usize = 10;
@@ -27,23 +28,25 @@ pub(crate) struct Rest {
 
 impl Rest {
     /// Takes that of the other for each segment in which fewer rows are a start-up with it and which it follows as well in the rows that are a
-    /// start-up for neither; whether there is any. Each comes with its residual and its start-up rows.
+    /// start-up for neither; whether there is any. Each comes with its residual and its start-up rows. `zero_is_known` unless a constant is taken from
+    /// the record.
     pub(crate) fn take_better(
         &mut self,
         other: &Self,
         samples: &Samples,
         [(own_residual, own_starts), (residual, starts)]: [(&[f64], &[bool]); 2],
+        zero_is_known: bool,
     ) -> bool {
         let mut any = false;
         for (i, segment) in samples.segments.iter().enumerate() {
             let count = |starts: &[bool]| starts[segment.clone()].iter().filter(|s| **s).count();
             let rows = || segment.clone().filter(|k| !own_starts[*k] && !starts[*k]);
-            // About the mean: a sensor's zero says nothing of either.
-            let scatter = |residual: &[f64]| {
-                let mean = rows().map(|k| residual[k]).sum::<f64>() / rows().count().max(1) as f64;
-                rows().map(|k| (residual[k] - mean).powi(2)).sum::<f64>()
+            let squares = |residual: &[f64]| {
+                let rows: Vec<f64> = rows().map(|k| residual[k]).collect();
+                let mean = if zero_is_known { 0.0 } else { rows.iter().sum::<f64>() / rows.len().max(1) as f64 };
+                rows.iter().map(|r| (r - mean).powi(2)).sum::<f64>()
             };
-            if count(starts) < count(own_starts) && scatter(residual) <= scatter(own_residual) {
+            if count(starts) < count(own_starts) && squares(residual) <= squares(own_residual) {
                 self.away[i] = other.away[i];
                 self.added[segment.clone()].copy_from_slice(&other.added[segment.clone()]);
                 any = true;
@@ -53,7 +56,7 @@ impl Rest {
     }
 }
 
-/// What is left of a creep, by what the first rows of each segment show. `residual` is what the model leaves from rest, `span` that of its motion
+/// What is left of a creep, by what the first rows of each segment show: a tenth of it, or as many as a start-up can last. `residual` is what the model leaves from rest, `span` that of its motion
 /// \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
 pub(crate) fn rest(
     samples: &Samples,
@@ -63,20 +66,20 @@ pub(crate) fn rest(
     span: f64,
     zero_is_known: bool,
 ) -> Rest {
+    let windows = windows(samples);
     let mut rest = Rest { added: vec![0.0; samples.len()], away: vec![0.0; samples.segments.len()] };
     for (i, segment) in samples.segments.iter().enumerate() {
         let Some(begins) = segment.clone().find(|k| !settling[*k]) else { continue };
-        let rows = begins..segment.end.min(begins + (segment.len() / BEGINNING).max(FEWEST));
+        let tenth = (segment.len() / BEGINNING).max(FEWEST);
+        let rows = begins..(begins + tenth).max(segment.start + windows[i]).min(segment.end);
         let period = samples.period_of(i);
-        let moved_before = [0.0, rows.len() as f64 * period];
+        let moved_before = [0.0, tenth as f64 * period, rows.len() as f64 * period];
         let shown = moved_before.map(|before| {
             let at = |k: usize| left_of(creep, before + (k - segment.start) as f64 * period);
-            shown(residual, settling, rows.clone(), &at, zero_is_known).map(|(away, share)| (share, away, before))
+            shown(residual, settling, rows.clone(), &at, span, zero_is_known).map(|(away, share)| (share, away, before))
         });
         let best = shown.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, away, before)) = best.filter(|(share, ..)| *share >= LEAST_SHARE) else { continue };
-        // It rested somewhere within its own motion.
-        let away = away.clamp(-span, span);
         rest.away[i] = away;
         for k in segment.clone() {
             rest.added[k] = away * left_of(creep, before + (k - segment.start) as f64 * period);
@@ -85,18 +88,32 @@ pub(crate) fn rest(
     rest
 }
 
+/// Σ residual² of some first rows of a segment, each with its time from the first one \[s\], less what the rest of a creep takes of it at most.
+pub(crate) fn squares_without(creep: &CreepParams<Vec<f64>>, rows: &[(f64, f64)], span: f64) -> f64 {
+    let (mut own, mut with, mut all) = (0.0, 0.0, 0.0);
+    for (seconds, r) in rows {
+        let x = left_of(creep, *seconds);
+        own += x * x;
+        with += x * r;
+        all += r * r;
+    }
+    let away = if own > 0.0 { (with / own).clamp(-span, span) } else { 0.0 };
+    all + away * (away * own - 2.0 * with)
+}
+
 /// What a step of one unit this time ago \[s\] still lacks.
 fn left_of(creep: &CreepParams<Vec<f64>>, seconds: f64) -> f64 {
     creep.shares.iter().zip(&creep.seconds).map(|(c, tau)| c * (-seconds / tau).exp()).sum()
 }
 
-/// The factor at which a column takes most of the squares of some rows, and the share that it takes of them; beside a constant where the zero is not
-/// known.
+/// The factor, at most `span`, at which a column takes most of the squares of some rows, and the share that it takes of them; beside a constant where
+/// the zero is not known.
 fn shown(
     residual: &[f64],
     settling: &[bool],
     rows: Range<usize>,
     column: &dyn Fn(usize) -> f64,
+    span: f64,
     zero_is_known: bool,
 ) -> Option<(f64, f64)> {
     let rows: Vec<usize> = rows.filter(|k| !settling[*k]).collect();
@@ -112,7 +129,9 @@ fn shown(
         with += x * r;
         all += r * r;
     }
-    (own > 0.0 && all > 0.0).then(|| (with / own, with * with / (own * all)))
+    // It rested somewhere within its own motion.
+    let away = (with / own).clamp(-span, span);
+    (own > 0.0 && all > 0.0).then(|| (away, away * (2.0 * with - away * own) / all))
 }
 
 #[cfg(test)]
@@ -132,12 +151,13 @@ mod tests {
             &rest([3.0, 4.0]),
             &samples,
             [(&ramps([1.0, 1.0]), &starts([5, 5])), (&ramps([0.9, 1.1]), &starts([0, 0]))],
+            false,
         );
         assert!(is_other);
         assert_eq!((own.away[0], own.added[0]), (3.0, 3.0), "fewer rows are a start-up, and it errs less");
         assert_eq!((own.away[1], own.added[39]), (2.0, 2.0), "it errs more");
         let same = [(&ramps([1.0, 1.0])[..], &starts([0, 5])[..]), (&ramps([0.5, 0.5]), &starts([0, 5]))];
-        assert!(!own.take_better(&rest([7.0, 7.0]), &samples, same), "as many rows are a start-up");
+        assert!(!own.take_better(&rest([7.0, 7.0]), &samples, same, false), "as many rows are a start-up");
     }
 
     #[test]

@@ -19,7 +19,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::{Record, RecordError};
 use crate::samples::Samples;
-use crate::settle::{AT_REST, rows_left_out, windows, without_beginnings};
+use crate::settle::{AT_REST, start_up_rows, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
 
 /// A fit, and what it leaves in some rows or in every row \[y\].
@@ -478,7 +478,7 @@ fn start_up_found(
             }
         }
     }
-    samples.settling = rows_left_out(samples, &residual);
+    samples.settling = start_up_rows(samples, &residual);
     let found = if samples.settling.iter().any(|s| *s) { run(samples)? } else { all };
     Ok((found, late))
 }

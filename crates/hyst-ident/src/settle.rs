@@ -76,7 +76,7 @@ impl Levels {
 }
 
 /// The last row of each segment from which the rest of it, together with the rows of the other segments that cannot be a start-up, still passes
-/// [`SEEN_AGAIN`] of its levels. A fit needs these rows: a drive that comes only once shows there alone what the actuator does.
+/// [`SEEN_AGAIN`] of its levels.
 fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     let span = samples.input_range();
     // Pairs of rows that the sensor shows, by the later one.
@@ -137,24 +137,14 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
     samples.segments.iter().map(|s| cycle(s).map(|before| before + 1)).collect()
 }
 
-/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output.
+/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output. Rows of a drive that comes only once
+/// are none: neither a fit nor an error may leave out the only ones that tell of a part of the range.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let windows = windows(samples);
-    marked(samples, residual, &windows, &windows)
-}
-
-/// The same, except for the rows that a fit cannot do without: after the start-up rows the record still sweeps the range of each segment.
-pub(crate) fn rows_left_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let windows = windows(samples);
-    marked(samples, residual, &windows, &seen_again(samples, &windows))
-}
-
-/// Marks the start-up rows of each segment within its window, at most this many.
-fn marked(samples: &Samples, residual: &[f64], windows: &[usize], most: &[usize]) -> Vec<bool> {
-    let blind = &samples.blind;
-    let centred = centre(samples, residual, windows, blind);
+    let (windows, blind) = (windows(samples), &samples.blind);
+    let needed_from = seen_again(samples, &windows);
+    let centred = centre(samples, residual, &windows, blind);
     let outside = || {
-        let rows = samples.segments.iter().zip(windows).flat_map(|(s, w)| s.start + w..s.end);
+        let rows = samples.segments.iter().zip(&windows).flat_map(|(s, w)| s.start + w..s.end);
         rows.filter(|k| !blind[*k]).map(|k| centred[k])
     };
     let n = outside().count().max(1) as f64;
@@ -162,7 +152,7 @@ fn marked(samples: &Samples, residual: &[f64], windows: &[usize], most: &[usize]
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
     let mut settling = blind.clone();
     let (low, high) = samples.input_range();
-    for ((s, window), most) in samples.segments.iter().zip(windows).zip(most) {
+    for ((s, window), needed_from) in samples.segments.iter().zip(&windows).zip(needed_from) {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
             continue;
@@ -177,7 +167,7 @@ fn marked(samples: &Samples, residual: &[f64], windows: &[usize], most: &[usize]
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
-        let end = (last + last / 2 + 1).min(rows.len()).min(*most);
+        let end = (last + last / 2 + 1).min(rows.len()).min(needed_from);
         settling[s.start..s.start + end].fill(true);
     }
     settling

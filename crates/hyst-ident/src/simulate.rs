@@ -1,5 +1,6 @@
 //! `simulate`: what a model says about a record.
 
+use hyst_core::CreepParams;
 use serde::{Deserialize, Serialize};
 
 use crate::creep_rest::{self, Rest};
@@ -141,7 +142,8 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let drive = || Drive::new(&samples, model.between_samples, passes);
             let mut others = Vec::new();
             // The drive may have turned before the record began, ...
-            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts);
+            let creep = model.effects.creep.as_ref().filter(|_| !options.at_rest);
+            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts, creep);
             if pasts.iter().any(|past| !past.is_empty()) {
                 let mut turned = vec![0.0; samples.len()];
                 drive().run_from(&chain, |s, i, env, u0| chain.of(i).reset_after(s, env, u0, &pasts[i]), &mut turned);
@@ -190,7 +192,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                 let from_first = rest_shown_by(&samples.settling);
                 let others = less_rest(&from_first);
                 let starting = start_up_rows(&samples, &others);
-                if rest.take_better(&from_first, &samples, [(&left, &now), (&others, &starting)]) {
+                if rest.take_better(&from_first, &samples, [(&left, &now), (&others, &starting)], known) {
                     left = less_rest(&rest);
                     now = start_up_rows(&samples, &left);
                 }
@@ -238,6 +240,7 @@ fn recalled(
     drive: &Drive<'_>,
     chain: &PerSegment<HostChain>,
     asked: &[bool],
+    creep: Option<&CreepParams<Vec<f64>>>,
 ) -> Vec<Vec<f64>> {
     let windows = windows(samples);
     let (centred, away) = (centre(samples, residual, &windows, &samples.blind), memory::away(samples));
@@ -252,7 +255,12 @@ fn recalled(
             let output =
                 drive.beginning(i, windows[i], chain, |state, env, u0| chain.reset_after(state, env, u0, past));
             let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);
-            left.map(|(k, v)| (samples.output[k] - zero - v).powi(2)).sum()
+            let left = left.map(|(k, v)| (k, samples.output[k] - zero - v));
+            let Some(creep) = creep else { return left.map(|(_, r)| r * r).sum() };
+            // A creep from before is another unknown of the same rows.
+            let seconds = |k: usize| (k - rows.start) as f64 * samples.period_of(i);
+            let left: Vec<(f64, f64)> = left.map(|(k, r)| (seconds(k), r)).collect();
+            creep_rest::squares_without(creep, &left, samples.output_span())
         };
         let level = memory::level(samples, &centred, &windows, i);
         let mut pasts = memory::pasts(samples.input[rows.start], samples.input_range());

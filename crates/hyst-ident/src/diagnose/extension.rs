@@ -16,7 +16,7 @@ use crate::model::{Effect, Model};
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, limit_slope, without_sensor_effects};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, rows_left_out, unless_followed};
+use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Simulation, Zero, simulate};
 
 /// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
@@ -316,7 +316,7 @@ impl<'a> Own<'a> {
             let problem = if holds { problem.holding() } else { problem };
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
             let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
-            let starting = rows_left_out(&motion, &residual);
+            let starting = start_up_rows(&motion, &residual);
             Ok::<_, FitError>(Some((fit, starting)))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.

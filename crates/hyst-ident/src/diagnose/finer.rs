@@ -21,7 +21,7 @@ use crate::lsq::Blocks;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::samples::Samples;
-use crate::settle::rows_left_out;
+use crate::settle::start_up_rows;
 
 /// Error from which on it is searched anew: it sees what the base of the search cannot.
 const FAR_BETTER: f64 = 0.7;
@@ -76,7 +76,7 @@ pub(super) fn refine(
     let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file);
     let Some(rough) = placed(&first, &found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
     // A triangle that keeps every turn in its memory also shows how long an unknown start lasts.
-    let starting = rows_left_out(samples, &first.residual(&rough)?);
+    let starting = start_up_rows(samples, &first.residual(&rough)?);
     settled.settling.iter_mut().zip(starting).for_each(|(known, starts)| *known |= starts);
     drop(first);
     let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file);

@@ -57,7 +57,7 @@ use crate::model::{Base, Effect, Model};
 use crate::nested::{Cause, Hypothesis, Problem};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::{Settled, rows_left_out, unless_followed};
+use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Zero, simulate};
 use trial::Trial;
 
@@ -160,7 +160,7 @@ pub fn diagnose(
             }
         }
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
-        Ok::<_, FitError>((found, rows_left_out(samples, &residual), on_own))
+        Ok::<_, FitError>((found, start_up_rows(samples, &residual), on_own))
     };
     let (mut found, starting, mut on_own) = searched(&samples, &start)?;
     // A transient may stand out only once what else was missing is found.
@@ -177,7 +177,7 @@ pub fn diagnose(
             seen.settling.copy_from_slice(settling);
             let problem = Problem::new(&seen, base_of(on_own), &blocks, per_record);
             let Some(fit) = problem.fit(&found.best.fit.hypothesis).map_err(stage)? else { return Ok(None) };
-            let starting = rows_left_out(&seen, &problem.residual(&fit).map_err(stage)?);
+            let starting = start_up_rows(&seen, &problem.residual(&fit).map_err(stage)?);
             Ok::<_, FitError>(Some((fit, starting)))
         })?;
         if followed.settling != samples.settling {

@@ -13,7 +13,7 @@ use crate::lsq::Blocks;
 use crate::memory;
 use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
-use crate::settle::{rows_left_out, without_beginnings};
+use crate::settle::{start_up_rows, without_beginnings};
 
 /// How often a start is looked for, each time with what is known of it.
 const RECALLS: usize = 2;
@@ -106,7 +106,7 @@ impl Own<'_> {
             known = next;
         }
         let Some((trial, residual, _)) = fitted(&known, false).map_err(stage)? else { return Ok(None) };
-        let starting = rows_left_out(&known, &residual);
+        let starting = start_up_rows(&known, &residual);
         known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
         Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
     }

@@ -11,7 +11,7 @@ use crate::model::ZERO;
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
-use crate::settle::rows_left_out;
+use crate::settle::start_up_rows;
 
 /// Most rows that a global search looks at.
 const SEARCHED: usize = 12_000;
@@ -84,7 +84,7 @@ struct Tried {
 impl Tried {
     fn new(between: BetweenSamples, identification: &Identification<'_>, located: Located) -> Self {
         let residual = identification.residual(&located);
-        Self { between, settling: rows_left_out(identification.samples, &residual), residual, located }
+        Self { between, settling: start_up_rows(identification.samples, &residual), residual, located }
     }
 
     /// The other one, if that leaves less; and what each leaves \[y\], over the rows that are a start-up for neither.
