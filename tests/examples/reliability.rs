@@ -1,5 +1,5 @@
 //! Whether the probability of a name is what it says, on actuators of seven hysteresis laws:
-//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--fit] [--svg FILE]`.
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE]`.
 //!
 //! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to what came out, which is then training
 //! data; without it the calibration error of those that are in use is told, and `--svg` draws the reliability diagram.
@@ -121,8 +121,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let number = |i: usize, usual: u64| words.get(i).and_then(|w| w.parse().ok()).unwrap_or(usual);
     let (count, seed) = (number(0, 500), number(1, 1));
     let mut outcomes: Vec<Outcome> = Vec::new();
-    let numbers: Vec<u64> = (0..count).collect();
-    for some in numbers.chunks(8) {
+    let option = |name: &str| words.iter().position(|w| w == name).map(|at| words.get(at + 1));
+    let from = option("--from").map_or(Some(0), |word| word?.parse().ok()).ok_or("--from needs a number")?;
+    let numbers: Vec<u64> = (from..from + count).collect();
+    for some in numbers.chunks(16) {
         let done: Vec<Outcome> = some.par_iter().map(|i| run(seed, *i)).collect();
         for (i, o) in some.iter().zip(&done) {
             let told: Vec<String> = o
@@ -167,8 +169,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let all = weighed.len().max(1) as f64;
     let error: f64 = bins.iter().map(|(told, right, n)| (told - right).abs() * *n as f64 / all).sum();
     println!("expected calibration error: {:.1} % over {} names", 100.0 * error, weighed.len());
-    if let Some(at) = words.iter().position(|w| w == "--svg") {
-        draw(words.get(at + 1).ok_or("--svg needs a file")?, &bins, error)?;
+    if let Some(file) = option("--svg") {
+        draw(file.ok_or("--svg needs a file")?, &bins, error)?;
     }
     Ok(())
 }

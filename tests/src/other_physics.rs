@@ -229,11 +229,16 @@ impl Actuator {
                     .collect();
             }
             if has(Effect::Lag) {
-                let share = 1.0 - (-1.0 / size(1, 1.5, 8.0)).exp();
-                let mut y = driven[0];
+                // In small steps of a drive that goes straight from one sample to the next.
+                const STEPS: u32 = 32;
+                let samples = size(1, 1.5, 8.0);
+                let (mut y, mut from) = (driven[0], driven[0]);
                 driven.iter_mut().for_each(|u| {
-                    y += share * (*u - y);
-                    *u = y;
+                    for i in 0..STEPS {
+                        let at = from + (*u - from) * (f64::from(i) + 0.5) / f64::from(STEPS);
+                        y += (at - y) / (samples * f64::from(STEPS));
+                    }
+                    (from, *u) = (*u, y);
                 });
             }
             if has(Effect::RateDependence) {

@@ -1,4 +1,4 @@
-//! The Python package: built and installed as a user would, tested against the references.
+//! The Python package: installed by pip in a fresh environment, from a wheel of the development profile, and tested against the references.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -34,13 +34,14 @@ pub(crate) fn check() -> Outcome {
     let Some(python) = interpreter() else { return Outcome::Skipped(INSTALL.to_owned()) };
     let Some(logs) = crate::logs::made() else { return Outcome::Failed };
     let own = root.join("target").join("python-tests");
-    let run = |program: &Path, arguments: &[&str]| {
+    // The other checks have compiled nearly all of the wheel in this profile already.
+    let builds = [("MATURIN_PEP517_ARGS", "--profile dev")];
+    let run = |program: &Path, arguments: &[&str], environment: &[(&str, &str)]| {
         let mut command = Command::new(program);
         command.current_dir(root).args(arguments).env("HYST_LOGS", &logs);
         // An environment of the caller's must not lend its packages.
         command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
-        // The other checks have compiled nearly all of it in this profile already.
-        command.env("MATURIN_PEP517_ARGS", "--profile dev");
+        command.envs(environment.iter().copied());
         match command.status() {
             Ok(status) => status.success(),
             Err(error) => {
@@ -54,8 +55,8 @@ pub(crate) fn check() -> Outcome {
     let package = format!(".{}{package}", std::path::MAIN_SEPARATOR);
     let install = [&["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package], NEEDED].concat();
     let tests = ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "tests/python"];
-    let passed = run(Path::new(python), &["-m", "venv", "--clear", &own.display().to_string()])
-        && run(&own_python, &install)
-        && run(&own_python, &tests);
+    let passed = run(Path::new(python), &["-m", "venv", "--clear", &own.display().to_string()], &[])
+        && run(&own_python, &install, &builds)
+        && run(&own_python, &tests, &[]);
     if passed { Outcome::Passed } else { Outcome::Failed }
 }

@@ -11,6 +11,7 @@ use hyst_core::{Grid, PiParams, ViscousPiParams};
 
 use crate::BetweenSamples;
 use crate::base::{Basis, DragParams, FixedBasis, PiBasis, PreisachBasis};
+use crate::criteria::MINOR_SHARE;
 use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
 use crate::memory;
@@ -19,7 +20,7 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::{Record, RecordError};
 use crate::samples::Samples;
-use crate::settle::{AT_REST, start_up_rows, windows, without_beginnings};
+use crate::settle::{start_up_rows, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
 
 /// A fit, and what it leaves in some rows or in every row \[y\].
@@ -465,7 +466,7 @@ fn start_up_found(
     // by a fit that has not seen them. So too where a record begins away from 0 V: its memory there is
     // nobody's guess. If neither, they belong to the record (and hold its virgin curve).
     let (low, high) = samples.input_range();
-    let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > AT_REST * low.abs().max(high.abs()));
+    let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > MINOR_SHARE * low.abs().max(high.abs()));
     let judged_late = away || rms_late(&all.1) > 1.5 * rms_late(&late.1);
     let mut residual = if judged_late { late.1.clone() } else { all.1.clone() };
     // What has not seen them need not have all weights that they call for. What another base follows there is no start-up.

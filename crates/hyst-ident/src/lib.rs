@@ -14,6 +14,7 @@ pub mod clipping;
 pub mod compare;
 pub mod compensate;
 mod creep_rest;
+mod criteria;
 pub mod diagnose;
 pub mod digits;
 mod drive;

@@ -11,9 +11,10 @@ use hyst_core::Error;
 use rayon::prelude::*;
 
 use crate::base::{Basis, Drag};
+use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE};
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
-use crate::settle::{AT_REST, centre, first_cycles, started, windows};
+use crate::settle::{centre, first_cycles, started, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -25,13 +26,6 @@ const DECAY: usize = 16;
 const AMPLITUDES: usize = 6;
 /// Rows from one turn to the next.
 const ROWS: usize = 16;
-/// RMS of what the first rows from rest leave above the level of the other rows, over that after a past, from which on the past is taken: where it
-/// explains less, something else acts, a transient of the sensor or an effect that is missing.
-const HELPS: f64 = 2.0;
-/// Σ residual² of a record after a history, over that from rest, from which on the history is taken.
-const HISTORY_HELPS: f64 = 0.8;
-/// RMS residual of the first rows, over that of the others, from which on a past is looked for.
-const STANDS_OUT: f64 = 1.4;
 
 /// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
 pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
@@ -90,7 +84,7 @@ pub(crate) fn with_histories<E>(
     let mut least = squares(&best)?;
     for first in [true, false] {
         let known = best.clone();
-        let enough = HISTORY_HELPS * least;
+        let enough = (1.0 - MIN_RMSE_DROP).powi(2) * least;
         for history in History::ALL {
             let mut after = known.clone();
             let mut is_new = false;
@@ -161,7 +155,7 @@ fn path(turns: &[f64], u0: f64) -> Vec<f64> {
 pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     let (low, high) = samples.input_range();
     let reach = low.abs().max(high.abs());
-    samples.segments.iter().map(|s| samples.input[s.start].abs() > AT_REST * reach).collect()
+    samples.segments.iter().map(|s| samples.input[s.start].abs() > MINOR_SHARE * reach).collect()
 }
 
 /// Segments whose past is worth asking for before it is known what acts: a start-up shows, and they do not begin near 0 V, where what stands out is a
@@ -280,7 +274,7 @@ pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 }
 
 /// The past after which least is left of the first rows; none unless what stands above the `level` of as many others falls to at most the share that
-/// [`HELPS`] says (all Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
+/// [`MIN_PAST_RATIO`] says (all Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
 /// out any more.
 pub(crate) fn best(
     pasts: Vec<Vec<f64>>,
@@ -289,13 +283,13 @@ pub(crate) fn best(
     squares: impl Fn(&Vec<f64>) -> f64 + Sync,
 ) -> Vec<f64> {
     let from_rest = squares(&Vec::new());
-    let stands_out = STANDS_OUT * STANDS_OUT * level;
+    let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
     if from_rest < stands_out {
         return Vec::new();
     }
     let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
     let least = all.iter().copied().fold(f64::INFINITY, f64::min);
-    let helps = HELPS * HELPS * (least - level).max(0.0) < from_rest - level;
+    let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
     let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || least < stands_out));
     found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }

@@ -7,22 +7,10 @@
 use std::ops::Range;
 
 use crate::Samples;
+use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE, RMSE_TOLERANCE, WHOLE_SHARE};
 use crate::nested::Fitted;
 use crate::samples::range;
 
-/// Share of a segment's swing after which its memory no longer depends on the past.
-const SWEPT: f64 = 0.9;
-/// Share of the levels of a segment that the rows of a fit have to pass.
-const SEEN_AGAIN: f64 = 0.98;
-/// A start-up must exceed the largest residual of the rest this many times to be called one.
-const CLEARLY: f64 = 3.0;
-
-/// Share of its range by which a drive has turned back when it counts as turned.
-const TURNED: f64 = 0.02;
-/// Share of the largest drive below which a segment begins at rest.
-pub(crate) const AT_REST: f64 = 0.1;
-/// RMSE, over that of a fit to fewer rows, up to which a fit errs no more.
-const NO_MORE: f64 = 1.05;
 /// Share of the output's span below which an RMSE is rounding.
 const EXACT: f64 = 1e-6;
 
@@ -35,7 +23,7 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
         let swept = u.iter().position(|u| {
             (least, most) = (least.min(*u), most.max(*u));
-            most - least >= SWEPT * (high - low)
+            most - least >= DOMINANT_SHARE * (high - low)
         });
         (2 * swept.unwrap_or(0)).min(u.len() / 2)
     };
@@ -76,7 +64,7 @@ impl Levels {
 }
 
 /// The last row of each segment from which the rest of it, together with the rows of the other segments that cannot be a start-up, still passes
-/// [`SEEN_AGAIN`] of its levels.
+/// [`WHOLE_SHARE`] of its levels.
 fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     let span = samples.input_range();
     // Pairs of rows that the sensor shows, by the later one.
@@ -103,7 +91,7 @@ fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
                 seen.pass(*from, *to);
                 share = seen.share(&own);
             }
-            share >= SEEN_AGAIN
+            share >= WHOLE_SHARE
         });
         again.map_or(0, |(k, ..)| k - 1 - s.start)
     };
@@ -131,7 +119,7 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
         u.windows(2).position(|u| {
             (least, most) = (least.min(u[1]), most.max(u[1]));
             let passes = if rises { u[0] < start && start <= u[1] } else { u[0] > start && start >= u[1] };
-            passes && most - least >= SWEPT * (high - low)
+            passes && most - least >= DOMINANT_SHARE * (high - low)
         })
     };
     samples.segments.iter().map(|s| cycle(s).map(|before| before + 1)).collect()
@@ -154,7 +142,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let (low, high) = samples.input_range();
     for ((s, window), needed_from) in samples.segments.iter().zip(&windows).zip(needed_from) {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
-        if !rows.iter().any(|r| r.abs() > CLEARLY * largest && r.abs() > 6.0 * rms) {
+        if !rows.iter().any(|r| r.abs() > LARGE_RATIO * largest && r.abs() > 6.0 * rms) {
             continue;
         }
         let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
@@ -162,7 +150,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
         // What comes later, in a sweep that passes a mode, is the record's own.
         let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>();
         let (first, second) = rows[..=last].split_at(last.div_ceil(2));
-        let at_rest = samples.input[s.start].abs() < AT_REST * low.abs().max(high.abs());
+        let at_rest = samples.input[s.start].abs() < MINOR_SHARE * low.abs().max(high.abs());
         if at_rest && last > 2 * first_turn(&samples.input[s.clone()]) && power(first) < power(second) {
             continue;
         }
@@ -185,7 +173,7 @@ fn first_turn(u: &[f64]) -> usize {
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     let turned = u.iter().position(|u| {
         (least, most) = (least.min(*u), most.max(*u));
-        (most - u).min(u - least) > TURNED * (high - low)
+        (most - u).min(u - least) > NEGLIGIBLE_SHARE * (high - low)
     });
     turned.unwrap_or(u.len())
 }
@@ -219,7 +207,7 @@ pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fi
         return Ok(known);
     }
     let floor = EXACT * samples.output_span();
-    let errs_no_more = |all: &Settled| all.fit.rmse() <= NO_MORE * known.fit.rmse().max(floor);
+    let errs_no_more = |all: &Settled| all.fit.rmse() <= RMSE_TOLERANCE * known.fit.rmse().max(floor);
     let Some(all) = Settled::from(blind.clone(), fit)? else { return Ok(known) };
     let followed = 2 * start_up(&all.settling) <= start_up(&known.settling);
     Ok(if followed && errs_no_more(&all) { all } else { known })

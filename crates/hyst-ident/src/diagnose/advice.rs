@@ -2,10 +2,10 @@
 
 use hyst_core::Error;
 
-use super::criteria::DIFFERS;
 use super::findings::BaseAdvice;
 use super::trial::Trial;
 use crate::base::Basis;
+use crate::criteria::MIN_RMSE_DROP;
 use crate::fit::{BLOCKS, FitError, basis_for};
 use crate::lsq::Blocks;
 use crate::model::Kind;
@@ -35,7 +35,7 @@ pub(super) fn base_advice(
     let mut best: Option<BaseAdvice> = None;
     for model in [Kind::Pi, Kind::Preisach].into_iter().filter(|kind| *kind != own.0) {
         let error = cv_rmse(basis_for(model, samples)?.as_ref()).map_err(stage)?;
-        let least = best.as_ref().map_or((1.0 - DIFFERS) * own_cv_rmse, |b| b.cv_rmse);
+        let least = best.as_ref().map_or((1.0 - MIN_RMSE_DROP) * own_cv_rmse, |b| b.cv_rmse);
         if let Some(cv_rmse) = error.filter(|e| *e < least) {
             best = Some(BaseAdvice { model, cv_rmse, own_cv_rmse });
         }

@@ -2,18 +2,12 @@
 
 use super::extension::Own;
 use super::findings::{Change, Remainder, RemainderKind};
-use super::remainder::RICHER;
+use crate::criteria::{HALF, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE};
 use crate::digits::{short, signed};
 use crate::fit::FitError;
 use crate::nested::Hypothesis;
 use crate::record::OutputUnit;
 use crate::simulate::{Zero, simulate};
-
-/// A model misses by as much more than in the record of its own fit before it is the device that is asked.
-const MORE_THAN_FITTED: f64 = 1.5;
-
-/// Share of the fitted range by which a drive may leave it before what is missed there is extrapolation's.
-const BEYOND: f64 = 0.01;
 
 /// A device that is no longer the one of the fit misses in the same way as a base that is too coarse does: a richer one would take it. But so
 /// would the same base with other weights, and it misses by more than it did in the record of its fit; a coarse base may follow a small part
@@ -26,11 +20,11 @@ pub(super) fn told_apart(
     left: Remainder,
 ) -> Result<Remainder, FitError> {
     let (Some(fitted), Some(errors)) = (own.model.rmse, &own.before.errors) else { return Ok(left) };
-    if left.kind != RemainderKind::BaseCapacity || errors.rmse <= MORE_THAN_FITTED * fitted {
+    if left.kind != RemainderKind::BaseCapacity || errors.rmse <= MIN_RMSE_RATIO * fitted {
         return Ok(left);
     }
     let (input, beyond) = (&own.model.input, own.before.extrapolated.largest);
-    if beyond > BEYOND * (input.high - input.low) {
+    if beyond > NEGLIGIBLE_SHARE * (input.high - input.low) {
         let (low, high, unit) = (input.low, input.high, input.symbol());
         let seen = format!(
             "; its drive goes up to {} {unit} beyond {} to {} {unit}, which the model was fitted to",
@@ -44,14 +38,14 @@ pub(super) fn told_apart(
     let (Some(before), Some(after)) = (&own.before.errors, &again.errors) else { return Ok(left) };
     let above = |mean_square: f64| (mean_square - noise * noise).max(0.0);
     let stood = above(before.rmse * before.rmse);
-    if above(after.rmse * after.rmse) > (1.0 - RICHER) * stood {
+    if above(after.rmse * after.rmse) > (1.0 - HALF) * stood {
         return Ok(left);
     }
     let line = Line::through(own);
     let unit = OutputUnit::of_suffix(&own.model.output.unit).map_or(own.model.output.unit.as_str(), |u| u.symbol());
     let behind_zero = above(before.rmse * before.rmse - line.mean * line.mean);
     // Another gain moves the mean too, but not alone.
-    let zero_alone = behind_zero <= (1.0 - RICHER) * stood && above(line.mean_square) >= (1.0 - RICHER) * behind_zero;
+    let zero_alone = behind_zero <= (1.0 - HALF) * stood && above(line.mean_square) >= (1.0 - HALF) * behind_zero;
     Ok(if zero_alone {
         let description = format!(
             "most of it is one constant: the sensor's zero stands {} {unit} from that of the record that the model was fitted to",

@@ -6,12 +6,11 @@
 
 use std::ops::Range;
 
+use crate::criteria::HALF;
 use crate::linear::{Hann, windows};
 
 /// Exponents between those of white noise and of a random walk that are nearer to flicker noise.
 const FLICKER: Range<f64> = 0.5..1.5;
-/// An octave counts where its power exceeds that of the white noise by this share.
-const ABOVE_WHITE: f64 = 0.5;
 /// Octaves that have to count.
 const LEAST_OCTAVES: usize = 4;
 /// Root mean square by which the octaves may scatter around the power law, as a logarithm to base 10: a tone or a mode stands out further.
@@ -48,7 +47,7 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
             let mean = power[first..2 * first].iter().sum::<f64>() / (first as f64 * energy);
             [(first as f64).log10(), mean - white * white]
         })
-        .filter(|[_, above]| *above > ABOVE_WHITE * white * white)
+        .filter(|[_, above]| *above > HALF * white * white)
         .map(|[f, above]| [f, above.log10()])
         .collect();
     if points.len() < LEAST_OCTAVES {

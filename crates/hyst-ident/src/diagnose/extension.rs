@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use hyst_core::{CurveSide, Error};
 
-use super::criteria::NEARLY_ALL;
 use super::search::{Named, Search, further, with_own_laws};
 use super::shape::Bent;
 use super::trial::Trial;
 use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
 use crate::base::{Drag, PiBasis};
+use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, RMSE_TOLERANCE};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
 use crate::model::{Effect, Model};
@@ -18,11 +18,6 @@ use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Simulation, Zero, simulate};
-
-/// Rise of the RMSE, over the rows that both models follow, beyond which an extended model is not handed out.
-const MAX_RISE: f64 = 1.05;
-/// The same over all rows, start-ups too: no model says much of what began before the record, but none may go anywhere there.
-const MAX_RISE_AT_ALL: f64 = 4.0;
 
 /// What the own base was found to lack beside what was found before.
 #[derive(Default)]
@@ -192,7 +187,7 @@ impl<'a> Own<'a> {
         let (before, floor) = (plain.total(), plain.fit.rows as f64 * noise * noise);
         let search = further(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
         let closes = search.best.cv_rmse() <= shape::CLOSED_ANEW * richest
-            && before - search.best.total() >= NEARLY_ALL * (before - floor);
+            && before - search.best.total() >= DOMINANT_SHARE * (before - floor);
         Ok(Some(search).filter(|s| closes && !s.named.is_empty()))
     }
 
@@ -343,7 +338,7 @@ impl<'a> Own<'a> {
 
     /// Whether it errs less `after` than `before`, over the rows that count for the search: a model that misses a stop, say, takes
     /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
-    /// In any case it may not err more, by [`MAX_RISE`], over the rows that are a start-up for neither, nor by [`MAX_RISE_AT_ALL`] over all that the
+    /// In any case it may not err more, by [`RMSE_TOLERANCE`], over the rows that are a start-up for neither, nor by [`LARGE_RATIO`] over all that the
     /// sensor shows.
     pub(super) fn is_helped(&self, before: &Simulation, after: &Simulation) -> bool {
         let samples = self.samples;
@@ -361,8 +356,8 @@ impl<'a> Own<'a> {
             squares(after) <= most * most * squares(before)
         };
         (errs_less(&|_| true) || errs_less(&|k| !after.settling[k]))
-            && stays_within(MAX_RISE, &both)
-            && stays_within(MAX_RISE_AT_ALL, &|k| !samples.blind[k])
+            && stays_within(RMSE_TOLERANCE, &both)
+            && stays_within(LARGE_RATIO, &|k| !samples.blind[k])
     }
 
     /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does

@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use hyst_core::Error;
 
-use super::criteria::DIFFERS;
 use super::scan::Scan;
 use super::score;
 use super::search::{Search, beyond, further};
@@ -17,30 +16,19 @@ use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
 use crate::base::{PreisachBasis, RatedBasis, ScreeningBasis};
+use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MINOR_SHARE, NEGLIGIBLE_SHARE};
 use crate::lsq::Blocks;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
-/// Error from which on it is searched anew: it sees what the base of the search cannot.
-const FAR_BETTER: f64 = 0.7;
-/// What it leaves, in noise floors, from which on something may hide in it that is worth the time: less is mostly its own.
-const WORTH_A_SEARCH: f64 = 3.0;
 /// Cells along an edge of the triangle.
 const CELLS: usize = 24;
 /// Cells along an edge of the one that is searched, which a trial passes four times as fast.
 const SEARCHED_CELLS: usize = 16;
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
-/// Error of the search up to which the finer base is asked about another effect in the place of one that was named.
-const NEAR: f64 = 3.0;
-/// Beside a wandering that explains much, an effect has to explain at least this share of as much (variance): the wandering is not
-/// modelled to the last digit, and what it leaves sounds like anything.
-const BESIDE_WANDERING: f64 = 0.1;
-/// The same beside an amplifier that does not follow: it turns between two samples, where nobody sees it. What is late by less than a sample
-/// then is none.
-const BESIDE_SLEW_LIMIT: f64 = 1e-3;
 
 /// What is known in the end.
 pub(super) struct Finer {
@@ -67,7 +55,7 @@ pub(super) fn refine(
         cv_rmse: trial.cv_rmse(),
     };
     // The triangle has no drag.
-    if found.best.cv_rmse() <= (1.0 + DIFFERS) * found.noise || found.best.fit.hypothesis.drag.is_some() {
+    if found.best.cv_rmse() <= (1.0 + MIN_RMSE_DROP) * found.noise || found.best.fit.hypothesis.drag.is_some() {
         return Ok(of(&found.best));
     }
     let blocks = Blocks::new(samples, problem.blocks.rows.len(), ROWS);
@@ -86,11 +74,11 @@ pub(super) fn refine(
     let fits = from.into_iter().take(if differ { 2 } else { 1 }).map(fitted).collect::<Result<Vec<_>, _>>()?;
     let best = fits.into_iter().flatten().min_by(|a, b| a.total().total_cmp(&b.total()));
     let Some(mut best) = best else { return Ok(of(&found.best)) };
-    if best.cv_rmse() >= (1.0 - DIFFERS) * found.best.cv_rmse() {
+    if best.cv_rmse() >= (1.0 - MIN_RMSE_DROP) * found.best.cv_rmse() {
         return Ok(of(&found.best));
     }
-    if best.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()
-        && best.cv_rmse() > WORTH_A_SEARCH * found.noise
+    if score::is_far_better(&found.best, &best)
+        && best.cv_rmse() > LARGE_RATIO * found.noise
         && let Some(anew) = searched_anew(problem, &triangle, found, already, seed, progress)?
         && let Some(rough) = placed(&triangle, &anew.best.fit.hypothesis)?
         && let Some(with) = fitted(&rough.hypothesis)?
@@ -145,8 +133,8 @@ fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, s
             // The others of its set are those of the best, or another rival has been named since.
             let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
                 == other.hypothesis.without(Cause::Effect(other.effect)).causes();
-            let near =
-                other.tie || (other.judgement.explains_enough() && other.cv_rmse <= NEAR * found.named[n].cv_with);
+            let near = other.tie
+                || (other.judgement.explains_enough() && other.cv_rmse <= LARGE_RATIO * found.named[n].cv_with);
             // In one loop no base can tell what is late from what is late otherwise.
             if !near || !stands || triangle.only_loop.is_some() {
                 continue;
@@ -186,7 +174,7 @@ fn searched_anew(
     let rough = placed(&coarser, &found.best.fit.hypothesis)?;
     let from = rough.map(|rough| coarser.fit(&rough.hypothesis)).transpose()?.flatten();
     let from = from.and_then(|f| Trial::of(&coarser, f));
-    let Some(from) = from.filter(|t| t.cv_rmse() <= FAR_BETTER * found.best.cv_rmse()) else { return Ok(None) };
+    let Some(from) = from.filter(|t| score::is_far_better(&found.best, t)) else { return Ok(None) };
     let mut anew = further(&coarser, from.fit, already, found.noise, seed, progress)?;
     beside_nameless(&coarser, &mut anew, already)?;
     // A wandering alone is no news: of what a triangle leaves some is its own, and wanders like anything.
@@ -227,12 +215,12 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
         Effect::Delay if h.effects.delay.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         Effect::Lag if h.effects.lag.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         // Of what only the sensor shows an amplifier leaves nothing.
-        _ if effect.acts_on_the_motion() => BESIDE_SLEW_LIMIT,
+        _ if effect.acts_on_the_motion() => NEGLIGIBLE_SHARE,
         _ => 0.0,
     };
     beside(problem, found, already, &follows, &share)?;
     let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
-    beside(problem, found, already, &still, &|_| BESIDE_WANDERING)
+    beside(problem, found, already, &still, &|_| MINOR_SHARE)
 }
 
 /// Takes back a creep beside a law of the rate that any other law of the rate takes as well.

@@ -14,7 +14,6 @@
 mod advice;
 mod changed;
 mod colour;
-mod criteria;
 mod evidence;
 mod extension;
 mod few_unknowns;

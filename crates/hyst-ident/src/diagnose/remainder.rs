@@ -1,19 +1,14 @@
 //! What is left when every effect that was found has been added.
 
-use super::criteria::{FAR_APART, NEARLY_ALL};
 use super::findings::{Remainder, RemainderKind};
 use super::search::Search;
 use super::{colour, history};
+use crate::criteria::{DOMINANT_SHARE, HALF, MIN_RMSE_RATIO, MINOR_SHARE};
 use crate::digits::short;
 use crate::model::Effect;
 use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
-
-/// A richer base that takes this share of the variance above the floor shows a lack of capacity.
-pub(super) const RICHER: f64 = 0.5;
-/// Share from which on what a richer base takes is told.
-const MENTIONED: f64 = 0.1;
 
 /// Whether the rest is noise, lack of capacity of the base, or unexplained. `amplified` is what the model says, without and with what was
 /// found, about the record as an amplifier drives it that does not follow every slope. The drive is in the unit `input`.
@@ -75,7 +70,7 @@ pub(super) fn judge(
         let what = format!("{:.2} % of span: {}", percent(rmse), nameless.join("; "));
         return left(RemainderKind::Unexplained, what);
     }
-    if rmse <= FAR_APART * found.noise {
+    if rmse <= MIN_RMSE_RATIO * found.noise {
         return left(
             RemainderKind::None,
             format!(
@@ -90,10 +85,10 @@ pub(super) fn judge(
     let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
     let residual: Vec<f64> = samples.output.iter().zip(&after.predicted).map(|(y, p)| y - p).collect();
     let counts: Vec<bool> = after.settling.iter().map(|s| !s).collect();
-    if taken < RICHER {
+    if taken < HALF {
         let undecided = history::undecided(samples, &residual, &counts).unwrap_or(f64::INFINITY);
         let decided = 1.0 - (undecided - noise2).max(0.0) / above;
-        if decided >= RICHER {
+        if decided >= HALF {
             let what = format!(
                 "{:.2} % of span: {:.0} % of its variance comes back where the input and its history do, so that it is a map of them that this base, \
                  and the richer ones that were tried, are too coarse for",
@@ -113,16 +108,16 @@ pub(super) fn judge(
         }
     }
     let map = "a map of the input's history that this base is too coarse for";
-    let (kind, rest) = if taken >= NEARLY_ALL || (taken >= RICHER && richest <= FAR_APART * found.noise) {
+    let (kind, rest) = if taken >= DOMINANT_SHARE || (taken >= HALF && richest <= MIN_RMSE_RATIO * found.noise) {
         (RemainderKind::BaseCapacity, format!("nearly all of it is {map}"))
-    } else if taken >= RICHER {
+    } else if taken >= HALF {
         let rest = format!(
             "{:.0} % of its variance is {map}; the rest stands above the noise floor of {:.2} % too, and no effect of the list explains it",
             100.0 * taken,
             percent(found.noise)
         );
         (RemainderKind::BaseCapacity, rest)
-    } else if taken >= MENTIONED {
+    } else if taken >= MINOR_SHARE {
         let rest = format!(
             "no effect of the list explains it, and only {:.0} % of its variance is {map}; look for what was not recorded (a load, a temperature)",
             100.0 * taken

@@ -5,44 +5,26 @@ use rand_chacha::ChaCha8Rng;
 
 use hyst_core::{ResonanceParams, SaturationParams};
 
-use super::criteria::{DIFFERS, FAR_APART};
 use super::tone::stands_alone;
 use super::trial::Trial;
 use crate::Samples;
+use crate::criteria::{
+    HALF, MAX_KNEE, MAX_MODE_DAMPING, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_BETTER_DRAWS, MIN_CONFIDENCE,
+    MIN_DRIFT_TIME, MIN_MODE_HZ, MIN_NOISE_FLOORS, MIN_RMSE_DROP, MIN_RMSE_RATIO, MIN_STOP_ROWS, MIN_TONE_HZ,
+    MIN_VARIANCE_SHARE, MINOR_SHARE,
+};
 use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
 use crate::samples::range;
 
 /// Bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
+/// Periods that a mode has to ring until 1/e of it is left, where nothing shows that it turns the phase.
+const RINGING_PERIODS: f64 = 3.0;
 /// Blocks that are drawn together.
 const RUN: usize = 4;
-/// Share of draws in which nothing may be lost.
-const CONFIDENCE: f64 = 0.99;
-/// Loss in a draw that counts as none, as a share of the whole gain: what acts in one experiment alone, a mode that one sweep excites, is missing
-/// from some draws, and costs a little there.
-const NO_LOSS: f64 = 0.1;
-/// Share of draws in which what is clearly better has to be better.
-const CLEARLY: f64 = 0.95;
-/// What an effect adds must be at least this many noise floors (root mean square).
-pub(super) const LEAST_OVER_NOISE: f64 = 0.5;
-/// Share of what stands above the noise floor that an effect must explain.
-const LEAST_SHARE: f64 = 0.3;
-/// Largest share of a motion that creep may add in the end.
-const MOST_CREEP: f64 = 0.5;
 
-/// Time constant, in durations of the record, from which on what settles is a drift: what is over sooner may be how the record began.
-const LEAST_SETTLING: f64 = 0.04;
-/// Slowest tone of a sensor \[Hz\]: what swings more slowly may as well be a force or the room.
-const SLOWEST_TONE: f64 = 2.0;
 /// How exactly the frequency of a loop is known, as a share.
 const HARMONIC: f64 = 0.002;
-/// Slowest structural mode \[Hz\]: what moves by itself in seconds is no structure of a piezo's size.
-const SLOWEST_MODE: f64 = 1.0;
-/// Largest damping ratio of what may be called a resonance: beyond it nothing rings.
-const MOST_DAMPING: f64 = 0.35;
-
-/// Damping ratio below which a mode that was set off goes on for three periods: 1/(2π ζ) of them pass until 1/e is left.
-const GOES_ON: f64 = 0.053;
 
 /// How an effect was judged.
 #[derive(Clone, Copy, Debug)]
@@ -73,11 +55,11 @@ impl Judgement {
 
     /// Whether it helps in nearly every part of the record and stands above the noise, however little of what is left it explains.
     pub(crate) fn is_sure(&self) -> bool {
-        self.sensible && self.confidence >= CONFIDENCE && self.over_noise >= LEAST_OVER_NOISE
+        self.sensible && self.confidence >= MIN_CONFIDENCE && self.over_noise >= MIN_NOISE_FLOORS
     }
 
     fn explains(&self) -> bool {
-        self.ratio <= 1.0 - DIFFERS && self.share >= LEAST_SHARE
+        self.ratio <= 1.0 - MIN_RMSE_DROP && self.share >= MIN_VARIANCE_SHARE
     }
 }
 
@@ -85,17 +67,17 @@ impl Judgement {
 /// [`Judgement`] come to.
 pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
-    let of_fall = left * (1.0 / (1.0 - DIFFERS).powi(2) - 1.0);
-    let of_share = (left - floor).max(0.0) * LEAST_SHARE / (1.0 - LEAST_SHARE);
-    (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall).max(of_share)
+    let of_fall = left * (1.0 / (1.0 - MIN_RMSE_DROP).powi(2) - 1.0);
+    let of_share = (left - floor).max(0.0) * MIN_VARIANCE_SHARE / (1.0 - MIN_VARIANCE_SHARE);
+    (MIN_NOISE_FLOORS * MIN_NOISE_FLOORS * floor).max(of_fall).max(of_share)
 }
 
 /// Gain from which on an effect may be accepted beside a fit that leaves this much of Σ residual² without it.
 pub(super) fn least_gain_from(rows: f64, before: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
-    let of_fall = before * (1.0 - (1.0 - DIFFERS).powi(2));
-    let of_share = (before - floor).max(0.0) * LEAST_SHARE;
-    (LEAST_OVER_NOISE * LEAST_OVER_NOISE * floor).max(of_fall.min(of_share))
+    let of_fall = before * (1.0 - (1.0 - MIN_RMSE_DROP).powi(2));
+    let of_share = (before - floor).max(0.0) * MIN_VARIANCE_SHARE;
+    (MIN_NOISE_FLOORS * MIN_NOISE_FLOORS * floor).max(of_fall.min(of_share))
 }
 
 /// How `with` stands against `without`, by the weaker of what it predicts and what it fits: where a part of the record shows what no
@@ -130,22 +112,22 @@ fn differences(without: &Trial, with: &Trial) -> Vec<f64> {
 
 /// Whether the second predicts clearly better than the first: in nearly every bootstrap draw.
 pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
-    share_above_zero(&differences(first, second), seed) >= CLEARLY
+    share_above_zero(&differences(first, second), seed) >= MIN_BETTER_DRAWS
 }
 
 /// Whether the second predicts better by as much as an effect has to.
 pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
-    second.cv_rmse() <= (1.0 - DIFFERS) * first.cv_rmse()
+    second.cv_rmse() <= (1.0 - MIN_RMSE_DROP) * first.cv_rmse()
 }
 
 /// Whether the second predicts so much better that it is needed, however little its parameters are known.
 pub(super) fn is_far_better(first: &Trial, second: &Trial) -> bool {
-    first.cv_rmse() > FAR_APART * second.cv_rmse()
+    first.cv_rmse() > MIN_RMSE_RATIO * second.cv_rmse()
 }
 
 /// Whether neither predicts clearly better than the other.
 pub(super) fn undecided(a: &Trial, b: &Trial, seed: u64) -> bool {
-    let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > FAR_APART.ln();
+    let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > MIN_RMSE_RATIO.ln();
     !apart && !clearly_better(a, b, seed) && !clearly_better(b, a, seed)
 }
 
@@ -161,7 +143,7 @@ fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
         let sum_of = |first: usize| (first..first + RUN).map(|b| differences[b % n]).sum::<f64>();
         (0..runs).map(|_| sum_of(rng.random_range(0..n))).sum::<f64>()
     };
-    let least = -NO_LOSS * differences.iter().sum::<f64>().max(0.0);
+    let least = -MINOR_SHARE * differences.iter().sum::<f64>().max(0.0);
     let above = (0..DRAWS).filter(|_| draw() > least).count();
     above as f64 / DRAWS as f64
 }
@@ -179,17 +161,17 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.lag.is_none_or(|p| time(p.seconds))
         && e.rate.is_none_or(|p| p.volts > 0.0)
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
-        && e.drift.is_none_or(|p| p.seconds == 0.0 || p.seconds > LEAST_SETTLING * samples.duration())
+        && e.drift.is_none_or(|p| p.seconds == 0.0 || p.seconds > MIN_DRIFT_TIME * samples.duration())
         && e.saturation.is_none_or(|p| stops_something(samples, &trial.fit, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
-        && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < MOST_CREEP)
+        && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < HALF)
         && e.resonances.iter().all(|p| {
             rings(p, longest)
-                && p.damping < MOST_DAMPING
-                && p.hz > f64::max(2.5 / longest, SLOWEST_MODE)
+                && p.damping < MAX_MODE_DAMPING
+                && p.hz > f64::max(2.5 / longest, MIN_MODE_HZ)
                 && p.hz < 0.9 * nyquist
         })
-        && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, SLOWEST_TONE) && !is_harmonic(problem, p.hz))
+        && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, MIN_TONE_HZ) && !is_harmonic(problem, p.hz))
 }
 
 /// Whether a mode rings: by itself it goes on for some periods, or its own part at its frequency, g/(2ζ), exceeds the part of the motion that does
@@ -198,27 +180,23 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
 fn rings(mode: &ResonanceParams, longest: f64) -> bool {
     let turns_the_phase = mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping;
     let decays = std::f64::consts::TAU * mode.hz * mode.damping * longest >= 1.0;
-    mode.gain > 0.0 && decays && (turns_the_phase || mode.damping < GOES_ON)
+    mode.gain > 0.0 && decays && (turns_the_phase || mode.damping < 1.0 / (std::f64::consts::TAU * RINGING_PERIODS))
 }
 
 /// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
 fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
-    // Over the record its phase then turns by less than once against the loop.
-    let resolution = 1.0 / problem.samples.duration();
-    problem.only_loop.is_some_and(|f| (hz - f * (hz / f).round()).abs() < resolution + HARMONIC * hz)
+    problem.only_loop.is_some_and(|first| is_multiple(hz, first, problem.samples.duration()))
 }
 
-/// Share of the rows that a stop has to touch, and how near to the limit the output has to come, as a share of the motion's span.
-const TOUCHED: f64 = 0.003;
-const NEAR_LIMIT: f64 = 0.05;
-/// Width of a knee, as a share of the range between the limits, below which a rich base that bends is told from a stop, and from which on the law of
-/// one has ended at its bound.
-const SHARP_KNEE: f64 = 0.2;
-const WIDEST_KNEE: f64 = 0.45;
+/// Whether a frequency \[Hz\] is a multiple of a first one, as far as a record of some seconds shows it.
+fn is_multiple(hz: f64, first: f64, seconds: f64) -> bool {
+    // Over the record its phase then turns by less than once against the loop.
+    (hz - first * (hz / first).round()).abs() < 1.0 / seconds + HARMONIC * hz
+}
 
 /// Whether the output comes to one of the limits and stays there for some rows.
 fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
-    p.knee < SHARP_KNEE && comes_near(samples, fit, p, 0.0)
+    p.knee < MAX_SHARP_KNEE && comes_near(samples, fit, p, 0.0)
 }
 
 /// Whether it comes so near to one of the limits that it follows the motion by less than half, for some rows: a soft stop does, where the base does
@@ -226,21 +204,28 @@ fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> boo
 pub(super) fn halves_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
     // In a knee of width w the slope is 1 − x² at the share x of it.
     let halved = (1.0 - 0.5f64.sqrt()) * p.knee * (p.high - p.low);
-    p.knee < WIDEST_KNEE && comes_near(samples, fit, p, halved)
+    p.knee < MAX_KNEE && comes_near(samples, fit, p, halved)
 }
 
 /// Whether some rows are nearer to a limit than a share of the motion's span, or than this \[y\].
 fn comes_near(samples: &Samples, fit: &Fitted, p: &SaturationParams, least: f64) -> bool {
     let shown = shown_motion(samples, fit);
     let (low, high) = range(shown.iter().copied());
-    let near = least.max(NEAR_LIMIT * (high - low));
+    let near = least.max(MAX_STOP_DISTANCE * (high - low));
     let touched = shown.iter().filter(|y| (p.high - **y).min(**y - p.low) < near).count();
-    touched as f64 > TOUCHED * shown.len() as f64
+    touched as f64 > MIN_STOP_ROWS * shown.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_tone_two_lines_beside_a_harmonic_is_none() {
+        // A loop of 2 Hz over 4 s has lines of 0.25 Hz; its frequency is known to 0.2 %.
+        assert!(is_multiple(10.0, 2.0, 4.0) && is_multiple(10.2, 2.0, 4.0));
+        assert!(!is_multiple(10.5, 2.0, 4.0) && !is_multiple(9.5, 2.0, 4.0));
+    }
 
     #[test]
     fn a_ripple_of_the_motion_is_no_mode() {

@@ -5,26 +5,19 @@ use std::sync::Mutex;
 use hyst_core::Error;
 use rayon::prelude::*;
 
-use super::criteria::{DIFFERS, NEARLY_ALL};
 use super::probability::Evidence;
 use super::scan::Scan;
-use super::score::{self, Judgement, LEAST_OVER_NOISE, judge};
+use super::score::{self, Judgement, judge};
 use super::trial::Trial;
 use super::uncertainty::Undetermined;
 use super::{hidden, starts};
+use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MAX_ZERO_STEP, MIN_NOISE_FLOORS, MIN_RMSE_DROP, NEGLIGIBLE_SHARE};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
 
-/// Σ residual², over that of the best set, beyond which a second one is not carried on beside it.
-const BEAM_WITHIN: f64 = 3.0;
-/// What a drag beside a creep adds, in noise floors, up to which a faster creep is tried instead.
-const SMALL_DRAG: f64 = 2.0;
-/// Share of its whole way that a zero that goes smoothly makes from a height that is known to the one after the next.
-const MOST_STEP: f64 = 0.25;
 /// Effects that make the drive arrive late, and the share of what one of them explains (variance) that another beside it has to explain.
 const TAKES_TIME: [Effect; 3] = [Effect::Delay, Effect::Lag, Effect::RateDependence];
-pub(super) const MIN_SHARE_OF_KIND: f64 = 0.01;
 /// Effects that one record is searched for at most.
 const MOST: usize = 5;
 
@@ -107,7 +100,7 @@ impl Judge<'_> {
     /// Whether even a perfect model would add less than an effect has to.
     fn nothing_to_gain(&self, best: &Trial) -> bool {
         let above = best.total() / best.fit.rows.max(1) as f64 - self.noise * self.noise;
-        above < (LEAST_OVER_NOISE * self.noise).powi(2)
+        above < (MIN_NOISE_FLOORS * self.noise).powi(2)
     }
 
     /// A set without one cause. A small drag beside a creep may be no more than a creep that goes on faster than the elements of the search.
@@ -117,7 +110,7 @@ impl Judge<'_> {
         let drags = cause == Cause::Effect(Effect::RateDependence);
         let creeps = less.effects.creep.is_some() && !already.contains(&Cause::Effect(Effect::Creep));
         let judged = self.judge(&plain, set);
-        if !drags || !creeps || !judged.accepted() || judged.over_noise >= SMALL_DRAG {
+        if !drags || !creeps || !judged.accepted() || judged.over_noise >= LARGE_RATIO {
             return Ok(Some(plain));
         }
         let faster = self.refit(&starts::with_faster_creep(self.problem.samples, &plain.fit.hypothesis))?;
@@ -215,7 +208,7 @@ pub(super) fn further(
             named = better.clone();
         }
         // What has no name takes nearly anything with its many numbers, and may not put an end to the search among names.
-        let far = BEAM_WITHIN * best.total();
+        let far = LARGE_RATIO * best.total();
         let second = next.iter().skip(1).find(|t| nameless(&next[0]) && !nameless(t));
         let second = second.or_else(|| next.iter().skip(1).find(|t| t.total() <= far)).cloned();
         // Whatever a smaller model leaves over may sound like noise; the floor only ever falls.
@@ -284,7 +277,7 @@ fn nearly_even_drift(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Resu
 
 /// Whether one set takes nearly all that another takes of what is left without either (Σ residual²).
 fn nearly_all(without: f64, one: f64, other: f64) -> bool {
-    without - one >= NEARLY_ALL * (without - other)
+    without - one >= DOMINANT_SHARE * (without - other)
 }
 
 /// Whether a zero that wanders through these times and heights makes no large part of its way at once; over a gap between segments it may make
@@ -295,7 +288,7 @@ fn goes_smoothly(zero: &[(f64, f64)]) -> bool {
     let usual = 2.0 * (last.0 - first.0) / (zero.len() - 1) as f64;
     zero.windows(3).all(|z| {
         let longer = ((z[2].0 - z[0].0) / usual).max(1.0);
-        (z[2].1 - z[0].1).abs() <= MOST_STEP * longer * way
+        (z[2].1 - z[0].1).abs() <= MAX_ZERO_STEP * longer * way
     })
 }
 
@@ -358,7 +351,7 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Optio
         .zip(&reduced)
         .map(|(cause, own)| {
             let mut others = names.iter().zip(&reduced).filter(|(other, _)| takes_time(other) && *other != cause);
-            takes_time(cause) && others.any(|(_, t)| explained(own) < MIN_SHARE_OF_KIND * explained(t))
+            takes_time(cause) && others.any(|(_, t)| explained(own) < NEGLIGIBLE_SHARE * explained(t))
         })
         .collect();
     let mut least: Option<Trial> = None;
@@ -403,7 +396,7 @@ fn swaps(
             // A tone that merely stands alone takes nobody's place.
             let accepted = judgement.explains_enough();
             // In one loop all that is late is alike.
-            let alike = one_loop && is_late(*other) && trial.cv_rmse() < (1.0 + DIFFERS) * best.cv_rmse();
+            let alike = one_loop && is_late(*other) && trial.cv_rmse() < (1.0 + MIN_RMSE_DROP) * best.cv_rmse();
             let tie = judgement.sensible && (alike || tie(judge, best, &trial));
             let (cv_rmse, hypothesis) = (trial.cv_rmse(), trial.fit.hypothesis.clone());
             instead.extend(other.effect().map(|effect| Instead { effect, cv_rmse, tie, hypothesis, judgement }));
@@ -445,7 +438,8 @@ fn is_late(cause: Cause) -> bool {
 /// every bootstrap draw.
 fn tie(judge: &Judge<'_>, a: &Trial, b: &Trial) -> bool {
     let per_row = (a.total() - b.total()).abs() / a.fit.rows.max(1) as f64;
-    let drowned = per_row < (LEAST_OVER_NOISE * judge.noise).powi(2) && (a.total() / b.total()).ln().abs() < 0.1;
+    let drowned =
+        per_row < (MIN_NOISE_FLOORS * judge.noise).powi(2) && (a.total() / b.total()).ln().abs() < MIN_RMSE_DROP;
     drowned || score::undecided(a, b, judge.seed)
 }
 

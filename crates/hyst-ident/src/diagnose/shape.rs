@@ -6,28 +6,23 @@
 
 use hyst_core::{AsymmetryParams, CurveSide, Error, MAX_DEAD_ZONES};
 
-use super::criteria::{DIFFERS, NEARLY_ALL};
-use super::search::{Instead, MIN_SHARE_OF_KIND, Named};
+use super::search::{Instead, Named};
 use super::trial::Trial;
 use super::{score, starts};
+use crate::criteria::{
+    DOMINANT_SHARE, MAX_NOISE_FLOORS, MIN_BEND_DIFFERENCE, MIN_RMSE_DROP, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE, WHOLE_SHARE,
+};
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem, dead_zone};
 
 /// Error of the own base with a curve over that of the rich one up to which the curve is all that was missing.
-pub(super) const CLOSED: f64 = 1.7;
+pub(super) const CLOSED: f64 = MIN_RMSE_RATIO * MIN_RMSE_RATIO;
 /// The same where the plays of the own base have been chosen anew behind the curve: little else is then left to be missing.
-pub(super) const CLOSED_ANEW: f64 = 1.25;
-/// Share of what stands above the noise floor from which on it is the curve that was missing, whatever else is left.
-const ALL: f64 = 0.98;
-/// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop that the base's
-/// operators are too coarse for.
-const LOPSIDED: f64 = 0.25;
+pub(super) const CLOSED_ANEW: f64 = MIN_RMSE_RATIO;
 /// Points at which the two halves of a curve are compared.
 const POINTS: usize = 64;
 /// How often the dead zones of a curve are placed anew at most, where the operator goes with the one before.
 const PLACINGS: usize = 6;
-/// Noise floors that count as near the noise.
-const NEAR_NOISE: f64 = 1.5;
 /// Ends of the curve: share of the motion's range beyond the outermost dead zone.
 const MARGIN: f64 = 0.08;
 
@@ -51,7 +46,7 @@ impl Curved {
     /// Whether it takes so much of what the base leaves above the noise without a curve that the rest may be no more than what the curve has bent.
     pub(super) fn takes(&self, plain: &Trial, noise: f64) -> bool {
         let above = plain.total() - plain.fit.rows as f64 * noise * noise;
-        self.is_lopsided && plain.total() - self.trial.total() >= NEARLY_ALL * above
+        self.is_lopsided && plain.total() - self.trial.total() >= DOMINANT_SHARE * above
     }
 }
 
@@ -97,7 +92,7 @@ struct Judged<'a> {
 
 /// Whether an error is near the noise floor.
 pub(super) fn is_near(cv_rmse: f64, noise: f64) -> bool {
-    cv_rmse <= NEAR_NOISE * noise
+    cv_rmse <= MAX_NOISE_FLOORS * noise
 }
 
 /// The own base with what was found; none if it cannot be solved.
@@ -107,7 +102,7 @@ pub(super) fn plain(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<
 
 /// Whether it misses nothing that the rich one shows.
 pub(super) fn is_complete(plain: &Trial, richest: f64) -> bool {
-    plain.cv_rmse() <= (1.0 + DIFFERS) * richest
+    plain.cv_rmse() <= (1.0 + MIN_RMSE_DROP) * richest
 }
 
 /// The same with a curve on this side of it; none if there is one already.
@@ -143,7 +138,8 @@ pub(super) fn bent(
     }
     let Some(fit) = best else { return Ok(None) };
     let curve = fit.hypothesis.effects.asymmetry.as_ref();
-    let is_lopsided = curve.zip(reach(problem, &fit, side)).is_some_and(|(p, reach)| lopsided(p, reach) >= LOPSIDED);
+    let is_lopsided =
+        curve.zip(reach(problem, &fit, side)).is_some_and(|(p, reach)| lopsided(p, reach) >= MIN_BEND_DIFFERENCE);
     Ok(Trial::of(problem, fit).map(|trial| Curved { trial, is_lopsided }))
 }
 
@@ -161,7 +157,7 @@ pub(super) fn shape(
     // With a drag there is no finer base than that of the search: what it leaves need not be the least that a base can leave. And what a
     // wandering leaves is no base's.
     let is_least = found.drag.is_none() && !found.zero_wanders && !found.gain_wanders;
-    let least = if is_least { richest } else { richest.min(NEAR_NOISE * noise) };
+    let least = if is_least { richest } else { richest.min(MAX_NOISE_FLOORS * noise) };
     let curves = bent.into_iter().enumerate().flat_map(|(at, Bent { own, anew })| {
         let own = own.map(|with| Tried::curve(with, None));
         own.into_iter().chain(anew.map(|(plain, with)| Tried::curve(with, Some((at, plain)))))
@@ -187,8 +183,8 @@ pub(super) fn shape(
             let stops = stop.map(|stop| score::halves_something(problem.samples, &t.trial.fit, &stop));
             let judgement = score::Judgement { sensible: stops.unwrap_or(judgement.sensible), ..judgement };
             let accepted = judgement.accepted()
-                && judgement.share >= NEARLY_ALL
-                && (t.trial.cv_rmse() <= closed * least || judgement.share >= ALL)
+                && judgement.share >= DOMINANT_SHARE
+                && (t.trial.cv_rmse() <= closed * least || judgement.share >= WHOLE_SHARE)
                 && t.is_of_its_kind;
             Judged { tried: t, judgement, accepted }
         })
@@ -202,7 +198,7 @@ pub(super) fn shape(
     let judged: Vec<Judged<'_>> = judged
         .into_iter()
         .map(|j| {
-            let enough = plain.total() - j.tried.trial.total() >= MIN_SHARE_OF_KIND * by_stop;
+            let enough = plain.total() - j.tried.trial.total() >= NEGLIGIBLE_SHARE * by_stop;
             Judged { accepted: j.accepted && enough, ..j }
         })
         .collect();
@@ -341,7 +337,7 @@ mod tests {
     fn zones_that_nothing_reaches_are_no_half_of_a_curve() {
         let odd = curve(&[10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0], &[1.0, 1.3, 1.6, 1.6, 1.3, 1.0, 1.0, 1.0]);
         assert!(lopsided(&odd, (10.0, 50.0)) < 1e-9);
-        assert!(lopsided(&odd, (10.0, 70.0)) > LOPSIDED);
+        assert!(lopsided(&odd, (10.0, 70.0)) > MIN_BEND_DIFFERENCE);
     }
 
     #[test]

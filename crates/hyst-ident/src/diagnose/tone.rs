@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::spectrum::{explained, strongest};
 use super::trial::Trial;
+use crate::criteria::MINOR_SHARE;
 use crate::nested::Problem;
 use crate::samples::Samples;
 
@@ -15,8 +16,6 @@ const NEIGHBOURS: usize = 8;
 const APART: f64 = 2.0;
 /// How far it stands above them (power).
 const OVER_NEIGHBOURS: f64 = 20.0;
-/// Least share of what moves at its frequency (power) that is no base's misfit: that is less.
-const OVER_MOTION: f64 = 0.1;
 /// Parts of the record, in how many of them it is there, in how many of them so little moves at its frequency, and between which shares of its
 /// height over the whole record it is there.
 const PARTS: usize = 8;
@@ -80,7 +79,7 @@ fn is_there_at_rest(samples: &Samples, motion: &[f64], wave: &[f64], hz: f64) ->
             .collect();
         let of = |hz: f64| pieces.iter().map(|s| explained(samples, std::slice::from_ref(s), motion, hz)).sum();
         let moved = [hz - line, hz, hz + line].map(of).into_iter().fold(0.0, f64::max);
-        wave.iter().map(|w| w * w).sum::<f64>() > OVER_MOTION * moved
+        wave.iter().map(|w| w * w).sum::<f64>() > MINOR_SHARE * moved
     });
     quiet.count() >= QUIET_PARTS
 }

@@ -4,14 +4,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::{MIN_STD_ERRORS, MINOR_SHARE};
 use crate::lsq::Gram;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted};
-
-/// Standard errors by which a parameter has to differ from the value at which its effect vanishes.
-const MIN_STD_ERRORS: f64 = 2.0;
-/// And below which it means nothing, however much lower the error is with it.
-const MEANINGLESS: f64 = 0.1;
 
 /// Effects whose law this record does not determine: a parameter that cannot be told from the value at which its effect is absent (or, for
 /// the damping of a mode, from zero) says little.
@@ -22,7 +18,7 @@ pub(super) struct Undetermined {
 
 impl Undetermined {
     pub(super) fn of(fit: &Fitted) -> Self {
-        Self { little: within(fit, MIN_STD_ERRORS), nothing: within(fit, MEANINGLESS) }
+        Self { little: within(fit, MIN_STD_ERRORS), nothing: within(fit, MINOR_SHARE) }
     }
 
     /// Whether a cause goes for that: a parameter that says nothing speaks against it however much lower the error is with it.
