@@ -10,7 +10,7 @@ use std::ops::Range;
 use hyst_core::CreepParams;
 
 use crate::Samples;
-use crate::settle::windows;
+use crate::settle::{start_up_rows, windows};
 
 /// Share of a segment's rows that its beginning is, and fewest rows.
 const BEGINNING: usize = 10;
@@ -30,7 +30,7 @@ impl Rest {
     /// Takes that of the other for each segment in which fewer rows are a start-up with it and which it follows as well in the rows that are a
     /// start-up for neither; whether there is any. Each comes with its residual and its start-up rows. `zero_is_known` unless a constant is taken from
     /// the record.
-    pub(crate) fn take_better(
+    fn take_better(
         &mut self,
         other: &Self,
         samples: &Samples,
@@ -56,9 +56,38 @@ impl Rest {
     }
 }
 
+/// What is left of a creep, with the residual and the start-up rows that remain with it. A creep that continues looks like a start-up: the rows that are
+/// `settling` may be those that show it, so that it is estimated without them and with them.
+pub(crate) fn continued(
+    samples: &Samples,
+    creep: &CreepParams<Vec<f64>>,
+    residual: &[f64],
+    settling: &[bool],
+    span: f64,
+    zero_is_known: bool,
+) -> (Rest, Vec<f64>, Vec<bool>) {
+    let remaining = |rest: &Rest| -> (Vec<f64>, Vec<bool>) {
+        let remains: Vec<f64> = residual.iter().zip(&rest.added).map(|(r, added)| r - added).collect();
+        let settling = start_up_rows(samples, &remains);
+        (remains, settling)
+    };
+    let shown_by = |hidden: &[bool]| rest(samples, creep, residual, hidden, span, zero_is_known);
+    let mut best = shown_by(settling);
+    let (mut remains, mut starts) = remaining(&best);
+    if settling != samples.settling {
+        let other = shown_by(&samples.settling);
+        let (others, other_starts) = remaining(&other);
+        let with_residuals = [(&remains[..], &starts[..]), (&others, &other_starts)];
+        if best.take_better(&other, samples, with_residuals, zero_is_known) {
+            (remains, starts) = remaining(&best);
+        }
+    }
+    (best, remains, starts)
+}
+
 /// What is left of a creep, by what the first rows of each segment show: a tenth of it, or as many as a start-up can last. `residual` is what the model leaves from rest, `span` that of its motion
 /// \[y\]; rows that are `settling` do not count. `zero_is_known` unless a constant is taken from the record.
-pub(crate) fn rest(
+fn rest(
     samples: &Samples,
     creep: &CreepParams<Vec<f64>>,
     residual: &[f64],

@@ -1,8 +1,8 @@
 //! Start-up rows: a transient left from before the record.
 //!
-//! A model starts each segment at rest with virgin memory. A real record may start otherwise: still
-//! ringing, or with an unknown memory. What was left decays, or is wiped out once the input has swept
-//! its range; until then a misfit says nothing about the model.
+//! A model starts each segment at rest with virgin memory. A real record may start in another state: still ringing, or with an unknown memory. The
+//! transient decays, or is erased once the input has swept its range. Until then a misfit says nothing about the model. Rows that pass a part of the
+//! range for the only time stay in the fit and in the error.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     samples.segments.iter().map(window).collect()
 }
 
-/// Levels of the input that are told apart when it is asked where a record has been.
+/// Number of levels into which the range of the input is divided.
 const LEVELS: usize = 256;
 
 /// The levels of the input that some rows pass.
@@ -125,8 +125,8 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
     samples.segments.iter().map(|s| cycle(s).map(|before| before + 1)).collect()
 }
 
-/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output. Rows of a drive that comes only once
-/// are none: neither a fit nor an error may leave out the only ones that tell of a part of the range.
+/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output. Rows that alone pass a part of the range
+/// are not marked.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let (windows, blind) = (windows(samples), &samples.blind);
     let needed_from = seen_again(samples, &windows);

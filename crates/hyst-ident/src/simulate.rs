@@ -3,7 +3,7 @@
 use hyst_core::CreepParams;
 use serde::{Deserialize, Serialize};
 
-use crate::creep_rest::{self, Rest};
+use crate::creep_rest;
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::memory;
@@ -96,9 +96,9 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
     simulate_with(model, record, &SimulateOptions { zero, ..SimulateOptions::default() })
 }
 
-/// Runs a model over a record. Memory starts virgin in each segment; where the output shows that it did not and fewer rows are a start-up then, as
-/// after the segment's own first cycle. A tone has the phase that the first rows of each file show, and a creep goes on from what they show
-/// of the time before. The drive goes on between samples as the model's file says.
+/// Runs a model over a record. The memory of each segment starts virgin. Where the first rows show another state and fewer rows are a start-up with it, the
+/// segment starts from that state: after the last turns of the drive, or after its own first cycle. The first rows of each file give the phase of a tone,
+/// those of each segment the rest of a creep. The model's file says how the drive runs between samples.
 ///
 /// # Errors
 /// If the record lacks a column that the model uses, or its units are not the model's.
@@ -174,29 +174,11 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             residual = missed(&predicted);
             settling = start_up_rows(&samples, &residual);
         }
-        // And what was done before goes on in a creep.
+        // A creep from before the record continues in it.
         if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic && !options.at_rest) {
             let (low, high) = range(predicted.iter().copied());
             let known = options.zero == Zero::None;
-            let rest_shown_by =
-                |hidden: &[bool]| creep_rest::rest(&samples, creep, &residual, hidden, high - low, known);
-            let mut rest = rest_shown_by(&settling);
-            let less_rest = |rest: &Rest| -> Vec<f64> {
-                let left = residual.iter().zip(&rest.added).map(|(r, added)| r - added);
-                left.collect()
-            };
-            let mut left = less_rest(&rest);
-            let mut now = start_up_rows(&samples, &left);
-            // What goes on looks like a start-up itself: the rows that were taken for one may be those that show it.
-            if settling != samples.settling {
-                let from_first = rest_shown_by(&samples.settling);
-                let others = less_rest(&from_first);
-                let starting = start_up_rows(&samples, &others);
-                if rest.take_better(&from_first, &samples, [(&left, &now), (&others, &starting)], known) {
-                    left = less_rest(&rest);
-                    now = start_up_rows(&samples, &left);
-                }
-            }
+            let (rest, left, now) = creep_rest::continued(&samples, creep, &residual, &settling, high - low, known);
             predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
             creep_away = rest.away;
             (residual, settling) = (left, now);
