@@ -23,6 +23,8 @@ pub(crate) const MIN_PAST_RATIO: f64 = 2.0;
 
 /// At most this share is next to nothing: no law is exact to a hundredth.
 pub(crate) const NEGLIGIBLE_SHARE: f64 = 0.01;
+/// Share of what a slow amplifier explains that an effect of the motion has to explain beside it: the amplifier's part is far larger than any effect.
+pub(crate) const MIN_SHARE_BESIDE_SLEW_LIMIT: f64 = 1e-3;
 /// At most this share is a small part.
 pub(crate) const MINOR_SHARE: f64 = 0.1;
 /// Share of the variance above the noise floor that an effect has to explain.

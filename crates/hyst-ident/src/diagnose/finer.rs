@@ -16,7 +16,7 @@ use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
 use crate::base::{PreisachBasis, RatedBasis, ScreeningBasis};
-use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MINOR_SHARE, NEGLIGIBLE_SHARE};
+use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MIN_SHARE_BESIDE_SLEW_LIMIT, MINOR_SHARE};
 use crate::lsq::Blocks;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
@@ -215,7 +215,7 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
         Effect::Delay if h.effects.delay.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         Effect::Lag if h.effects.lag.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         // Of what only the sensor shows an amplifier leaves nothing.
-        _ if effect.acts_on_the_motion() => NEGLIGIBLE_SHARE,
+        _ if effect.acts_on_the_motion() => MIN_SHARE_BESIDE_SLEW_LIMIT,
         _ => 0.0,
     };
     beside(problem, found, already, &follows, &share)?;
