@@ -1,10 +1,11 @@
 //! Legal records that are unlike the usual one: fits and diagnoses end with a result or an error that says why.
 
+use hyst_core::CreepParams;
 use hyst_ident::diagnose::{DiagnoseOptions, diagnose};
 use hyst_ident::fit::{FitError, FitOptions, fit};
 use hyst_ident::model::Kind;
 use hyst_ident::record::{Columns, OutputUnit, Record};
-use hyst_ident::simulate::{Zero, simulate};
+use hyst_ident::simulate::{SimulateOptions, Simulation, Zero, simulate, simulate_with};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -250,4 +251,40 @@ fn a_record_in_mid_cycle_is_followed_from_its_first_row() {
     let simulated = simulate(&model, &made(2_000, 4000), Zero::None).unwrap();
     assert_eq!(simulated.settling.iter().filter(|s| **s).count(), 0);
     assert!(simulated.errors.unwrap().nrmse_percent < 0.5, "{:?}", simulated.errors);
+}
+
+/// An actuator that rested 10 µm above the start of the record still creeps from there. The first rows show it, and all later rows are predicted with it.
+#[test]
+fn a_creep_continues_from_before_the_record() {
+    let triangle = |k: i32| 50.0 * (1.0 - (f64::from(k % 200) / 100.0 - 1.0).abs());
+    let columns = |output: Vec<f64>| Columns {
+        time: (0..4000).map(|k| 0.01 * f64::from(k)).collect(),
+        input: Some((0..4000).map(triangle).collect()),
+        output: Some((OutputUnit::Micrometre, output)),
+        ..Columns::default()
+    };
+    let mut play = 0.0;
+    let motion = (0..4000).map(|k| {
+        let u = triangle(k);
+        play = f64::clamp(play, u - 5.0, u + 5.0);
+        0.4 * u + 0.2 * play
+    });
+    let record = Record::from_samples(columns(motion.collect())).unwrap();
+    let mut model = fit(&record, Kind::Pi, &FitOptions::default()).unwrap();
+    let (seconds, shares) = (vec![0.5, 5.0, 50.0], vec![0.01, 0.02, 0.02]);
+    model.effects.creep = Some(CreepParams { seconds: seconds.clone(), shares: shares.clone() });
+
+    let from_rest = SimulateOptions { at_rest: true, ..SimulateOptions::default() };
+    let crept = simulate_with(&model, &record, &from_rest).unwrap().predicted;
+    let rest =
+        |k: usize| shares.iter().zip(&seconds).map(|(c, tau)| 10.0 * c * (-0.01 * k as f64 / tau).exp()).sum::<f64>();
+    let noise = |k: usize| 0.003 * (1.7 * k as f64).sin();
+    let output = crept.iter().enumerate().map(|(k, y)| y + rest(k) + noise(k)).collect();
+    let record = Record::from_samples(columns(output)).unwrap();
+    let found = simulate(&model, &record, Zero::None).unwrap();
+    assert!((found.creep_away[0] - 10.0).abs() < 0.2, "{:?}", found.creep_away);
+    let rmse = |s: &Simulation| s.errors.as_ref().unwrap().rmse;
+    let ignored = simulate_with(&model, &record, &from_rest).unwrap();
+    assert!(rmse(&found) < 0.1 * rmse(&ignored), "{} against {}", rmse(&found), rmse(&ignored));
+    assert_eq!(ignored.creep_away, [0.0]);
 }

@@ -1,9 +1,9 @@
-//! The thresholds of all decisions: what counts as alike, as better, as nearly all of something, as above the noise, and what an effect of a piezo
+//! The thresholds that decisions share: what counts as alike, as better, as nearly all of something, as above the noise, and what an effect of a piezo
 //! actuator can be.
 //!
-//! Comparisons use a few ratios and shares, the same ones everywhere. They were chosen on simulated actuators of seven hysteresis laws
-//! (`tests/src/other_physics.rs`) and on the examinations one to six of `tests/examination`. Settings that only cost or save time (rows, grids, rounds) are
-//! where they are used.
+//! Comparisons use a few ratios and shares. They were chosen on simulated actuators of seven hysteresis laws
+//! (`tests/src/other_physics.rs`) and on the examinations one to six of `tests/examination`. What belongs to one question (the
+//! colour of a noise, a tone of the sensor) and settings that only cost or save time (rows, grids, rounds) are where they are used.
 
 // Ratios of two errors (RMSE).
 
@@ -66,9 +66,11 @@ pub(crate) const MIN_DRIFT_TIME: f64 = 0.04;
 pub(crate) const MAX_ZERO_STEP: f64 = 0.25;
 /// Share of a curve's bend (power) that has to differ between its two halves: one that bends both alike is a symmetric loop.
 pub(crate) const MIN_BEND_DIFFERENCE: f64 = 0.25;
-/// Widths of the knee of a stop, as shares of the range between its limits: largest one of a stop on a base that bends by itself, and on one that does not.
+/// Largest width of the knee of a stop on a base that bends by itself, as a share of the range between its limits.
 pub(crate) const MAX_SHARP_KNEE: f64 = 0.2;
+/// The same on a base that does not bend.
 pub(crate) const MAX_KNEE: f64 = 0.45;
-/// Distance from a limit within which an output is at a stop, as a share of the motion's span, and share of the rows that have to be there.
+/// Distance from a limit within which an output is at a stop, as a share of the motion's span.
 pub(crate) const MAX_STOP_DISTANCE: f64 = 0.05;
+/// Share of the rows that have to be at a stop.
 pub(crate) const MIN_STOP_ROWS: f64 = 0.003;

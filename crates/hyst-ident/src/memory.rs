@@ -273,8 +273,8 @@ pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     new.into_iter().zip(old).map(|(new, old)| if new.is_empty() { old.clone() } else { new }).collect()
 }
 
-/// The past after which least is left of the first rows; none unless what stands above the `level` of as many others falls to at most the share that
-/// [`MIN_PAST_RATIO`] says (all Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
+/// The past after which least is left of the first rows. None unless their error above the `level` of as many other rows falls by [`MIN_PAST_RATIO`] (`level`
+/// and `squares` are Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
 /// out any more.
 pub(crate) fn best(
     pasts: Vec<Vec<f64>>,

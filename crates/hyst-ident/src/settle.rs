@@ -129,7 +129,7 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
 /// are not marked.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let (windows, blind) = (windows(samples), &samples.blind);
-    let needed_from = seen_again(samples, &windows);
+    let mut needed_from: Option<Vec<usize>> = None;
     let centred = centre(samples, residual, &windows, blind);
     let outside = || {
         let rows = samples.segments.iter().zip(&windows).flat_map(|(s, w)| s.start + w..s.end);
@@ -140,7 +140,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let largest = outside().fold(0.0f64, |m, r| m.max(r.abs()));
     let mut settling = blind.clone();
     let (low, high) = samples.input_range();
-    for ((s, window), needed_from) in samples.segments.iter().zip(&windows).zip(needed_from) {
+    for (i, (s, window)) in samples.segments.iter().zip(&windows).enumerate() {
         let rows: Vec<f64> = (s.start..s.start + window).map(|k| if blind[k] { 0.0 } else { centred[k] }).collect();
         if !rows.iter().any(|r| r.abs() > LARGE_RATIO * largest && r.abs() > 6.0 * rms) {
             continue;
@@ -155,6 +155,7 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         // What decays into the residual's level goes on below it for about half as long again.
+        let needed_from = needed_from.get_or_insert_with(|| seen_again(samples, &windows))[i];
         let end = (last + last / 2 + 1).min(rows.len()).min(needed_from);
         settling[s.start..s.start + end].fill(true);
     }

@@ -3,7 +3,7 @@
 use hyst_core::CreepParams;
 use serde::{Deserialize, Serialize};
 
-use crate::creep_rest;
+use crate::creep_rest::{self, Estimate};
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::memory;
@@ -177,8 +177,9 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         // A creep from before the record continues in it.
         if let Some(creep) = model.effects.creep.as_ref().filter(|_| !options.periodic && !options.at_rest) {
             let (low, high) = range(predicted.iter().copied());
-            let known = options.zero == Zero::None;
-            let (rest, left, now) = creep_rest::continued(&samples, creep, &residual, &settling, high - low, known);
+            let zero_is_known = options.zero == Zero::None;
+            let estimate = Estimate { samples: &samples, creep, span: high - low, zero_is_known };
+            let (rest, left, now) = estimate.continued(&residual, &settling);
             predicted.iter_mut().zip(rest.added).for_each(|(p, rest)| *p += rest);
             creep_away = rest.away;
             (residual, settling) = (left, now);
@@ -232,17 +233,18 @@ fn recalled(
             return Vec::new();
         }
         let zero = residual[rows.start] - centred[rows.start];
+        // A creep from before is another unknown of the same rows.
+        let nothing = || vec![0.0; windows[i]];
+        let unit = creep.map_or_else(nothing, |creep| creep_rest::column(creep, 0.0, samples.period_of(i), windows[i]));
         let squares = |past: &Vec<f64>| -> f64 {
             let chain = chain.of(i);
             let output =
                 drive.beginning(i, windows[i], chain, |state, env, u0| chain.reset_after(state, env, u0, past));
             let left = rows.clone().zip(output).filter(|(k, _)| !samples.blind[*k]);
             let left = left.map(|(k, v)| (k, samples.output[k] - zero - v));
-            let Some(creep) = creep else { return left.map(|(_, r)| r * r).sum() };
-            // A creep from before is another unknown of the same rows.
-            let seconds = |k: usize| (k - rows.start) as f64 * samples.period_of(i);
-            let left: Vec<(f64, f64)> = left.map(|(k, r)| (seconds(k), r)).collect();
-            creep_rest::squares_without(creep, &left, samples.output_span())
+            let left: Vec<(f64, f64)> = left.map(|(k, r)| (unit[k - rows.start], r)).collect();
+            let all: f64 = left.iter().map(|(_, r)| r * r).sum();
+            all - creep_rest::fitted(left.into_iter(), samples.output_span()).map_or(0.0, |(_, taken)| taken)
         };
         let level = memory::level(samples, &centred, &windows, i);
         let mut pasts = memory::pasts(samples.input[rows.start], samples.input_range());

@@ -214,11 +214,12 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
     let share = |effect: Effect| match effect {
         Effect::Delay if h.effects.delay.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         Effect::Lag if h.effects.lag.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
-        // Of what only the sensor shows an amplifier leaves nothing.
+        // An amplifier turns between two samples, where no row shows it: what remains of it looks like an effect of the motion, none of the sensor.
         _ if effect.acts_on_the_motion() => MIN_SHARE_BESIDE_SLEW_LIMIT,
         _ => 0.0,
     };
     beside(problem, found, already, &follows, &share)?;
+    // A zero or a gain that wanders is interpolated between few heights; the remainder looks like many effects.
     let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
     beside(problem, found, already, &still, &|_| MINOR_SHARE)
 }
