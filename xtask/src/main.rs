@@ -53,8 +53,9 @@ const CHECKS: &[Check] = &[
         arguments: &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"],
         environment: &[],
     },
-    // The process-level tests drive this binary.
-    Check { name: "build", arguments: &["build", "--package", "hyst-cli"], environment: &[] },
+    // With `hystctl` itself, which the process-level tests drive: in one command, so that all is compiled once, with one
+    // set of features.
+    Check { name: "build", arguments: &["build", "--workspace", "--lib", "--bins", "--tests"], environment: &[] },
     // The lints have compiled the examples, and no test runs one.
     Check {
         name: "tests",
