@@ -46,7 +46,7 @@ impl FixedBasis {
 
 impl Basis for FixedBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        debug_assert_eq!(segments, self.samples.segments);
+        assert_eq!(segments, self.samples.segments, "the columns of a fixed base are those of its own record");
         let column = |_| {
             let mut column = vec![0.0; drive.len()];
             Drive::of(&self.samples, drive, self.between, Passes::Once).run(&self.operator, &mut column);

@@ -122,7 +122,7 @@ impl Surface {
             once: vec![0.0; cells],
         };
         let set = params.set_surface(|i, j| self.value(i, j), |i| self.virgin(i));
-        debug_assert!(set.is_ok(), "the lists were made for the grid");
+        assert!(set.is_ok(), "the lists have the lengths of the grid");
         params
     }
 }
