@@ -1,8 +1,9 @@
 //! Whether the probability of a name is what it says, on actuators of seven hysteresis laws:
-//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE]`.
+//! `cargo run --release -p hyst-tests --example reliability -- [COUNT] [SEED] [--from NUMBER] [--fit] [--svg FILE] [--save DIR]`.
 //!
 //! Each actuator is measured, fitted and diagnosed. `--fit` fits the coefficients of the probability to what came out, which is then training
 //! data; without it the calibration error of those that are in use is told, and `--svg` draws the reliability diagram.
+//! `--save` writes the records to look at, and diagnoses nothing.
 
 use std::time::Instant;
 
@@ -124,6 +125,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let option = |name: &str| words.iter().position(|w| w == name).map(|at| words.get(at + 1));
     let from = option("--from").map_or(Some(0), |word| word?.parse().ok()).ok_or("--from needs a number")?;
     let numbers: Vec<u64> = (from..from + count).collect();
+    if let Some(folder) = option("--save") {
+        let folder = folder.ok_or("--save needs a folder")?;
+        std::fs::create_dir_all(folder)?;
+        for i in numbers {
+            let actuator = Actuator::draw(seed, i);
+            for (experiment, name) in (0..).zip(["train", "test"]) {
+                let file = std::fs::File::create_new(format!("{folder}/{i}-{name}.csv"))?;
+                actuator.record(experiment, name).write_csv(file)?;
+            }
+        }
+        return Ok(());
+    }
     for some in numbers.chunks(16) {
         let done: Vec<Outcome> = some.par_iter().map(|i| run(seed, *i)).collect();
         for (i, o) in some.iter().zip(&done) {

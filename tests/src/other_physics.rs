@@ -93,11 +93,13 @@ impl Law {
             }
             Self::BoucWen => {
                 let (n, closing, scale) = (draw(1.0, 2.0), draw(0.1, 0.6), draw(0.15, 0.5));
+                // A piezo's output follows its input: the law's force is subtracted.
                 let law = move |_: f64, z: f64, dx: f64| {
                     let share = if dx * z > 0.0 { 1.0 } else { closing };
                     dx * (1.0 - share * (z.abs() / scale).powf(n))
                 };
-                small_steps(Box::new(law), 0.0)
+                let z = small_steps(Box::new(law), 0.0);
+                x.iter().zip(z).map(|(x, z)| x - z).collect()
             }
             Self::JilesAtherton => {
                 let (k, a, c) = (draw(0.1, 0.3), draw(0.2, 0.5), draw(0.05, 0.3));
@@ -113,17 +115,19 @@ impl Law {
                 small_steps(Box::new(law), -0.5)
             }
             Self::Dahl => {
-                let mut total = vec![0.0; x.len()];
+                // Subtracted, too, from a line that is nowhere less steep.
+                let (mut total, mut steepest) = (vec![0.0; x.len()], 0.0);
                 for _ in 0..3 {
-                    let (reach, n, weight) = (draw(0.05, 0.5), draw(0.6, 1.4), draw(0.1, 0.4));
+                    let (reach, n, weight) = (draw(0.2, 0.9), draw(0.6, 1.4), draw(0.1, 0.4));
                     let law = move |_: f64, f: f64, dx: f64| {
                         let left = 1.0 - f * dx.signum();
                         dx / reach * left.abs().powf(n).copysign(left)
                     };
                     let part = small_steps(Box::new(law), -1.0);
                     total.iter_mut().zip(part).for_each(|(sum, f)| *sum += weight * f.clamp(-1.5, 1.5));
+                    steepest += weight * 2_f64.powf(n) / reach;
                 }
-                total
+                x.iter().zip(total).map(|(x, f)| x - f / steepest).collect()
             }
         }
     }

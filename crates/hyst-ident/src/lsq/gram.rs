@@ -61,6 +61,23 @@ impl Blocks {
     }
 }
 
+/// Columns of a strip of [`own_products`].
+const STRIP: usize = 48;
+
+/// `XᵀX`, strip by strip of the upper triangle: half of the work of a product of two different matrices.
+fn own_products(x: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = x.ncols();
+    let mut products = DMatrix::zeros(n, n);
+    for first in (0..n).step_by(STRIP) {
+        let width = STRIP.min(n - first);
+        let strip = x.columns(first, width).transpose();
+        let rest = n - first;
+        products.view_mut((first, first), (width, rest)).gemm(1.0, &strip, &x.columns(first, rest), 0.0);
+    }
+    products.fill_lower_triangle_with_upper_triangle();
+    products
+}
+
 /// `XᵀX` of one set of rows, the target being X's last column.
 #[derive(Clone, Debug)]
 pub(crate) struct Gram {
@@ -75,7 +92,7 @@ impl Gram {
 
     /// Of these rows.
     pub(crate) fn of(rows: &DMatrix<f64>) -> Self {
-        Self { matrix: rows.transpose() * rows, rows: rows.nrows() }
+        Self { matrix: own_products(rows), rows: rows.nrows() }
     }
 
     /// Of each of these blocks of rows.
@@ -136,8 +153,9 @@ impl Bordered {
 
     /// Adds rows: the columns that there are, and those that come.
     pub(crate) fn add(&mut self, x: &DMatrix<f64>, further: &DMatrix<f64>) {
-        self.cross += x.tr_mul(further);
-        self.own += further.tr_mul(further);
+        // Transposing the few columns costs less than transposing the many.
+        self.cross += (further.transpose() * x).transpose();
+        self.own += own_products(further);
     }
 
     /// The normal equations of all columns: the old ones keep their place, the target moves behind the new ones.
@@ -162,6 +180,12 @@ impl Bordered {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn products_by_strips_are_those_of_the_whole() {
+        let x = DMatrix::from_fn(70, 2 * STRIP + 5, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
+        assert!((own_products(&x) - x.transpose() * &x).amax() < 1e-12);
+    }
 
     #[test]
     fn further_columns_stand_between_the_old_ones_and_the_target() {

@@ -15,11 +15,7 @@ pub(crate) struct Projector<'a> {
 impl<'a> Projector<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, blocks: Vec<DMatrix<f64>>) -> Self {
         let n = blocks.first().map_or(0, |x| x.ncols() - 1);
-        let mut h = DMatrix::zeros(n, n);
-        for x in &blocks {
-            let own = x.columns(0, n);
-            h += own.tr_mul(&own);
-        }
+        let mut h = Gram::of_all(&blocks, n + 1).matrix.view((0, 0), (n, n)).into_owned();
         for i in 0..n {
             // A column of zeros takes nothing.
             h[(i, i)] = if h[(i, i)] > 0.0 { h[(i, i)] * (1.0 + 1e-9) } else { 1.0 };
@@ -48,11 +44,12 @@ impl<'a> Projector<'a> {
         let mut cross = DMatrix::zeros(factor.l_dirty().ncols(), columns.ncols());
         let mut first = 0;
         for x in &self.blocks {
-            cross += x.columns(0, cross.nrows()).tr_mul(&columns.rows(first, x.nrows()));
+            let few = columns.rows(first, x.nrows()).transpose() * x.columns(0, cross.nrows());
+            cross += few.transpose();
             first += x.nrows();
         }
-        let matrix = columns.tr_mul(columns) - cross.tr_mul(&factor.solve(&cross));
-        Some(Gram { matrix, rows: columns.nrows() })
+        let all = Gram::of(columns);
+        Some(Gram { matrix: all.matrix - cross.transpose() * factor.solve(&cross), ..all })
     }
 
     /// How much of Σ residual² some columns would take together, all unknowns refitted.
