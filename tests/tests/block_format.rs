@@ -5,7 +5,7 @@
 //! either undo that, or count [`BLOCK_VERSION`] up and write the file anew:
 //!
 //! ```text
-//! HYST_WRITE_BLOCKS=1 cargo test -p hyst-tests --test block_format
+//! HYST_WRITE_BLOCKS=1 cargo test -p hyst-tests block_format
 //! ```
 //!
 //! which with the version unchanged writes new lines only: a new operator at the end, or a new value of an enumeration.

@@ -6,6 +6,7 @@ mod browser;
 mod can;
 mod command;
 mod firmware;
+mod layouts;
 mod logs;
 mod python;
 
@@ -21,6 +22,7 @@ cargo xtask firmware --table    the same, and write its figures to docs/firmware
 cargo xtask can                 run the CAN check alone: against python-can, and in QEMU against Linux's own ISO-TP and slcan
 cargo xtask fuzz [CASES]        frames and bytes by chance against whatever takes them, 1,000,000 cases of each kind; half an hour
 cargo xtask logs                run the log checks alone: logs of every kind of run, read with Foxglove's Go programs
+cargo xtask layouts             run the layout check alone: files that other programs write, read by hystctl as they are
 cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
 ";
 
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         ["can"] => table(&[("can", timed("can", can::check))]),
         ["fuzz", ref more @ ..] => table(&[("fuzz", timed("fuzz", || fuzz(more)))]),
         ["logs"] => table(&logs()),
+        ["layouts"] => table(&[("layouts", timed("layouts", layouts::check))]),
         ["python"] => table(&[("python", timed("python", python::check))]),
         [] | ["help" | "--help" | "-h"] => {
             print!("{USAGE}");
@@ -88,6 +91,7 @@ fn test() -> ExitCode {
     results.push(("firmware", timed("firmware", || firmware::check(false))));
     results.push(("can", timed("can", can::check)));
     results.extend(logs());
+    results.push(("layouts", timed("layouts", layouts::check)));
     results.push(("python", timed("python", python::check)));
     table(&results)
 }

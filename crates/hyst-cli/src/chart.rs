@@ -27,6 +27,9 @@ pub(crate) struct Chart {
     y: String,
     curves: Vec<Curve>,
     log: bool,
+    log_across: bool,
+    bounds: Option<(f64, f64)>,
+    legend: SeriesLabelPosition,
     small: bool,
 }
 
@@ -36,7 +39,17 @@ const POINTS: usize = 4000;
 impl Chart {
     /// An empty panel; a description that is empty takes no room.
     pub(crate) fn new(title: &str, x: &str, y: &str) -> Self {
-        Self { title: title.into(), x: x.into(), y: y.into(), curves: Vec::new(), log: false, small: false }
+        Self {
+            title: title.into(),
+            x: x.into(),
+            y: y.into(),
+            curves: Vec::new(),
+            log: false,
+            log_across: false,
+            bounds: None,
+            legend: SeriesLabelPosition::UpperLeft,
+            small: false,
+        }
     }
 
     /// The same with a logarithmic vertical axis: what is not positive is not drawn.
@@ -57,9 +70,42 @@ impl Chart {
 
     /// A path, as a loop is: evenly thinned, in the order in which it was passed.
     pub(crate) fn path(&mut self, name: &str, colour: RGBColor, x: &[f64], y: &[f64]) {
-        let step = x.len().div_ceil(POINTS).max(1);
-        let points = x.iter().copied().zip(y.iter().copied()).step_by(step).collect();
-        self.curves.push((name.into(), colour, vec![points]));
+        self.paths(name, colour, &[x.iter().copied().zip(y.iter().copied()).collect()]);
+    }
+
+    /// A path in pieces.
+    pub(crate) fn paths(&mut self, name: &str, colour: RGBColor, pieces: &[Vec<(f64, f64)>]) {
+        let points: usize = pieces.iter().map(Vec::len).sum();
+        let step = points.div_ceil(POINTS).max(1);
+        let thinned = pieces.iter().map(|piece| piece.iter().copied().step_by(step).collect()).collect();
+        self.curves.push((name.into(), colour, thinned));
+    }
+
+    /// The same with these bounds of the vertical axis, as panels that are compared share them.
+    pub(crate) fn between(self, low: f64, high: f64) -> Self {
+        Self { bounds: Some((low, high)), ..self }
+    }
+
+    /// The same with its legend at the right.
+    pub(crate) fn legend_right(self) -> Self {
+        Self { legend: SeriesLabelPosition::UpperRight, ..self }
+    }
+
+    /// The same with a logarithmic horizontal axis too.
+    pub(crate) fn log_across(self) -> Self {
+        Self { log_across: true, ..self }
+    }
+
+    /// Draws it, unless there is nothing to draw.
+    pub(crate) fn draw_if_any<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn
+    where
+        B::ErrorType: 'static,
+    {
+        if self.curves.iter().any(|(_, _, pieces)| pieces.iter().any(|piece| !piece.is_empty())) {
+            self.draw(area)
+        } else {
+            Ok(())
+        }
     }
 
     /// Draws it.
@@ -86,10 +132,16 @@ impl Chart {
             .y_label_area_size(room.1);
         let across = range(|p| p.0, 0.0);
         if self.log {
-            let (low, high) = ends(|p| p.1);
-            self.lines(builder.build_cartesian_2d(across, (low / 1.3..high * 1.3).log_scale())?)
+            let (low, high) = self.bounds.unwrap_or_else(|| ends(|p| p.1));
+            let up = (low / 1.3..high * 1.3).log_scale();
+            if self.log_across {
+                self.lines(builder.build_cartesian_2d(across.log_scale(), up)?)
+            } else {
+                self.lines(builder.build_cartesian_2d(across, up)?)
+            }
         } else {
-            self.lines(builder.build_cartesian_2d(across, range(|p| p.1, 0.08))?)
+            let up = self.bounds.map_or_else(|| range(|p| p.1, 0.08), |(low, high)| low..high);
+            self.lines(builder.build_cartesian_2d(across, up)?)
         }
     }
 
@@ -126,7 +178,7 @@ impl Chart {
         if !self.small {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperLeft)
+                .position(self.legend.clone())
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
                 .label_font(("sans-serif", 13))

@@ -9,37 +9,40 @@ use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::clipping::clipped;
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::range;
-use hyst_ident::record::{ColumnMap, Losses, Need, OutputUnit, Record};
+use hyst_ident::record::{ColumnMap, Losses, Need, OutputUnit, Reading, Record};
 use hyst_ident::simulate::Zero;
+use hyst_ident::spikes::spikes_of;
 
 use crate::cli::{MapArg, TemperatureArg, ZeroArg};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::output::say;
+use crate::progress::Progress;
 use crate::text;
 
 /// The records of all files, joined to one.
-pub(crate) fn training(paths: &[PathBuf], map: &[String]) -> CommandResult<Record> {
-    let map = ColumnMap::parse(map)?;
-    let read = |path: &PathBuf| read(path, &map, Need::InputAndOutput);
+pub(crate) fn training(paths: &[PathBuf], map: &MapArg) -> CommandResult<Record> {
+    let read = |path: &PathBuf| read(path, map, Need::InputAndOutput);
     let records: Vec<Record> = paths.iter().map(read).collect::<CommandResult<_>>()?;
     records.iter().for_each(tell_oddities);
     Ok(Record::join(records)?)
 }
 
 /// A file, or what comes on stdin for `-`.
-fn read(path: &Path, map: &ColumnMap, need: Need) -> CommandResult<Record> {
+fn read(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
+    let how = Reading { map: ColumnMap::parse(&map.map)?, rate: map.rate };
     if path != Path::new("-") {
-        return Ok(Record::read(path, map, need)?);
+        let bar = Progress::bar("reading", 1000);
+        return Ok(Record::read_watched(path, how, need, &mut |share| bar.at((1000.0 * share) as usize))?);
     }
     let mut bytes = Vec::new();
     let came = io::stdin().lock().read_to_end(&mut bytes);
     came.map_err(|error| CommandError::bad_input(format!("stdin: cannot be read: {error}")))?;
-    Ok(Record::parse("stdin", &bytes, map, need)?)
+    Ok(Record::parse("stdin", &bytes, how, need)?)
 }
 
 /// One record.
-pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<Record> {
-    let record = read(path, &ColumnMap::parse(map)?, need)?;
+pub(crate) fn record(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
+    let record = read(path, map, need)?;
     tell_oddities(&record);
     if falls(&record) {
         let column = record.output_unit().map_or("", |unit| unit.column());
@@ -48,6 +51,14 @@ pub(crate) fn record(path: &Path, map: &[String], need: Need) -> CommandResult<R
             record.name()
         ));
     }
+    Ok(record)
+}
+
+/// A record with what the file has: input and output, or one of them.
+pub(crate) fn any(path: &Path, map: &MapArg) -> CommandResult<Record> {
+    let how = Reading { map: ColumnMap::parse(&map.map)?, rate: map.rate };
+    let record = Record::read_any(path, &how)?;
+    tell_oddities(&record);
     Ok(record)
 }
 
@@ -95,33 +106,73 @@ fn span(x: &[f64]) -> f64 {
 /// Sample rates that actuators are measured at \[Hz\].
 const ORDINARY_RATES: Range<f64> = 5.0..2e5;
 
-/// Says what is legal in a record but is seldom meant.
-fn tell_oddities(record: &Record) {
-    let (name, rate) = (record.name(), 1.0 / record.sample_period());
+/// Says what was done to read a record.
+fn tell_notes(record: &Record) {
+    record.notes().iter().for_each(|note| say(&format!("note: {}: {note}", record.name())));
+}
+
+/// Says what was done to read a record, and what is legal in it but seldom meant.
+pub(crate) fn tell_oddities(record: &Record) {
+    tell_notes(record);
+    oddities(record).iter().for_each(|odd| say(&format!("note: {}: {odd}", record.name())));
+}
+
+/// Refuses a record of which input or output never moves.
+pub(crate) fn refuse_still(record: &Record) -> CommandResult {
+    let still = |x: &[f64]| record.rows() > 1 && !x.is_empty() && span(x) == 0.0;
+    let output = record.output().unwrap_or_default();
+    for (column, x) in
+        [(record.input_column(), record.input()), (record.output_unit().map_or("", |unit| unit.column()), output)]
+    {
+        if still(x) {
+            let message = format!(
+                "{}, column \"{column}\": it is {} throughout; nothing can be learned of what never moves: choose another column with --map",
+                record.name(),
+                text::short(x[0])
+            );
+            return Err(CommandError::bad_input(message));
+        }
+    }
+    Ok(())
+}
+
+/// What is legal in a record but seldom meant, a sentence each.
+pub(crate) fn oddities(record: &Record) -> Vec<String> {
+    let mut odd = Vec::new();
+    let rate = 1.0 / record.sample_period();
     if !ORDINARY_RATES.contains(&rate) {
-        say(&format!(
-            "note: {name} has {} samples per second; if its times are in another unit than their column says, name that, as with --map {}=COLUMN",
+        odd.push(format!(
+            "{} samples per second; if its times are in another unit than their column says, name that, as with --map {}=COLUMN",
             text::short(rate),
             if rate < ORDINARY_RATES.start { "time_ms" } else { "time_s" }
         ));
     }
-    losses(record.lost()).iter().for_each(|told| say(&format!("note: {name}: {told}")));
+    odd.extend(losses(record.lost()));
     if leads(record) {
-        say(&format!(
-            "note: {name}: the output runs ahead of the input in its loops, where hysteresis makes it follow; are the columns of input and output exchanged?"
-        ));
+        odd.push("the output runs ahead of the input in its loops, where hysteresis makes it follow; are the columns of input and output exchanged?".to_owned());
     }
     let unit = record.output_unit().map_or("", |unit| unit.symbol());
     // A reference may stand where it likes.
     let measured = record.output().filter(|_| !record.input().is_empty());
     for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
-        say(&format!(
-            "note: {name}: the sensor stands at the end of its range, {} {unit}, in {} (the first at {} s); they are left out: lower the drive or widen the range",
+        odd.push(format!(
+            "the sensor stands at the end of its range, {} {unit}, in {} (the first at {} s); they are left out: lower the drive or widen the range",
             text::short(end.at),
             text::count(end.rows, "row"),
             text::short(record.time()[end.first])
         ));
     }
+    let spikes = spikes_of(record);
+    if let Some(largest) = spikes.first() {
+        odd.push(format!(
+            "{} of the output left out; the largest, in row {} at {} s, is {} spans away from the rows beside it",
+            text::count(spikes.len(), "spike"),
+            largest.row + 1,
+            text::short(record.time()[largest.row]),
+            text::short(largest.spans)
+        ));
+    }
+    odd
 }
 
 /// What a log lost of its run, a sentence each.
@@ -144,9 +195,14 @@ pub(crate) fn holes(holes: usize) -> Option<String> {
 
 /// Options with which records are read, as the command line takes them.
 pub(crate) fn reading(map: &MapArg, zero: &ZeroArg) -> Vec<String> {
-    let map = map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]);
     let zero = (zero.get() == Zero::PerRecord).then(|| ["--zero".to_owned(), "per-record".to_owned()]);
-    map.chain(zero.into_iter().flatten()).collect()
+    columns(map).into_iter().chain(zero.into_iter().flatten()).collect()
+}
+
+/// Those of them that say which columns are read.
+pub(crate) fn columns(map: &MapArg) -> Vec<String> {
+    let rate = map.rate.into_iter().flat_map(|rate| ["--rate".to_owned(), rate.to_string()]);
+    map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]).chain(rate).collect()
 }
 
 /// Says how much of a test record repeats the training's drive, if any of it does.

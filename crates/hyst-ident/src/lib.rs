@@ -32,14 +32,14 @@ mod memory;
 pub mod metrics;
 pub mod model;
 mod nested;
-mod noise;
+pub mod noise;
 pub mod optimize;
 pub mod record;
 mod repetition;
 mod samples;
 mod settle;
 pub mod simulate;
-mod spikes;
+pub mod spikes;
 mod tone_phase;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};

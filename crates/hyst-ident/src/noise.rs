@@ -6,7 +6,7 @@ use std::ops::Range;
 ///
 /// Fourth differences remove everything smooth; their median magnitude ignores edges. White noise of
 /// deviation σ gives fourth differences of deviation √70 σ, and the median of |N(0, s²)| is 0.6745 s.
-pub(crate) fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
+pub fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let mut magnitudes: Vec<f64> = segments
         .iter()
         .flat_map(|s| residual[s.clone()].windows(5))
@@ -22,7 +22,7 @@ pub(crate) fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
 
 /// Standard deviation that the output's own steps bring \[its unit\]: q/√12 with q the smallest gap between two of its
 /// values. Next to nothing where values are not quantised.
-pub(crate) fn quantisation(output: &[f64]) -> f64 {
+pub fn quantisation(output: &[f64]) -> f64 {
     let mut sorted = output.to_vec();
     sorted.sort_by(f64::total_cmp);
     let gaps = sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0);

@@ -260,6 +260,7 @@ fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
         let spiked = spiked_rows(record.input(), output, record.segments());
         blind.iter_mut().zip(spiked).for_each(|(blind, spiked)| *blind |= spiked);
     }
+    blind.iter_mut().zip(record.missing()).for_each(|(blind, missing)| *blind |= missing);
     blind
 }
 

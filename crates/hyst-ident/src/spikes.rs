@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use crate::Samples;
+use crate::record::Record;
 
 /// Rows to each side whose median a row is held against: a spike of up to three rows stands out of it, what rises or falls does not.
 const BESIDE: usize = 3;
@@ -21,6 +22,29 @@ const STANDS_OUT: f64 = 5.0;
 const MORE_THAN_THE_DRIVE: f64 = 2.0;
 /// Share of the rows beyond which what stands out is no fault but the record.
 const MOST: f64 = 0.1;
+
+/// A row in which the sensor shows what no device does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spike {
+    /// The row, from 0.
+    pub row: usize,
+    /// How far it is from the rows beside it, in spans of the output without spikes.
+    pub spans: f64,
+}
+
+/// The spikes of a record's output, the farthest first; none without an input.
+pub fn spikes_of(record: &Record) -> Vec<Spike> {
+    let Some(y) = record.output().filter(|y| y.len() == record.input().len()) else { return Vec::new() };
+    let marked = spiked_rows(record.input(), y, record.segments());
+    let (low, high) = crate::samples::range((0..y.len()).filter(|k| !marked[*k]).map(|k| y[k]));
+    let off = |row: usize| {
+        let mut beside = y[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(y.len())].to_vec();
+        (y[row] - quantile(&mut beside, 0.5)).abs() / (high - low).max(f64::MIN_POSITIVE)
+    };
+    let mut found: Vec<Spike> = (0..y.len()).filter(|k| marked[*k]).map(|row| Spike { row, spans: off(row) }).collect();
+    found.sort_by(|a, b| b.spans.total_cmp(&a.spans));
+    found
+}
 
 /// Marks the spikes of an output.
 pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<bool> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hyst_ident::record::{self as core, ColumnMap, Columns, Need, OutputUnit};
+use hyst_ident::record::{self as core, ColumnMap, Columns, Need, OutputUnit, Reading};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -177,6 +177,12 @@ impl Record {
         self.0.name()
     }
 
+    /// What was done to read the files: units converted, rows left out, times resampled; a sentence each.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.0.notes().to_vec()
+    }
+
     fn __len__(&self) -> usize {
         self.0.rows()
     }
@@ -191,7 +197,7 @@ impl Record {
     }
 }
 
-/// Reads a record from a CSV file.
+/// Reads a record from a file of any format that is told apart by its content.
 ///
 /// Parameters
 /// ----------
@@ -201,19 +207,25 @@ impl Record {
 ///     Which column stands for which name of the record format: ``{"voltage_v": "Vin", "displacement_um": "Sensor"}``.
 /// need : {"both", "input", "output"}
 ///     Columns that have to be there: both to fit, the input to simulate, the output for a reference.
+/// rate : float, optional
+///     Sample rate [Hz] of files without times; times that a file has are not read.
 ///
 /// Raises
 /// ------
 /// RecordError
 ///     Names file, line and column, and what to do.
 #[pyfunction]
-#[pyo3(signature = (path, *, map=None, need="both"))]
+#[pyo3(signature = (path, *, map=None, need="both", rate=None))]
 pub(crate) fn read_record(
     py: Python<'_>,
     path: &Bound<'_, PyAny>,
     map: Option<&Bound<'_, PyDict>>,
     need: &str,
+    rate: Option<f64>,
 ) -> PyResult<Record> {
+    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        return Err(PyValueError::new_err(format!("rate is {rate}; it must be a positive number of samples a second")));
+    }
     let need = match need {
         "both" => Need::InputAndOutput,
         "input" => Need::Input,
@@ -228,10 +240,10 @@ pub(crate) fn read_record(
     for (name, column) in map.into_iter().flatten() {
         arguments.push(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?));
     }
-    let map = ColumnMap::parse(&arguments).map_err(errors::record)?;
+    let how = Reading { map: ColumnMap::parse(&arguments).map_err(errors::record)?, rate };
     let paths = paths(path)?;
     let read = || {
-        let records = paths.iter().map(|path| core::Record::read(path, &map, need)).collect::<Result<_, _>>()?;
+        let records = paths.iter().map(|path| core::Record::read(path, how.clone(), need)).collect::<Result<_, _>>()?;
         core::Record::join(records)
     };
     Ok(Record::wrap(py.detach(read).map_err(errors::record)?))
@@ -258,5 +270,5 @@ pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) 
     if record.extract::<PathBuf>().is_err() {
         return Err(PyTypeError::new_err("record must be a Record, a path, or a list of them"));
     }
-    read_record(py, record, None, need).map(|r| r.0)
+    read_record(py, record, None, need, None).map(|r| r.0)
 }

@@ -114,6 +114,6 @@ diagnosis can name; a [[disturbance]] is what it cannot:
                            # slew-limit (v_per_s) of the amplifier";
 
 pub(super) const RECORDS: &str = "\
-Records are CSV files with one header line; column names end in their unit: time_s (or _ms, _us), voltage_v, one \
-output of displacement_um (or _nm, _mm) and force_n, and where measured temperature_degc and load_n. An integer \
-column segment tells apart stretches between which the device rested.";
+Records are files with a row per sample: time, input, output, and where measured temperature and load. Columns are \
+recognised by headings that state their unit, as time_s, Voltage [mV] or \"Position (nm)\"; --map names others. An integer \
+column segment tells apart stretches between which the device rested. Tables of text in any dialect, MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files are read as they are.";

@@ -55,6 +55,9 @@ pub(crate) enum Command {
     Stop(StopArgs),
     Status(StatusArgs),
     Devices(DevicesArgs),
+    Info(InfoArgs),
+    Convert(ConvertArgs),
+    Plot(PlotArgs),
     Log(LogArgs),
     Export(ExportArgs),
     Demo(DemoArgs),
@@ -302,9 +305,6 @@ pub(crate) struct RunArgs {
     /// Record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle or steps
     #[arg(long, requires = "model", required_unless_present = "drive", conflicts_with = "drive")]
     pub(crate) reference: Option<PathBuf>,
-    /// Samples a second of a reference that is no file; those of the model's record if not given
-    #[arg(long, value_name = "HZ", value_parser = positive, requires = "reference")]
-    pub(crate) rate: Option<f64>,
     /// Record of the voltages to play, as excite or compensate writes it; - for stdin
     #[arg(long)]
     pub(crate) drive: Option<PathBuf>,
@@ -537,9 +537,64 @@ pub(crate) struct TemperatureArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct MapArg {
-    /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; may be given several times
+    /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; a column without a name goes by its number, as time_s=1; may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
+    /// Samples a second of a file without times; times that it has are not read
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub(crate) rate: Option<f64>,
+}
+
+/// Show what a file holds: channels, units, rate, noise, and what is odd about it
+///
+/// Ends with the command to type next. Nothing is written.
+#[derive(Debug, Args)]
+#[command(after_help = format!("Example:\n  hystctl info scan.csv\n\n{RECORDS}"))]
+pub(crate) struct InfoArgs {
+    /// File to look at
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Write a file of any format as a record, or as what other programs load
+///
+/// Units are converted, columns get the names of the record format, and times the even grid that a fit uses.
+#[derive(Debug, Args)]
+#[command(after_help = format!("Example:\n  hystctl convert scope.txt record.csv --map 'voltage_v=CH1 (V)'\n\n{RECORDS}"))]
+pub(crate) struct ConvertArgs {
+    /// File to read
+    pub(crate) input: PathBuf,
+    /// File to write, in the format that its name ends in: .csv, .npy, .mat or .tdms; - for CSV on stdout
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Draw records: loops, time, spectra, and what models miss of them
+///
+/// Several records are drawn over one another. With --model each record is simulated, and a panel for each model shows measured minus predicted,
+/// all on one scale. Nothing is fitted.
+#[derive(Debug, Args)]
+#[command(after_help = format!("Examples:\n  hystctl plot train.csv -o train.svg\n  hystctl plot test.csv --model pi.json --model extended.json -o compared.svg\n\n{RECORDS}"))]
+pub(crate) struct PlotArgs {
+    /// Records to draw
+    #[arg(required = true)]
+    pub(crate) records: Vec<PathBuf>,
+    /// Model files to compare with them; may be given several times
+    #[arg(long)]
+    pub(crate) model: Vec<PathBuf>,
+    /// Picture to write (SVG); - for stdout
+    #[arg(short, long, value_name = "SVG")]
+    pub(crate) output: Target,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
 }
 
 /// List the serial ports and CAN interfaces at which a device may be

@@ -46,8 +46,8 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let written: Vec<_> = args.picture.iter().collect();
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let train = input::training(&args.train, &args.map.map)?;
-    let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let train = input::training(&args.train, &args.map)?;
+    let test = args.test.as_ref().map(|path| input::record(path, &args.map, Need::InputAndOutput)).transpose()?;
     let trained_on = test.as_ref().is_some_and(|test| input::is_trained_on(test, &train));
     match &test {
         Some(_) if trained_on => output::say(input::TRAINED_ON),

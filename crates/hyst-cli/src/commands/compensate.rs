@@ -62,8 +62,10 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
         Some(_) if !args.map.map.is_empty() => {
             return Err(CommandError::bad_input("--map is for a reference in a file"));
         }
-        Some(shape) => shape.record(&args.reference, input::output_unit(&model)?, model.recorded_at_hz)?,
-        None => input::record(&args.reference, &args.map.map, Need::Output)?,
+        Some(shape) => {
+            shape.record(&args.reference, input::output_unit(&model)?, args.map.rate.unwrap_or(model.recorded_at_hz))?
+        }
+        None => input::record(&args.reference, &args.map, Need::Output)?,
     };
     let temperature = input::temperature(args.temperature, &model, &reference);
     let options = CompensateOptions { temperature, ..options(&args.limits) };

@@ -30,8 +30,8 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
     output::check(&read, &written)?;
     let said_as = Report::new(args.json.json, &written)?;
     let given = if is_auto { None } else { Some(input::model(&args.model)?) };
-    let train = input::training(&args.train, &args.map.map)?;
-    let test = args.test.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let train = input::training(&args.train, &args.map)?;
+    let test = args.test.as_ref().map(|path| input::record(path, &args.map, Need::InputAndOutput)).transpose()?;
     let options = DiagnoseOptions { zero: args.zero.get(), seed: args.seed };
     let (model, model_text, diagnosis) = match given {
         Some((model, text)) => {

@@ -106,7 +106,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let written: Vec<_> = [&args.output].into_iter().chain(&args.trace).chain(&args.picture).collect();
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let record = input::training(&args.train, &args.map.map)?;
+    let record = input::training(&args.train, &args.map)?;
     let zero = args.zero.get();
 
     let options = args.search.options(zero == Zero::PerRecord)?;

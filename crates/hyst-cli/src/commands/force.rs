@@ -45,8 +45,8 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
     output::check(&read, &[&args.output])?;
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (model, _) = input::model(&args.model)?;
-    let record = input::record(&args.record, &args.map.map, Need::InputAndOutput)?;
-    let other = args.free.as_ref().map(|path| input::record(path, &args.map.map, Need::InputAndOutput)).transpose()?;
+    let record = input::record(&args.record, &args.map, Need::InputAndOutput)?;
+    let other = args.free.as_ref().map(|path| input::record(path, &args.map, Need::InputAndOutput)).transpose()?;
     let free = match (&other, args.free_until) {
         (Some(other), _) => Free::Record(other),
         (None, Some(seconds)) => Free::Until(record.time().first().copied().unwrap_or_default() + seconds),

@@ -23,7 +23,7 @@ pub(super) fn run(args: &GainArgs) -> CommandResult {
     let written: Vec<&Target> = args.output.iter().collect();
     output::check(&args.records.iter().map(AsRef::as_ref).collect::<Vec<_>>(), &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let record = input::training(&args.records, &args.map.map)?;
+    let record = input::training(&args.records, &args.map)?;
     let points = gain_map(&Samples::from_record(&record), args.frequency)?;
     let summary =
         Summary { unit: text::gain_unit(&record), points, drive_unit: text::column_unit(record.input_column()) };

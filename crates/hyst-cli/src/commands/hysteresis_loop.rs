@@ -29,12 +29,12 @@ pub(super) fn run(args: &LoopArgs) -> CommandResult {
     read.extend(args.reference.as_deref());
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let record = input::record(&args.record, &args.map.map, Need::InputAndOutput)?;
+    let record = input::record(&args.record, &args.map, Need::InputAndOutput)?;
     let measured = record.output().unwrap_or_default();
     let reference = match &args.reference {
         None => None,
         Some(path) => {
-            let reference = input::record(path, &args.map.map, Need::Output)?;
+            let reference = input::record(path, &args.map, Need::Output)?;
             if reference.rows() != record.rows() || reference.output_unit() != record.output_unit() {
                 let message = format!(
                     "{}: a reference for {} has {} of the same unit; this one has {}",

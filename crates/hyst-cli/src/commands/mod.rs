@@ -3,6 +3,7 @@
 mod close_loop;
 mod compare;
 mod compensate;
+mod convert;
 mod devices;
 mod diagnose;
 mod excite;
@@ -11,7 +12,9 @@ mod fit;
 mod force;
 mod gain;
 mod hysteresis_loop;
+mod info;
 mod log;
+mod plot;
 mod record;
 mod response;
 mod run;
@@ -45,6 +48,9 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Stop(args) => stop::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Devices(args) => devices::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Plot(args) => plot::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Log(args) => log::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),

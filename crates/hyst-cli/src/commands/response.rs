@@ -63,7 +63,7 @@ pub(super) fn run(args: &ResponseArgs) -> CommandResult {
     let written: Vec<&Target> = args.output.iter().chain(&args.picture).collect();
     output::check(&args.records.iter().map(AsRef::as_ref).collect::<Vec<_>>(), &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let record = input::training(&args.records, &args.map.map)?;
+    let record = input::training(&args.records, &args.map)?;
     let unit = text::gain_unit(&record);
     let options = StructureOptions {
         order: args.order.0.clone(),

@@ -302,7 +302,7 @@ fn asked(args: &RunArgs) -> BTreeMap<String, String> {
         ("hottest_degc", number(args.hottest)),
         ("max_error", number(args.max_error)),
         ("silence_s", number(args.silence)),
-        ("rate_hz", number(args.rate)),
+        ("rate_hz", number(args.map.rate)),
         ("settle_s", number(args.settle)),
         ("rest_s", Some(args.rest.to_string())),
         ("kout", number(args.kout)),

@@ -45,7 +45,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[&args.output])?.on_stderr();
     let (model, _) = input::model(&args.model)?;
     let predicted_column = input::output_unit(&model)?.predicted_column();
-    let record = input::record(&args.input, &args.map.map, Need::Input)?;
+    let record = input::record(&args.input, &args.map, Need::Input)?;
     let zero = args.zero.get();
     let temperature = input::temperature(args.temperature, &model, &record);
     let simulated = simulate_with(

@@ -13,6 +13,7 @@ mod error;
 mod fundamental;
 mod periodic;
 mod roots;
+mod spectrum;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ pub use corrected::{CorrectedLoop, LoopFigures, corrected_loop};
 pub use error::LinearError;
 pub use fundamental::{GainPoint, gain_map};
 pub use periodic::periodic_response;
+pub use spectrum::amplitude_density;
 pub use structure::{Structure, StructureOptions, identify_structure};
 pub use welch::{FrequencyResponse, Method, ResponseLine, WelchOptions, response};
 pub(crate) use welch::{Hann, windows};

@@ -62,92 +62,60 @@ pub enum RecordError {
         /// The file.
         file: String,
     },
-    /// The bytes are not UTF-8.
-    #[error("{file}, line {line}, byte {byte} of the line: {problem}; save the file as UTF-8 text")]
-    Encoding {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-        /// The byte within the line; the first is 1.
-        byte: usize,
-        /// What was found.
-        problem: &'static str,
-    },
-    /// The columns seem to be separated by something other than a comma.
+    /// The bytes are of no format that is read.
     #[error(
-        "{file}, line 1: the columns seem to be separated by {found}; a record needs ',' between columns and '.' as the decimal point"
+        "{file}: the format is not recognised (read are {formats}); in Python, pandas.DataFrame(dict(time_s=t, voltage_v=u, displacement_um=y)).to_csv(\"record.csv\", index=False) writes a record", formats = super::source::FORMATS
     )]
-    Delimiter {
+    UnknownFormat {
         /// The file.
         file: String,
-        /// The separator found.
-        found: &'static str,
     },
-    /// A column that the command needs is missing.
-    #[error(
-        "{file}, line 1: there is no column for {role}; name it {accepted}, or say which column it is with --map {example}=COLUMN (columns found: {found})"
-    )]
-    MissingColumn {
+    /// A file of a known format that is damaged, or holds something else than columns.
+    #[error("{file}: {format}: {what}")]
+    Damaged {
         /// The file.
         file: String,
-        /// What the column is for, as `the input`.
-        role: &'static str,
-        /// The names that it may have.
-        accepted: String,
-        /// A name to show the use of `--map` with.
-        example: &'static str,
-        /// The header's names.
-        found: String,
+        /// The format, as `MATLAB 5`.
+        format: &'static str,
+        /// What is wrong, and what to do.
+        what: String,
     },
-    /// A column's name suggests a role, but not in a unit that the record format knows.
+    /// A text without rows of numbers.
     #[error(
-        "{file}, line 1, column \"{column}\": this is not a name for {role}; accepted is {accepted}. Convert the values and rename the column; if only the name differs, use --map {example}={column}"
+        "{file}: no row of numbers was found; a record has a row for each sample, with the same number of columns in each"
     )]
-    WrongUnit {
+    NoNumbers {
         /// The file.
         file: String,
-        /// The column's name in the file.
+    },
+    /// Columns that are needed are missing, of unknown unit, or several.
+    #[error("{file}: {problems}; {advice}")]
+    Columns {
+        /// The file and the line of its header.
+        file: String,
+        /// Every problem.
+        problems: String,
+        /// What to type.
+        advice: String,
+        /// How many columns the file has.
+        columns: usize,
+    },
+    /// A column has hardly any values.
+    #[error(
+        "{file}, column \"{column}\": {missing} of {rows} rows have no value; choose another column with --map, or repair the file"
+    )]
+    MostlyMissing {
+        /// The file.
+        file: String,
+        /// The column.
         column: String,
-        /// What it seems to be for.
-        role: &'static str,
-        /// The names that it may have.
-        accepted: String,
-        /// The name to give it with `--map`.
-        example: &'static str,
-    },
-    /// Two columns have the same name.
-    #[error("{file}, line 1, column \"{column}\": columns {first} and {second} have the same name; rename or drop one")]
-    DuplicateColumn {
-        /// The file.
-        file: String,
-        /// The name.
-        column: String,
-        /// The first column's number; the leftmost is 1.
-        first: usize,
-        /// The second column's number.
-        second: usize,
-    },
-    /// Two columns could play the same role.
-    #[error(
-        "{file}, line 1, columns \"{first}\" and \"{second}\": both could be {role}; choose one with --map {first}={first}, or drop the other from the file{hint}"
-    )]
-    AmbiguousColumn {
-        /// The file.
-        file: String,
-        /// What both could be.
-        role: &'static str,
-        /// The first candidate.
-        first: String,
-        /// The second candidate.
-        second: String,
-        /// What else the second may be, or empty.
-        hint: &'static str,
+        /// Rows without a value.
+        missing: usize,
+        /// Rows of the file.
+        rows: usize,
     },
     /// `--map` names a column that the file does not have.
-    #[error(
-        "{file}, line 1: --map {canonical}={column} names a column that is not in the file (columns found: {found}){hint}"
-    )]
+    #[error("{file}: --map {canonical}={column} names a column that is not in the file (columns found: {found}){hint}")]
     MappedColumnMissing {
         /// The file.
         file: String,

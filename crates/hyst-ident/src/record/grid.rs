@@ -47,6 +47,12 @@ impl Printed {
         self.decimals = self.decimals.max(decimals.saturating_sub(exponent).clamp(-300, 300));
     }
 
+    /// Takes the figures of other rows into account.
+    pub(crate) fn join(&mut self, other: Self) {
+        self.digits = self.digits.max(other.digits);
+        self.decimals = self.decimals.max(other.decimals);
+    }
+
     /// One unit of the last printed digit of the time `t` \[s\].
     fn resolution(self, t: f64) -> f64 {
         let fixed = 10_f64.powi(-self.decimals);

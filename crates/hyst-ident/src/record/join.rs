@@ -49,6 +49,12 @@ impl Record {
     fn append(&mut self, mut next: Self) {
         self.share_periods(&mut next);
         let (rows, files) = (self.rows(), self.sources.len());
+        if !(self.missing.is_empty() && next.missing.is_empty()) {
+            self.missing.resize(rows, false);
+            self.missing.extend(&next.missing);
+            self.missing.resize(rows + next.rows(), false);
+        }
+        self.notes.extend(next.notes);
         self.sources.extend(next.sources);
         self.labelled |= next.labelled;
         self.lost = self.lost.and(next.lost);

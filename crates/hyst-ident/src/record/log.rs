@@ -112,6 +112,20 @@ pub fn is_log(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
+/// Whether these are the bytes of a log of a run, and no other program's MCAP file with messages of its own.
+pub(super) fn is_run_log(bytes: &[u8]) -> bool {
+    let Some(entries) = is_log(bytes).then(|| LogRecords::new(bytes)).flatten() else { return false };
+    let mut messages = false;
+    for entry in entries {
+        match entry {
+            Entry::Channel(channel) if channel.topic == TOPIC => return true,
+            Entry::Message { .. } => messages = true,
+            _ => {}
+        }
+    }
+    !messages || cfg!(not(feature = "mcap-messages"))
+}
+
 impl RunLog {
     /// Reads a log; `name` stands for the file in messages.
     ///

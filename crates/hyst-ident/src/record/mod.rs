@@ -1,10 +1,13 @@
 //! Records: what an actuator was told, what it did, and the surroundings, over the lab's clock.
 //!
-//! A record is a CSV file with one header line whose column names end in their unit: `segment` (integer, optional;
+//! The product's own form is a CSV file with one header line whose column names end in their unit: `segment` (integer, optional;
 //! the device rests and its state resets between segments), `time_s|time_ms|time_us`, the input `voltage_v` (or
 //! another, as `force_in_n`), one output of `displacement_um|_nm|_mm` and `force_n`, and optionally
-//! `temperature_degc` and `load_n`. Further columns are carried through. Time goes on across segments; within a
+//! `temperature_degc` and `load_n`. Further columns are carried through. Time increases across segments; within a
 //! segment it is even to the last printed digit; segments may differ in their sample period.
+//!
+//! Files of others are read as they are: `source` finds the columns of a file, `roles` which of them play which role,
+//! `repair` makes even rows of what clocks and sensors gave. What was done is in [`Record::notes`].
 //!
 //! Reading checks all of that, so that a [`Record`] in hand is sound: finite values, increasing time, at least one
 //! row, columns of one length.
@@ -12,9 +15,15 @@
 mod columns;
 mod error;
 mod grid;
+mod heading;
 mod join;
 mod log;
 mod read;
+mod repair;
+mod roles;
+mod sink;
+mod source;
+mod survey;
 #[cfg(test)]
 mod tests;
 mod unit;
@@ -22,11 +31,15 @@ mod write;
 
 use std::collections::HashSet;
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
 pub use columns::{ColumnMap, MapError, Need, is_input_column};
 pub use error::{Place, RecordError};
 pub use log::{EVENTS, LogEvent, LogRecords, LogSample, Losses, RunLog, TOPIC, is_log};
+pub use read::Reading;
+pub use sink::FileKind;
+pub use survey::{Channel, MAX_CHANNELS, Survey};
 pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
 
@@ -80,6 +93,10 @@ pub struct Record {
     temperature: Option<Vec<f64>>,
     load: Option<Vec<f64>>,
     lost: Losses,
+    /// Rows whose output is missing; empty where none is.
+    missing: Vec<bool>,
+    /// What was done to read the file.
+    notes: Vec<String>,
     /// The file's text without a byte-order mark, for writing its columns again as they stand.
     text: Option<Arc<[u8]>>,
 }
@@ -203,6 +220,8 @@ impl Record {
             temperature,
             load,
             lost: Losses::default(),
+            missing: Vec::new(),
+            notes: Vec::new(),
             text: None,
         })
     }
@@ -215,6 +234,17 @@ impl Record {
         self
     }
 
+    /// The same, with the sum of the file at `path`, which is read in blocks.
+    fn kept_in(mut self, path: &Path) -> Result<Self, RecordError> {
+        let io = |source| RecordError::Io { file: path.display().to_string(), source };
+        let mut sum = Sha256::new();
+        std::io::copy(&mut std::fs::File::open(path).map_err(io)?, &mut sum).map_err(io)?;
+        if let [source] = self.sources.as_mut_slice() {
+            source.sha256 = Some(format!("{:x}", sum.finalize()));
+        }
+        Ok(self)
+    }
+
     /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
     pub fn sources(&self) -> &[Source] {
         &self.sources
@@ -223,6 +253,16 @@ impl Record {
     /// What the logs that it was read from, if any, lost of their runs.
     pub fn lost(&self) -> Losses {
         self.lost
+    }
+
+    /// What was done to read the files that is not the record format's: units converted, rows left out, times resampled; a sentence each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Rows whose output is missing in the file; empty where none is. It is interpolated there, and is no measurement.
+    pub fn missing(&self) -> &[bool] {
+        &self.missing
     }
 
     /// The names of all sources, as messages use them.

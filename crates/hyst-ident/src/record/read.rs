@@ -1,248 +1,291 @@
-//! Reading records from CSV.
+//! Reading records from files.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use csv::ByteRecord;
-
 use super::ABSOLUTE_ZERO;
-use super::columns::{ColumnMap, Layout, Need};
+use super::columns::{ColumnMap, Need};
 use super::error::{Place, RecordError};
 use super::grid::Printed;
-use super::log::is_log;
+use super::heading::Unit;
+use super::log::is_run_log;
+use super::repair::{place_of, repair};
+use super::roles::{Choice, Clock, File, Layout};
+use super::source::{self, Axis, Contents, Values};
+use super::unit::OutputUnit;
 use super::{Columns, Origin, Record};
 
+/// How a file is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Which columns play which role, where their headings do not say it.
+    pub map: ColumnMap,
+    /// Sample rate of files without times \[Hz\]; where it is given, times in a file are not read.
+    pub rate: Option<f64>,
+}
+
+impl From<&ColumnMap> for Reading {
+    fn from(map: &ColumnMap) -> Self {
+        Self { map: map.clone(), rate: None }
+    }
+}
+
 impl Record {
-    /// Reads and checks the file at `path`.
+    /// Reads and checks the file at `path`, in any format and dialect that is told apart by its content.
     ///
     /// # Errors
-    /// When the file cannot be read or breaks a rule of the record format; the message names file, line and column
-    /// and what to do.
-    pub fn read(path: impl AsRef<Path>, map: &ColumnMap, need: Need) -> Result<Self, RecordError> {
+    /// When the file cannot be read, or a role is not filled or not clear; the message names file, line and column and what to do.
+    pub fn read(path: impl AsRef<Path>, how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
+        Self::read_watched(path, how, need, &mut |_| {})
+    }
+
+    /// As [`read`](Self::read); `watch` is called with the share of a large file that is read. A text of more than 256 MB is read in blocks, and
+    /// rows beyond two million are averaged, some into one: the memory that it takes does not grow with the file.
+    ///
+    /// # Errors
+    /// As those of [`read`](Self::read).
+    pub fn read_watched(
+        path: impl AsRef<Path>,
+        how: impl Into<Reading>,
+        need: Need,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Self, RecordError> {
         let path = path.as_ref();
+        if let Some(contents) = source::LargeText::open(path, watch)? {
+            let record = of_contents(&path.display().to_string(), &contents, &how.into(), need)?;
+            return record.kept_in(path);
+        }
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| RecordError::Io { file: file.clone(), source })?;
-        Self::parse(&file, &bytes, map, need)
+        Self::parse(&file, &bytes, how, need)
     }
 
     /// Checks `bytes` as [`read`](Self::read) does a file's; `name` stands for the file in messages.
     ///
     /// # Errors
-    /// When the bytes break a rule of the record format.
-    pub fn parse(name: &str, bytes: &[u8], map: &ColumnMap, need: Need) -> Result<Self, RecordError> {
-        if is_log(bytes) {
-            return Self::parse_log(name, bytes, map, need);
+    /// As those of [`read`](Self::read).
+    pub fn parse(name: &str, bytes: &[u8], how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
+        let how = how.into();
+        if is_run_log(bytes) {
+            return Self::parse_log(name, bytes, &how.map, need);
         }
-        let text = decode(name, bytes)?;
-        let mut reader = rows_of(text);
-        let mut fields = ByteRecord::new();
-        let more = reader.read_byte_record(&mut fields).map_err(|error| failed(name, error))?;
-        if !more {
-            return Err(RecordError::Empty { file: name.to_owned() });
-        }
-        let names: Vec<String> = fields.iter().map(|field| lossy(field.trim_ascii())).collect();
-        if let ([_], Some(found)) = (names.as_slice(), foreign_delimiter(&fields)) {
-            return Err(RecordError::Delimiter { file: name.to_owned(), found });
-        }
-        let layout = Layout::resolve(name, &names, map, need)?;
-        let (samples, printed) = Table { name, text, names: &names }.rows(&mut reader, &layout)?;
-
-        let place = |row: usize| Place::Line(line_of_row(text, row));
-        let column = |at: usize| names.get(at).map_or("", String::as_str);
-        let origin = Origin {
-            time_column: column(layout.time.0),
-            segment_column: layout.segment.map_or("", column),
-            place: &place,
-        };
-        let mut record = Self::assemble(samples, printed, &origin)?.kept_as(bytes);
-        record.text = Some(Arc::from(text));
-        Ok(record)
+        let unpacked = source::unpack(name, bytes)?;
+        let contents = source::open(name, &unpacked)?;
+        Ok(of_contents(name, contents.as_ref(), &how, need)?.kept_as(bytes))
     }
 }
 
-/// A file while its rows are read.
-struct Table<'a> {
-    name: &'a str,
-    text: &'a [u8],
-    names: &'a [String],
+/// The record in a file's columns.
+pub(super) fn of_contents(
+    name: &str,
+    contents: &dyn Contents,
+    how: &Reading,
+    need: Need,
+) -> Result<Record, RecordError> {
+    let heads = contents.heads();
+    let file = File { name, header: contents.header(), heads };
+    let layout = Layout::resolve(&file, &how.map, need, how.rate)?;
+    let column = |at: usize| heads[at].name.as_str();
+
+    // The time comes first.
+    let clock = match layout.time {
+        Clock::Column { column, .. } => Some(column),
+        Clock::Even { .. } => None,
+    };
+    let choices = [&layout.input, &layout.output, &layout.temperature, &layout.load];
+    let chosen = choices.map(|choice| choice.as_ref().map(|choice| choice.column));
+    let wanted: Vec<usize> = [clock].into_iter().chain([layout.segment]).chain(chosen).flatten().collect();
+    let mut read = contents.values(&wanted)?.into_iter();
+    // Values come in the order in which they were asked for.
+    let mut next = |asked: bool| if asked { read.next() } else { None };
+    let time = next(clock.is_some());
+    let labels = next(layout.segment.is_some());
+    let mut values = choices.map(|choice| next(choice.is_some()).map(|values| values.numbers));
+    for (choice, values) in choices.into_iter().zip(&mut values) {
+        if let (Some(choice), Some(values)) = (choice, values) {
+            convert(choice, values);
+        }
+    }
+    let notes = onto_one_clock(contents, &layout, &mut values)?;
+    let [input, output, temperature, load] = values;
+    let rows = output.as_ref().or(input.as_ref()).map_or(0, Vec::len);
+    let (mut time, mut printed) = match (time, &layout.time) {
+        (Some(Values { numbers, mut printed }), Clock::Column { per_second, .. }) => {
+            printed.decimals += per_second.log10().round() as i32;
+            let exact = *per_second >= 1.0 && per_second.log10().fract() == 0.0;
+            (numbers.iter().map(|t| t / per_second).collect(), if exact { printed } else { Printed::EXACT })
+        }
+        (_, Clock::Even { start, step }) => ((0..rows).map(|k| start + k as f64 * step).collect(), Printed::EXACT),
+        (None, Clock::Column { .. }) => (Vec::new(), Printed::EXACT),
+    };
+    let place = |row: usize| contents.place(row);
+    let named = [
+        ("the input", input.as_ref().map(Vec::len)),
+        ("the output", output.as_ref().map(Vec::len)),
+        ("the temperature", temperature.as_ref().map(Vec::len)),
+        ("the load", load.as_ref().map(Vec::len)),
+        ("the segment", labels.as_ref().map(|values| values.numbers.len())),
+    ];
+    for (role, found) in named {
+        if let Some(found) = found.filter(|found| *found != time.len()) {
+            return Err(RecordError::Lengths {
+                name: name.to_owned(),
+                column: role.to_owned(),
+                found,
+                expected: time.len(),
+            });
+        }
+    }
+    let segment = labels
+        .map(|values| integers(name, &values.numbers, column(layout.segment.unwrap_or(0)), &place))
+        .transpose()?;
+    too_cold(name, &layout, temperature.as_deref(), column, &place)?;
+    let unit = layout.output.as_ref().and_then(|choice| OutputUnit::of_column(&choice.canonical));
+    let mut samples = Columns {
+        name: name.to_owned(),
+        segment,
+        time: std::mem::take(&mut time),
+        input_column: layout.input.as_ref().map_or_else(String::new, |choice| choice.canonical.clone()),
+        input,
+        output: unit.zip(output),
+        temperature,
+        load,
+    };
+    let origin = Origin {
+        time_column: clock.map_or("time_s", column),
+        segment_column: layout.segment.map_or("segment", column),
+        place: &place,
+    };
+    if samples.time.is_empty() {
+        return Err(RecordError::NoRows { file: name.to_owned() });
+    }
+    let done = repair(&mut samples, &mut printed, need == Need::Output, &origin)?;
+    let place = place_of(&done, &place);
+    let mut record = Record::assemble(samples, printed, &Origin { place: &place, ..origin })?;
+    record.missing.clone_from(&done.missing);
+    record.notes = contents.notes().iter().chain(&layout.notes).chain(&notes).chain(&done.notes).cloned().collect();
+    record.text = contents.plain_text().filter(|_| !done.changed).map(|text| Arc::from(text.as_bytes()));
+    Ok(record)
 }
 
-impl Table<'_> {
-    fn rows(&self, reader: &mut csv::Reader<&[u8]>, layout: &Layout) -> Result<(Columns, Printed), RecordError> {
-        let (time_at, time_unit) = layout.time;
-        // A row has two bytes or more per column.
-        let room = self.text.len() / (8 * self.names.len());
-        let column = || Vec::<f64>::with_capacity(room);
-        let mut segment = layout.segment.map(|at| (at, Vec::<i64>::with_capacity(room)));
-        let mut time = column();
-        let mut input = layout.input.as_ref().map(|(at, _)| (*at, column()));
-        let mut output = layout.output.map(|(at, _)| (at, column()));
-        let mut temperature = layout.temperature.map(|at| (at, column()));
-        let mut load = layout.load.map(|at| (at, column()));
-        let mut printed = Printed::default();
-
-        let mut fields = ByteRecord::new();
-        while reader.read_byte_record(&mut fields).map_err(|error| failed(self.name, error))? {
-            if fields.len() != self.names.len() {
-                return Err(self.ragged(&fields));
-            }
-            if let Some((at, labels)) = &mut segment {
-                labels.push(self.label(&fields, *at)?);
-            }
-            time.push(self.number(&fields, time_at)? / time_unit.per_second());
-            printed.take(fields[time_at].trim_ascii());
-            if let Some((at, _)) = &temperature
-                && self.number(&fields, *at)? < ABSOLUTE_ZERO
-            {
-                return Err(RecordError::TooCold {
-                    file: self.name.to_owned(),
-                    place: self.place(&fields),
-                    column: self.names[*at].clone(),
-                    value: shortened(fields[*at].trim_ascii()),
-                });
-            }
-            for (at, values) in [&mut input, &mut output, &mut temperature, &mut load].into_iter().flatten() {
-                let value = self.number(&fields, *at)?;
-                values.push(if layout.turned.contains(at) { -value } else { value });
-            }
+/// Interpolates columns that have other times than the output (or, without one, the input) to its times, by straight lines. Before its first value
+/// and behind its last a column is missing there.
+fn onto_one_clock(
+    contents: &dyn Contents,
+    layout: &Layout,
+    values: &mut [Option<Vec<f64>>; 4],
+) -> Result<Vec<String>, RecordError> {
+    let heads = contents.heads();
+    let choices = [&layout.input, &layout.output, &layout.temperature, &layout.load];
+    let Some(main) = layout.output.as_ref().or(layout.input.as_ref()) else { return Ok(Vec::new()) };
+    let axis = |choice: &Choice| heads[choice.column].axis;
+    // A clock that was named, or a rate, holds for all.
+    let named = match (layout.time.clone(), axis(main)) {
+        (Clock::Column { column, .. }, Axis::Column(own)) => column != own,
+        (Clock::Column { .. }, _) => true,
+        (Clock::Even { step, .. }, Axis::Even { step: own, .. }) => step != own,
+        (Clock::Even { .. }, _) => true,
+    };
+    let (Some(rows), false) = (values[usize::from(layout.output.is_some())].as_ref().map(Vec::len), named) else {
+        return Ok(Vec::new());
+    };
+    let times = |axis: Axis, rows: usize| -> Result<Vec<f64>, RecordError> {
+        match axis {
+            Axis::Even { start, step } => Ok((0..rows).map(|k| start + k as f64 * step).collect()),
+            Axis::Column(column) => Ok(contents.values(&[column])?.remove(0).numbers),
+            Axis::Unknown => Ok(Vec::new()),
         }
-        printed.decimals += time_unit.per_second().log10() as i32;
-
-        let values = |column: Option<(usize, Vec<f64>)>| column.map(|(_, values)| values);
-        let samples = Columns {
-            name: self.name.to_owned(),
-            segment: segment.map(|(_, labels)| labels),
-            time,
-            input_column: layout.input.as_ref().map_or_else(String::new, |(_, column)| column.clone()),
-            input: values(input),
-            output: layout.output.map(|(_, unit)| unit).zip(values(output)),
-            temperature: values(temperature),
-            load: values(load),
+    };
+    let mut wanted = None;
+    let mut notes = Vec::new();
+    for (choice, values) in choices.into_iter().zip(values) {
+        let (Some(choice), Some(values)) = (choice, values) else { continue };
+        let own = axis(choice);
+        if own == axis(main) || own == Axis::Unknown {
+            continue;
+        }
+        let from = times(own, values.len())?;
+        let to = match &wanted {
+            Some(to) => to,
+            None => wanted.insert(times(axis(main), rows)?),
         };
-        Ok((samples, printed))
-    }
-
-    fn number(&self, fields: &ByteRecord, at: usize) -> Result<f64, RecordError> {
-        let text = fields[at].trim_ascii();
-        let value = std::str::from_utf8(text).ok().and_then(|text| text.parse::<f64>().ok());
-        let (file, column) = (|| self.name.to_owned(), || self.names[at].clone());
-        match value {
-            Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(RecordError::NotFinite {
-                file: file(),
-                place: self.place(fields),
-                column: column(),
-                value: shortened(text),
-            }),
-            None => Err(RecordError::NotANumber {
-                file: file(),
-                place: self.place(fields),
-                column: column(),
-                text: shortened(text),
-            }),
+        if from == *to || from.len() != values.len() {
+            continue;
         }
+        *values = interpolated(&from, values, to);
+        notes.push(format!(
+            "\"{}\" has other times: interpolated to those of \"{}\"",
+            heads[choice.column].name, heads[main.column].name
+        ));
     }
+    Ok(notes)
+}
 
-    fn label(&self, fields: &ByteRecord, at: usize) -> Result<i64, RecordError> {
-        let text = fields[at].trim_ascii();
-        std::str::from_utf8(text).ok().and_then(|text| text.parse().ok()).ok_or_else(|| {
-            RecordError::SegmentNotInteger {
-                file: self.name.to_owned(),
-                place: self.place(fields),
-                column: self.names[at].clone(),
-                text: shortened(text),
+/// Values at increasing times `from`, at the times `to`; NaN outside.
+fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
+    // A rounding is no time outside.
+    let slack = from.windows(2).map(|t| t[1] - t[0]).fold(0.0, f64::max) * 1e-6;
+    let (Some(first), Some(last)) = (from.first(), from.last()) else { return vec![f64::NAN; to.len()] };
+    to.iter()
+        .map(|t| {
+            if *t < first - slack || *t > last + slack || !t.is_finite() {
+                return f64::NAN;
+            }
+            let after = from.partition_point(|own| own <= t).clamp(1, from.len().max(2) - 1).min(from.len() - 1);
+            let before = after.saturating_sub(1);
+            let step = from[after] - from[before];
+            if step > 0.0 {
+                values[before] + (values[after] - values[before]) * (t - from[before]) / step
+            } else {
+                values[before]
             }
         })
-    }
+        .collect()
+}
 
-    fn ragged(&self, fields: &ByteRecord) -> RecordError {
-        let quoted = fields.iter().any(|field| field.contains(&b'\n'));
-        RecordError::RaggedRow {
-            file: self.name.to_owned(),
-            line: line_at(self.text, start(self.text, fields)),
-            found: fields.len(),
-            expected: self.names.len(),
-            column: self.names.last().cloned().unwrap_or_default(),
-            hint: if quoted { "; a quotation mark may be left open there" } else { "" },
+/// Brings values to the unit and sign of their role.
+fn convert(choice: &Choice, values: &mut [f64]) {
+    let own = Unit::of_canonical(&choice.canonical);
+    if let Some(to) = choice.unit.zip(own).and_then(|(unit, own)| unit.to(own)) {
+        values.iter_mut().for_each(|value| *value = to(*value));
+    }
+    if choice.turned {
+        values.iter_mut().for_each(|value| *value = -*value);
+    }
+}
+
+/// Labels of segments.
+fn integers(file: &str, values: &[f64], column: &str, place: &dyn Fn(usize) -> Place) -> Result<Vec<i64>, RecordError> {
+    let of = |(row, value): (usize, &f64)| {
+        // What a double holds exactly.
+        if value.fract() == 0.0 && value.abs() < 9e15 {
+            return Ok(*value as i64);
         }
-    }
-
-    fn place(&self, fields: &ByteRecord) -> Place {
-        Place::Line(line_at(self.text, start(self.text, fields)))
-    }
-}
-
-/// A reader of all rows, the header among them, that leaves their lengths to us.
-pub(super) fn rows_of(text: &[u8]) -> csv::Reader<&[u8]> {
-    csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text)
-}
-
-/// The text without a byte-order mark, if it is UTF-8.
-fn decode<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a [u8], RecordError> {
-    let refuse = |at: usize, problem| {
-        let line_start = bytes[..at].iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-        RecordError::Encoding { file: name.to_owned(), line: line_at(bytes, at), byte: at - line_start + 1, problem }
+        Err(RecordError::SegmentNotInteger {
+            file: file.to_owned(),
+            place: place(row),
+            column: column.to_owned(),
+            text: value.to_string(),
+        })
     };
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(refuse(0, "the file is UTF-16"));
-    }
-    match std::str::from_utf8(bytes) {
-        Ok(_) => Ok(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
-        Err(error) => Err(refuse(error.valid_up_to(), "this is not UTF-8")),
-    }
+    values.iter().enumerate().map(of).collect()
 }
 
-fn foreign_delimiter(header: &ByteRecord) -> Option<&'static str> {
-    let text = header.as_slice();
-    if text.contains(&b';') {
-        Some("';'")
-    } else if text.contains(&b'\t') {
-        Some("tabs")
-    } else {
-        None
-    }
-}
-
-fn failed(name: &str, error: csv::Error) -> RecordError {
-    RecordError::Io { file: name.to_owned(), source: error.into() }
-}
-
-/// Where a row starts. The reader's position is where it began to look, which may be before blank lines.
-fn start(text: &[u8], fields: &ByteRecord) -> usize {
-    let looked = fields.position().map_or(0, |position| position.byte() as usize).min(text.len());
-    let blank = text[looked..].iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).count();
-    looked + blank
-}
-
-/// The number of the line that holds byte `at`; lines end in `\n`, `\r\n` or `\r`. Only errors ask for it.
-fn line_at(text: &[u8], at: usize) -> u64 {
-    let ends = |i: usize| match text[i] {
-        b'\n' => true,
-        b'\r' => text.get(i + 1) != Some(&b'\n'),
-        _ => false,
-    };
-    1 + (0..at.min(text.len())).filter(|i| ends(*i)).count() as u64
-}
-
-/// The line of a row below the header, counted from 0.
-fn line_of_row(text: &[u8], row: usize) -> u64 {
-    let mut reader = rows_of(text);
-    let mut fields = ByteRecord::new();
-    for _ in 0..row + 2 {
-        if !matches!(reader.read_byte_record(&mut fields), Ok(true)) {
-            break;
-        }
-    }
-    line_at(text, start(text, &fields))
-}
-
-fn lossy(field: &[u8]) -> String {
-    String::from_utf8_lossy(field).into_owned()
-}
-
-/// A field as a message shows it: one line, not too long.
-fn shortened(field: &[u8]) -> String {
-    const MOST: usize = 40;
-    let text: String = String::from_utf8_lossy(field).chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    if text.chars().count() <= MOST { text } else { text.chars().take(MOST).chain("…".chars()).collect() }
+fn too_cold<'a>(
+    file: &str,
+    layout: &Layout,
+    values: Option<&[f64]>,
+    column: impl Fn(usize) -> &'a str,
+    place: &dyn Fn(usize) -> Place,
+) -> Result<(), RecordError> {
+    let coldest =
+        values.and_then(|values| values.iter().position(|degc| *degc < ABSOLUTE_ZERO).map(|row| (row, values[row])));
+    coldest.map_or(Ok(()), |(row, degc)| {
+        Err(RecordError::TooCold {
+            file: file.to_owned(),
+            place: place(row),
+            column: layout.temperature.as_ref().map_or("", |choice| column(choice.column)).to_owned(),
+            value: degc.to_string(),
+        })
+    })
 }

@@ -8,7 +8,6 @@ use csv::ByteRecord;
 
 use super::Record;
 use super::grid::{self, Printed};
-use super::read::rows_of;
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -233,4 +232,9 @@ impl Record {
 /// The decimals of the shortest text that reads as `t` again.
 fn decimals_of(t: f64) -> usize {
     t.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len())
+}
+
+/// A reader of all rows, the header among them, that leaves their lengths to us.
+fn rows_of(text: &[u8]) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text)
 }

@@ -683,6 +683,8 @@ class Record:
     def periods(self) -> list[float]: ...
     @property
     def name(self) -> str: ...
+    @property
+    def notes(self) -> list[str]: ...
     def __len__(self) -> int: ...
 
 _AnyRecord = Record | _Path | list[Record | _Path] | tuple[Record | _Path, ...]
@@ -692,6 +694,7 @@ def read_record(
     *,
     map: dict[str, str] | None = None,
     need: Literal["both", "input", "output"] = "both",
+    rate: float | None = None,
 ) -> Record: ...
 
 class Model:

@@ -280,15 +280,10 @@ impl Job {
         let reference = match Shape::named(reference)? {
             Some(shape) => {
                 let usual = model.recorded_at_hz.clamp(device.min_rate_hz, device.max_rate_hz);
-                let rate_hz = args.rate.unwrap_or(usual);
+                let rate_hz = args.map.rate.unwrap_or(usual);
                 shape.record(reference, recording::unit(device.output), rate_hz)?
             }
-            None if args.rate.is_some() => {
-                return Err(CommandError::bad_input(
-                    "--rate is for a reference as sine:LOW,HIGH,HZ,SECONDS; a record has its own rate",
-                ));
-            }
-            None => input::record(reference, &args.map.map, Need::Output)?,
+            None => input::record(reference, &args.map, Need::Output)?,
         };
         if args.pid.is_some() && !args.control.closes() {
             return Err(CommandError::bad_input("--pid needs --control pid or --control pid+feedforward"));
@@ -470,7 +465,7 @@ impl Job {
                 "--settle needs --model and --reference: a drive is played as it stands",
             ));
         }
-        let drive = input::record(path, &args.map.map, Need::Input)?;
+        let drive = input::record(path, &args.map, Need::Input)?;
         let (file, column) = (path.display(), drive.input_column());
         if column != "voltage_v" {
             let message = format!(

@@ -1,35 +1,40 @@
 //! What is whole in an MCAP file that may have been cut off or damaged.
 
-use mcap::McapError;
+mod chunk;
+mod layout;
+
+use std::borrow::Cow;
+
 use mcap::read::parse_record;
 use mcap::records::{Record, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use chunk::Unpacker;
 
 /// What an MCAP file begins with.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Kind and length in front of every record.
+/// Kind and length in front of every record \[bytes\].
 const HEAD: usize = 9;
-/// Bytes of the largest record that a chunk may have, unless the file itself is larger: what a damaged length asks for is not tried.
-const LARGEST: usize = 64 << 20;
 
 /// The records of a log in their order, those inside of chunks among them.
 ///
 /// A cut ends them; of a chunk that was cut its whole records are given. Of a chunk whose check sum is wrong nothing is given, and
-/// what comes after it is.
+/// what comes after it is. One chunk is unpacked at a time, and its records are parsed one by one.
 #[derive(Debug)]
 pub struct LogRecords<'a> {
     rest: &'a [u8],
-    /// Records of a chunk, last first.
-    unpacked: Vec<Record<'static>>,
-    largest: usize,
+    /// Contents of the chunk that is being read, and where its next record begins.
+    chunk: (Cow<'a, [u8]>, usize),
+    unpacker: Unpacker,
     damaged: usize,
+    problem: Option<String>,
 }
 
 impl<'a> LogRecords<'a> {
     /// Of the bytes of a file; `None` if it is no MCAP file.
     pub fn new(bytes: &'a [u8]) -> Option<Self> {
         let rest = bytes.strip_prefix(MAGIC)?;
-        Some(Self { rest, unpacked: Vec::new(), largest: bytes.len().max(LARGEST), damaged: 0 })
+        let unpacker = Unpacker::of_file(bytes.len());
+        Some(Self { rest, chunk: (Cow::Borrowed(&[]), 0), unpacker, damaged: 0, problem: None })
     }
 
     /// Records that were left out because they are damaged; a chunk counts as one.
@@ -37,41 +42,52 @@ impl<'a> LogRecords<'a> {
         self.damaged
     }
 
-    /// Takes a chunk, or what there is of it, apart.
-    fn unpack(&mut self, chunk: &[u8], whole: bool) {
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(self.largest);
-        let (mut reader, mut left, mut unpacked) = (LinearReader::new_with_options(options), chunk, Vec::new());
-        let ended = loop {
-            match reader.next_event() {
-                None => break Ok(()),
-                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
-                    let (now, later) = left.split_at(wanted.min(left.len()));
-                    reader.insert(now.len()).copy_from_slice(now);
-                    reader.notify_read(now.len());
-                    left = later;
-                }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => match parse_record(opcode, data) {
-                    Ok(record) => unpacked.push(record.into_owned()),
-                    Err(error) => break Err(error),
-                },
-                Some(Err(error)) => break Err(error),
-            }
-        };
-        match ended {
-            Ok(()) => {}
-            Err(McapError::UnexpectedEof) if !whole => {}
-            Err(_) => {
-                self.damaged += 1;
-                return;
-            }
-        }
-        unpacked.reverse();
-        self.unpacked = unpacked;
+    /// What is wrong with the first record that was left out, as part of a sentence.
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
     }
+
+    fn leave_out(&mut self, problem: String) {
+        self.damaged += 1;
+        self.problem.get_or_insert(problem);
+    }
+
+    /// The next record of the chunk that is being read.
+    fn next_of_chunk(&mut self) -> Option<Result<Record<'a>, String>> {
+        let (contents, at) = &mut self.chunk;
+        let Some((kind, body, rest)) = split(&contents[*at..]) else {
+            self.chunk = (Cow::Borrowed(&[]), 0);
+            return None;
+        };
+        let (from, end) = (*at + HEAD, *at + HEAD + body.len());
+        *at = contents.len() - rest.len();
+        Some(match contents {
+            // Borrowed from the file, and not only from this reader.
+            Cow::Borrowed(contents) => {
+                let contents: &'a [u8] = contents;
+                parsed(kind, &contents[from..end])
+            }
+            Cow::Owned(contents) => parsed(kind, &contents[from..end]).map(Record::into_owned),
+        })
+    }
+}
+
+/// Kind and body of the record that `bytes` begin with, and what follows it; `None` if it is not whole.
+fn split(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let (head, rest) = bytes.split_at_checked(HEAD)?;
+    let (kind, length) = head.split_first()?;
+    let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
+    let (body, rest) = rest.split_at_checked(length)?;
+    Some((*kind, body, rest))
+}
+
+/// A record from its body.
+fn parsed(kind: u8, body: &[u8]) -> Result<Record<'_>, String> {
+    // The parser takes the lengths inside on trust: it reserves memory for them, and stops the program at an attachment that is cut.
+    if !layout::fits(kind, body) {
+        return Err(format!("a record of kind {kind} is shorter than it says"));
+    }
+    parse_record(kind, body).map_err(|error| format!("a record of kind {kind} is damaged ({error})"))
 }
 
 impl<'a> Iterator for LogRecords<'a> {
@@ -79,24 +95,42 @@ impl<'a> Iterator for LogRecords<'a> {
 
     fn next(&mut self) -> Option<Record<'a>> {
         loop {
-            if let Some(record) = self.unpacked.pop() {
-                return Some(record);
-            }
-            let (head, _) = self.rest.split_at_checked(HEAD)?;
-            let (kind, length) = head.split_first()?;
-            let length = length.try_into().map_or(u64::MAX, u64::from_le_bytes);
-            let end = usize::try_from(length).ok().and_then(|length| length.checked_add(HEAD)).unwrap_or(usize::MAX);
-            let (record, rest) = self.rest.split_at_checked(end).unwrap_or((self.rest, &[]));
-            let whole = record.len() == end;
-            self.rest = rest;
-            if *kind == op::CHUNK {
-                self.unpack(record, whole);
-            } else if whole {
-                match parse_record(*kind, &record[HEAD..]) {
-                    Ok(record) => return Some(record),
-                    Err(_) => self.damaged += 1,
-                }
+            let record = match self.next_of_chunk() {
+                Some(record) => record,
+                None if self.rest.is_empty() => return None,
+                None => match split(self.rest) {
+                    Some((op::CHUNK, body, rest)) => {
+                        self.rest = rest;
+                        match self.unpacker.whole(body) {
+                            Ok(contents) => self.chunk = (contents, 0),
+                            Err(problem) => self.leave_out(problem),
+                        }
+                        continue;
+                    }
+                    Some((kind, body, rest)) => {
+                        self.rest = rest;
+                        parsed(kind, body)
+                    }
+                    // Cut off.
+                    None => {
+                        let last = std::mem::take(&mut self.rest);
+                        if let Some(body) = last.get(HEAD..).filter(|_| last.first() == Some(&op::CHUNK)) {
+                            match self.unpacker.cut(body) {
+                                Ok(contents) => self.chunk = (contents, 0),
+                                Err(problem) => self.leave_out(problem),
+                            }
+                        }
+                        continue;
+                    }
+                },
+            };
+            match record {
+                Ok(record) => return Some(record),
+                Err(problem) => self.leave_out(problem),
             }
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,253 @@
+//! `info`: what a file holds, what is odd about it, and what to type next.
+
+use hyst_ident::noise::noise_floor;
+use hyst_ident::range;
+use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, Reading, Record, Survey};
+use hyst_ident::spikes::spikes_of;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::symbols::Marker;
+use ratatui::widgets::Widget;
+use ratatui::widgets::canvas::{Canvas, Points};
+use serde::Serialize;
+
+use crate::cli::InfoArgs;
+use crate::exit::{CommandError, CommandResult};
+use crate::output::Report;
+use crate::report::next::{further, quoted};
+use crate::{input, text};
+
+/// A channel, as `--json` tells it.
+#[derive(Debug, Serialize)]
+struct ChannelSummary {
+    name: String,
+    unit: Option<&'static str>,
+    rows: usize,
+    missing: usize,
+    min: Option<f64>,
+    max: Option<f64>,
+    step: f64,
+}
+
+/// What the record is.
+#[derive(Debug, Serialize)]
+struct RecordSummary {
+    rows: usize,
+    sample_rate_hz: f64,
+    seconds: f64,
+    segments: usize,
+    input: Option<String>,
+    output: Option<&'static str>,
+    temperature: bool,
+    load: bool,
+    /// White noise of the output, standard deviation \[output unit\].
+    noise: Option<f64>,
+    /// The same as a share of the output's span.
+    noise_share: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Summary {
+    file: String,
+    format: String,
+    channels: Vec<ChannelSummary>,
+    record: Option<RecordSummary>,
+    /// Why the channels are no record yet, and what to type.
+    missing: Option<String>,
+    odd: Vec<String>,
+    next: Option<String>,
+    #[serde(skip)]
+    picture: String,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &InfoArgs) -> CommandResult {
+    let how = Reading { map: ColumnMap::parse(&args.map.map)?, rate: args.map.rate };
+    let survey = Survey::read(&args.file, &how)?;
+    let summary = summary(args, survey);
+    let report = Report::new(args.json.json, &[])?;
+    report.print(&summary.text(), &summary)?;
+    // Columns that cannot be used are bad input for whatever comes next, but they were looked at.
+    match (summary.channels.is_empty(), &summary.missing) {
+        (true, Some(why)) => Err(CommandError::bad_input(why.clone())),
+        _ => Ok(()),
+    }
+}
+
+fn summary(args: &InfoArgs, survey: Survey) -> Summary {
+    let file = args.file.display().to_string();
+    let (record, missing) = match survey.record {
+        Ok(record) => (Some(record), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
+    let mut odd: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
+    odd.extend(record.iter().flat_map(input::oddities));
+    let options = further(&input::columns(&args.map));
+    let next = record.as_ref().and_then(|record| next(&file, record, &options));
+    let channel = |c: &Channel| ChannelSummary {
+        name: c.name.clone(),
+        unit: c.unit,
+        rows: c.rows,
+        missing: c.missing,
+        min: c.range.map(|r| r.0),
+        max: c.range.map(|r| r.1),
+        step: c.step,
+    };
+    Summary {
+        file,
+        format: survey.format,
+        channels: survey.channels.iter().map(channel).collect(),
+        picture: record.as_ref().map(picture).unwrap_or_default(),
+        record: record.as_ref().map(of_record),
+        missing,
+        odd,
+        next,
+    }
+}
+
+fn never_moves(channel: &Channel) -> Option<String> {
+    let (low, high) = channel.range?;
+    (low == high).then(|| format!("\"{}\" never moves: it is {} throughout", channel.name, text::short(low)))
+}
+
+fn of_record(record: &Record) -> RecordSummary {
+    let noise = record.output().map(|y| noise_floor(y, record.segments()));
+    let spikes = spikes_of(record);
+    let is_spike = |row: usize| spikes.iter().any(|spike| spike.row == row);
+    let span = record.output().map(|y| {
+        let (low, high) = range((0..y.len()).filter(|row| !is_spike(*row)).map(|row| y[row]));
+        high - low
+    });
+    let time = record.time();
+    RecordSummary {
+        rows: record.rows(),
+        sample_rate_hz: 1.0 / record.sample_period(),
+        seconds: time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0),
+        segments: record.segments().len(),
+        input: (!record.input().is_empty()).then(|| record.input_column().to_owned()),
+        output: record.output_unit().map(|unit| unit.column()),
+        temperature: record.temperature().is_some(),
+        load: record.load().is_some(),
+        noise,
+        noise_share: noise.zip(span).map(|(noise, span)| noise / span).filter(|share| share.is_finite()),
+    }
+}
+
+/// What to type next with this record.
+fn next(file: &str, record: &Record, options: &str) -> Option<String> {
+    let file = quoted(file);
+    match (record.input().is_empty(), record.output().is_some()) {
+        (false, true) => Some(format!("hystctl fit {file}{options} --model pi -o model.json")),
+        (false, false) => Some(format!("hystctl simulate --model model.json {file}{options} -o predicted.csv")),
+        (true, true) => Some(format!("hystctl compensate --model model.json {file}{options} -o drive.csv")),
+        (true, false) => None,
+    }
+}
+
+/// Width and height of the picture \[characters\].
+const PICTURE: (u16, u16) = (64, 18);
+/// Points of the picture.
+const POINTS: usize = 20_000;
+
+/// The loop of output over input, or one of them over time, in dots.
+fn picture(record: &Record) -> String {
+    let time = record.time();
+    let (x, y, names) = match (record.input(), record.output()) {
+        (u, Some(y)) if !u.is_empty() => {
+            (u, y, (record.input_column(), record.output_unit().map_or("", |unit| unit.column())))
+        }
+        (_, Some(y)) => (time, y, ("time_s", record.output_unit().map_or("", |unit| unit.column()))),
+        (u, None) => (time, u, ("time_s", record.input_column())),
+    };
+    let step = x.len().div_ceil(POINTS).max(1);
+    let spiked: Vec<usize> = spikes_of(record).iter().map(|spike| spike.row).collect();
+    let points: Vec<(f64, f64)> =
+        (0..x.len()).step_by(step).filter(|k| !spiked.contains(k)).map(|k| (x[k], y[k])).collect();
+    let bounds = |of: fn(&(f64, f64)) -> f64| {
+        let (low, high) = range(points.iter().map(of));
+        if high > low { [low, high] } else { [low - 1.0, low + 1.0] }
+    };
+    let (across, up) = (bounds(|p| p.0), bounds(|p| p.1));
+    let area = Rect::new(0, 0, PICTURE.0, PICTURE.1);
+    let mut buffer = Buffer::empty(area);
+    Canvas::default()
+        .marker(Marker::Braille)
+        .x_bounds(across)
+        .y_bounds(up)
+        .paint(|context| context.draw(&Points { coords: &points, color: ratatui::style::Color::Reset }))
+        .render(area, &mut buffer);
+    let line = |row: u16| {
+        let cells: String = (0..PICTURE.0).map(|column| buffer[(column, row)].symbol()).collect();
+        format!("  {}", cells.trim_end())
+    };
+    let lines: Vec<String> = (0..PICTURE.1).map(line).collect();
+    format!(
+        "  {} up, {} to {}\n{}\n  {} across, {} to {}",
+        names.1,
+        text::short(up[0]),
+        text::short(up[1]),
+        lines.join("\n"),
+        names.0,
+        text::short(across[0]),
+        text::short(across[1])
+    )
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let mut lines = vec![format!("{}: {}", self.file, self.format), String::new()];
+        let wide = self.channels.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).clamp(7, 40);
+        lines.push(format!(
+            "  {:wide$}  {:>5}  {:>11}  {:>11}  {:>10}  {:>8}  {:>7}",
+            "channel", "unit", "min", "max", "step", "rows", "missing"
+        ));
+        for c in &self.channels {
+            let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
+            let name: String = c.name.chars().take(40).collect();
+            lines.push(format!(
+                "  {name:wide$}  {:>5}  {:>11}  {:>11}  {:>10}  {:>8}  {:>7}",
+                c.unit.unwrap_or(if c.name == "segment" { "-" } else { "?" }),
+                number(c.min),
+                number(c.max),
+                text::short(c.step),
+                c.rows,
+                c.missing
+            ));
+        }
+        if self.channels.len() == MAX_CHANNELS {
+            lines.push(format!("  (the first {MAX_CHANNELS})"));
+        }
+        lines.push(String::new());
+        if let Some(record) = &self.record {
+            let output = record.output.map_or(String::new(), |column| format!(", output {column}"));
+            let input = record.input.as_ref().map_or(String::new(), |column| format!(", input {column}"));
+            let more = [(record.temperature, ", temperature"), (record.load, ", load")];
+            let more: String = more.iter().filter(|(there, _)| *there).map(|(_, word)| *word).collect();
+            lines.push(format!(
+                "record: {} over {} s in {}, {} samples a second{input}{output}{more}",
+                text::count(record.rows, "row"),
+                text::short(record.seconds),
+                text::count(record.segments, "segment"),
+                text::short(record.sample_rate_hz)
+            ));
+            if let (Some(noise), Some(share), Some(column)) = (record.noise, record.noise_share, record.output) {
+                let unit = column.rsplit_once('_').map_or("", |(_, unit)| unit);
+                lines.push(format!(
+                    "white noise of the output: {} {unit} rms, {} of its span",
+                    text::short(noise),
+                    text::percent(100.0 * share)
+                ));
+            }
+        }
+        if self.odd.is_empty() && self.record.is_some() {
+            lines.push("odd: nothing".to_owned());
+        }
+        lines.extend(self.odd.iter().map(|odd| format!("odd: {odd}")));
+        if !self.picture.is_empty() {
+            lines.extend([String::new(), self.picture.clone()]);
+        }
+        lines.extend(self.missing.iter().flat_map(|why| [String::new(), format!("not a record yet: {why}")]));
+        lines.extend(self.next.iter().flat_map(|next| [String::new(), format!("next: {next}")]));
+        lines.join("\n")
+    }
+}

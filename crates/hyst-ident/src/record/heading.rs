@@ -1,0 +1,240 @@
+//! What the heading of a column says: a quantity in words and a unit, as people and instruments write them.
+//!
+//! `Time (s)`, `Voltage [mV]`, `disp_nm`, `U / V`, `t_ms` and `/group/Position, µm` are understood. A unit is read, never assumed: a
+//! heading without one has none.
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Dimension {
+    Time,
+    Voltage,
+    Length,
+    Force,
+    Temperature,
+}
+
+/// A unit as a factor to the dimension's own: s, V, µm, N, °C. Division by `per_base` rounds once where the factor is a whole number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Unit {
+    pub(crate) dimension: Dimension,
+    /// How many of this unit make one of the base unit.
+    pub(crate) per_base: f64,
+    /// The base unit's value at zero of this unit, before the scaling: 0 for all but absolute temperatures.
+    pub(crate) zero: f64,
+    /// How the unit is written.
+    pub(crate) symbol: &'static str,
+}
+
+impl Unit {
+    /// A value in this unit, in the base unit of its dimension.
+    pub(crate) fn to_base(self, value: f64) -> f64 {
+        if self.per_base >= 1.0 {
+            (value - self.zero) / self.per_base
+        } else {
+            (value - self.zero) * (1.0 / self.per_base)
+        }
+    }
+
+    /// Values in this unit, in `other`; `None` where they measure different things.
+    pub(crate) fn to(self, other: Self) -> Option<impl Fn(f64) -> f64> {
+        let same = self.per_base == other.per_base && self.zero == other.zero;
+        (self.dimension == other.dimension).then_some(move |value: f64| {
+            if same {
+                return value;
+            }
+            let base = self.to_base(value);
+            if other.per_base >= 1.0 {
+                base * other.per_base + other.zero
+            } else {
+                base / (1.0 / other.per_base) + other.zero
+            }
+        })
+    }
+
+    /// The unit that `text` names, as `mV`, `µm`, `um`, `sec`, `°C`.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let text = text.trim().trim_matches(['"', '\'']).trim();
+        let exact = UNITS.iter().find(|(names, _)| names.contains(&text));
+        // Capitals carry meaning in mV and MV alone, which nobody applies to a piezo.
+        let lower = text.to_lowercase();
+        let loose = || UNITS.iter().find(|(names, _)| names.iter().any(|name| name.to_lowercase() == lower));
+        exact.or_else(loose).map(|(_, unit)| *unit)
+    }
+}
+
+const fn unit(dimension: Dimension, per_base: f64, symbol: &'static str) -> Unit {
+    Unit { dimension, per_base, zero: 0.0, symbol }
+}
+
+use Dimension::{Force, Length, Temperature, Time, Voltage};
+
+const UNITS: &[(&[&str], Unit)] = &[
+    (&["s", "sec", "secs", "second", "seconds", "sekunden"], unit(Time, 1.0, "s")),
+    (&["ms", "msec", "millisecond", "milliseconds"], unit(Time, 1e3, "ms")),
+    (&["us", "µs", "μs", "usec", "microsecond", "microseconds"], unit(Time, 1e6, "µs")),
+    (&["ns", "nsec", "nanosecond", "nanoseconds"], unit(Time, 1e9, "ns")),
+    (&["min", "minute", "minutes"], unit(Time, 1.0 / 60.0, "min")),
+    (&["h", "hour", "hours"], unit(Time, 1.0 / 3600.0, "h")),
+    (&["V", "volt", "volts"], unit(Voltage, 1.0, "V")),
+    (&["mV", "millivolt", "millivolts"], unit(Voltage, 1e3, "mV")),
+    (&["uV", "µV", "μV"], unit(Voltage, 1e6, "µV")),
+    (&["kV", "kilovolt", "kilovolts"], unit(Voltage, 1e-3, "kV")),
+    (
+        &["um", "µm", "μm", "micron", "microns", "micrometer", "micrometre", "micrometers", "micrometres"],
+        unit(Length, 1.0, "µm"),
+    ),
+    (&["nm", "nanometer", "nanometre", "nanometers", "nanometres"], unit(Length, 1e3, "nm")),
+    (&["pm", "picometer", "picometre"], unit(Length, 1e6, "pm")),
+    (&["mm", "millimeter", "millimetre", "millimeters", "millimetres"], unit(Length, 1e-3, "mm")),
+    (&["m", "meter", "metre", "meters", "metres"], unit(Length, 1e-6, "m")),
+    (&["N", "newton", "newtons"], unit(Force, 1.0, "N")),
+    (&["mN", "millinewton"], unit(Force, 1e3, "mN")),
+    (&["uN", "µN", "μN"], unit(Force, 1e6, "µN")),
+    (&["kN", "kilonewton"], unit(Force, 1e-3, "kN")),
+    (&["degC", "°C", "℃", "deg C", "deg_C", "C", "celsius"], unit(Temperature, 1.0, "°C")),
+    (&["K", "kelvin", "degK"], Unit { dimension: Temperature, per_base: 1.0, zero: 273.15, symbol: "K" }),
+    (&["degF", "°F", "℉", "F", "fahrenheit"], Unit { dimension: Temperature, per_base: 1.8, zero: 32.0, symbol: "°F" }),
+];
+
+/// A heading taken apart.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Heading {
+    /// The words without the unit, in lower case.
+    pub(crate) words: Vec<String>,
+    /// The unit, where the heading has one that is known.
+    pub(crate) unit: Option<Unit>,
+}
+
+impl Heading {
+    /// Takes `name` apart; `unit` is what the file says of it elsewhere, as a row of units or an attribute, and goes first.
+    pub(crate) fn parse(name: &str, unit: Option<&str>) -> Self {
+        // Of a path the last part names the column.
+        let leaf = leaf(name);
+        let (rest, own) = split_unit(leaf);
+        let words = words(rest);
+        Self { words, unit: unit.and_then(Unit::parse).or(own) }
+    }
+
+    /// Whether the words suggest `role`, as "piezo drive voltage" does the input.
+    pub(crate) fn suggests(&self, words: &[&str]) -> bool {
+        self.words.iter().any(|word| words.contains(&word.as_str()))
+    }
+}
+
+/// The last part of a path as `/group/name`, `struct.field` or `Sheet!Heading`; a `/` that stands before a unit divides nothing.
+pub(crate) fn leaf(name: &str) -> &str {
+    let cut = name.rfind(['/', '!']).filter(|at| {
+        let (before, after) = (&name[..*at], &name[*at + 1..]);
+        let unit = !before.contains('/') && !name.contains('!') && Unit::parse(after).is_some();
+        !before.ends_with(' ') && !after.starts_with(' ') && !unit
+    });
+    let last = cut.map_or(name, |at| &name[at + 1..]);
+    // Points divide the parts of a path, but not words or numbers.
+    match last.rsplit_once('.') {
+        Some((before, field))
+            if !last.contains(' ') && !before.is_empty() && field.starts_with(char::is_alphabetic) =>
+        {
+            field
+        }
+        _ => last,
+    }
+}
+
+/// The heading without its unit, and the unit.
+fn split_unit(name: &str) -> (&str, Option<Unit>) {
+    let name = name.trim().trim_matches('"').trim();
+    // In brackets, at the end.
+    for (open, close) in [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')] {
+        if let Some(inner) = name.strip_suffix(close)
+            && let Some(at) = inner.rfind(open)
+        {
+            return (inner[..at].trim(), Unit::parse(&inner[at + open.len_utf8()..]));
+        }
+    }
+    // Behind a separator: "U / V", "disp, nm", "x in µm", "disp_nm", "Position nm".
+    for separator in [" / ", "/", ", ", " in ", "_in_", "_", " ", "-"] {
+        if let Some((rest, last)) = name.rsplit_once(separator)
+            && !rest.trim().is_empty()
+            && let Some(unit) = Unit::parse(last)
+            && (last.trim().chars().count() > 1
+                || !matches!(separator, " " | "-")
+                || rest.contains(char::is_alphabetic))
+        {
+            return (rest.trim(), Some(unit));
+        }
+    }
+    // A heading may be a unit and nothing else, but "t", "s" or "V" alone may as well be a symbol: only longer ones are taken.
+    let whole = Unit::parse(name).filter(|_| name.chars().count() > 1 && name.to_lowercase() != "min");
+    if whole.is_some() { ("", whole) } else { (name, None) }
+}
+
+/// Words of a heading, in lower case; `VinputVoltage` has two.
+fn words(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut word = String::new();
+    let mut before = None;
+    for c in name.chars() {
+        let turn = c.is_uppercase() && before.is_some_and(char::is_lowercase);
+        if !c.is_alphanumeric() || turn {
+            if !word.is_empty() {
+                words.push(std::mem::take(&mut word));
+            }
+        }
+        if c.is_alphanumeric() {
+            word.extend(c.to_lowercase());
+        }
+        before = Some(c);
+    }
+    if !word.is_empty() {
+        words.push(word);
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn of(name: &str) -> (String, Option<&'static str>) {
+        let heading = Heading::parse(name, None);
+        (heading.words.join(" "), heading.unit.map(|unit| unit.symbol))
+    }
+
+    #[test]
+    fn headings_are_taken_apart() {
+        assert_eq!(of("Time (s)"), ("time".into(), Some("s")));
+        assert_eq!(of("Voltage [mV]"), ("voltage".into(), Some("mV")));
+        assert_eq!(of("disp_nm"), ("disp".into(), Some("nm")));
+        assert_eq!(of("U / V"), ("u".into(), Some("V")));
+        assert_eq!(of("U/V"), ("u".into(), Some("V")));
+        assert_eq!(of("t_ms"), ("t".into(), Some("ms")));
+        assert_eq!(of("/stage 1/Position, µm"), ("position".into(), Some("µm")));
+        assert_eq!(of("piezoVoltage_V"), ("piezo voltage".into(), Some("V")));
+        assert_eq!(of("temperature °C"), ("temperature".into(), Some("°C")));
+        assert_eq!(of("/run/voltage_v"), ("voltage".into(), Some("V")));
+        assert_eq!((leaf("data.time_s"), leaf("/imu.accel.x"), leaf("Dist. (m)")), ("time_s", "x", "Dist. (m)"));
+    }
+
+    #[test]
+    fn no_unit_is_assumed() {
+        assert_eq!(of("t"), ("t".into(), None));
+        assert_eq!(of("V"), ("v".into(), None));
+        assert_eq!(of("x"), ("x".into(), None));
+        assert_eq!(of("Channel A"), ("channel a".into(), None));
+        assert_eq!(of("position [counts]"), ("position".into(), None));
+        assert_eq!(of("load_cell"), ("load cell".into(), None));
+    }
+
+    #[test]
+    fn units_convert() {
+        let convert = |from: &str, to: &str, value: f64| Unit::parse(from)?.to(Unit::parse(to)?).map(|f| f(value));
+        assert_eq!(convert("mV", "V", 1500.0), Some(1.5));
+        assert_eq!(convert("kV", "V", 0.15), Some(150.0));
+        assert_eq!(convert("m", "µm", 2.5e-6), Some(2.5));
+        assert_eq!(convert("K", "°C", 273.15), Some(0.0));
+        assert_eq!(convert("°F", "°C", 212.0), Some(100.0));
+        assert_eq!(convert("nm", "nm", 0.1), Some(0.1));
+        assert_eq!(convert("nm", "V", 0.1), None);
+    }
+}

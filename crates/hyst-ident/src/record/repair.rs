@@ -1,0 +1,532 @@
+//! Rows as sensors and clocks give them, made into rows that a record can hold.
+//!
+//! Missing values are left out and counted, rows that were written twice are joined, an interruption begins a segment, and times that
+//! jitter are resampled to an even grid by a cubic spline. Each of these leaves a note.
+
+use std::ops::Range;
+
+use super::error::{Place, RecordError};
+use super::grid::{self, Fault, Printed};
+use super::{Columns, Origin};
+
+/// Longest run of missing inputs, temperatures or loads that is bridged by a straight line \[rows\].
+const MAX_BRIDGE: usize = 8;
+/// Share of rows with one time beyond which the times are printed too coarsely to join them.
+const MAX_JOINED_SHARE: f64 = 0.02;
+/// Share of rows without a value beyond which a column is no measurement.
+const MAX_MISSING_SHARE: f64 = 0.5;
+/// Step in time, as a multiple of the usual one, from which on there is an interruption.
+const MIN_GAP: f64 = 1.5;
+/// How far the times around lost rows may be off the grid \[periods\].
+const MAX_OFF_GRID: f64 = 0.3;
+/// Share of steps beyond which long steps are no interruptions but the clock.
+const MAX_GAP_SHARE: f64 = 0.05;
+
+/// What became of the rows of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Repaired {
+    /// Rows whose output is missing; it is interpolated, and counts for nothing.
+    pub(super) missing: Vec<bool>,
+    /// Row of the file for each row, where rows were left out.
+    rows: Option<Vec<usize>>,
+    /// Whether anything differs from the file's rows.
+    pub(super) changed: bool,
+    pub(super) notes: Vec<String>,
+}
+
+impl Repaired {
+    /// The row of the file.
+    pub(super) fn row(&self, row: usize) -> usize {
+        self.rows.as_ref().map_or(row, |rows| rows[row])
+    }
+
+    fn note(&mut self, note: String) {
+        self.changed = true;
+        self.notes.push(note);
+    }
+}
+
+/// Repairs columns of equal length. `wanted` says that the output is a reference, which has to be complete.
+pub(super) fn repair(
+    samples: &mut Columns,
+    printed: &mut Printed,
+    wanted: bool,
+    origin: &Origin<'_>,
+) -> Result<Repaired, RecordError> {
+    let mut done = Repaired::default();
+    leave_out_without(samples, &mut done, wanted, origin)?;
+    join_repeated(samples, &mut done);
+    insert_lost(samples, &mut done, *printed);
+    bridge(samples);
+    even_out(samples, printed, &mut done);
+    Ok(done)
+}
+
+/// The values of a row's columns.
+fn channels(samples: &mut Columns) -> impl Iterator<Item = &mut Vec<f64>> {
+    let Columns { input, output, temperature, load, .. } = samples;
+    [input.as_mut(), output.as_mut().map(|(_, y)| y), temperature.as_mut(), load.as_mut()].into_iter().flatten()
+}
+
+/// Keeps these rows.
+fn keep(samples: &mut Columns, done: &mut Repaired, kept: &[bool]) {
+    let mut flags = kept.iter();
+    let mut is_kept = || flags.next().copied().unwrap_or(true);
+    let old = done.rows.take().unwrap_or_else(|| (0..samples.time.len()).collect());
+    done.rows = Some(old.into_iter().filter(|_| is_kept()).collect());
+    fn filter<T: Copy>(values: &mut Vec<T>, kept: &[bool]) {
+        let mut flags = kept.iter();
+        values.retain(|_| flags.next().copied().unwrap_or(true));
+    }
+    filter(&mut samples.time, kept);
+    samples.segment.iter_mut().for_each(|labels| filter(labels, kept));
+    channels(samples).for_each(|values| filter(values, kept));
+    if !done.missing.is_empty() {
+        filter(&mut done.missing, kept);
+    }
+}
+
+fn rows_word(count: usize) -> String {
+    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
+}
+
+/// Leaves out rows without a time, and without an input where that is longer away than a bridge reaches.
+fn leave_out_without(
+    samples: &mut Columns,
+    done: &mut Repaired,
+    wanted: bool,
+    origin: &Origin<'_>,
+) -> Result<(), RecordError> {
+    let rows = samples.time.len();
+    let without_time: Vec<bool> = samples.time.iter().map(|t| t.is_finite()).collect();
+    let count = without_time.iter().filter(|there| !**there).count();
+    let few = |file: &str, column: &str, missing: usize| RecordError::MostlyMissing {
+        file: file.to_owned(),
+        column: column.to_owned(),
+        missing,
+        rows,
+    };
+    if count as f64 > MAX_MISSING_SHARE * rows as f64 {
+        return Err(few(&samples.name, origin.time_column, count));
+    }
+    if count > 0 {
+        keep(samples, done, &without_time);
+        done.note(format!("{} without a time {} left out", rows_word(count), was(count)));
+    }
+    let output = samples.output.as_ref().map(|(unit, y)| (unit.column(), y));
+    if let Some((column, y)) = output {
+        let missing: Vec<bool> = y.iter().map(|y| !y.is_finite()).collect();
+        let count = missing.iter().filter(|missing| **missing).count();
+        if count as f64 > MAX_MISSING_SHARE * rows as f64 {
+            return Err(few(&samples.name, column, count));
+        }
+        if let Some(row) = missing.iter().position(|missing| *missing).filter(|_| wanted) {
+            let place = (origin.place)(done.row(row));
+            return Err(RecordError::NotFinite {
+                file: samples.name.clone(),
+                place,
+                column: column.to_owned(),
+                value: "missing".to_owned(),
+            });
+        }
+        if count > 0 {
+            done.missing = missing;
+            done.note(format!("{} without {column} {} not fitted", rows_word(count), was(count)));
+        }
+    }
+    let columns = [
+        (samples.input_column.clone(), samples.input.as_ref()),
+        ("temperature_degc".to_owned(), samples.temperature.as_ref()),
+        ("load_n".to_owned(), samples.load.as_ref()),
+    ];
+    let mut kept = vec![true; samples.time.len()];
+    let mut notes = Vec::new();
+    for (column, values) in columns.into_iter().filter_map(|(column, values)| Some((column, values?))) {
+        let missing = values.iter().filter(|value| !value.is_finite()).count();
+        if missing as f64 > MAX_MISSING_SHARE * rows as f64 {
+            return Err(few(&samples.name, &column, missing));
+        }
+        let mut left_out = 0;
+        for run in runs(values) {
+            // Nothing to draw a line from or to at an end.
+            let inner = run.start > 0 && run.end < values.len();
+            if run.len() > MAX_BRIDGE || !inner {
+                left_out += run.len();
+                kept[run].fill(false);
+            }
+        }
+        let bridged = missing - left_out;
+        if bridged > 0 {
+            notes.push(format!("{} without {column}: interpolated", rows_word(bridged)));
+        }
+        if left_out > 0 {
+            notes.push(format!("{} without {column} {} left out", rows_word(left_out), was(left_out)));
+        }
+    }
+    if kept.contains(&false) {
+        keep(samples, done, &kept);
+    }
+    notes.into_iter().for_each(|note| done.note(note));
+    Ok(())
+}
+
+fn was(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
+/// Runs of values that are missing.
+fn runs(values: &[f64]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = None;
+    for (row, value) in values.iter().enumerate() {
+        match (value.is_finite(), start) {
+            (false, None) => start = Some(row),
+            (true, Some(first)) => {
+                runs.push(first..row);
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    runs.extend(start.map(|first| first..values.len()));
+    runs
+}
+
+/// Fills what is missing by straight lines; at an end by the nearest value.
+fn bridge(samples: &mut Columns) {
+    let time = samples.time.clone();
+    for values in channels(samples) {
+        for run in runs(values) {
+            let before = run.start.checked_sub(1).map(|row| (time[row], values[row]));
+            let after = (run.end < values.len()).then(|| (time[run.end], values[run.end]));
+            for row in run {
+                values[row] = match (before, after) {
+                    (Some((t0, v0)), Some((t1, v1))) if t1 > t0 => v0 + (v1 - v0) * (time[row] - t0) / (t1 - t0),
+                    (Some((_, v)), _) | (None, Some((_, v))) => v,
+                    (None, None) => 0.0,
+                };
+            }
+        }
+    }
+}
+
+/// Joins rows of one time: their values are averaged.
+fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
+    let rows = samples.time.len();
+    let label = |row: usize| samples.segment.as_ref().map(|labels| labels[row]);
+    let repeats = |row: usize| row > 0 && samples.time[row] == samples.time[row - 1] && label(row) == label(row - 1);
+    let repeated: Vec<bool> = (0..rows).map(repeats).collect();
+    let count = repeated.iter().filter(|repeated| **repeated).count();
+    // Of times that are printed too coarsely many rows share each: these are told apart by nobody.
+    let values: Vec<Vec<f64>> = channels(samples).map(|values| values.clone()).collect();
+    let differs = |row: usize| values.iter().any(|v| v[row].to_bits() != v[row - 1].to_bits());
+    let differing = (1..rows).filter(|row| repeated[*row] && differs(*row)).count();
+    if count == 0 || differing as f64 > MAX_JOINED_SHARE * rows as f64 {
+        return;
+    }
+    for values in channels(samples) {
+        let mut first = 0;
+        for row in 1..rows {
+            if !repeated[row] {
+                first = row;
+            } else if values[row].is_finite() && values[row] != values[first] {
+                let so_far = (row - first) as f64;
+                values[first] = if values[first].is_finite() {
+                    (values[first] * so_far + values[row]) / (so_far + 1.0)
+                } else {
+                    values[row]
+                };
+            }
+        }
+    }
+    let kept: Vec<bool> = repeated.iter().map(|repeated| !repeated).collect();
+    keep(samples, done, &kept);
+    done.note(format!("{} with the time of the row before: joined", rows_word(count)));
+}
+
+/// Whether times increase, but not by even steps.
+fn is_uneven(samples: &Columns, printed: Printed) -> Option<Vec<Range<usize>>> {
+    let rows = samples.time.len();
+    if rows < 2 || samples.time.windows(2).any(|t| t[1] <= t[0]) {
+        return None;
+    }
+    let labels = samples.segment.clone().unwrap_or_else(|| vec![0; rows]);
+    let (_, segments) = super::split(&labels).ok()?;
+    matches!(grid::fit(&samples.time, &segments, printed), Err(Fault::Uneven { .. })).then_some(segments)
+}
+
+/// Puts back rows that are lost where only a few in sequence are: without values.
+fn insert_lost(samples: &mut Columns, done: &mut Repaired, printed: Printed) {
+    let Some(segments) = is_uneven(samples, printed) else { return };
+    let rows = samples.time.len();
+    // Rows to insert before each row.
+    let mut lost = vec![0; rows];
+    for rows in segments.iter().filter(|rows| rows.len() > 2) {
+        let usual = usual_step(&samples.time[rows.clone()]);
+        for row in rows.start + 1..rows.end {
+            let steps = (samples.time[row] - samples.time[row - 1]) / usual;
+            let whole = steps.round();
+            if whole >= 2.0 && whole <= MAX_BRIDGE as f64 + 1.0 && (steps - whole).abs() < MAX_OFF_GRID {
+                lost[row] = whole as usize - 1;
+            }
+        }
+    }
+    let gaps = lost.iter().filter(|lost| **lost > 0).count();
+    let count: usize = lost.iter().sum();
+    if count == 0 || gaps as f64 > (MAX_GAP_SHARE * rows as f64).max(1.0) {
+        return;
+    }
+    let times: Vec<f64> = (0..rows)
+        .flat_map(|row| {
+            let (end, n) = (samples.time[row], lost[row]);
+            let start = if n > 0 { samples.time[row - 1] } else { end };
+            (1..=n).map(move |k| start + (end - start) * k as f64 / (n + 1) as f64).chain([end])
+        })
+        .collect();
+    fn insert<T: Copy>(values: &mut Vec<T>, lost: &[usize], with: impl Fn(usize, T) -> T) {
+        let repeated = |(row, value): (usize, &T)| {
+            std::iter::repeat_n(with(row, *value), lost[row]).chain([*value]).collect::<Vec<T>>()
+        };
+        *values = values.iter().enumerate().flat_map(repeated).collect();
+    }
+    samples.time = times;
+    if samples.output.is_some() && done.missing.is_empty() {
+        done.missing = vec![false; rows];
+    }
+    insert(&mut done.missing, &lost, |_, _| true);
+    channels(samples).for_each(|values| insert(values, &lost, |_, _| f64::NAN));
+    samples.segment.iter_mut().for_each(|labels| insert(labels, &lost, |_, label| label));
+    let mut own = done.rows.take().unwrap_or_else(|| (0..rows).collect());
+    insert(&mut own, &lost, |_, row| row);
+    done.rows = Some(own);
+    done.note(format!("{} lost between others: interpolated, and not fitted", rows_word(count)));
+}
+
+/// Begins a segment behind each interruption, and resamples times that jitter. Times that do not increase are left to the checks.
+fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired) {
+    let Some(mut segments) = is_uneven(samples, *printed) else { return };
+    let rows = samples.time.len();
+    let mut gaps = Vec::new();
+    segments = segments.into_iter().flat_map(|rows| at_gaps(&samples.time, rows, &mut gaps)).collect();
+    if !gaps.is_empty() {
+        let alone = segments.iter().filter(|rows| rows.len() < 2).count();
+        let longest = gaps.iter().fold(0.0_f64, |m, g| m.max(*g));
+        let word = if gaps.len() == 1 { "an interruption".to_owned() } else { format!("{} interruptions", gaps.len()) };
+        done.note(format!("{word} of up to {longest:.3} s: a segment begins after each; what the actuator remembers from before is estimated"));
+        if alone > 0 && alone < segments.len() {
+            let mut kept = vec![true; rows];
+            segments.iter().filter(|rows| rows.len() < 2).for_each(|rows| kept[rows.clone()].fill(false));
+            relabel(samples, &segments);
+            keep(samples, done, &kept);
+            done.note(format!("{} between two interruptions: left out", rows_word(alone)));
+        } else {
+            relabel(samples, &segments);
+        }
+    }
+    if let Some(segments) = is_uneven(samples, *printed) {
+        let (rms, most) = resample(samples, done, &segments);
+        *printed = Printed::EXACT;
+        done.note(format!(
+            "times jitter by {:.2} % of a sample period (rms; at most {:.2} %): resampled to even steps by a cubic spline",
+            100.0 * rms,
+            100.0 * most
+        ));
+    }
+}
+
+/// Labels segments 0, 1, 2 …
+fn relabel(samples: &mut Columns, segments: &[Range<usize>]) {
+    samples.segment =
+        Some((0..).zip(segments).flat_map(|(label, rows)| std::iter::repeat_n(label, rows.len())).collect());
+}
+
+/// The usual step of increasing times \[s\].
+fn usual_step(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
+    let middle = (steps.len() - 1) / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Parts of a segment between its interruptions, whose lengths \[s\] go to `gaps`.
+fn at_gaps(time: &[f64], rows: Range<usize>, gaps: &mut Vec<f64>) -> Vec<Range<usize>> {
+    if rows.len() < 3 {
+        return vec![rows];
+    }
+    let usual = usual_step(&time[rows.clone()]);
+    let is_gap = |row: &usize| time[*row] - time[*row - 1] > MIN_GAP * usual;
+    let starts: Vec<usize> = (rows.start + 1..rows.end).filter(is_gap).collect();
+    if starts.len() as f64 > (MAX_GAP_SHARE * rows.len() as f64).max(1.0) {
+        return vec![rows];
+    }
+    gaps.extend(starts.iter().map(|row| time[*row] - time[*row - 1]));
+    let ends = starts.iter().copied().chain([rows.end]);
+    std::iter::once(rows.start).chain(starts.iter().copied()).zip(ends).map(|(start, end)| start..end).collect()
+}
+
+/// Puts each segment on an even grid with its number of rows; how far its times were off it: their rms and their most, as shares of a period.
+fn resample(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>]) -> (f64, f64) {
+    let old = samples.time.clone();
+    let (mut squares, mut most) = (0.0, 0.0_f64);
+    let mut periods: Vec<f64> = Vec::new();
+    for rows in segments.iter().filter(|rows| rows.len() >= 2) {
+        let t = &old[rows.clone()];
+        periods.push((t[t.len() - 1] - t[0]) / (t.len() - 1) as f64);
+    }
+    // Segments of nearly one rate have it.
+    let median = {
+        let mut sorted = periods.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        sorted[sorted.len() / 2]
+    };
+    for rows in segments.iter().filter(|rows| rows.len() >= 2) {
+        let t = &old[rows.clone()];
+        let own = (t[t.len() - 1] - t[0]) / (t.len() - 1) as f64;
+        let shared = (own - median).abs() * (t.len() - 1) as f64;
+        let h = round_period(if shared < 2.0 * median { median } else { own }, t);
+        for (k, row) in rows.clone().enumerate() {
+            let even = t[0] + k as f64 * h;
+            let off = (old[row] - even) / h;
+            squares += off * off;
+            most = most.max(off.abs());
+            samples.time[row] = even;
+        }
+    }
+    let time = samples.time.clone();
+    for values in channels(samples) {
+        for rows in segments.iter().filter(|rows| rows.len() >= 2) {
+            let moved = spline(&old[rows.clone()], &values[rows.clone()], &time[rows.clone()]);
+            values[rows.clone()].copy_from_slice(&moved);
+        }
+    }
+    done.changed = true;
+    ((squares / old.len() as f64).sqrt(), most)
+}
+
+/// The whole rate next to a period that times of a segment cannot tell from it.
+fn round_period(h: f64, t: &[f64]) -> f64 {
+    let rate = (1.0 / h).round();
+    let whole = 1.0 / rate;
+    if rate >= 1.0 && (whole - h).abs() * (t.len() - 1) as f64 <= 0.5 * h { whole } else { h }
+}
+
+/// The natural cubic spline through `(t, y)` at the times `at`, which increase; beyond the ends the end's line.
+fn spline(t: &[f64], y: &[f64], at: &[f64]) -> Vec<f64> {
+    let n = t.len();
+    let h = |k: usize| t[k + 1] - t[k];
+    let slope = |k: usize| (y[k + 1] - y[k]) / h(k);
+    // Second derivatives: a tridiagonal system, by elimination.
+    let mut second = vec![0.0; n];
+    if n > 2 {
+        let mut upper = vec![0.0; n];
+        for k in 1..n - 1 {
+            let pivot = 2.0 * (h(k - 1) + h(k)) - h(k - 1) * upper[k - 1];
+            upper[k] = h(k) / pivot;
+            second[k] = (6.0 * (slope(k) - slope(k - 1)) - h(k - 1) * second[k - 1]) / pivot;
+        }
+        for k in (1..n - 1).rev() {
+            second[k] -= upper[k] * second[k + 1];
+        }
+    }
+    let mut k = 0;
+    at.iter()
+        .map(|x| {
+            while k + 2 < n && t[k + 1] <= *x {
+                k += 1;
+            }
+            let (a, b) = (x - t[k], t[k + 1] - x);
+            let line = y[k] + slope(k) * a;
+            if a < 0.0 || b < 0.0 {
+                line
+            } else {
+                line - a * b / 6.0 * (second[k] * (1.0 + b / h(k)) + second[k + 1] * (1.0 + a / h(k)))
+            }
+        })
+        .collect()
+}
+
+/// A row of the file, as a reader finds it.
+pub(super) fn place_of<'a>(done: &'a Repaired, place: &'a dyn Fn(usize) -> Place) -> impl Fn(usize) -> Place + 'a {
+    move |row| place(done.row(row))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{ColumnMap, Need, Record};
+
+    fn read(text: &str) -> Record {
+        Record::parse("run.csv", text.as_bytes(), &ColumnMap::default(), Need::InputAndOutput)
+            .unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn table(times: &[f64]) -> String {
+        times.iter().fold("time_s,voltage_v,displacement_um\n".to_owned(), |text, t| {
+            text + &format!("{t:.6},{:.9},{:.9}\n", (6.0 * t).sin(), 1.0 + (6.0 * t).cos())
+        })
+    }
+
+    #[test]
+    fn a_spline_gives_a_cubic_inside_and_its_own_points() {
+        let t: Vec<f64> = (0..30).map(|k| f64::from(k) + 0.3 * f64::from(k % 3)).collect();
+        let y: Vec<f64> = t.iter().map(|t| (0.3 * t).sin()).collect();
+        let at: Vec<f64> = (0..28).map(f64::from).collect();
+        let worst =
+            at.iter().zip(spline(&t, &y, &at)).skip(3).map(|(x, y)| ((0.3 * x).sin() - y).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-3, "{worst}");
+        for (own, y) in spline(&t, &y, &t).iter().zip(&y) {
+            assert!((own - y).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn jitter_is_resampled() {
+        let jitter = |k: usize| 1e-3 * k as f64 + 2e-6 * (k as f64 * 1.7).sin();
+        let record = read(&table(&(0..500).map(jitter).collect::<Vec<_>>()));
+        assert_eq!((record.sample_period(), record.segments().len()), (1e-3, 1));
+        assert!(record.notes()[0].contains("jitter by 0.15 %"), "{:?}", record.notes());
+        let worst =
+            record.time().iter().zip(record.input()).map(|(t, u)| ((6.0 * t).sin() - u).abs()).fold(0.0, f64::max);
+        // Times are printed to the microsecond.
+        assert!(worst < 5e-6, "{worst}");
+    }
+
+    #[test]
+    fn an_interruption_begins_a_segment() {
+        let times: Vec<f64> = (0..100).map(|k| 1e-3 * f64::from(k) + if k >= 40 { 2.0 } else { 0.0 }).collect();
+        let record = read(&table(&times));
+        assert_eq!((record.segments(), record.labels()), (&[0..40, 40..100][..], &[0, 1][..]));
+        assert!(record.notes()[0].contains("interruption of up to 2.001 s"), "{:?}", record.notes());
+    }
+
+    #[test]
+    fn repeated_rows_are_joined() {
+        let mut times: Vec<f64> = (0..100).map(|k| 1e-3 * f64::from(k)).collect();
+        times.insert(41, 0.040);
+        let record = read(&table(&times));
+        assert_eq!((record.rows(), record.sample_period()), (100, 1e-3));
+        assert!(record.notes()[0].contains("1 row with the time of the row before"), "{:?}", record.notes());
+    }
+
+    #[test]
+    fn missing_values_are_left_out_and_counted() {
+        let mut rows: Vec<String> =
+            table(&(0..100).map(|k| 1e-3 * f64::from(k)).collect::<Vec<_>>()).lines().map(str::to_owned).collect();
+        rows[11] = "0.010,0.06,NaN".into();
+        rows[21] = "0.020,,1.9".into();
+        for row in &mut rows[31..51] {
+            *row = format!("{},,1.9", row.split(',').next().unwrap());
+        }
+        let record = read(&rows.join("\n"));
+        assert_eq!((record.rows(), record.segments().len()), (80, 2));
+        assert_eq!(record.missing().iter().filter(|missing| **missing).count(), 1);
+        assert!((record.input()[20] - (0.12_f64).sin()).abs() < 1e-4);
+        let notes = record.notes().join("; ");
+        for part in [
+            "1 row without displacement_um is not fitted",
+            "1 row without voltage_v: interpolated",
+            "20 rows without voltage_v are left out",
+        ] {
+            assert!(notes.contains(part), "{notes}");
+        }
+    }
+}

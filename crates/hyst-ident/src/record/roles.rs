@@ -1,0 +1,612 @@
+//! Which column of a file plays which role, in which unit.
+//!
+//! What `--map` says goes first, then names of the record format, then headings that state what they measure: a column in volts is the
+//! input, one in micrometres the output. Where two are possible, words decide; where a unit is not stated, nothing is assumed, and
+//! the message ends with the options to paste.
+
+use super::columns::{ColumnMap, Entry, Need, Role};
+use super::error::{Place, RecordError};
+use super::heading::{Dimension, Heading, Unit, leaf};
+use super::source::{Axis, Head};
+use super::unit::{OutputUnit, TimeUnit};
+
+/// A column in a role.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choice {
+    /// Its number; the first is 0.
+    pub(crate) column: usize,
+    /// Its name in the record format.
+    pub(crate) canonical: String,
+    /// Its unit, where that is another than its role's.
+    pub(crate) unit: Option<Unit>,
+    /// Whether it has the other sign.
+    pub(crate) turned: bool,
+}
+
+/// Where times come from.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Clock {
+    /// A column, and how many of its unit make a second.
+    Column { column: usize, per_second: f64 },
+    /// Even times \[s\].
+    Even { start: f64, step: f64 },
+}
+
+/// The columns of a file by role.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Layout {
+    pub(crate) segment: Option<usize>,
+    pub(crate) time: Clock,
+    pub(crate) input: Option<Choice>,
+    pub(crate) output: Option<Choice>,
+    pub(crate) temperature: Option<Choice>,
+    pub(crate) load: Option<Choice>,
+    /// What was read otherwise than the record format says.
+    pub(crate) notes: Vec<String>,
+}
+
+/// A file's columns as messages name them.
+pub(crate) struct File<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) header: Option<Place>,
+    pub(crate) heads: &'a [Head],
+}
+
+/// Names that a message lists.
+const MOST_LISTED: usize = 12;
+/// Characters of a name that a message shows.
+const MOST_CHARACTERS: usize = 48;
+
+impl Layout {
+    /// Finds the columns that `need` asks for; `rate` \[Hz\] stands in for times that the file does not have.
+    pub(crate) fn resolve(
+        file: &File<'_>,
+        map: &ColumnMap,
+        need: Need,
+        rate: Option<f64>,
+    ) -> Result<Self, RecordError> {
+        let search =
+            Search { file, headings: file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect() };
+        let mut problems = Problems::default();
+        let mapped = search.mapped(map)?;
+        let wants_input = matches!(need, Need::InputAndOutput | Need::Input);
+        let wants_output = matches!(need, Need::InputAndOutput | Need::Output);
+
+        let mut taken: Vec<usize> = mapped.iter().map(|(_, choice)| choice.column).collect();
+        let mut role = |role: Role, required: bool| {
+            let found = match mapped.iter().find(|(own, _)| *own == role) {
+                Some((_, choice)) => Some(choice.clone()),
+                None => search.find(role, required, &taken, &mut problems),
+            };
+            taken.extend(found.iter().map(|choice| choice.column));
+            found
+        };
+        let segment = role(Role::Segment, false);
+        let input = role(Role::Input, wants_input);
+        let output = role(Role::Output, wants_output);
+        let temperature = role(Role::Temperature, false);
+        let load = role(Role::Load, false);
+        let column = output.as_ref().or(input.as_ref()).map_or(0, |choice| choice.column);
+        let axis = file.heads.get(column).map_or(Axis::Unknown, |head| head.axis);
+        // A stated rate stands for a column of time too, where nobody names one.
+        let stated = rate.map(|rate| Axis::Even { start: 0.0, step: 1.0 / rate }).or(match axis {
+            Axis::Unknown => None,
+            axis => Some(axis),
+        });
+        // Of several times those of the output's own rows count.
+        let own = matches!(stated, Some(Axis::Column(_))) && !mapped.iter().any(|(role, _)| *role == Role::Time);
+        let clock = if rate.is_some() || own { None } else { role(Role::Time, stated.is_none()) };
+        let input = input.filter(|_| wants_input);
+        let time = match (clock.as_ref(), stated) {
+            (Some(choice), _) => Some(Clock::Column {
+                column: choice.column,
+                per_second: choice.unit.map_or_else(|| per_second(&choice.canonical), |unit| unit.per_base),
+            }),
+            (None, Some(Axis::Even { start, step })) => Some(Clock::Even { start, step }),
+            (None, Some(Axis::Column(column))) => {
+                let unit = search.headings[column].unit.filter(|unit| unit.dimension == Dimension::Time);
+                Some(Clock::Column { column, per_second: unit.map_or(1.0, |unit| unit.per_base) })
+            }
+            (None, _) => None,
+        };
+        let Some(time) = time.filter(|_| problems.list.is_empty()) else {
+            return Err(search.refuse(problems, map, &taken));
+        };
+        let choices = [&clock, &input, &output, &temperature, &load];
+        let notes = choices.into_iter().flatten().filter_map(|choice| search.reading(choice)).collect();
+        Ok(Self { segment: segment.map(|choice| choice.column), time, input, output, temperature, load, notes })
+    }
+}
+
+fn per_second(canonical: &str) -> f64 {
+    TimeUnit::of_column(canonical).unwrap_or(TimeUnit::Second).per_second()
+}
+
+/// What keeps a file's columns from being used, and the roles that are open.
+#[derive(Default)]
+struct Problems {
+    list: Vec<String>,
+    /// Roles with the column that they may be in.
+    open: Vec<(Role, Option<usize>)>,
+}
+
+impl Problems {
+    fn add(&mut self, role: Role, guess: Option<usize>, what: String) {
+        self.list.push(what);
+        self.open.push((role, guess));
+    }
+}
+
+struct Search<'a> {
+    file: &'a File<'a>,
+    headings: Vec<Heading>,
+}
+
+impl Search<'_> {
+    fn name(&self, column: usize) -> &str {
+        &self.file.heads[column].name
+    }
+
+    fn columns(&self) -> std::ops::Range<usize> {
+        0..self.file.heads.len()
+    }
+
+    /// The column that a map names: by its whole name, by the last part of it, or by its number.
+    fn mapped(&self, map: &ColumnMap) -> Result<Vec<(Role, Choice)>, RecordError> {
+        let of = |entry: &Entry| {
+            let by = |is: &dyn Fn(&str) -> bool| {
+                let mut found = self.columns().filter(|at| is(self.name(*at)));
+                found.next().filter(|_| found.next().is_none())
+            };
+            let number = || entry.column.parse::<usize>().ok()?.checked_sub(1).filter(|at| self.columns().contains(at));
+            let column = by(&|name| name == entry.column)
+                .or_else(|| by(&|name| leaf(name) == entry.column))
+                .or_else(|| self.file.heads.iter().position(|head| head.path.as_deref() == Some(&entry.column)))
+                .or_else(number)
+                .or_else(|| self.part_of_table(&entry.column))
+                .ok_or_else(|| self.not_there(entry))?;
+            let unit = self.headings[column].unit;
+            // A clock's unit is often named wrongly, and an odd rate shows it: of times the map's unit counts.
+            let unit = match (Unit::of_canonical(&entry.canonical), unit) {
+                (Some(own), Some(unit)) if entry.role != Role::Time && unit != own => {
+                    if unit.dimension != own.dimension {
+                        return Err(self.other_dimension(entry, unit));
+                    }
+                    Some(unit)
+                }
+                _ => None,
+            };
+            Ok((entry.role, Choice { column, canonical: entry.canonical.clone(), unit, turned: entry.turned }))
+        };
+        map.entries.iter().map(of).collect()
+    }
+
+    /// The column that `table[2]` names in a table whose columns have names.
+    fn part_of_table(&self, name: &str) -> Option<usize> {
+        let (table, number) = name.strip_suffix(']')?.rsplit_once('[')?;
+        let number = number.parse::<usize>().ok()?.checked_sub(1)?;
+        let table = format!("{}/", table.trim_end_matches('/'));
+        let own = |at: &usize| self.name(*at).strip_prefix(&table).is_some_and(|rest| !rest.contains('/'));
+        self.columns().filter(own).nth(number)
+    }
+
+    /// The column with `role`, or a problem if there has to be one.
+    fn find(&self, role: Role, required: bool, taken: &[usize], problems: &mut Problems) -> Option<Choice> {
+        let free = || self.columns().filter(|at| !taken.contains(at));
+        let plain = |column: usize| {
+            let canonical = leaf(self.name(column)).to_owned();
+            Choice { column, canonical, unit: None, turned: false }
+        };
+        let voltage = || free().filter(|at| leaf(self.name(*at)) == "voltage_v");
+        // Names of the record format.
+        let mut own = free().filter(|at| Role::of_column(leaf(self.name(*at))) == Some(role));
+        match (own.next(), own.next()) {
+            // A voltage is the input wherever there is one; other inputs count only in its absence.
+            (Some(_), Some(_)) if role == Role::Input && voltage().count() == 1 => return voltage().next().map(plain),
+            (Some(first), Some(second)) => {
+                let hint = match (role, leaf(self.name(second))) {
+                    (Role::Output, "force_n") => {
+                        "; if \"force_n\" is the load that acts on the actuator: --map load_n=force_n"
+                    }
+                    _ => "",
+                };
+                let what =
+                    format!("{} and {} both could be {}{hint}", self.quoted(first), self.quoted(second), role.words());
+                problems.add(role, Some(first), what);
+                return None;
+            }
+            (Some(only), None) => return Some(plain(only)),
+            (None, _) => {}
+        }
+        // Headings that state a unit.
+        let measured: Vec<usize> = free().filter(|at| self.could_be(role, *at, required)).collect();
+        let chosen = match *measured.as_slice() {
+            [] => None,
+            [only] => Some(only),
+            ref several => match self.preferred(role, several).as_slice() {
+                [best] => Some(*best),
+                _ => {
+                    let names =
+                        several.iter().map(|at| self.quoted(*at)).take(MOST_LISTED).collect::<Vec<_>>().join(", ");
+                    problems.add(role, Some(several[0]), format!("{names} each could be {}", role.words()));
+                    return None;
+                }
+            },
+        };
+        if let Some(column) = chosen {
+            return self.headings[column].unit.map(|unit| {
+                let canonical = unit.canonical(role).to_owned();
+                let own = Unit::of_canonical(&canonical);
+                Choice {
+                    column,
+                    unit: Some(unit).filter(|unit| role == Role::Time || own != Some(*unit)),
+                    canonical,
+                    turned: false,
+                }
+            });
+        }
+        // Words without a unit.
+        let worded: Vec<usize> = free().filter(|at| self.headings[*at].suggests(words_of(role))).collect();
+        let unknown = worded.iter().find(|at| required || self.states_unknown_unit(role, **at));
+        match unknown {
+            Some(at) if self.headings[*at].unit.is_none() => {
+                problems.add(
+                    role,
+                    Some(*at),
+                    format!("{} may be {}, but its unit is not stated", self.quoted(*at), role.words()),
+                );
+            }
+            _ if required => {
+                problems.add(role, None, format!("no column is {} ({})", role.words(), role.accepted()));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Whether a column's unit is one of `role`, which `required` says it needs.
+    fn could_be(&self, role: Role, column: usize, required: bool) -> bool {
+        let heading = &self.headings[column];
+        let Some(unit) = heading.unit else {
+            return role == Role::Segment && heading.words == ["segment"];
+        };
+        match role {
+            Role::Segment => false,
+            Role::Time => unit.dimension == Dimension::Time,
+            Role::Input => unit.dimension == Dimension::Voltage && (required || heading.suggests(INPUT)),
+            Role::Output => {
+                let measures = matches!(unit.dimension, Dimension::Length | Dimension::Force);
+                measures && !heading.suggests(LOAD) && (required || heading.suggests(OUTPUT))
+            }
+            Role::Temperature => unit.dimension == Dimension::Temperature,
+            Role::Load => unit.dimension == Dimension::Force && heading.suggests(LOAD),
+        }
+    }
+
+    /// Those of several columns that words prefer.
+    fn preferred(&self, role: Role, several: &[usize]) -> Vec<usize> {
+        let with = |words: &[&str], is: bool| {
+            several.iter().copied().filter(|at| self.headings[*at].suggests(words) == is).collect::<Vec<_>>()
+        };
+        let by_word = with(words_of(role), true);
+        if by_word.len() == 1 {
+            return by_word;
+        }
+        match role {
+            // What was measured, not what was wanted.
+            Role::Output => {
+                let measured = with(WANTED, false);
+                let lengths =
+                    |at: &usize| self.headings[*at].unit.is_some_and(|unit| unit.dimension == Dimension::Length);
+                if measured.len() == 1 { measured } else { measured.iter().copied().filter(lengths).collect() }
+            }
+            Role::Input => with(SENSOR, false),
+            _ => by_word,
+        }
+    }
+
+    /// Whether a column that may be absent goes by a unit of its role's that is not known.
+    fn states_unknown_unit(&self, role: Role, column: usize) -> bool {
+        let heading = &self.headings[column];
+        match role {
+            Role::Temperature | Role::Load => {
+                heading.words.len() == 2 && heading.unit.is_none() && UNKNOWN_UNITS.contains(&heading.words[1].as_str())
+            }
+            _ => false,
+        }
+    }
+
+    /// What is said of a column that is read by its heading, or in another unit.
+    fn reading(&self, choice: &Choice) -> Option<String> {
+        let name = self.name(choice.column);
+        if leaf(name) == choice.canonical {
+            return None;
+        }
+        let own = Unit::of_canonical(&choice.canonical);
+        let converted = choice.unit.zip(own).filter(|(unit, own)| unit != own);
+        let converted = converted
+            .map_or(String::new(), |(unit, own)| format!(", converted from {} to {}", unit.symbol, own.symbol));
+        Some(format!("{} is read as {}{converted}", quoted(name), choice.canonical))
+    }
+
+    /// A column's name, with the unit that the file states beside it.
+    fn quoted(&self, column: usize) -> String {
+        let unit = self.file.heads[column].unit.as_deref().map_or(String::new(), |unit| format!(" in {unit}"));
+        format!("{}{unit}", quoted(self.name(column)))
+    }
+
+    fn listed(&self) -> String {
+        let names: Vec<String> = self.columns().take(MOST_LISTED).map(|at| self.quoted(at)).collect();
+        let more = self.file.heads.len().saturating_sub(MOST_LISTED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{more}", names.join(", "))
+    }
+
+    fn not_there(&self, entry: &Entry) -> RecordError {
+        let longer =
+            self.columns().map(|at| self.name(at)).find(|name| name.starts_with(&format!("{} ", entry.column)));
+        RecordError::MappedColumnMissing {
+            file: self.place(),
+            canonical: entry.canonical.clone(),
+            column: entry.column.clone(),
+            found: self.listed(),
+            hint: match longer {
+                Some(whole) => {
+                    format!(
+                        "; a name with spaces needs quotes: --map {}",
+                        argument(&entry.canonical, entry.turned, whole)
+                    )
+                }
+                None => String::new(),
+            },
+        }
+    }
+
+    fn other_dimension(&self, entry: &Entry, unit: Unit) -> RecordError {
+        let what = format!(
+            "--map {}={}: the column is in {}, which {} is not",
+            entry.canonical, entry.column, unit.symbol, entry.canonical
+        );
+        RecordError::Columns {
+            file: self.place(),
+            problems: what,
+            advice: "map another column, or convert the values".to_owned(),
+            columns: self.file.heads.len(),
+        }
+    }
+
+    fn place(&self) -> String {
+        self.file.header.map_or_else(|| self.file.name.to_owned(), |place| format!("{}, {place}", self.file.name))
+    }
+
+    /// All problems in one message, with a map that is complete.
+    fn refuse(&self, problems: Problems, map: &ColumnMap, taken: &[usize]) -> RecordError {
+        // A column with a unit would have been found.
+        let is_free = |at: &usize| {
+            self.headings[*at].unit.is_none()
+                && !taken.contains(at)
+                && !problems.open.iter().any(|(_, guess)| *guess == Some(*at))
+        };
+        let mut free = self.columns().filter(is_free);
+        let mut open: Vec<(Role, Option<usize>)> = problems.open.clone();
+        open.sort_by_key(|(role, _)| *role != Role::Time);
+        let arguments = open.iter().map(|(role, guess)| {
+            let column = guess.or_else(|| free.next());
+            let canonical =
+                column.and_then(|at| self.headings[at].unit).map_or(role.example(), |unit| unit.canonical(*role));
+            // A unit of another dimension is no unit of the role.
+            let canonical = if Role::of_column(canonical) == Some(*role) { canonical } else { role.example() };
+            format!(
+                "--map {}",
+                column.map_or_else(|| format!("{canonical}=COLUMN"), |at| argument(canonical, false, self.name(at)))
+            )
+        });
+        let own = map.entries.iter().map(|e| format!("--map {}", argument(&e.canonical, e.turned, &e.column)));
+        let line = own.chain(arguments).collect::<Vec<_>>().join(" ");
+        let no_time = open.iter().any(|(role, guess)| *role == Role::Time && guess.is_none());
+        let rate = if no_time { "; for a file without times give the rate with --rate" } else { "" };
+        RecordError::Columns {
+            file: self.place(),
+            problems: problems.list.join("; "),
+            advice: format!("columns found: {}{rate}; if the columns and units are right: {line}", self.listed()),
+            columns: self.file.heads.len(),
+        }
+    }
+}
+
+/// A name in quotation marks, not too long.
+fn quoted(name: &str) -> String {
+    let short: String = name.chars().take(MOST_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let more = if name.chars().nth(MOST_CHARACTERS).is_some() { "…" } else { "" };
+    format!("\"{short}{more}\"")
+}
+
+/// A map as a shell takes it.
+fn argument(canonical: &str, turned: bool, column: &str) -> String {
+    let text = format!("{canonical}={}{column}", if turned { "-" } else { "" });
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-=/.,:@%+".contains(c);
+    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}
+
+const TIME: &[&str] = &["time", "t", "zeit", "timestamp", "clock", "temps"];
+const INPUT: &[&str] = &[
+    "voltage",
+    "volt",
+    "volts",
+    "u",
+    "v",
+    "vin",
+    "uin",
+    "input",
+    "drive",
+    "command",
+    "excitation",
+    "ao",
+    "ao0",
+    "spannung",
+    "actuation",
+    "hv",
+    "piezo",
+];
+const OUTPUT: &[&str] = &[
+    "displacement",
+    "disp",
+    "position",
+    "pos",
+    "force",
+    "weg",
+    "stroke",
+    "elongation",
+    "extension",
+    "sensor",
+    "measured",
+    "y",
+    "z",
+    "x",
+    "auslenkung",
+    "output",
+];
+const TEMPERATURE: &[&str] = &["temperature", "temp", "temperatur"];
+const LOAD: &[&str] = &["load", "preload", "external"];
+/// Words of a position that was asked for.
+const WANTED: &[&str] = &[
+    "target",
+    "commanded",
+    "command",
+    "setpoint",
+    "set",
+    "reference",
+    "desired",
+    "wanted",
+    "soll",
+    "error",
+    "cmd",
+    "ref",
+];
+/// Words of a voltage that was measured.
+const SENSOR: &[&str] = &[
+    "sensor",
+    "monitor",
+    "mon",
+    "measured",
+    "feedback",
+    "output",
+    "out",
+    "gauge",
+    "adc",
+    "ai",
+    "cell",
+    "capacitive",
+    "strain",
+];
+/// Units of columns that may be absent, which are no units of them here.
+const UNKNOWN_UNITS: &[&str] = &["kg", "g", "lbf"];
+
+fn words_of(role: Role) -> &'static [&'static str] {
+    match role {
+        Role::Segment => &["segment", "segments"],
+        Role::Time => TIME,
+        Role::Input => INPUT,
+        Role::Output => OUTPUT,
+        Role::Temperature => TEMPERATURE,
+        Role::Load => LOAD,
+    }
+}
+
+impl Unit {
+    /// The unit of a column of the record format.
+    pub(crate) fn of_canonical(name: &str) -> Option<Self> {
+        let is_own = matches!(Role::of_column(name)?, Role::Time | Role::Output | Role::Temperature | Role::Load)
+            || name == "voltage_v";
+        is_own.then(|| name.rsplit_once('_')).flatten().and_then(|(_, unit)| Self::parse(unit))
+    }
+
+    /// The column of the record format in which values of this unit are kept in `role`: without a conversion where the format has the unit.
+    fn canonical(self, role: Role) -> &'static str {
+        match (role, self.dimension) {
+            (Role::Time, _) => "time_s",
+            (Role::Load, _) => "load_n",
+            (_, Dimension::Force) => OutputUnit::Newton.column(),
+            (Role::Output, _) => match self.symbol {
+                "nm" => OutputUnit::Nanometre,
+                "mm" => OutputUnit::Millimetre,
+                _ => OutputUnit::Micrometre,
+            }
+            .column(),
+            (Role::Temperature, _) => "temperature_degc",
+            (Role::Segment, _) => "segment",
+            (Role::Input, _) => "voltage_v",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(names: &[&str], map: &[&str], need: Need) -> Result<Layout, String> {
+        let heads: Vec<Head> = names.iter().map(|name| Head::new(*name)).collect();
+        let file = File { name: "x.csv", header: Some(Place::Line(1)), heads: &heads };
+        Layout::resolve(&file, &ColumnMap::parse(map).unwrap(), need, None).map_err(|error| error.to_string())
+    }
+
+    fn train(names: &[&str]) -> Result<Layout, String> {
+        layout(names, &[], Need::InputAndOutput)
+    }
+
+    fn of(choice: &Option<Choice>) -> (usize, &str, Option<&str>) {
+        let choice = choice.as_ref().unwrap();
+        (choice.column, &choice.canonical, choice.unit.map(|unit| unit.symbol))
+    }
+
+    #[test]
+    fn headings_with_units_are_enough() {
+        let found = train(&["Time (ms)", "Voltage [mV]", "Position, nm", "T (K)"]).unwrap();
+        assert_eq!(found.time, Clock::Column { column: 0, per_second: 1e3 });
+        assert_eq!(of(&found.input), (1, "voltage_v", Some("mV")));
+        assert_eq!(of(&found.output), (2, "displacement_nm", None));
+        assert_eq!(of(&found.temperature), (3, "temperature_degc", Some("K")));
+        assert!(found.notes[1].contains("from mV to V"), "{:?}", found.notes);
+    }
+
+    #[test]
+    fn words_decide_between_columns_of_one_unit() {
+        let found = train(&["Time (s)", "Monitor (V)", "Drive (V)", "Target position (µm)", "Position (µm)"]).unwrap();
+        assert_eq!(of(&found.input), (2, "voltage_v", None));
+        assert_eq!(of(&found.output).0, 4);
+        let message = train(&["Time (s)", "CH1 (V)", "CH2 (V)", "Position (µm)"]).unwrap_err();
+        assert!(message.contains("\"CH1 (V)\", \"CH2 (V)\" each could be the input"), "{message}");
+        assert!(message.contains("--map 'voltage_v=CH1 (V)'"), "{message}");
+    }
+
+    #[test]
+    fn a_unit_that_is_not_stated_is_asked_for_all_at_once() {
+        let message = train(&["t", "V", "x"]).unwrap_err();
+        assert!(message.contains("--map time_s=t --map voltage_v=V --map displacement_um=x"), "{message}");
+        let message = train(&["1", "2", "3"]).unwrap_err();
+        assert!(message.contains("--map time_s=1 --map voltage_v=2 --map displacement_um=3"), "{message}");
+        assert!(message.contains("--rate"), "{message}");
+        let found =
+            layout(&["t", "V", "x"], &["time_s=1", "voltage_v=V", "displacement_um=-3"], Need::InputAndOutput).unwrap();
+        assert_eq!(of(&found.output), (2, "displacement_um", None));
+    }
+
+    #[test]
+    fn a_map_converts_and_refuses_another_dimension() {
+        let names = ["time_s", "Vin [mV]", "displacement_um", "displacement_nm"];
+        let found =
+            layout(&names, &["voltage_v=Vin [mV]", "displacement_um=displacement_nm"], Need::InputAndOutput).unwrap();
+        assert_eq!(of(&found.input), (1, "voltage_v", Some("mV")));
+        assert_eq!(of(&found.output), (3, "displacement_um", Some("nm")));
+        let message = layout(&names, &["displacement_um=Vin [mV]"], Need::InputAndOutput).unwrap_err();
+        assert!(message.contains("is in mV"), "{message}");
+    }
+
+    #[test]
+    fn messages_are_bounded() {
+        let names: Vec<String> = (0..100_000).map(|k| format!("channel{k}{}", "x".repeat(100))).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let message = train(&names).unwrap_err();
+        assert!(message.len() < 2000 && message.contains("and 99988 more"), "{message}");
+    }
+}

@@ -1,0 +1,173 @@
+//! Arrow IPC files, which are Feather files of version 2, and Arrow streams.
+
+mod buffers;
+mod columns;
+mod flatbuffer;
+mod schema;
+
+use super::Table;
+use super::columnar::apply_statements;
+use crate::record::error::RecordError;
+use columns::Columns;
+use flatbuffer::{i64_at, u32_at};
+use schema::Schema;
+
+const FORMAT: &str = "Arrow";
+/// Stands for the file's name in lines to paste.
+const FILE: &str = "{FILE}";
+/// First and last bytes of a file.
+const MAGIC: &[u8] = b"ARROW1";
+/// First bytes of a Feather file of version 1, which is another format.
+const FEATHER_1: &[u8] = b"FEA1";
+/// What each message of a stream begins with.
+const CONTINUES: u32 = u32::MAX;
+
+/// Kinds of messages.
+const SCHEMA: u8 = 1;
+const DICTIONARY: u8 = 2;
+const BATCH: u8 = 3;
+
+/// What is wrong with a file, and what to do.
+#[derive(Debug, PartialEq)]
+struct Fault(String);
+
+impl Fault {
+    fn new(what: impl Into<String>) -> Self {
+        Self(what.into())
+    }
+
+    /// What only a damaged file has.
+    fn damaged(what: &str) -> Self {
+        Self(format!("{what}; the file is damaged: copy it again, or write it again with the program that made it"))
+    }
+}
+
+/// Whether these are the bytes of an Arrow file or stream, or of a Feather file.
+pub(crate) fn is(bytes: &[u8]) -> bool {
+    // The first message of a stream is a schema; a damaged length is reported rather than taken for another format.
+    let stream = u32_at(bytes, 0) == Some(CONTINUES) && u32_at(bytes, 4).is_some_and(|length| length >= 16);
+    let plausible = || Message::kind_of(&bytes[8..]) == Some(SCHEMA);
+    bytes.starts_with(MAGIC) || bytes.starts_with(FEATHER_1) || stream && plausible()
+}
+
+/// The columns of an Arrow file or stream; `file` names it in messages.
+///
+/// # Errors
+/// When the file is damaged, or has no column of numbers.
+pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
+    let named =
+        |Fault(what)| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what: what.replace(FILE, file) };
+    table(bytes).map_err(named)
+}
+
+fn table(bytes: &[u8]) -> Result<Table, Fault> {
+    if bytes.starts_with(FEATHER_1) {
+        let line = format!("pandas.read_feather(\"{FILE}\").to_feather(\"new.feather\")");
+        return Err(Fault::new(format!(
+            "the file is Feather version 1, which is not read; in Python, {line} rewrites it as version 2"
+        )));
+    }
+    let is_file = bytes.starts_with(MAGIC);
+    let mut table = Table::new(if is_file { "Arrow file (Feather)" } else { "Arrow stream" });
+    let columns = if is_file { of_file(bytes)? } else { of_stream(bytes, &mut table.notes)? };
+    let statements = columns.fill(&mut table);
+    if table.heads.is_empty() {
+        return Err(Fault::new(
+            "no column holds two or more numbers; write time, voltage and displacement as columns of numbers",
+        ));
+    }
+    apply_statements(&mut table, statements.iter().map(|(key, value)| (key.as_str(), value.as_str())));
+    Ok(table)
+}
+
+/// The units that a schema message states, by the columns' names; Parquet files of Arrow programs hold one.
+pub(super) fn units_of_schema(message: &[u8]) -> Vec<(String, String)> {
+    let Ok(Some(message)) = Message::read(message, 0) else { return Vec::new() };
+    let schema =
+        message.header.filter(|_| message.kind == SCHEMA).and_then(|header| Schema::parse(header, "open_stream").ok());
+    let stated = |field: schema::Field| Some((field.name, field.unit?));
+    schema.map_or_else(Vec::new, |schema| schema.fields.into_iter().filter_map(stated).collect())
+}
+
+/// A message, and where the next one begins.
+struct Message<'a> {
+    kind: u8,
+    header: Option<flatbuffer::Table<'a>>,
+    body: &'a [u8],
+    next: usize,
+}
+
+impl<'a> Message<'a> {
+    fn kind_of(metadata: &[u8]) -> Option<u8> {
+        Some(flatbuffer::Table::root(metadata)?.u8(1, 0))
+    }
+
+    /// The message at `at`; `None` at the end mark.
+    fn read(bytes: &'a [u8], at: usize) -> Result<Option<Self>, Fault> {
+        let cut = || Fault::damaged("the file ends in the middle of a message");
+        let mut start = at;
+        let mut word = || {
+            let word = u32_at(bytes, start);
+            start = start.saturating_add(4);
+            word.ok_or_else(cut)
+        };
+        // Before version 0.15 there was a length alone.
+        let mut length = word()?;
+        if length == CONTINUES {
+            length = word()?;
+        }
+        if length == 0 {
+            return Ok(None);
+        }
+        let part = |start: usize, length: usize| bytes.get(start..start.checked_add(length)?);
+        let metadata = part(start, length as usize).ok_or_else(cut)?;
+        let start = start + metadata.len();
+        let table = flatbuffer::Table::root(metadata).ok_or_else(cut)?;
+        let length = usize::try_from(table.i64(3, 0)).map_err(|_| cut())?;
+        let body = part(start, length).ok_or_else(cut)?;
+        Ok(Some(Self { kind: table.u8(1, 0), header: table.table(2), body, next: start + length }))
+    }
+}
+
+/// Reads the batches that the footer lists.
+fn of_file(bytes: &[u8]) -> Result<Columns, Fault> {
+    let no_end = || Fault::damaged("the end of the file is missing");
+    let inner = bytes.strip_suffix(MAGIC).filter(|inner| inner.len() >= 12).ok_or_else(no_end)?;
+    let end = inner.len() - 4;
+    let length = u32_at(inner, end).map_or(usize::MAX, |length| length as usize);
+    let damaged = || Fault::damaged("the list of batches at the end of the file cannot be read");
+    let start = end.checked_sub(length).ok_or_else(damaged)?;
+    let footer = flatbuffer::Table::root(&inner[start..end]).ok_or_else(damaged)?;
+    let schema = Schema::parse(footer.table(1).ok_or_else(damaged)?, "open_file")?;
+    let mut columns = Columns::new(schema, bytes.len())?;
+    // Batches that overlap could claim the same bytes a million times.
+    let mut unread = bytes.len();
+    for (kind, field) in [(DICTIONARY, 2), (BATCH, 3)] {
+        for block in footer.vector(field, 24).unwrap_or_default().chunks_exact(24) {
+            let at = i64_at(block, 0).and_then(|at| usize::try_from(at).ok()).ok_or_else(damaged)?;
+            let message = Message::read(bytes, at)?.filter(|message| message.kind == kind).ok_or_else(damaged)?;
+            unread = unread.checked_sub(message.next - at).ok_or_else(damaged)?;
+            columns.take(message.kind, message.header.ok_or_else(damaged)?, message.body)?;
+        }
+    }
+    Ok(columns)
+}
+
+/// Reads the messages of a stream in their order.
+fn of_stream(bytes: &[u8], notes: &mut Vec<String>) -> Result<Columns, Fault> {
+    let no_schema = || Fault::damaged("the first message is not a schema");
+    let first = Message::read(bytes, 0)?.filter(|message| message.kind == SCHEMA).ok_or_else(no_schema)?;
+    let mut columns = Columns::new(Schema::parse(first.header.ok_or_else(no_schema)?, "open_stream")?, bytes.len())?;
+    let mut at = first.next;
+    while at < bytes.len() {
+        let Some(message) = Message::read(bytes, at)? else { return Ok(columns) };
+        let header = message.header.ok_or_else(|| Fault::damaged("a message has no header"))?;
+        columns.take(message.kind, header, message.body)?;
+        at = message.next;
+    }
+    notes.push("the stream has no end mark; its last rows may be missing".to_owned());
+    Ok(columns)
+}
+
+#[cfg(test)]
+mod tests;

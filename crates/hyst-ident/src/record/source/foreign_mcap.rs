@@ -1,0 +1,131 @@
+//! MCAP logs that other programs wrote: JSON, ROS 2 and Protobuf messages.
+//!
+//! Every numeric field of a topic is a column `/topic.field`. Its times are those that the messages state in their header, or those at
+//! which they were logged, in a column `/topic@time`.
+
+mod align;
+mod cdr;
+mod clock;
+mod decoder;
+mod json;
+mod json_units;
+mod log;
+mod protobuf;
+mod room;
+mod ros2;
+mod series;
+mod stated_unit;
+#[cfg(test)]
+mod tests;
+
+use crate::record::error::RecordError;
+use crate::record::log::LogRecords;
+
+use super::{Axis, Head, Table};
+use clock::Clock;
+use log::Log;
+use series::Series;
+
+/// What messages call the format.
+const FORMAT: &str = "MCAP";
+/// Topics that are named in one note.
+const MOST_NAMED: usize = 8;
+/// Notes on one file.
+const MOST_NOTES: usize = 24;
+/// Fewest messages that make a column.
+const MIN_ROWS: usize = 2;
+
+/// Whether these are the bytes of an MCAP file.
+pub(crate) fn is(bytes: &[u8]) -> bool {
+    LogRecords::new(bytes).is_some()
+}
+
+/// Reads the numeric fields of all topics; `file` is for messages.
+///
+/// # Errors
+/// If no topic has two messages with numbers.
+pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
+    let damaged = |what: String| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what };
+    let log = Log::read(bytes).map_err(damaged)?;
+    let (mut topics, mut notes, mut left_out) = (Vec::new(), log.notes(), log.left_out.clone());
+    let encodings = log.encodings();
+    let is_empty = log.is_empty();
+    for topic in log.topics {
+        let decoder = topic.decoder;
+        let mut series = topic.series;
+        series.sort();
+        notes.extend(series.notes());
+        if series.rows() < MIN_ROWS || series.columns.is_empty() {
+            left_out.push(format!("{} ({})", series.topic, series.why_unused()));
+            continue;
+        }
+        let (clock, note) = Clock::of(&mut series);
+        notes.extend(note);
+        series.complete().map_err(damaged)?;
+        series.set_units(&decoder.units());
+        topics.push((series, clock));
+    }
+    topics.retain(|(series, _)| !series.columns.is_empty());
+    if topics.is_empty() {
+        return Err(damaged(why_nothing(is_empty, &left_out, &notes)));
+    }
+    notes.extend(align::align(&mut topics));
+    if !left_out.is_empty() {
+        notes.push(format!("left out: {}", listed(&left_out)));
+    }
+    let more = notes.len().saturating_sub(MOST_NOTES);
+    notes.truncate(MOST_NOTES);
+    notes.extend((more > 0).then(|| format!("and {more} more notes")));
+    Ok(Table { notes, ..table(topics, &encodings) })
+}
+
+/// Why there is no column, and what to do.
+fn why_nothing(is_empty: bool, left_out: &[String], notes: &[String]) -> String {
+    let notes = if notes.is_empty() { String::new() } else { format!(" ({})", listed(notes)) };
+    if is_empty {
+        return format!("the file has no message{notes}; copy the file again, or record again");
+    }
+    let topics = if left_out.is_empty() { String::new() } else { format!(": {}", listed(left_out)) };
+    format!(
+        "no topic has two messages with numbers{topics}{notes}; read are JSON, ROS 2 (cdr with ros2msg) and Protobuf messages"
+    )
+}
+
+/// The first of many texts.
+fn listed(texts: &[String]) -> String {
+    let more = texts.len().saturating_sub(MOST_NAMED);
+    let first = texts.iter().take(MOST_NAMED).map(|text| shortened(text)).collect::<Vec<_>>().join("; ");
+    if more == 0 { first } else { format!("{first}; and {more} more") }
+}
+
+/// At most so much of a text that stands in the file as a message can show.
+fn shortened(text: &str) -> String {
+    /// Characters of a text that a message shows.
+    const MOST: usize = 200;
+    if text.chars().count() <= MOST { text.to_owned() } else { text.chars().take(MOST).chain(['…']).collect() }
+}
+
+/// The columns; topics with the same times share one column of them.
+fn table(topics: Vec<(Series, Clock)>, encodings: &str) -> Table {
+    let mut table = Table::new(format!("MCAP log of {encodings} messages"));
+    let zeros = clock::zeros(topics.iter().map(|(_, clock)| clock));
+    let mut written: Vec<(Clock, usize)> = Vec::new();
+    for ((series, clock), zero) in topics.into_iter().zip(zeros) {
+        let axis = if !clock.moves() {
+            Axis::Unknown
+        } else if let Some((_, column)) = written.iter().find(|(other, _)| *other == clock) {
+            Axis::Column(*column)
+        } else {
+            let head = Head { unit: Some("s".to_owned()), ..Head::new(format!("{}@time", clock.topic)) };
+            let column = table.push(head, clock.seconds_from(zero));
+            table.heads[column].axis = Axis::Column(column);
+            written.push((clock, column));
+            Axis::Column(column)
+        };
+        for column in series.columns {
+            let name = format!("{}{}", series.topic, column.path);
+            table.push(Head { unit: column.unit, axis, ..Head::new(name) }, column.values);
+        }
+    }
+    table
+}

@@ -1,0 +1,68 @@
+//! Units that a JSON schema states.
+
+use std::collections::HashMap;
+
+use serde_json::{Map, Value};
+
+use super::stated_unit::stated_unit;
+
+/// Bytes of a schema in which units are looked for.
+const MAX_SIZE: usize = 1 << 20;
+/// Parts of a schema that are looked at; references make it grow without bounds.
+const MAX_PARTS: usize = 10_000;
+/// Fields inside of fields.
+const MAX_DEPTH: usize = 16;
+
+/// Units by the fields' paths, with `[]` for an index.
+pub(crate) fn units(schema: &[u8]) -> HashMap<String, String> {
+    let schema =
+        Some(schema).filter(|schema| schema.len() <= MAX_SIZE).and_then(|schema| serde_json::from_slice(schema).ok());
+    let Some(root) = schema else { return HashMap::new() };
+    let mut search = Search { root: &root, parts: 0, units: HashMap::new() };
+    search.part(&root, "", MAX_DEPTH);
+    search.units
+}
+
+struct Search<'a> {
+    root: &'a Value,
+    parts: usize,
+    units: HashMap<String, String>,
+}
+
+impl Search<'_> {
+    /// Looks at a part of the schema and what is inside of it.
+    fn part(&mut self, part: &Value, path: &str, depth: usize) {
+        self.parts += 1;
+        let Some(part) = part.as_object().filter(|_| depth > 0 && self.parts <= MAX_PARTS) else { return };
+        if let Some(unit) = unit(part) {
+            self.units.entry(path.to_owned()).or_insert_with(|| unit.clone());
+            // The unit of an array is that of its elements.
+            self.units.entry(format!("{path}[]")).or_insert(unit);
+        }
+        let root = self.root;
+        if let Some(at) = part.get("$ref").and_then(Value::as_str).and_then(|at| root.pointer(at.strip_prefix('#')?)) {
+            self.part(at, path, depth - 1);
+        }
+        // An optional value is one of a number and null.
+        for name in ["anyOf", "oneOf", "allOf"] {
+            for option in part.get(name).and_then(Value::as_array).into_iter().flatten() {
+                self.part(option, path, depth - 1);
+            }
+        }
+        for (name, field) in part.get("properties").and_then(Value::as_object).into_iter().flatten() {
+            self.part(field, &format!("{path}.{name}"), depth - 1);
+        }
+        match part.get("items") {
+            Some(Value::Array(items)) => items.iter().for_each(|item| self.part(item, &format!("{path}[]"), depth - 1)),
+            Some(item) => self.part(item, &format!("{path}[]"), depth - 1),
+            None => {}
+        }
+    }
+}
+
+/// The unit of a field, as its own keyword or in its description.
+fn unit(field: &Map<String, Value>) -> Option<String> {
+    let text = |name: &str| field.get(name).and_then(Value::as_str).map(str::trim).filter(|text| !text.is_empty());
+    let own = text("unit").or_else(|| text("units")).map(super::shortened);
+    own.or_else(|| stated_unit(text("description")?))
+}

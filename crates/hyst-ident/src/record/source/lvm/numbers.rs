@@ -1,0 +1,42 @@
+//! Numbers as LabVIEW prints them.
+
+/// What is between cells and within numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Format {
+    pub(crate) separator: char,
+    pub(crate) decimal: char,
+}
+
+/// Seconds of a day.
+const DAY: i64 = 86_400;
+
+/// The number in a cell: NaN where it is empty or says that there is none.
+pub(crate) fn number(cell: &str, decimal: char) -> Option<f64> {
+    let cell = cell.trim();
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    let parsed = if decimal == '.' { cell.parse::<f64>() } else { cell.replace(decimal, ".").parse::<f64>() };
+    // What is infinite is no measured value.
+    parsed.ok().map(|number| if number.is_finite() { number } else { f64::NAN })
+}
+
+/// The midnight before a time in seconds since 1904.
+pub(crate) fn midnight(cell: &str, decimal: char) -> Option<i64> {
+    let seconds = number(cell, decimal)?.floor();
+    (seconds.abs() < 1e15).then_some((seconds as i64).div_euclid(DAY) * DAY)
+}
+
+/// A number less `start`. The whole part is subtracted first: seconds since 1904 have no room for a microsecond in a double.
+pub(crate) fn since(cell: &str, decimal: char, start: i64) -> Option<f64> {
+    let number = number(cell, decimal)?;
+    let (whole, fraction) = cell.trim().split_once(decimal).unwrap_or((cell.trim(), ""));
+    let is_plain = fraction.bytes().all(|byte| byte.is_ascii_digit()) && !whole.starts_with('-');
+    match whole.parse::<i64>() {
+        Ok(whole) if start != 0 && is_plain => {
+            let fraction: f64 = format!("0.{fraction}").parse().unwrap_or(0.0);
+            Some((whole - start) as f64 + fraction)
+        }
+        _ => Some(number - start as f64),
+    }
+}

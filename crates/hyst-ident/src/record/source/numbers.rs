@@ -1,0 +1,253 @@
+//! Numbers as files print them, read in one pass.
+
+use crate::record::grid::Printed;
+
+/// A cell of a table of text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Cell {
+    Number(f64),
+    /// Nothing, or a word for it, as `NaN`.
+    Missing,
+    /// A date and time, as ISO 8601 writes it.
+    Time(Moment),
+    Other,
+}
+
+/// A date and time: seconds of it since 1970 have no room for a millionth beside them in one number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// Whole seconds since 1970, or since midnight where there is no date.
+    whole: i64,
+    fraction: f64,
+}
+
+impl Moment {
+    /// Seconds since `start`.
+    pub(super) fn since(self, start: i64) -> f64 {
+        (self.whole - start) as f64 + self.fraction
+    }
+
+    /// The midnight before, in seconds since 1970.
+    pub(super) fn midnight(self) -> i64 {
+        self.whole.div_euclid(86_400) * 86_400
+    }
+}
+
+/// Powers of ten that a double holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// The number that a cell without blanks around it prints, rounded to the nearest double.
+pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
+    let (negative, digits) = match cell.first()? {
+        b'-' => (true, &cell[1..]),
+        b'+' => (false, &cell[1..]),
+        _ => (false, cell),
+    };
+    let (mut mantissa, mut count, mut after) = (0_u64, 0_u32, 0_i32);
+    let mut pointed = false;
+    let mut at = 0;
+    while let Some(byte) = digits.get(at) {
+        match byte {
+            b'0'..=b'9' => {
+                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
+                count += u32::from(mantissa != 0);
+                after += i32::from(pointed);
+            }
+            _ if *byte == decimal && !pointed => pointed = true,
+            _ => break,
+        }
+        at += 1;
+    }
+    // At least one digit.
+    if at == usize::from(pointed) {
+        return None;
+    }
+    let mut exponent = -after;
+    if let Some(b'e' | b'E' | b'd' | b'D') = digits.get(at) {
+        exponent += std::str::from_utf8(&digits[at + 1..]).ok()?.parse::<i32>().ok().filter(|e| e.abs() < 10_000)?;
+        at = digits.len();
+    }
+    if at != digits.len() {
+        return None;
+    }
+    // One rounding of two exact numbers (Clinger 1990).
+    let magnitude = if count <= 19 && mantissa <= 1 << 53 && exponent.unsigned_abs() <= 22 {
+        let power = POWERS[exponent.unsigned_abs() as usize];
+        if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power }
+    } else {
+        let text: String = digits
+            .iter()
+            .map(|byte| match byte {
+                b'd' | b'D' => 'e',
+                byte if *byte == decimal => '.',
+                byte => char::from(*byte),
+            })
+            .collect();
+        text.parse().ok()?
+    };
+    Some(if negative { -magnitude } else { magnitude })
+}
+
+/// What a cell without blanks around it is.
+pub(super) fn cell(cell: &[u8], decimal: u8) -> Cell {
+    if let Some(number) = number(cell, decimal) {
+        // What overflows is no measured value.
+        return if number.is_finite() { Cell::Number(number) } else { Cell::Missing };
+    }
+    if is_missing(cell) {
+        return Cell::Missing;
+    }
+    std::str::from_utf8(cell).ok().and_then(date_time).map_or(Cell::Other, Cell::Time)
+}
+
+/// Words that stand for no value in files of instruments and spreadsheets.
+fn is_missing(cell: &[u8]) -> bool {
+    const WORDS: [&str; 17] = [
+        "nan",
+        "na",
+        "n/a",
+        "#n/a",
+        "null",
+        "none",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#ind",
+        "inf",
+        "+inf",
+        "-inf",
+        "infinity",
+        "-infinity",
+        "---",
+    ];
+    cell.is_empty() || cell.len() <= 10 && WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
+}
+
+/// The moment of `2024-05-31T12:30:01.25`, with a blank for the T, a time zone, or the date left out.
+fn date_time(text: &str) -> Option<Moment> {
+    let (days, clock) = match text.split_once(['T', ' ']) {
+        Some((date, clock)) => (days(date)?, clock.trim()),
+        None if text.contains(':') => (0, text),
+        None => return Some(Moment { whole: days(text)? * 86_400, fraction: 0.0 }),
+    };
+    let (clock, offset) = zone(clock)?;
+    let mut parts = clock.split(':');
+    let (hour, minute) = (whole(parts.next()?, 0..=24)?, whole(parts.next()?, 0..=59)?);
+    let second = parts.next().unwrap_or("0");
+    // A decimal comma is as much ISO 8601 as a point is.
+    let (second, fraction) = second.split_once(['.', ',']).unwrap_or((second, "0"));
+    let second = whole(second, 0..=60)?;
+    if parts.next().is_some() || fraction.is_empty() || !fraction.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let whole_seconds = days * 86_400 + hour * 3600 + minute * 60 + second - offset;
+    Some(Moment { whole: whole_seconds, fraction: format!("0.{fraction}").parse().ok()? })
+}
+
+fn whole(text: &str, range: std::ops::RangeInclusive<i64>) -> Option<i64> {
+    let plain = !text.is_empty() && text.len() <= 4 && text.bytes().all(|b| b.is_ascii_digit());
+    plain.then(|| text.parse().ok()).flatten().filter(|value| range.contains(value))
+}
+
+/// Days since 1970-01-01 of `2024-05-31` or `2024/05/31` (Hinnant's algorithm, proleptic Gregorian calendar).
+fn days(date: &str) -> Option<i64> {
+    let mut parts = date.split(['-', '/']);
+    let (y, m, d) = (parts.next()?, parts.next()?, parts.next()?);
+    if parts.next().is_some() || y.len() != 4 {
+        return None;
+    }
+    let (y, m, d) = (whole(y, 1..=9999)?, whole(m, 1..=12)?, whole(d, 1..=31)?);
+    let y = if m <= 2 { y - 1 } else { y };
+    let era = y / 400;
+    let year_of_era = y - era * 400;
+    let day_of_year = (153 * ((m + 9) % 12) + 2) / 5 + d - 1;
+    let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
+    Some(era * 146_097 + day_of_era - 719_468)
+}
+
+/// A clock time without its zone, and the zone's offset \[s\].
+fn zone(clock: &str) -> Option<(&str, i64)> {
+    if let Some(utc) = clock.strip_suffix(['Z', 'z']) {
+        return Some((utc, 0));
+    }
+    let Some(at) = clock.rfind(['+', '-']) else { return Some((clock, 0)) };
+    let sign = if clock[at..].starts_with('-') { -1 } else { 1 };
+    let (hours, minutes) = match clock[at + 1..].split_once(':') {
+        Some((hours, minutes)) => (hours, minutes),
+        None if clock.len() - at == 5 => clock[at + 1..].split_at(2),
+        None => (&clock[at + 1..], "0"),
+    };
+    Some((&clock[..at], sign * (whole(hours, 0..=14)? * 3600 + whole(minutes, 0..=59)? * 60)))
+}
+
+/// Digits of a printed time, added to those of the rows before.
+pub(super) fn take_digits(printed: &mut Printed, cell: &[u8], decimal: u8) {
+    if decimal == b'.' {
+        printed.take(cell);
+    } else {
+        let text: Vec<u8> = cell.iter().map(|byte| if *byte == decimal { b'.' } else { *byte }).collect();
+        printed.take(&text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn numbers_are_those_that_the_standard_library_reads() {
+        for text in [
+            "0",
+            "-0.5",
+            "+1.25",
+            "1e3",
+            "1.5E-7",
+            ".5",
+            "5.",
+            "123456789012345678901234567890",
+            "0.1",
+            "2.2250738585072014e-308",
+            "9007199254740993",
+        ] {
+            assert_eq!(number(text.as_bytes(), b'.'), text.parse().ok(), "{text}");
+        }
+        assert_eq!(number(b"1,5", b','), Some(1.5));
+        assert_eq!(number(b"1.5D+02", b'.'), Some(150.0));
+        for text in ["", "-", ".", "e5", "1e", "1.2.3", "1 2", "0x10", "1,5", "--1"] {
+            assert_eq!(number(text.as_bytes(), b'.'), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn dates_are_seconds() {
+        let date_time = |text| date_time(text).map(|moment| moment.since(0));
+        assert_eq!(date_time("1970-01-02"), Some(86_400.0));
+        assert_eq!(date_time("2024-02-29T12:00:00Z"), Some(1_709_208_000.0));
+        assert_eq!(date_time("2024-02-29 12:00:00.250"), Some(1_709_208_000.25));
+        assert_eq!(date_time("2024-02-29T13:00:00+01:00"), Some(1_709_208_000.0));
+        assert_eq!(date_time("00:00:01.5"), Some(1.5));
+        for wrong in ["2024-13-01", "24-01-01", "12:61:00", "abc", "2024-01-01T", "1:2:3:4", "2024-01-01T00:00:00+99"] {
+            assert_eq!(date_time(wrong), None, "{wrong}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn printed_numbers_come_back(value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO, decimals in 0..9usize) {
+            prop_assert_eq!(number(value.to_string().as_bytes(), b'.'), Some(value));
+            prop_assert_eq!(number(format!("{value:e}").as_bytes(), b'.'), Some(value));
+            let short = format!("{:.decimals$}", value % 1e6);
+            prop_assert_eq!(number(short.as_bytes(), b'.'), short.parse().ok());
+        }
+
+        #[test]
+        fn any_bytes_are_some_cell(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+            let _ = cell(&bytes, b'.');
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Columns in memory, as most formats hold them.
+
+use super::{Contents, Head, Values};
+use crate::record::error::RecordError;
+use crate::record::grid::Printed;
+
+/// Columns of a file that were read as a whole.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Table {
+    /// The format in words, as `MATLAB 5`.
+    pub(crate) format: String,
+    /// The columns.
+    pub(crate) heads: Vec<Head>,
+    /// Their values; NaN stands for a cell without a number.
+    pub(crate) values: Vec<Vec<f64>>,
+    /// What was done to read the file that its owner may want to know.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Table {
+    /// An empty one.
+    pub(crate) fn new(format: impl Into<String>) -> Self {
+        Self { format: format.into(), ..Self::default() }
+    }
+
+    /// Adds a column; its number.
+    pub(crate) fn push(&mut self, head: Head, values: Vec<f64>) -> usize {
+        self.heads.push(Head { rows: Some(values.len()), ..head });
+        self.values.push(values);
+        self.heads.len() - 1
+    }
+}
+
+impl Contents for Table {
+    fn format(&self) -> String {
+        self.format.clone()
+    }
+
+    fn heads(&self) -> &[Head] {
+        &self.heads
+    }
+
+    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError> {
+        let of = |at: &usize| {
+            let numbers = self.values[*at].clone();
+            // Numbers of 32 bits have seven digits.
+            let single =
+                numbers.iter().all(|value| f64::from(*value as f32).to_bits() == value.to_bits() || value.is_nan());
+            let printed = if single { Printed { digits: 7, ..Printed::EXACT } } else { Printed::EXACT };
+            Values { numbers, printed }
+        };
+        Ok(wanted.iter().map(of).collect())
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}

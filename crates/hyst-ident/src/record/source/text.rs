@@ -1,0 +1,235 @@
+//! Tables of text: CSV and its dialects, and what instruments export.
+//!
+//! The dialect (delimiter, decimal sign, where the numbers begin) is the one that makes most cells of the first rows numbers. Lines above
+//! the numbers are names, units and remarks.
+
+mod dialect;
+mod encoding;
+mod rows;
+mod stream;
+
+use std::borrow::Cow;
+
+use super::numbers::number;
+use super::{Axis, Contents, Head, Values};
+use crate::record::error::{Place, RecordError};
+pub(crate) use stream::LargeText;
+
+use dialect::{Delimiter, Dialect, lines, remark};
+
+/// A table of text, its rows unread.
+pub(crate) struct Text<'a> {
+    file: String,
+    text: Cow<'a, str>,
+    dialect: Dialect,
+    heads: Vec<Head>,
+    notes: Vec<String>,
+}
+
+impl<'a> Text<'a> {
+    /// Finds the dialect of a file and its header.
+    pub(super) fn open(file: &str, bytes: &'a [u8]) -> Result<Self, RecordError> {
+        let (text, encoding) = encoding::decode(file, bytes)?;
+        let mut notes: Vec<String> = encoding.into_iter().collect();
+        let empty = || RecordError::Empty { file: file.to_owned() };
+        if text.trim().is_empty() {
+            return Err(empty());
+        }
+        let dialect = Dialect::find(&text).ok_or_else(|| no_numbers(file, &text))?;
+        let heads = dialect.heads(&text);
+        notes.extend(dialect.note());
+        Ok(Self { file: file.to_owned(), text, dialect, heads, notes })
+    }
+}
+
+/// A text without a row of numbers.
+fn no_numbers(file: &str, text: &str) -> RecordError {
+    let lines = text.lines().filter(|line| !line.trim().is_empty()).count();
+    if lines <= 1 {
+        RecordError::NoRows { file: file.to_owned() }
+    } else {
+        RecordError::NoNumbers { file: file.to_owned() }
+    }
+}
+
+impl Contents for Text<'_> {
+    fn format(&self) -> String {
+        format!("table of text, {}", self.dialect.words())
+    }
+
+    fn heads(&self) -> &[Head] {
+        &self.heads
+    }
+
+    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError> {
+        let cells: Vec<usize> = wanted.iter().map(|at| self.dialect.field_of(*at)).collect();
+        rows::read(&self.text, &self.dialect, &cells).map_err(|fault| {
+            let head =
+                |field: usize| self.dialect.column_of(field).map_or(String::new(), |at| self.heads[at].name.clone());
+            fault.error(&self.file, &self.text, head)
+        })
+    }
+
+    fn place(&self, row: usize) -> Place {
+        Place::Line(rows::line_of_row(&self.text, &self.dialect, row))
+    }
+
+    fn header(&self) -> Option<Place> {
+        self.dialect.header_line(&self.text).map(Place::Line)
+    }
+
+    fn plain_text(&self) -> Option<&str> {
+        let remarks = || lines(&self.text, 0).any(|(_, line)| remark(line).is_some());
+        (self.dialect.is_plain() && self.notes.is_empty() && !remarks()).then_some(&*self.text)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+/// The number in a remark such as `Sample Interval, 1.0e-3` or `# SAMPLE_TIME = 0.001`, taken as seconds between rows.
+fn period_of_remark(line: &str) -> Option<f64> {
+    let lower = line.to_lowercase();
+    let lower = lower.trim_start_matches(|c: char| !c.is_alphanumeric());
+    let interval = [
+        "sample interval",
+        "sample_time",
+        "sampletime",
+        "sample time",
+        "sampling interval",
+        "sample period",
+        "sampling period",
+        "delta_x",
+        "time increment",
+    ];
+    let rate = ["sample rate", "sample_rate", "samplerate", "sampling rate", "sampling frequency"];
+    let behind = |keys: &[&str]| {
+        let key = keys.iter().find(|key| lower.starts_with(**key))?;
+        let rest = lower[key.len()..].trim_start_matches(|c: char| !(c.is_ascii_digit() || c == '.'));
+        let end =
+            rest.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '+'))).unwrap_or(rest.len());
+        let value = number(rest[..end].as_bytes(), b'.').filter(|value| *value > 0.0 && value.is_finite())?;
+        Some((value, rest[end..].trim_matches(|c: char| !c.is_alphabetic()).to_owned()))
+    };
+    if let Some((value, unit)) = behind(&interval) {
+        return match unit.as_str() {
+            "" | "s" | "sec" | "seconds" => Some(value),
+            "ms" => Some(value / 1e3),
+            "us" | "µs" => Some(value / 1e6),
+            _ => None,
+        };
+    }
+    let (value, unit) = behind(&rate)?;
+    match unit.as_str() {
+        "" | "hz" | "s" | "sa s" | "samples s" | "s/s" | "sa/s" | "samples/s" => Some(1.0 / value),
+        "khz" | "ks/s" | "ksa/s" => Some(1e-3 / value),
+        "mhz" | "ms/s" | "msa/s" => Some(1e-6 / value),
+        _ => None,
+    }
+}
+
+/// The times of all rows that remarks above them state.
+fn axis_of_remarks<'a>(mut lines: impl Iterator<Item = &'a str>) -> Axis {
+    lines.find_map(period_of_remark).map_or(Axis::Unknown, |step| Axis::Even { start: 0.0, step })
+}
+
+/// Fields of a line.
+fn fields(line: &str, delimiter: Delimiter) -> Vec<&str> {
+    match delimiter {
+        Delimiter::Blanks => line.split_whitespace().collect(),
+        Delimiter::One(byte) => quoted_fields(line, byte),
+    }
+}
+
+/// Fields between delimiters, those in quotation marks whole.
+fn quoted_fields(line: &str, delimiter: u8) -> Vec<&str> {
+    let delimiter = char::from(delimiter);
+    if !line.contains('"') {
+        return line.split(delimiter).map(str::trim).collect();
+    }
+    let mut fields = Vec::new();
+    let (mut start, mut quoted) = (0, false);
+    for (at, c) in line.char_indices() {
+        match c {
+            '"' => quoted = !quoted,
+            _ if c == delimiter && !quoted => {
+                fields.push(&line[start..at]);
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    fields.push(&line[start..]);
+    fields.into_iter().map(unquoted).collect()
+}
+
+fn unquoted(field: &str) -> &str {
+    let field = field.trim();
+    field.strip_prefix('"').and_then(|inner| inner.strip_suffix('"')).unwrap_or(field).trim()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn table(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>) {
+        let text = Text::open("x.csv", bytes).unwrap();
+        let all: Vec<usize> = (0..text.heads.len()).collect();
+        let values = text.values(&all).unwrap_or_else(|error| panic!("{error}"));
+        (text.heads.iter().map(|head| head.name.clone()).collect(), values.into_iter().map(|v| v.numbers).collect())
+    }
+
+    #[test]
+    fn dialects_are_told_apart() {
+        let expected = vec![vec![0.0, 0.5], vec![1.5, -2.5], vec![3.0, 4.25]];
+        for text in [
+            "a,b,c\n0,1.5,3\n0.5,-2.5,4.25\n",
+            "a;b;c\n0;1.5;3\n0.5;-2.5;4.25\n",
+            "a;b;c\n0;1,5;3\n0,5;-2,5;4,25\n",
+            "a\tb\tc\r\n0\t1.5\t3\r\n0.5\t-2.5\t4.25\r\n",
+            "a\tb\tc\n0\t1,5\t3\n0,5\t-2,5\t4,25\n",
+            "# a b c\n0.0e+00 1.5 3\n5.0e-01 -2.5 4.25\n",
+            "  a   b     c\n  0   1.5   3\n 0.5 -2.5  4.25\n",
+            "a,b,c,\n0,1.5,3,\n0.5,-2.5,4.25,\n",
+            "% made by hand\n%\na,b,c\n0,1.5,3\n# in between\n0.5,-2.5,4.25\n\n",
+            "\"a\";\"b\";\"c\"\n\"0\";\"1,5\";\"3\"\n\"0,5\";\"-2,5\";\"4,25\"\n",
+            "Device: X, made 2024\nOperator;none\na,b,c\n0,1.5,3\n0.5,-2.5,4.25\n",
+            "a,b,c\r0,1.5,3\r0.5,-2.5,4.25\r",
+        ] {
+            let (names, values) = table(text.as_bytes());
+            assert_eq!(names, ["a", "b", "c"], "{text}");
+            assert_eq!(values, expected, "{text}");
+        }
+        let utf16: Vec<u8> =
+            "\u{feff}a;b;c\n0;1,5;3\n0,5;-2,5;4,25\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert_eq!(table(&utf16).1, expected);
+    }
+
+    #[test]
+    fn names_units_and_rates_are_read_above_the_numbers() {
+        let open = |text: &'static str| Text::open("x.csv", text.as_bytes()).unwrap();
+        let scope =
+            open("Model,XY\nSample Interval,1.0e-3,s\nTime,Channel A,Channel B\n(ms),(V),(µm)\n\n0.0,1,2\n0.1,1,3\n");
+        let of = |text: &Text<'_>| {
+            text.heads.iter().map(|h| (h.name.clone(), h.unit.clone().unwrap_or_default())).collect::<Vec<_>>()
+        };
+        let own = |name: &str, unit: &str| (name.to_owned(), unit.to_owned());
+        assert_eq!(of(&scope), [own("Time", "ms"), own("Channel A", "V"), own("Channel B", "µm")]);
+        assert_eq!(scope.heads[0].axis, Axis::Even { start: 0.0, step: 1e-3 });
+        assert_eq!(of(&open("0.0,1,2\n0.1,1,3\n")), [own("1", ""), own("2", ""), own("3", "")]);
+        assert_eq!(of(&open("x-axis,1,2\nsecond,Volt,Volt\n-0.1,1,2\n0.1,1,3\n"))[1], own("1", "Volt"));
+    }
+
+    #[test]
+    fn what_is_no_number_is_missing_or_refused() {
+        let (_, values) = table(b"a,b\n0,NaN\n1,\n2,5\n3,inf\n");
+        assert!(values[1][0].is_nan() && values[1][1].is_nan() && values[1][2] == 5.0 && values[1][3].is_nan());
+        let text = Text::open("x.csv", b"a,b\n0,1\n1,2\n2,x y\n3,4\n").unwrap();
+        let message = text.values(&[1]).unwrap_err().to_string();
+        assert!(message.contains("x.csv, line 4, column \"b\"") && message.contains("\"x y\""), "{message}");
+        let message = Text::open("x.csv", b"a,b\n0,1\n1,2\n2\n3,4\n").unwrap().values(&[0]).unwrap_err().to_string();
+        assert!(message.contains("line 4") && message.contains("1 field"), "{message}");
+    }
+}

@@ -1,0 +1,333 @@
+//! Which dialect a table of text is written in.
+
+use super::super::numbers::{Cell, cell};
+use super::super::{Axis, Head};
+use super::{axis_of_remarks, fields};
+use crate::record::columns::Role;
+use crate::record::heading::Unit;
+
+/// What separates two fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Delimiter {
+    One(u8),
+    /// Any number of blanks.
+    Blanks,
+}
+
+/// Bytes at the beginning of a file that decide its dialect.
+const SAMPLE_BYTES: usize = 1 << 18;
+/// Minimum share of the cells in a column of numbers that are numbers or missing.
+const MIN_NUMERIC_SHARE: f64 = 0.5;
+
+/// Titles that a header may have beyond the fields of a row.
+const MAX_FURTHER_TITLES: usize = 3;
+
+/// How a table is written, and where its rows begin.
+#[derive(Clone, Debug)]
+pub(super) struct Dialect {
+    pub(super) delimiter: Delimiter,
+    pub(super) decimal: u8,
+    /// Fields of a row, an empty one at the end included.
+    pub(super) fields: usize,
+    /// Byte at which the first row begins.
+    pub(super) start: usize,
+    /// Byte at which the line with the names begins.
+    names: Option<usize>,
+    /// Byte at which the line with the units begins.
+    units: Option<usize>,
+    /// Fields that are columns.
+    columns: Vec<usize>,
+    /// Those of them that hold dates and times.
+    dates: Vec<usize>,
+}
+
+/// A line, and the byte at which it begins.
+type Line<'a> = (usize, &'a str);
+
+/// Lines that are not blank.
+pub(super) fn lines(text: &str, start: usize) -> impl Iterator<Item = Line<'_>> {
+    let mut at = start;
+    text[start..].split_inclusive('\n').filter_map(move |whole| {
+        let begins = at;
+        at += whole.len();
+        let line = whole.trim_end_matches(['\n', '\r']);
+        (!line.trim().is_empty()).then_some((begins, line))
+    })
+}
+
+/// A remark without the sign before it; `None` if the line is no remark.
+pub(super) fn remark(line: &str) -> Option<&str> {
+    let line = line.trim_start();
+    ["#", "%", "//", "!"]
+        .iter()
+        .find_map(|sign| line.strip_prefix(sign))
+        .map(|rest| rest.trim_start_matches(['#', '%']))
+}
+
+impl Dialect {
+    /// The dialect with most numbers in the first rows; `None` without a row of numbers.
+    pub(super) fn find(text: &str) -> Option<Self> {
+        let mut end = text.len();
+        if end > SAMPLE_BYTES {
+            // Whole lines only, of which no sensible one is as long as the sample; a line feed is a character of its own in UTF-8.
+            end = text.as_bytes()[..SAMPLE_BYTES].iter().rposition(|byte| *byte == b'\n')? + 1;
+        }
+        let sample: Vec<Line<'_>> = lines(&text[..end], 0).collect();
+        if let Some(own) = Self::of_records(&sample) {
+            return Some(own);
+        }
+        let delimiters = [b'\t', b';', b',', b'|'].map(Delimiter::One).into_iter().chain([Delimiter::Blanks]);
+        let mut best: Option<(i64, Self)> = None;
+        for (delimiter, decimal) in delimiters.flat_map(|delimiter| [(delimiter, b'.'), (delimiter, b',')]) {
+            let Some((score, dialect)) = Self::scored(&sample, delimiter, decimal) else { continue };
+            if best.as_ref().is_none_or(|(most, _)| score > *most) {
+                best = Some((score, dialect));
+            }
+        }
+        best.map(|(_, dialect)| dialect)
+    }
+
+    /// The dialect of a file whose first line has names of the record format and whose second has numbers.
+    fn of_records(sample: &[Line<'_>]) -> Option<Self> {
+        let [(at, header), (first, row), ..] = *sample else { return None };
+        let header = remark(header).unwrap_or(header);
+        let is_header = |delimiter: &Delimiter| {
+            let names = fields(header, *delimiter);
+            names.len() > 1 && names.iter().any(|name| Role::of_column(name).is_some())
+        };
+        let delimiter =
+            [b',', b';', b'\t'].map(Delimiter::One).into_iter().chain([Delimiter::Blanks]).find(is_header)?;
+        let decimal_comma = delimiter != Delimiter::One(b',') && row.contains(',');
+        let cells: Vec<Cell> = fields(row, delimiter).iter().map(|field| cell(field.as_bytes(), b'.')).collect();
+        if decimal_comma || !cells.iter().any(is_number) {
+            return None;
+        }
+        let names = fields(header, delimiter);
+        let trailing = usize::from(names.last().is_some_and(|name| name.is_empty()));
+        let columns = (0..names.len() - trailing).collect();
+        let dates = (0..cells.len()).filter(|field| matches!(cells[*field], Cell::Time(_))).collect();
+        Some(Self {
+            delimiter,
+            decimal: b'.',
+            fields: names.len(),
+            start: first,
+            names: Some(at),
+            units: None,
+            columns,
+            dates,
+        })
+    }
+
+    /// How many more cells are numbers in this dialect than are not.
+    fn scored(sample: &[Line<'_>], delimiter: Delimiter, decimal: u8) -> Option<(i64, Self)> {
+        let quoted = || sample.iter().any(|(_, line)| line.contains('"'));
+        if delimiter == Delimiter::One(b',') && decimal == b',' && !quoted() {
+            return None;
+        }
+        let cells_of = |line: &str| fields(line, delimiter).iter().map(|f| cell(f.as_bytes(), decimal)).collect();
+        let cells: Vec<Vec<Cell>> = sample.iter().map(|(_, line)| cells_of(line)).collect();
+        let numbers_in = |row: &[Cell]| row.iter().filter(|cell| is_number(cell)).count();
+        // The number of fields that most rows of numbers have; remarks are short.
+        let mut counts: Vec<(usize, usize)> = Vec::new();
+        for row in cells.iter().filter(|row| numbers_in(row) > 0) {
+            match counts.iter_mut().find(|(fields, _)| *fields == row.len()) {
+                Some((_, rows)) => *rows += 1,
+                None => counts.push((row.len(), 1)),
+            }
+        }
+        let (count, _) = counts.into_iter().max_by_key(|(fields, rows)| (rows * fields, *fields))?;
+        let like_row = |k: usize| {
+            let row = &cells[k];
+            let filled = row.iter().filter(|cell| **cell != Cell::Missing).count();
+            row.len() == count && numbers_in(row) > 0 && 2 * numbers_in(row) >= filled
+        };
+        let alike: Vec<usize> = (0..cells.len()).filter(|k| like_row(*k)).collect();
+        // Fields that hold numbers in most rows, and so in the first: remarks begin with a word.
+        let texts = |field: &usize| alike.iter().filter(|k| cells[**k][*field] == Cell::Other).count();
+        let usual: Vec<usize> = (0..count).filter(|field| 2 * texts(field) < alike.len()).collect();
+        let is_row = |k: usize| like_row(k) && usual.iter().all(|field| cells[k][*field] != Cell::Other);
+        // A line of remarks may look like a row, but two in sequence are rows.
+        let begins = |k: &usize| is_row(*k) && (alike.len() < 3 || *k + 1 == cells.len() || is_row(*k + 1));
+        let first = (0..cells.len()).find(begins)?;
+        let rows: Vec<&Vec<Cell>> = cells[first..].iter().filter(|row| row.len() == count).collect();
+        let share = |field: usize, counts: fn(&Cell) -> bool| {
+            rows.iter().filter(|row| counts(&row[field])).count() as f64 / rows.len() as f64
+        };
+        let numeric = |field: &usize| {
+            share(*field, |cell| *cell != Cell::Other) >= MIN_NUMERIC_SHARE && share(*field, is_number) > 0.0
+        };
+        let columns: Vec<usize> = (0..count).filter(numeric).collect();
+        let surplus = |row: &Vec<Cell>| 2 * numbers_in(row) as i64 - count as i64;
+        let score = rows.into_iter().map(surplus).sum();
+        let start = sample[first].0;
+        let is_date = |field: &usize| matches!(cells[first][*field], Cell::Time(_));
+        let dates = columns.iter().copied().filter(is_date).collect();
+        let mut dialect = Self { delimiter, decimal, fields: count, start, names: None, units: None, columns, dates };
+        dialect.find_names(&sample[..first]);
+        Some((score, dialect))
+    }
+
+    /// Fields of a line above the rows, if it has as many as they.
+    fn titles<'a>(&self, line: &'a str) -> Option<Vec<&'a str>> {
+        let line = remark(line).unwrap_or(line);
+        let mut titles = fields(line, self.delimiter);
+        if self.delimiter == Delimiter::Blanks && titles.len() != self.fields {
+            titles = line.split("  ").map(str::trim).filter(|title| !title.is_empty()).collect();
+        }
+        // Further ones, as for remarks or the times of an oscilloscope, have no rows.
+        let more = titles.len().saturating_sub(self.fields);
+        if self.fields > 1 && more <= MAX_FURTHER_TITLES {
+            titles.truncate(self.fields);
+        }
+        let named =
+            self.columns.iter().filter(|field| titles.get(**field).is_some_and(|title| !title.is_empty())).count();
+        (titles.len() == self.fields && 2 * named >= self.columns.len().max(1)).then_some(titles)
+    }
+
+    /// Looks for the lines with names and units above the first row.
+    fn find_names(&mut self, above: &[Line<'_>]) {
+        let mut titled = above.iter().rev().take(6).filter(|line| self.titles(line.1).is_some());
+        let (last, before) = (titled.next().copied(), titled.next().copied());
+        drop(titled);
+        let Some(last) = last else { return };
+        let units = self.titles(last.1).is_some_and(|titles| {
+            let known = titles.iter().filter(|title| unit_in(title).is_some()).count();
+            let none = titles.iter().filter(|title| is_dimensionless(title)).count();
+            // One that is not known, as "counts/s", may be among two that are.
+            known > 0 && known + none + usize::from(known > 1) >= titles.len()
+        });
+        match before.filter(|_| units) {
+            Some(before) => (self.names, self.units) = (Some(before.0), Some(last.0)),
+            None => self.names = Some(last.0),
+        }
+    }
+
+    /// The columns.
+    pub(super) fn heads(&self, text: &str) -> Vec<Head> {
+        let line = |at: Option<usize>| at.and_then(|at| self.titles(lines(text, at).next()?.1));
+        let (names, units) = (line(self.names), line(self.units));
+        let remarks = || lines(&text[..self.start], 0).map(|(_, line)| line);
+        let whole = |at: Option<usize>| Some(fields(lines(text, at?).next()?.1, self.delimiter));
+        let stated =
+            whole(self.names).zip(whole(self.units)).and_then(|(names, units)| start_and_increment(&names, &units));
+        let axis = stated.unwrap_or_else(|| axis_of_remarks(remarks()));
+        let head = |field: &usize| {
+            let name = names.as_ref().map(|names| names[*field]).filter(|name| !name.is_empty());
+            let unit = units.as_ref().and_then(|units| unit_in(units[*field]));
+            let name = name.map_or_else(|| (field + 1).to_string(), str::to_owned);
+            // Dates are read as seconds.
+            let unit = unit.or_else(|| self.dates.contains(field).then_some("s"));
+            Head { unit: unit.map(str::to_owned), axis, ..Head::new(name) }
+        };
+        let mut heads: Vec<Head> = self.columns.iter().map(head).collect();
+        if self.units.is_none() {
+            for (column, unit) in units_of_axes(remarks(), self.delimiter) {
+                let Some(head) = heads.get_mut(column).filter(|head| head.unit.is_none()) else { continue };
+                head.unit = Some(unit.to_owned());
+            }
+        }
+        if self.names.is_none() {
+            // Remarks may state names one by one, as `# NAME0 = Target position`.
+            for (key, name) in remarks().filter_map(|line| remark(line)?.split_once('=')) {
+                let number = key.trim().strip_prefix("NAME").and_then(|number| number.parse::<usize>().ok());
+                if let Some(head) = number.and_then(|number| heads.get_mut(number)) {
+                    name.trim().clone_into(&mut head.name);
+                }
+            }
+        }
+        heads
+    }
+
+    /// The same, of a text whose rows begin at this byte.
+    pub(super) fn starting_at(&self, start: usize) -> Self {
+        Self { start, ..self.clone() }
+    }
+
+    /// The midnight before the first row, in seconds since 1970: from there dates are counted.
+    pub(super) fn midnight(&self, text: &str) -> i64 {
+        let Some((_, row)) = lines(text, self.start).next() else { return 0 };
+        let row = fields(row, self.delimiter);
+        let first = self.dates.iter().find_map(|field| match cell(row.get(*field)?.as_bytes(), self.decimal) {
+            Cell::Time(moment) => Some(moment.midnight()),
+            _ => None,
+        });
+        first.unwrap_or(0)
+    }
+
+    /// The field of a column.
+    pub(super) fn field_of(&self, column: usize) -> usize {
+        self.columns[column]
+    }
+
+    /// The column of a field.
+    pub(super) fn column_of(&self, field: usize) -> Option<usize> {
+        self.columns.iter().position(|own| *own == field)
+    }
+
+    /// Number of the line with the names.
+    pub(super) fn header_line(&self, text: &str) -> Option<u64> {
+        self.names.map(|at| super::rows::line_at(text, at))
+    }
+
+    /// Whether the table is written as the record format is.
+    pub(super) fn is_plain(&self) -> bool {
+        let comma = self.delimiter == Delimiter::One(b',') && self.decimal == b'.';
+        comma && self.names.is_some() && self.units.is_none() && self.columns.len() == self.fields
+    }
+
+    /// What was found, where it is not the record format.
+    pub(super) fn note(&self) -> Option<String> {
+        let plain = self.delimiter == Delimiter::One(b',') && self.decimal == b'.';
+        (!plain).then(|| format!("read with {}", self.words()))
+    }
+
+    /// The dialect in words.
+    pub(super) fn words(&self) -> String {
+        let between = match self.delimiter {
+            Delimiter::Blanks => "blanks".to_owned(),
+            Delimiter::One(b'\t') => "tabs".to_owned(),
+            Delimiter::One(byte) => format!("'{}'", char::from(byte)),
+        };
+        let decimal = if self.decimal == b',' { " and a decimal comma" } else { "" };
+        format!("{between} between columns{decimal}")
+    }
+}
+
+fn is_number(cell: &Cell) -> bool {
+    matches!(cell, Cell::Number(_) | Cell::Time(_))
+}
+
+/// The unit in a cell of a row of units, without brackets.
+fn unit_in(title: &str) -> Option<&str> {
+    let inner = title.trim_matches(['(', ')', '[', ']', '{', '}', ' ']);
+    Unit::parse(inner).map(|_| inner)
+}
+
+fn is_dimensionless(title: &str) -> bool {
+    let inner = title.trim_matches(['(', ')', '[', ']']);
+    ["", "-", "1", "%", "n/a", "a.u.", "counts", "sequence"].contains(&inner.to_lowercase().as_str())
+}
+
+/// Units that an oscilloscope states above its table, as `Horizontal Units,s` and `Vertical Units,V,um`, by column.
+fn units_of_axes<'a>(remarks: impl Iterator<Item = &'a str>, delimiter: Delimiter) -> Vec<(usize, &'a str)> {
+    let of = |line: &'a str| {
+        let parts = fields(line, delimiter);
+        let first = match parts.first()?.to_lowercase().as_str() {
+            "horizontal units" | "x units" | "x_unit" => 0,
+            "vertical units" | "y units" | "y_unit" => 1,
+            _ => return None,
+        };
+        Some((first..).zip(parts.into_iter().skip(1).filter(|unit| Unit::parse(unit).is_some())))
+    };
+    remarks.filter_map(of).flatten().collect()
+}
+
+/// Times that an oscilloscope states beside the names: columns `Start` and `Increment`, with their values in the row of units.
+fn start_and_increment(names: &[&str], units: &[&str]) -> Option<Axis> {
+    let value = |name: &str| {
+        let at = names.iter().position(|own| own.eq_ignore_ascii_case(name))?;
+        units.get(at)?.parse::<f64>().ok().filter(|value| value.is_finite())
+    };
+    let step = value("increment").filter(|step| *step > 0.0)?;
+    Some(Axis::Even { start: value("start").unwrap_or(0.0), step })
+}

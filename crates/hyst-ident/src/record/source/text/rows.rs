@@ -1,0 +1,204 @@
+//! The rows of a table of text, read in parallel.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::super::Values;
+use super::super::numbers::{Cell, cell, take_digits};
+use super::dialect::{Delimiter, Dialect, lines, remark};
+use super::fields;
+use crate::record::error::{Place, RecordError};
+use crate::record::grid::Printed;
+
+/// Bytes of a piece that one thread reads.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// What is wrong with a row.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// Byte at which its line begins.
+    at: usize,
+    /// Lines before the text.
+    before: u64,
+    kind: FaultKind,
+}
+
+#[derive(Debug)]
+enum FaultKind {
+    /// Another number of fields.
+    Fields { found: usize, expected: usize, open_quote: bool },
+    /// A cell that is no number.
+    Cell { field: usize, text: String },
+}
+
+impl Fault {
+    /// The same, of a text that begins at this line of its file.
+    pub(super) fn after(self, line: u64) -> Self {
+        Self { before: line - 1, ..self }
+    }
+
+    /// The message, with the name of a field's column.
+    pub(super) fn error(self, file: &str, text: &str, column: impl Fn(usize) -> String) -> RecordError {
+        let (file, line) = (file.to_owned(), self.before + line_at(text, self.at));
+        match self.kind {
+            FaultKind::Fields { found, expected, open_quote } => RecordError::RaggedRow {
+                file,
+                line,
+                found,
+                expected,
+                column: column(expected - 1),
+                hint: if open_quote { "; a quotation mark may be left open there" } else { "" },
+            },
+            FaultKind::Cell { field, text } => {
+                RecordError::NotANumber { file, place: Place::Line(line), column: column(field), text }
+            }
+        }
+    }
+}
+
+/// Reads the fields with these numbers of all rows.
+pub(super) fn read(text: &str, dialect: &Dialect, wanted: &[usize]) -> Result<Vec<Values>, Fault> {
+    read_from(text, dialect, dialect.midnight(text), wanted)
+}
+
+/// The same, with dates counted from `midnight` \[s\].
+pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[usize]) -> Result<Vec<Values>, Fault> {
+    let read = |piece| piece_of(text, piece, dialect, midnight, wanted);
+    let pieces: Vec<Vec<Values>> = pieces(text, dialect.start).into_par_iter().map(read).collect::<Result<_, _>>()?;
+    let rows: usize = pieces.iter().map(|piece| piece.first().map_or(0, |column| column.numbers.len())).sum();
+    let mut all: Vec<Values> = wanted.iter().map(|_| with_room(rows)).collect();
+    for piece in pieces {
+        for (column, part) in all.iter_mut().zip(piece) {
+            column.numbers.extend(part.numbers);
+            column.printed.join(part.printed);
+        }
+    }
+    Ok(all)
+}
+
+fn with_room(rows: usize) -> Values {
+    Values { numbers: Vec::with_capacity(rows), printed: Printed::default() }
+}
+
+/// Pieces of whole lines.
+fn pieces(text: &str, start: usize) -> Vec<Range<usize>> {
+    let bytes = text.as_bytes();
+    let mut pieces = Vec::new();
+    let mut from = start;
+    while from < bytes.len() {
+        let until = (from + PIECE_BYTES).min(bytes.len());
+        let end = bytes[until..].iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |more| until + more + 1);
+        pieces.push(from..end);
+        from = end;
+    }
+    pieces
+}
+
+fn piece_of(
+    text: &str,
+    piece: Range<usize>,
+    dialect: &Dialect,
+    midnight: i64,
+    wanted: &[usize],
+) -> Result<Vec<Values>, Fault> {
+    let room = piece.len() / (4 * dialect.fields);
+    let mut columns: Vec<Values> = wanted.iter().map(|_| with_room(room)).collect();
+    // Columns to which the number of each field goes.
+    let mut goals: Vec<Vec<usize>> = vec![Vec::new(); dialect.fields];
+    for (column, field) in wanted.iter().enumerate() {
+        goals[*field].push(column);
+    }
+    let mut rows = Rows { dialect, midnight, goals: &goals, columns: &mut columns };
+    for (at, line) in lines(&text[..piece.end], piece.start) {
+        rows.take(at, line)?;
+    }
+    Ok(columns)
+}
+
+/// Where rows go.
+struct Rows<'a> {
+    dialect: &'a Dialect,
+    /// From which dates are counted \[s\].
+    midnight: i64,
+    goals: &'a [Vec<usize>],
+    columns: &'a mut [Values],
+}
+
+impl Rows<'_> {
+    fn take(&mut self, at: usize, line: &str) -> Result<(), Fault> {
+        if remark(line).is_some() {
+            return Ok(());
+        }
+        match self.dialect.delimiter {
+            Delimiter::Blanks => self.take_fields(at, line.split_whitespace(), false),
+            Delimiter::One(_) if line.contains('"') => {
+                let open_quote = line.bytes().filter(|byte| *byte == b'"').count() % 2 == 1;
+                self.take_fields(at, fields(line, self.dialect.delimiter).into_iter(), open_quote)
+            }
+            Delimiter::One(delimiter) => self.take_fields(at, line.split(char::from(delimiter)), false),
+        }
+    }
+
+    fn take_fields<'t>(
+        &mut self,
+        at: usize,
+        fields: impl Iterator<Item = &'t str>,
+        open_quote: bool,
+    ) -> Result<(), Fault> {
+        let (mut found, mut ends_empty) = (0, false);
+        for field in fields {
+            let text = field.as_bytes().trim_ascii();
+            if let Some(goals) = self.goals.get(found).filter(|goals| !goals.is_empty()) {
+                let value = match cell(text, self.dialect.decimal) {
+                    Cell::Number(value) => value,
+                    Cell::Time(moment) => moment.since(self.midnight),
+                    Cell::Missing => f64::NAN,
+                    Cell::Other if open_quote => break,
+                    Cell::Other => {
+                        return Err(Fault {
+                            at,
+                            before: 0,
+                            kind: FaultKind::Cell { field: found, text: shortened(field) },
+                        });
+                    }
+                };
+                for goal in goals {
+                    let column = &mut self.columns[*goal];
+                    column.numbers.push(value);
+                    // The digits of times matter, and those come first.
+                    if *goal == 0 {
+                        take_digits(&mut column.printed, text, self.dialect.decimal);
+                    }
+                }
+            }
+            ends_empty = text.is_empty();
+            found += 1;
+        }
+        let expected = self.dialect.fields;
+        let one_more = found == expected + 1 && ends_empty;
+        if !open_quote && (found == expected || one_more) {
+            return Ok(());
+        }
+        Err(Fault { at, before: 0, kind: FaultKind::Fields { found, expected, open_quote } })
+    }
+}
+
+/// The number of the line that holds byte `at`. Only messages ask for it.
+pub(super) fn line_at(text: &str, at: usize) -> u64 {
+    1 + text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count() as u64
+}
+
+/// The number of the line of a row, counted from 0.
+pub(super) fn line_of_row(text: &str, dialect: &Dialect, row: usize) -> u64 {
+    let mut rows = lines(text, dialect.start).filter(|(_, line)| remark(line).is_none());
+    line_at(text, rows.nth(row).map_or(text.len(), |(at, _)| at))
+}
+
+/// A field as a message shows it: one line, not too long.
+fn shortened(field: &str) -> String {
+    const MOST: usize = 40;
+    let field = field.trim();
+    let text: String = field.chars().take(MOST).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if field.chars().nth(MOST).is_some() { format!("{text}…") } else { text }
+}

@@ -1,0 +1,128 @@
+//! What a file holds, for somebody who looks at it: format, channels, and the record in them.
+
+use std::path::Path;
+
+use super::columns::Need;
+use super::error::RecordError;
+use super::heading::Heading;
+use super::log::is_run_log;
+use super::read::{Reading, of_contents};
+use super::source::{self, Contents};
+use super::{Record, RunLog};
+use crate::noise::quantisation;
+use crate::samples::range;
+
+/// A column of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Its name, as `--map` takes it.
+    pub name: String,
+    /// Its unit, where heading or file state one that is known.
+    pub unit: Option<&'static str>,
+    /// Rows.
+    pub rows: usize,
+    /// Rows without a value.
+    pub missing: usize,
+    /// Smallest and largest value, in its unit.
+    pub range: Option<(f64, f64)>,
+    /// Smallest difference between two values, in its unit; 0 where all are one.
+    pub step: f64,
+}
+
+/// What a file holds.
+#[derive(Debug)]
+pub struct Survey {
+    /// The format, as `table of text, ';' between columns`.
+    pub format: String,
+    /// Its columns, in their order.
+    pub channels: Vec<Channel>,
+    /// The record, or why it is none yet.
+    pub record: Result<Record, RecordError>,
+}
+
+/// Columns that are looked at; a file with more is listed in part.
+pub const MAX_CHANNELS: usize = 200;
+
+impl Survey {
+    /// Looks at the file at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read or has no columns.
+    pub fn read(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        if let Some(contents) = source::LargeText::open(path, &mut |_| {})? {
+            let channels = channels(&contents)?;
+            let record = any(|need| of_contents(&file, &contents, how, need));
+            return Ok(Self { format: contents.format(), channels, record });
+        }
+        let bytes = std::fs::read(path).map_err(|source| RecordError::Io { file: file.clone(), source })?;
+        Self::parse(&file, &bytes, how)
+    }
+
+    /// As [`read`](Self::read), of the bytes of a file.
+    ///
+    /// # Errors
+    /// As those of [`read`](Self::read).
+    pub fn parse(name: &str, bytes: &[u8], how: &Reading) -> Result<Self, RecordError> {
+        if is_run_log(bytes) {
+            let log = RunLog::parse(name, bytes)?;
+            let text = log.csv(name, false)?;
+            let survey = Self::parse(name, text.as_bytes(), how)?;
+            let record = any(|need| Record::parse(name, bytes, how.clone(), need));
+            return Ok(Self { format: "MCAP log of a run".to_owned(), record, ..survey });
+        }
+        let unpacked = source::unpack(name, bytes)?;
+        let contents = source::open(name, &unpacked)?;
+        let channels = channels(contents.as_ref())?;
+        let record = any(|need| Ok(of_contents(name, contents.as_ref(), how, need)?.kept_as(bytes)));
+        Ok(Self { format: contents.format(), channels, record })
+    }
+}
+
+/// A record with what a file has: input and output, or one of them if there is nothing else. If it is none, the reason is why it has
+/// not both.
+fn any(read: impl Fn(Need) -> Result<Record, RecordError>) -> Result<Record, RecordError> {
+    read(Need::InputAndOutput).or_else(|error| match error {
+        RecordError::Columns { columns, .. } => {
+            let whole = |record: &Record| record.columns() == columns;
+            read(Need::Input).ok().filter(whole).or_else(|| read(Need::Output).ok().filter(whole)).ok_or(error)
+        }
+        error => Err(error),
+    })
+}
+
+impl Record {
+    /// How many columns of a file have a role.
+    fn columns(&self) -> usize {
+        let channels = [self.input.is_some(), self.output.is_some(), self.temperature.is_some(), self.load.is_some()];
+        1 + usize::from(self.labelled) + channels.into_iter().filter(|there| *there).count()
+    }
+
+    /// Reads what a file has: input and output, or one of them.
+    ///
+    /// # Errors
+    /// As those of [`read`](Self::read).
+    pub fn read_any(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
+        any(|need| Self::read(path.as_ref(), how.clone(), need))
+    }
+}
+
+fn channels(contents: &dyn Contents) -> Result<Vec<Channel>, RecordError> {
+    let heads = &contents.heads()[..contents.heads().len().min(MAX_CHANNELS)];
+    let all: Vec<usize> = (0..heads.len()).collect();
+    let values = contents.values(&all)?;
+    let channel = |(head, values): (&source::Head, source::Values)| {
+        let there: Vec<f64> = values.numbers.iter().copied().filter(|value| value.is_finite()).collect();
+        let (low, high) = range(there.iter().copied());
+        Channel {
+            name: head.name.clone(),
+            unit: Heading::parse(&head.name, head.unit.as_deref()).unit.map(|unit| unit.symbol),
+            rows: values.numbers.len(),
+            missing: values.numbers.len() - there.len(),
+            range: (!there.is_empty()).then_some((low, high)),
+            step: quantisation(&there) * 12f64.sqrt(),
+        }
+    };
+    Ok(heads.iter().zip(values).map(channel).collect())
+}

@@ -1,0 +1,33 @@
+//! Files of laboratories: written by the programs that write them there, read by `hystctl`, and compared with the truth.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::command::{self, Outcome, passes, passes_quietly};
+use crate::python;
+
+pub(crate) fn check() -> Outcome {
+    let Some(interpreter) = python::interpreter() else { return Outcome::Skipped(python::INSTALL.to_owned()) };
+    let own = command::target().join("layouts");
+    let environment = own.join("environment");
+    let (program, files) = (python::program(&environment), own.join("files"));
+    let sources = command::root().join("tests").join("layouts");
+    let python = |program: &Path| {
+        let mut command = Command::new(program);
+        command.current_dir(command::root());
+        command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
+        command
+    };
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
+    let installed = passes_quietly(python(Path::new(interpreter)).args(["-m", "venv"]).arg(&environment))
+        && passes_quietly(python(&program).args(pip).arg(sources.join("requirements.txt")));
+    if !installed {
+        let wanted = sources.join("requirements.txt");
+        return Outcome::Skipped(format!("{} could not be installed; see what pip says", wanted.display()));
+    }
+    let hystctl = command::target().join("debug").join(format!("hystctl{}", std::env::consts::EXE_SUFFIX));
+    let _ = std::fs::remove_dir_all(&files);
+    let passed = passes(python(&program).arg(sources.join("write.py")).arg(&files))
+        && passes(python(&program).arg(sources.join("check.py")).arg(hystctl).arg(&files));
+    if passed { Outcome::Passed } else { Outcome::Failed }
+}
