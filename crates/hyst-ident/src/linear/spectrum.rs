@@ -45,6 +45,6 @@ mod tests {
         assert!((power - 0.125).abs() < 0.002, "{power}");
         let (at, _) = lines.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!((at - 50.0).abs() < 2.0 * step);
-        assert!(amplitude_density(&x, &[0..20], 1e-3).is_empty());
+        assert!(amplitude_density(&x, std::slice::from_ref(&(0..20)), 1e-3).is_empty());
     }
 }

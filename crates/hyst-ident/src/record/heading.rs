@@ -175,10 +175,8 @@ fn words(name: &str) -> Vec<String> {
     let mut before = None;
     for c in name.chars() {
         let turn = c.is_uppercase() && before.is_some_and(char::is_lowercase);
-        if !c.is_alphanumeric() || turn {
-            if !word.is_empty() {
-                words.push(std::mem::take(&mut word));
-            }
+        if (turn || !c.is_alphanumeric()) && !word.is_empty() {
+            words.push(std::mem::take(&mut word));
         }
         if c.is_alphanumeric() {
             word.extend(c.to_lowercase());

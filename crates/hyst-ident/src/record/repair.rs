@@ -263,11 +263,11 @@ fn insert_lost(samples: &mut Columns, done: &mut Repaired, printed: Printed) {
     let mut lost = vec![0; rows];
     for rows in segments.iter().filter(|rows| rows.len() > 2) {
         let usual = usual_step(&samples.time[rows.clone()]);
-        for row in rows.start + 1..rows.end {
+        for (row, lost) in lost.iter_mut().enumerate().take(rows.end).skip(rows.start + 1) {
             let steps = (samples.time[row] - samples.time[row - 1]) / usual;
             let whole = steps.round();
             if whole >= 2.0 && whole <= MAX_BRIDGE as f64 + 1.0 && (steps - whole).abs() < MAX_OFF_GRID {
-                lost[row] = whole as usize - 1;
+                *lost = whole as usize - 1;
             }
         }
     }

@@ -109,7 +109,7 @@ fn period_of_remark(line: &str) -> Option<f64> {
         let rest = lower[key.len()..].trim_start_matches(|c: char| !(c.is_ascii_digit() || c == '.'));
         let end =
             rest.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '+'))).unwrap_or(rest.len());
-        let value = number(rest[..end].as_bytes(), b'.').filter(|value| *value > 0.0 && value.is_finite())?;
+        let value = number(&rest.as_bytes()[..end], b'.').filter(|value| *value > 0.0 && value.is_finite())?;
         Some((value, rest[end..].trim_matches(|c: char| !c.is_alphabetic()).to_owned()))
     };
     if let Some((value, unit)) = behind(&interval) {
