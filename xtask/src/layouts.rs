@@ -27,7 +27,8 @@ pub(crate) fn check() -> Outcome {
     }
     let hystctl = command::target().join("debug").join(format!("hystctl{}", std::env::consts::EXE_SUFFIX));
     let _ = std::fs::remove_dir_all(&files);
-    let passed = passes(python(&program).arg(sources.join("write.py")).arg(&files))
-        && passes(python(&program).arg(sources.join("check.py")).arg(hystctl).arg(&files));
-    if passed { Outcome::Passed } else { Outcome::Failed }
+    match passes(python(&program).arg(sources.join("write.py")).arg(&files)) {
+        Outcome::Passed => passes(python(&program).arg(sources.join("check.py")).arg(hystctl).arg(&files)),
+        failed => failed,
+    }
 }
