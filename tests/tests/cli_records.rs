@@ -104,7 +104,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
         format!("{:.6},{}", 0.002 * k as f64 + 1e-6 * (k % 3) as f64, row.split_once(',').unwrap().1)
     };
     let rows: Vec<String> = long().iter().enumerate().map(|(k, row)| jitter(k, row)).collect();
-    noted(with_header(HEADER, &rows), "", &["jitter by 0.0", "cubic spline"]);
+    noted(with_header(HEADER, &rows), "", &["jitter by 0.0", "monotone cubic"]);
     let mut rows = long();
     rows.remove(500);
     noted(with_header(HEADER, &rows), "", &["1 row lost between others"]);

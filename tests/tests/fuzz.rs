@@ -54,3 +54,20 @@ fn records_logs_and_plants_are_survived() {
     all("logs");
     all("plants");
 }
+
+#[test]
+fn files_of_other_programs_are_survived() {
+    all("tables");
+    all("matlab");
+    all("hdf5");
+    all("labview");
+    all("numpy");
+}
+
+#[test]
+fn tables_and_logs_of_other_programs_are_survived() {
+    all("parquet");
+    all("arrow");
+    all("excel");
+    all("messages");
+}

@@ -51,7 +51,7 @@ impl Samples {
             output: record.output().unwrap_or_default().to_vec(),
             temperature: record.temperature().map(<[f64]>::to_vec),
             load: record.load().map(<[f64]>::to_vec),
-            falls: falls(record.input(), record.output().unwrap_or_default()),
+            falls: falls_where(record.input(), record.output().unwrap_or_default(), &blind),
             segments: record.segments().to_vec(),
             pasts: vec![Vec::new(); record.segments().len()],
             file_of_segment: record.file_of_segment().to_vec(),
@@ -262,6 +262,12 @@ fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
     }
     blind.iter_mut().zip(record.missing()).for_each(|(blind, missing)| *blind |= missing);
     blind
+}
+
+/// Whether an output falls where its input rises, in the rows that show its motion.
+fn falls_where(input: &[f64], output: &[f64], blind: &[bool]) -> bool {
+    let seen = |x: &[f64]| -> Vec<f64> { x.iter().zip(blind).filter(|(_, blind)| !**blind).map(|(x, _)| *x).collect() };
+    falls(&seen(input), &seen(output))
 }
 
 /// Whether an output falls where its input rises.

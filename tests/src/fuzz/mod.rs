@@ -2,6 +2,7 @@
 //!
 //! Each case is a kind and a seed; the same two make the same case. A case that finds something panics.
 
+mod files;
 mod inputs;
 mod line;
 mod luck;
@@ -31,6 +32,15 @@ pub const KINDS: &[Kind] = &[
     Kind { name: "records", case: inputs::records },
     Kind { name: "logs", case: inputs::logs },
     Kind { name: "plants", case: inputs::plants },
+    Kind { name: "tables", case: files::tables },
+    Kind { name: "matlab", case: files::matlab },
+    Kind { name: "hdf5", case: files::hdf5 },
+    Kind { name: "labview", case: files::labview },
+    Kind { name: "numpy", case: files::numpy },
+    Kind { name: "parquet", case: files::parquet },
+    Kind { name: "arrow", case: files::arrow },
+    Kind { name: "excel", case: files::excel },
+    Kind { name: "messages", case: files::messages },
 ];
 
 impl Kind {

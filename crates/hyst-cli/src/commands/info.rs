@@ -1,5 +1,7 @@
 //! `info`: what a file holds, what is odd about it, and what to type next.
 
+use std::collections::HashSet;
+
 use hyst_ident::noise::noise_floor;
 use hyst_ident::range;
 use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, Reading, Record, Survey};
@@ -55,6 +57,8 @@ struct Summary {
     /// Why the channels are no record yet, and what to type.
     missing: Option<String>,
     odd: Vec<String>,
+    /// What is done to read the record.
+    notes: Vec<String>,
     next: Option<String>,
     #[serde(skip)]
     picture: String,
@@ -81,7 +85,10 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         Err(error) => (None, Some(error.to_string())),
     };
     let mut odd: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
+    let text = |(name, cell): &(String, String)| format!("\"{name}\" is not read: it holds text (\"{cell}\")");
+    odd.extend(survey.texts.iter().map(text));
     odd.extend(record.iter().flat_map(input::oddities));
+    let notes = record.as_ref().map_or_else(Vec::new, |record| record.notes().to_vec());
     let options = further(&input::columns(&args.map));
     let next = record.as_ref().and_then(|record| next(&file, record, &options));
     let channel = |c: &Channel| ChannelSummary {
@@ -101,6 +108,7 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         record: record.as_ref().map(of_record),
         missing,
         odd,
+        notes,
         next,
     }
 }
@@ -113,7 +121,8 @@ fn never_moves(channel: &Channel) -> Option<String> {
 fn of_record(record: &Record) -> RecordSummary {
     let noise = record.output().map(|y| noise_floor(y, record.segments()));
     let spikes = spikes_of(record);
-    let is_spike = |row: usize| spikes.iter().any(|spike| spike.row == row);
+    let spiked: HashSet<usize> = spikes.iter().map(|spike| spike.row).collect();
+    let is_spike = |row: usize| spiked.contains(&row);
     let span = record.output().map(|y| {
         let (low, high) = range((0..y.len()).filter(|row| !is_spike(*row)).map(|row| y[row]));
         high - low
@@ -160,7 +169,7 @@ fn picture(record: &Record) -> String {
         (u, None) => (time, u, ("time_s", record.input_column())),
     };
     let step = x.len().div_ceil(POINTS).max(1);
-    let spiked: Vec<usize> = spikes_of(record).iter().map(|spike| spike.row).collect();
+    let spiked: HashSet<usize> = spikes_of(record).iter().map(|spike| spike.row).collect();
     let points: Vec<(f64, f64)> =
         (0..x.len()).step_by(step).filter(|k| !spiked.contains(k)).map(|k| (x[k], y[k])).collect();
     let bounds = |of: fn(&(f64, f64)) -> f64| {
@@ -239,7 +248,8 @@ impl Summary {
                 ));
             }
         }
-        if self.odd.is_empty() && self.record.is_some() {
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        if self.odd.is_empty() && self.notes.is_empty() && self.record.is_some() {
             lines.push("odd: nothing".to_owned());
         }
         lines.extend(self.odd.iter().map(|odd| format!("odd: {odd}")));

@@ -35,7 +35,7 @@ pub enum MapError {
         name: String,
     },
     /// A minus where a sign means nothing.
-    #[error("--map \"{argument}\": {role} has no sign to turn; leave the minus out")]
+    #[error("--map \"{argument}\": {role} takes no sign and no factor; leave it out")]
     Signless {
         /// The argument.
         argument: String,
@@ -64,22 +64,23 @@ pub enum MapError {
 
 /// Which columns of a file stand for which names of the record format (`--map voltage_v=Vin`).
 ///
-/// A minus before the column (`--map displacement_um=-Sensor`) turns the sign of an input, an output or a load. A mapped role is taken from the mapped column only, so that `--map displacement_um=displacement_um` also settles
+/// A minus before the column (`--map displacement_um=-Sensor`) turns the sign of an input, an output or a load; a factor
+/// (`--map displacement_um=2.5*CH2`) says how many of the role's unit one of the column's is, whatever unit the file states. A mapped role is taken from the mapped column only, so that `--map displacement_um=displacement_um` also settles
 /// which of two possible outputs is meant. The default maps nothing.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnMap {
     pub(crate) entries: Vec<Entry>,
 }
 
 /// One `--map`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
     pub(crate) role: Role,
     /// Name in the record format.
     pub(crate) canonical: String,
     pub(crate) column: String,
-    /// Whether the column has the other sign.
-    pub(crate) turned: bool,
+    /// Factor of its values to those of the role: −1 turns the sign.
+    pub(crate) factor: Option<f64>,
     /// As it was given.
     argument: String,
 }
@@ -100,14 +101,14 @@ impl ColumnMap {
             let malformed = || MapError::Malformed { argument: argument.to_owned() };
             let (name, column) = argument.split_once('=').ok_or_else(malformed)?;
             let (name, column) = (name.trim(), column.trim());
-            let (column, turned) = column.strip_prefix('-').map_or((column, false), |rest| (rest.trim(), true));
+            let (column, factor) = factor_of(column);
             if name.is_empty() || column.is_empty() {
                 return Err(malformed());
             }
             let Some(role) = Role::of_column(name) else {
                 return Err(MapError::UnknownName { argument: argument.to_owned(), name: name.to_owned() });
             };
-            if turned && !matches!(role, Role::Input | Role::Output | Role::Load) {
+            if factor.is_some() && !matches!(role, Role::Input | Role::Output | Role::Load) {
                 return Err(MapError::Signless { argument: argument.to_owned(), role: role.words() });
             }
             for other in &entries {
@@ -120,10 +121,19 @@ impl ColumnMap {
                 }
             }
             let (canonical, argument) = (name.to_owned(), argument.to_owned());
-            entries.push(Entry { role, canonical, column: column.to_owned(), turned, argument });
+            entries.push(Entry { role, canonical, column: column.to_owned(), factor, argument });
         }
         Ok(Self { entries })
     }
+}
+
+/// A column and the factor before it, as `-Sensor` or `2.5*CH2` have one.
+fn factor_of(column: &str) -> (&str, Option<f64>) {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|factor| factor.is_finite() && *factor != 0.0);
+    if let Some((factor, rest)) = column.split_once('*').and_then(|(factor, rest)| Some((number(factor)?, rest))) {
+        return (rest.trim(), Some(factor));
+    }
+    column.strip_prefix('-').map_or((column, None), |rest| (rest.trim(), Some(-1.0)))
 }
 
 /// What a column is for.

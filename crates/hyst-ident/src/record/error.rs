@@ -216,7 +216,7 @@ pub enum RecordError {
     },
     /// Time stands still or goes back.
     #[error(
-        "{file}, {place}, column \"{column}\": time has to increase from row to row and across segments, but {found} s follows {previous} s; sort the rows, or print the time with more decimals"
+        "{file}, {place}, column \"{column}\": time has to increase from row to row and across segments, but {found} s follows {previous} s; if another run begins there, split the file; if the times have too few decimals, give the sample rate with --rate"
     )]
     TimeNotIncreasing {
         /// The file.

@@ -51,14 +51,20 @@ impl Unit {
         })
     }
 
-    /// The unit that `text` names, as `mV`, `µm`, `um`, `sec`, `°C`.
+    /// The unit that `text` names, as `mV`, `µm`, `um`, `sec`, `°C`. Capitals count in symbols: Nm and F are no nm and °F.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let text = text.trim().trim_matches(['"', '\'']).trim();
-        let exact = UNITS.iter().find(|(names, _)| names.contains(&text));
-        // Capitals carry meaning in mV and MV alone, which nobody applies to a piezo.
-        let lower = text.to_lowercase();
-        let loose = || UNITS.iter().find(|(names, _)| names.iter().any(|name| name.to_lowercase() == lower));
-        exact.or_else(loose).map(|(_, unit)| *unit)
+        let word = text.chars().count() > 3;
+        let is = |name: &str| name == text || word && name.eq_ignore_ascii_case(text);
+        UNITS.iter().find(|(names, _)| names.iter().any(|name| is(name))).map(|(_, unit)| *unit)
+    }
+
+    /// The unit at the end of a name such as `voltage_v`, where all letters are small.
+    pub(crate) fn parse_suffix(text: &str) -> Option<Self> {
+        let is = |name: &str| name.to_lowercase() == text && !matches!(text, "min" | "h");
+        Self::parse(text)
+            .filter(|_| !matches!(text, "min" | "h"))
+            .or_else(|| UNITS.iter().find(|(names, _)| names.iter().any(|name| is(name))).map(|(_, unit)| *unit))
     }
 }
 
@@ -96,6 +102,22 @@ const UNITS: &[(&[&str], Unit)] = &[
     (&["degF", "°F", "℉", "F", "fahrenheit"], Unit { dimension: Temperature, per_base: 1.8, zero: 32.0, symbol: "°F" }),
 ];
 
+/// Words of a temperature.
+const WARM: &[&str] = &[
+    "temperature",
+    "temp",
+    "temperatur",
+    "t",
+    "tc",
+    "ntc",
+    "pt100",
+    "pt1000",
+    "thermo",
+    "ambient",
+    "celsius",
+    "kelvin",
+];
+
 /// A heading taken apart.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Heading {
@@ -103,6 +125,8 @@ pub(crate) struct Heading {
     pub(crate) words: Vec<String>,
     /// The unit, where the heading has one that is known.
     pub(crate) unit: Option<Unit>,
+    /// What stands in brackets where a unit does, and is none that is known.
+    pub(crate) unknown: Option<String>,
 }
 
 impl Heading {
@@ -112,7 +136,18 @@ impl Heading {
         let leaf = leaf(name);
         let (rest, own) = split_unit(leaf);
         let words = words(rest);
-        Self { words, unit: unit.and_then(Unit::parse).or(own) }
+        let found = unit.and_then(Unit::parse).or(own);
+        // C, K and F alone are units of much else.
+        let text = unit.filter(|unit| Unit::parse(unit).is_some()).unwrap_or(leaf);
+        let mut ending = text.trim_end_matches([')', ']', '}', '>', ' ']).chars().rev();
+        let is_letter = matches!(ending.next(), Some('C' | 'K' | 'F' | 'c' | 'k' | 'f'));
+        let alone = is_letter && ending.next().is_none_or(|before| !before.is_alphabetic() && before != '°');
+        let warm = words.iter().any(|word| WARM.contains(&word.as_str()));
+        let found = found.filter(|unit| unit.dimension != Temperature || warm || !alone);
+        let unknown = in_brackets(leaf)
+            .filter(|(_, text)| found.is_none() && text.contains(char::is_alphabetic))
+            .map(|(_, text)| text.to_owned());
+        Self { words, unit: found, unknown }
     }
 
     /// Whether the words suggest `role`, as "piezo drive voltage" does the input.
@@ -140,25 +175,30 @@ pub(crate) fn leaf(name: &str) -> &str {
     }
 }
 
+/// What is before the brackets at the end of a heading, and in them.
+fn in_brackets(name: &str) -> Option<(&str, &str)> {
+    let name = name.trim().trim_matches('"').trim();
+    [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')].into_iter().find_map(|(open, close)| {
+        let inner = name.strip_suffix(close)?;
+        let at = inner.rfind(open)?;
+        Some((inner[..at].trim(), inner[at + open.len_utf8()..].trim()))
+    })
+}
+
 /// The heading without its unit, and the unit.
 fn split_unit(name: &str) -> (&str, Option<Unit>) {
     let name = name.trim().trim_matches('"').trim();
-    // In brackets, at the end.
-    for (open, close) in [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')] {
-        if let Some(inner) = name.strip_suffix(close)
-            && let Some(at) = inner.rfind(open)
-        {
-            return (inner[..at].trim(), Unit::parse(&inner[at + open.len_utf8()..]));
-        }
+    if let Some((rest, unit)) = in_brackets(name) {
+        return (rest, Unit::parse(unit));
     }
     // Behind a separator: "U / V", "disp, nm", "x in µm", "disp_nm", "Position nm".
     for separator in [" / ", "/", ", ", " in ", "_in_", "_", " ", "-"] {
         if let Some((rest, last)) = name.rsplit_once(separator)
             && !rest.trim().is_empty()
-            && let Some(unit) = Unit::parse(last)
-            && (last.trim().chars().count() > 1
-                || !matches!(separator, " " | "-")
-                || rest.contains(char::is_alphabetic))
+            && let Some(unit) = if separator.contains('_') { Unit::parse_suffix(last) } else { Unit::parse(last) }
+            // "Channel C" has a letter, not a unit; "velocity_um_s" has two units, and so another one.
+            && (last.trim().chars().count() > 1 || !matches!(separator, " " | "-"))
+            && !(separator == "_" && rest.rsplit('_').next().and_then(Unit::parse_suffix).is_some())
         {
             return (rest.trim(), Some(unit));
         }
@@ -169,7 +209,7 @@ fn split_unit(name: &str) -> (&str, Option<Unit>) {
 }
 
 /// Words of a heading, in lower case; `VinputVoltage` has two.
-fn words(name: &str) -> Vec<String> {
+pub(crate) fn words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut word = String::new();
     let mut before = None;
@@ -222,6 +262,12 @@ mod tests {
         assert_eq!(of("Channel A"), ("channel a".into(), None));
         assert_eq!(of("position [counts]"), ("position".into(), None));
         assert_eq!(of("load_cell"), ("load cell".into(), None));
+        for name in
+            ["Charge (C)", "Torque (Nm)", "Channel C", "velocity_um_s", "temp_min", "Capacitance (F)", "Inductance [H]"]
+        {
+            assert_eq!(of(name).1, None, "{name}");
+        }
+        assert_eq!((of("T (K)").1, of("temperature_k").1, of("Temp C").1), (Some("K"), Some("K"), None));
     }
 
     #[test]

@@ -7,11 +7,11 @@ use super::ABSOLUTE_ZERO;
 use super::columns::{ColumnMap, Need};
 use super::error::{Place, RecordError};
 use super::grid::Printed;
-use super::heading::Unit;
+use super::heading::{Dimension, Heading, Unit};
 use super::log::is_run_log;
 use super::repair::{place_of, repair};
 use super::roles::{Choice, Clock, File, Layout};
-use super::source::{self, Axis, Contents, Values};
+use super::source::{self, Axis, Contents, Values, Wanted};
 use super::unit::OutputUnit;
 use super::{Columns, Origin, Record};
 
@@ -82,8 +82,13 @@ pub(super) fn of_contents(
     how: &Reading,
     need: Need,
 ) -> Result<Record, RecordError> {
+    if let Some(rate) = how.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        let problems = format!("the sample rate is {rate} Hz");
+        let advice = "give a positive number of samples a second".to_owned();
+        return Err(RecordError::Columns { file: name.to_owned(), problems, advice, columns: 0 });
+    }
     let heads = contents.heads();
-    let file = File { name, header: contents.header(), heads };
+    let file = File { name, header: contents.header(), heads, texts: contents.texts() };
     let layout = Layout::resolve(&file, &how.map, need, how.rate)?;
     let column = |at: usize| heads[at].name.as_str();
 
@@ -95,7 +100,12 @@ pub(super) fn of_contents(
     let choices = [&layout.input, &layout.output, &layout.temperature, &layout.load];
     let chosen = choices.map(|choice| choice.as_ref().map(|choice| choice.column));
     let wanted: Vec<usize> = [clock].into_iter().chain([layout.segment]).chain(chosen).flatten().collect();
-    let mut read = contents.values(&wanted)?.into_iter();
+    let asked = Wanted {
+        columns: &wanted,
+        time: clock.map(|_| 0),
+        segment: layout.segment.map(|_| usize::from(clock.is_some())),
+    };
+    let mut read = contents.values(asked)?.into_iter();
     // Values come in the order in which they were asked for.
     let mut next = |asked: bool| if asked { read.next() } else { None };
     let time = next(clock.is_some());
@@ -115,7 +125,11 @@ pub(super) fn of_contents(
             let exact = *per_second >= 1.0 && per_second.log10().fract() == 0.0;
             (numbers.iter().map(|t| t / per_second).collect(), if exact { printed } else { Printed::EXACT })
         }
-        (_, Clock::Even { start, step }) => ((0..rows).map(|k| start + k as f64 * step).collect(), Printed::EXACT),
+        (_, Clock::Even { start, step }) => {
+            // A mean of some rows is half of them late.
+            let n = contents.rows_per_row() as f64;
+            ((0..rows).map(|k| start + (k as f64 * n + 0.5 * (n - 1.0)) * step).collect(), Printed::EXACT)
+        }
         (None, Clock::Column { .. }) => (Vec::new(), Printed::EXACT),
     };
     let place = |row: usize| contents.place(row);
@@ -163,7 +177,15 @@ pub(super) fn of_contents(
     let place = place_of(&done, &place);
     let mut record = Record::assemble(samples, printed, &Origin { place: &place, ..origin })?;
     record.missing.clone_from(&done.missing);
-    record.notes = contents.notes().iter().chain(&layout.notes).chain(&notes).chain(&done.notes).cloned().collect();
+    record.notes = contents
+        .notes()
+        .iter()
+        .chain(&contents.late_notes())
+        .chain(&layout.notes)
+        .chain(&notes)
+        .chain(&done.notes)
+        .cloned()
+        .collect();
     record.text = contents.plain_text().filter(|_| !done.changed).map(|text| Arc::from(text.as_bytes()));
     Ok(record)
 }
@@ -192,7 +214,13 @@ fn onto_one_clock(
     let times = |axis: Axis, rows: usize| -> Result<Vec<f64>, RecordError> {
         match axis {
             Axis::Even { start, step } => Ok((0..rows).map(|k| start + k as f64 * step).collect()),
-            Axis::Column(column) => Ok(contents.values(&[column])?.remove(0).numbers),
+            Axis::Column(column) => {
+                let unit = Heading::parse(&heads[column].name, heads[column].unit.as_deref()).unit;
+                let per_second =
+                    unit.filter(|unit| unit.dimension == Dimension::Time).map_or(1.0, |unit| unit.per_base);
+                let read = contents.values(Wanted::all(&[column]))?.remove(0).numbers;
+                Ok(read.into_iter().map(|t| t / per_second).collect())
+            }
             Axis::Unknown => Ok(Vec::new()),
         }
     };
@@ -221,10 +249,19 @@ fn onto_one_clock(
     Ok(notes)
 }
 
+/// Step in time, as a multiple of the usual one, across which nothing is interpolated.
+const MAX_STEP: f64 = 1.75;
+
 /// Values at increasing times `from`, at the times `to`; NaN outside.
 fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
+    let mut steps: Vec<f64> = from.windows(2).map(|t| t[1] - t[0]).collect();
+    if steps.iter().any(|step| *step <= 0.0 || step.is_nan()) {
+        return vec![f64::NAN; to.len()];
+    }
+    steps.sort_unstable_by(f64::total_cmp);
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
     // A rounding is no time outside.
-    let slack = from.windows(2).map(|t| t[1] - t[0]).fold(0.0, f64::max) * 1e-6;
+    let slack = 1e-6 * usual;
     let (Some(first), Some(last)) = (from.first(), from.last()) else { return vec![f64::NAN; to.len()] };
     to.iter()
         .map(|t| {
@@ -234,7 +271,9 @@ fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
             let after = from.partition_point(|own| own <= t).clamp(1, from.len().max(2) - 1).min(from.len() - 1);
             let before = after.saturating_sub(1);
             let step = from[after] - from[before];
-            if step > 0.0 {
+            if step > MAX_STEP * usual {
+                f64::NAN
+            } else if step > 0.0 {
                 values[before] + (values[after] - values[before]) * (t - from[before]) / step
             } else {
                 values[before]
@@ -249,8 +288,8 @@ fn convert(choice: &Choice, values: &mut [f64]) {
     if let Some(to) = choice.unit.zip(own).and_then(|(unit, own)| unit.to(own)) {
         values.iter_mut().for_each(|value| *value = to(*value));
     }
-    if choice.turned {
-        values.iter_mut().for_each(|value| *value = -*value);
+    if let Some(factor) = choice.factor {
+        values.iter_mut().for_each(|value| *value *= factor);
     }
 }
 

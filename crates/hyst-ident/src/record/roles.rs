@@ -6,7 +6,7 @@
 
 use super::columns::{ColumnMap, Entry, Need, Role};
 use super::error::{Place, RecordError};
-use super::heading::{Dimension, Heading, Unit, leaf};
+use super::heading::{Dimension, Heading, Unit, leaf, words};
 use super::source::{Axis, Head};
 use super::unit::{OutputUnit, TimeUnit};
 
@@ -19,8 +19,8 @@ pub(crate) struct Choice {
     pub(crate) canonical: String,
     /// Its unit, where that is another than its role's.
     pub(crate) unit: Option<Unit>,
-    /// Whether it has the other sign.
-    pub(crate) turned: bool,
+    /// Factor of its values, after a conversion.
+    pub(crate) factor: Option<f64>,
 }
 
 /// Where times come from.
@@ -50,6 +50,8 @@ pub(crate) struct File<'a> {
     pub(crate) name: &'a str,
     pub(crate) header: Option<Place>,
     pub(crate) heads: &'a [Head],
+    /// Columns of text, with a cell of each.
+    pub(crate) texts: &'a [(String, String)],
 }
 
 /// Names that a message lists.
@@ -65,11 +67,11 @@ impl Layout {
         need: Need,
         rate: Option<f64>,
     ) -> Result<Self, RecordError> {
-        let search =
-            Search { file, headings: file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect() };
+        let wants_input = matches!(need, Need::InputAndOutput | Need::Input);
+        let headings = file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect();
+        let search = Search { wants_input, file, headings };
         let mut problems = Problems::default();
         let mapped = search.mapped(map)?;
-        let wants_input = matches!(need, Need::InputAndOutput | Need::Input);
         let wants_output = matches!(need, Need::InputAndOutput | Need::Output);
 
         let mut taken: Vec<usize> = mapped.iter().map(|(_, choice)| choice.column).collect();
@@ -97,6 +99,7 @@ impl Layout {
         let own = matches!(stated, Some(Axis::Column(_))) && !mapped.iter().any(|(role, _)| *role == Role::Time);
         let clock = if rate.is_some() || own { None } else { role(Role::Time, stated.is_none()) };
         let input = input.filter(|_| wants_input);
+        let mut further = Vec::new();
         let time = match (clock.as_ref(), stated) {
             (Some(choice), _) => Some(Clock::Column {
                 column: choice.column,
@@ -105,6 +108,10 @@ impl Layout {
             (None, Some(Axis::Even { start, step })) => Some(Clock::Even { start, step }),
             (None, Some(Axis::Column(column))) => {
                 let unit = search.headings[column].unit.filter(|unit| unit.dimension == Dimension::Time);
+                if unit.is_none() {
+                    further
+                        .push(format!("the times in {} have no unit: they are read as seconds", search.quoted(column)));
+                }
                 Some(Clock::Column { column, per_second: unit.map_or(1.0, |unit| unit.per_base) })
             }
             (None, _) => None,
@@ -113,7 +120,7 @@ impl Layout {
             return Err(search.refuse(problems, map, &taken));
         };
         let choices = [&clock, &input, &output, &temperature, &load];
-        let notes = choices.into_iter().flatten().filter_map(|choice| search.reading(choice)).collect();
+        let notes = choices.into_iter().flatten().filter_map(|choice| search.reading(choice)).chain(further).collect();
         Ok(Self { segment: segment.map(|choice| choice.column), time, input, output, temperature, load, notes })
     }
 }
@@ -138,6 +145,8 @@ impl Problems {
 }
 
 struct Search<'a> {
+    /// Whether the record is one of a drive, not a reference.
+    wants_input: bool,
     file: &'a File<'a>,
     headings: Vec<Heading>,
 }
@@ -167,7 +176,9 @@ impl Search<'_> {
                 .ok_or_else(|| self.not_there(entry))?;
             let unit = self.headings[column].unit;
             // A clock's unit is often named wrongly, and an odd rate shows it: of times the map's unit counts.
-            let unit = match (Unit::of_canonical(&entry.canonical), unit) {
+            // A factor is that of the file's values, whatever their unit; −1 is a sign alone.
+            let scaled = entry.factor.is_some_and(|factor| factor != -1.0);
+            let unit = match (Unit::of_canonical(&entry.canonical), unit.filter(|_| !scaled)) {
                 (Some(own), Some(unit)) if entry.role != Role::Time && unit != own => {
                     if unit.dimension != own.dimension {
                         return Err(self.other_dimension(entry, unit));
@@ -176,7 +187,7 @@ impl Search<'_> {
                 }
                 _ => None,
             };
-            Ok((entry.role, Choice { column, canonical: entry.canonical.clone(), unit, turned: entry.turned }))
+            Ok((entry.role, Choice { column, canonical: entry.canonical.clone(), unit, factor: entry.factor }))
         };
         map.entries.iter().map(of).collect()
     }
@@ -195,11 +206,27 @@ impl Search<'_> {
         let free = || self.columns().filter(|at| !taken.contains(at));
         let plain = |column: usize| {
             let canonical = leaf(self.name(column)).to_owned();
-            Choice { column, canonical, unit: None, turned: false }
+            // A row of units or an attribute may say otherwise than the name does.
+            let own = Unit::of_canonical(&canonical);
+            let stated = self.file.heads[column].unit.as_deref().and_then(Unit::parse);
+            let unit = stated.filter(|unit| own.is_some_and(|own| own != *unit && own.dimension == unit.dimension));
+            Choice { column, canonical, unit, factor: None }
         };
         let voltage = || free().filter(|at| leaf(self.name(*at)) == "voltage_v");
+        let volts = |at: &usize| self.headings[*at].unit.is_some_and(|unit| unit.dimension == Dimension::Voltage);
         // Names of the record format.
-        let mut own = free().filter(|at| Role::of_column(leaf(self.name(*at))) == Some(role));
+        let is_own = |at: &usize| {
+            let name = leaf(self.name(*at));
+            // An input of another kind counts only where nothing is in volts, and no time or temperature is one.
+            let other = role == Role::Input && name != "voltage_v";
+            let odd = || {
+                name.rsplit_once("_in_")
+                    .and_then(|(_, unit)| Unit::parse(unit))
+                    .is_some_and(|unit| matches!(unit.dimension, Dimension::Time | Dimension::Temperature))
+            };
+            Role::of_column(name) == Some(role) && !(other && (odd() || free().any(|at| volts(&at))))
+        };
+        let mut own = free().filter(is_own);
         match (own.next(), own.next()) {
             // A voltage is the input wherever there is one; other inputs count only in its absence.
             (Some(_), Some(_)) if role == Role::Input && voltage().count() == 1 => return voltage().next().map(plain),
@@ -222,9 +249,16 @@ impl Search<'_> {
         let measured: Vec<usize> = free().filter(|at| self.could_be(role, *at, required)).collect();
         let chosen = match *measured.as_slice() {
             [] => None,
+            [only] if required && role != Role::Segment && self.contradicts(role, only) => {
+                let what =
+                    format!("{} is hardly {}: it reads like {}", self.quoted(only), role.words(), contrary(role));
+                problems.add(role, Some(only), what);
+                return None;
+            }
             [only] => Some(only),
             ref several => match self.preferred(role, several).as_slice() {
                 [best] => Some(*best),
+                _ if !required => None,
                 _ => {
                     let names =
                         several.iter().map(|at| self.quoted(*at)).take(MOST_LISTED).collect::<Vec<_>>().join(", ");
@@ -233,6 +267,9 @@ impl Search<'_> {
                 }
             },
         };
+        if role == Role::Segment {
+            return chosen.map(|column| Choice { column, canonical: "segment".to_owned(), unit: None, factor: None });
+        }
         if let Some(column) = chosen {
             return self.headings[column].unit.map(|unit| {
                 let canonical = unit.canonical(role).to_owned();
@@ -241,7 +278,7 @@ impl Search<'_> {
                     column,
                     unit: Some(unit).filter(|unit| role == Role::Time || own != Some(*unit)),
                     canonical,
-                    turned: false,
+                    factor: None,
                 }
             });
         }
@@ -250,10 +287,18 @@ impl Search<'_> {
         let unknown = worded.iter().find(|at| required || self.states_unknown_unit(role, **at));
         match unknown {
             Some(at) if self.headings[*at].unit.is_none() => {
+                let why = match &self.headings[*at].unknown {
+                    Some(unit) => format!("the unit {} is not known", quoted(unit)),
+                    None => "its unit is not stated".to_owned(),
+                };
+                problems.add(role, Some(*at), format!("{} may be {}, but {why}", self.quoted(*at), role.words()));
+            }
+            _ if required && self.text_of(role).is_some() => {
+                let (name, example) = self.text_of(role).unwrap_or_default();
                 problems.add(
                     role,
-                    Some(*at),
-                    format!("{} may be {}, but its unit is not stated", self.quoted(*at), role.words()),
+                    None,
+                    format!("{} would be {}, but it holds text: {}", quoted(name), role.words(), quoted(example)),
                 );
             }
             _ if required => {
@@ -264,22 +309,39 @@ impl Search<'_> {
         None
     }
 
+    /// A column of text whose heading states a unit of `role`.
+    fn text_of(&self, role: Role) -> Option<(&str, &str)> {
+        let fits = |name: &str| {
+            Role::of_column(name) == Some(role) || Heading::parse(name, None).unit.is_some_and(|unit| has(role, unit))
+        };
+        self.file.texts.iter().find(|(name, _)| fits(name)).map(|(name, example)| (name.as_str(), example.as_str()))
+    }
+
     /// Whether a column's unit is one of `role`, which `required` says it needs.
     fn could_be(&self, role: Role, column: usize, required: bool) -> bool {
         let heading = &self.headings[column];
         let Some(unit) = heading.unit else {
             return role == Role::Segment && heading.words == ["segment"];
         };
-        match role {
-            Role::Segment => false,
-            Role::Time => unit.dimension == Dimension::Time,
-            Role::Input => unit.dimension == Dimension::Voltage && (required || heading.suggests(INPUT)),
-            Role::Output => {
-                let measures = matches!(unit.dimension, Dimension::Length | Dimension::Force);
-                measures && !heading.suggests(LOAD) && (required || heading.suggests(OUTPUT))
+        has(role, unit)
+            && match role {
+                Role::Input => required || heading.suggests(INPUT),
+                Role::Output => !heading.suggests(LOAD) && (required || heading.suggests(OUTPUT)),
+                Role::Load => heading.suggests(LOAD),
+                _ => true,
             }
-            Role::Temperature => unit.dimension == Dimension::Temperature,
-            Role::Load => unit.dimension == Dimension::Force && heading.suggests(LOAD),
+    }
+
+    /// Whether words say that a column is something else than `role`.
+    fn contradicts(&self, role: Role, column: usize) -> bool {
+        let heading = &self.headings[column];
+        match role {
+            Role::Input => {
+                heading.suggests(NEVER_DRIVEN) && !heading.suggests(&["drive", "input", "voltage", "command"])
+            }
+            // In a reference the wanted position is what is asked for.
+            Role::Output => self.wants_input && heading.suggests(NEVER_MEASURED),
+            _ => false,
         }
     }
 
@@ -289,18 +351,23 @@ impl Search<'_> {
             several.iter().copied().filter(|at| self.headings[*at].suggests(words) == is).collect::<Vec<_>>()
         };
         let by_word = with(words_of(role), true);
-        if by_word.len() == 1 {
-            return by_word;
-        }
         match role {
             // What was measured, not what was wanted.
             Role::Output => {
                 let measured = with(WANTED, false);
+                let by_word: Vec<usize> = by_word.into_iter().filter(|at| measured.contains(at)).collect();
+                if measured.len() != 1 && by_word.len() == 1 {
+                    return by_word;
+                }
                 let lengths =
                     |at: &usize| self.headings[*at].unit.is_some_and(|unit| unit.dimension == Dimension::Length);
                 if measured.len() == 1 { measured } else { measured.iter().copied().filter(lengths).collect() }
             }
-            Role::Input => with(SENSOR, false),
+            Role::Input => {
+                let driven = with(SENSOR, false);
+                let by_word: Vec<usize> = by_word.into_iter().filter(|at| driven.contains(at)).collect();
+                if by_word.len() == 1 { by_word } else { driven }
+            }
             _ => by_word,
         }
     }
@@ -319,7 +386,8 @@ impl Search<'_> {
     /// What is said of a column that is read by its heading, or in another unit.
     fn reading(&self, choice: &Choice) -> Option<String> {
         let name = self.name(choice.column);
-        if leaf(name) == choice.canonical {
+        let own_name = leaf(name) == choice.canonical;
+        if own_name && choice.unit.is_none() && !choice.canonical.contains("_in_") {
             return None;
         }
         let own = Unit::of_canonical(&choice.canonical);
@@ -343,6 +411,19 @@ impl Search<'_> {
     }
 
     fn not_there(&self, entry: &Entry) -> RecordError {
+        let same = |at: &usize| self.name(*at) == entry.column || leaf(self.name(*at)) == entry.column;
+        let numbers: Vec<String> =
+            self.columns().filter(same).take(MOST_LISTED).map(|at| (at + 1).to_string()).collect();
+        if let [first, _, ..] = numbers.as_slice() {
+            let problems = format!("{} is the name of the columns {}", quoted(&entry.column), numbers.join(", "));
+            let advice = format!("give the number, as --map {}={first}", entry.canonical);
+            return RecordError::Columns {
+                file: self.place(),
+                problems,
+                advice,
+                columns: self.file.heads.len() + self.file.texts.len(),
+            };
+        }
         let longer =
             self.columns().map(|at| self.name(at)).find(|name| name.starts_with(&format!("{} ", entry.column)));
         RecordError::MappedColumnMissing {
@@ -354,7 +435,7 @@ impl Search<'_> {
                 Some(whole) => {
                     format!(
                         "; a name with spaces needs quotes: --map {}",
-                        argument(&entry.canonical, entry.turned, whole)
+                        argument(&entry.canonical, entry.factor, whole)
                     )
                 }
                 None => String::new(),
@@ -371,7 +452,7 @@ impl Search<'_> {
             file: self.place(),
             problems: what,
             advice: "map another column, or convert the values".to_owned(),
-            columns: self.file.heads.len(),
+            columns: self.file.heads.len() + self.file.texts.len(),
         }
     }
 
@@ -384,24 +465,32 @@ impl Search<'_> {
         // A column with a unit would have been found.
         let is_free = |at: &usize| {
             self.headings[*at].unit.is_none()
+                && self.headings[*at].unknown.is_none()
                 && !taken.contains(at)
                 && !problems.open.iter().any(|(_, guess)| *guess == Some(*at))
         };
-        let mut free = self.columns().filter(is_free);
+        let mut free: Vec<usize> = self.columns().filter(is_free).collect();
+        // Of columns that say nothing of themselves, one whose path does, else the next.
+        let mut next = |role: Role| {
+            let says = |at: &usize| words(self.name(*at)).iter().any(|word| words_of(role).contains(&word.as_str()));
+            let place = free.iter().position(says).or((!free.is_empty()).then_some(0))?;
+            Some(free.remove(place))
+        };
         let mut open: Vec<(Role, Option<usize>)> = problems.open.clone();
         open.sort_by_key(|(role, _)| *role != Role::Time);
         let arguments = open.iter().map(|(role, guess)| {
-            let column = guess.or_else(|| free.next());
+            let known = |at: &usize| self.headings[*at].unknown.is_none();
+            let column = guess.filter(known).or_else(|| next(*role));
             let canonical =
                 column.and_then(|at| self.headings[at].unit).map_or(role.example(), |unit| unit.canonical(*role));
             // A unit of another dimension is no unit of the role.
             let canonical = if Role::of_column(canonical) == Some(*role) { canonical } else { role.example() };
             format!(
                 "--map {}",
-                column.map_or_else(|| format!("{canonical}=COLUMN"), |at| argument(canonical, false, self.name(at)))
+                column.map_or_else(|| format!("{canonical}=COLUMN"), |at| argument(canonical, None, self.name(at)))
             )
         });
-        let own = map.entries.iter().map(|e| format!("--map {}", argument(&e.canonical, e.turned, &e.column)));
+        let own = map.entries.iter().map(|e| format!("--map {}", argument(&e.canonical, e.factor, &e.column)));
         let line = own.chain(arguments).collect::<Vec<_>>().join(" ");
         let no_time = open.iter().any(|(role, guess)| *role == Role::Time && guess.is_none());
         let rate = if no_time { "; for a file without times give the rate with --rate" } else { "" };
@@ -409,8 +498,20 @@ impl Search<'_> {
             file: self.place(),
             problems: problems.list.join("; "),
             advice: format!("columns found: {}{rate}; if the columns and units are right: {line}", self.listed()),
-            columns: self.file.heads.len(),
+            columns: self.file.heads.len() + self.file.texts.len(),
         }
+    }
+}
+
+/// Whether values in a unit can have a role.
+fn has(role: Role, unit: Unit) -> bool {
+    match role {
+        Role::Segment => false,
+        Role::Time => unit.dimension == Dimension::Time,
+        Role::Input => unit.dimension == Dimension::Voltage,
+        Role::Output => matches!(unit.dimension, Dimension::Length | Dimension::Force),
+        Role::Temperature => unit.dimension == Dimension::Temperature,
+        Role::Load => unit.dimension == Dimension::Force,
     }
 }
 
@@ -422,8 +523,15 @@ fn quoted(name: &str) -> String {
 }
 
 /// A map as a shell takes it.
-fn argument(canonical: &str, turned: bool, column: &str) -> String {
-    let text = format!("{canonical}={}{column}", if turned { "-" } else { "" });
+fn argument(canonical: &str, factor: Option<f64>, column: &str) -> String {
+    let short: String = column.chars().take(4 * MOST_CHARACTERS).collect();
+    let column = short.as_str();
+    let factor = match factor {
+        Some(-1.0) => "-".to_owned(),
+        Some(factor) => format!("{factor}*"),
+        None => String::new(),
+    };
+    let text = format!("{canonical}={factor}{column}");
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-=/.,:@%+".contains(c);
     if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
@@ -447,6 +555,7 @@ const INPUT: &[&str] = &[
     "actuation",
     "hv",
     "piezo",
+    "amplifier",
 ];
 const OUTPUT: &[&str] = &[
     "displacement",
@@ -502,6 +611,16 @@ const SENSOR: &[&str] = &[
 /// Units of columns that may be absent, which are no units of them here.
 const UNKNOWN_UNITS: &[&str] = &["kg", "g", "lbf"];
 
+/// Words of a voltage that no amplifier puts out.
+const NEVER_DRIVEN: &[&str] = &["sensor", "gauge", "strain", "capacitive", "lvdt", "interferometer"];
+/// Words of a position that nobody measured.
+const NEVER_MEASURED: &[&str] = &["target", "commanded", "setpoint", "desired", "wanted", "soll"];
+
+/// What a column is that cannot have `role`.
+fn contrary(role: Role) -> &'static str {
+    if role == Role::Input { "a sensor" } else { "what was wanted, not what was measured" }
+}
+
 fn words_of(role: Role) -> &'static [&'static str] {
     match role {
         Role::Segment => &["segment", "segments"],
@@ -518,13 +637,21 @@ impl Unit {
     pub(crate) fn of_canonical(name: &str) -> Option<Self> {
         let is_own = matches!(Role::of_column(name)?, Role::Time | Role::Output | Role::Temperature | Role::Load)
             || name == "voltage_v";
-        is_own.then(|| name.rsplit_once('_')).flatten().and_then(|(_, unit)| Self::parse(unit))
+        match name.rsplit_once("_in_") {
+            Some((_, unit)) => Self::parse_suffix(unit),
+            None => is_own.then(|| name.rsplit_once('_')).flatten().and_then(|(_, unit)| Self::parse_suffix(unit)),
+        }
     }
 
     /// The column of the record format in which values of this unit are kept in `role`: without a conversion where the format has the unit.
     fn canonical(self, role: Role) -> &'static str {
         match (role, self.dimension) {
-            (Role::Time, _) => "time_s",
+            (Role::Time, _) => match self.symbol {
+                "ms" => TimeUnit::Millisecond,
+                "µs" => TimeUnit::Microsecond,
+                _ => TimeUnit::Second,
+            }
+            .column(),
             (Role::Load, _) => "load_n",
             (_, Dimension::Force) => OutputUnit::Newton.column(),
             (Role::Output, _) => match self.symbol {
@@ -546,7 +673,7 @@ mod tests {
 
     fn layout(names: &[&str], map: &[&str], need: Need) -> Result<Layout, String> {
         let heads: Vec<Head> = names.iter().map(|name| Head::new(*name)).collect();
-        let file = File { name: "x.csv", header: Some(Place::Line(1)), heads: &heads };
+        let file = File { name: "x.csv", header: Some(Place::Line(1)), heads: &heads, texts: &[] };
         Layout::resolve(&file, &ColumnMap::parse(map).unwrap(), need, None).map_err(|error| error.to_string())
     }
 

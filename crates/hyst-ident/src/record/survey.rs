@@ -36,6 +36,8 @@ pub struct Survey {
     pub format: String,
     /// Its columns, in their order.
     pub channels: Vec<Channel>,
+    /// Columns that hold text, with a cell of each.
+    pub texts: Vec<(String, String)>,
     /// The record, or why it is none yet.
     pub record: Result<Record, RecordError>,
 }
@@ -53,8 +55,8 @@ impl Survey {
         let file = path.display().to_string();
         if let Some(contents) = source::LargeText::open(path, &mut |_| {})? {
             let channels = channels(&contents)?;
-            let record = any(|need| of_contents(&file, &contents, how, need));
-            return Ok(Self { format: contents.format(), channels, record });
+            let record = any(how.rate.is_some(), |need| of_contents(&file, &contents, how, need));
+            return Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), record });
         }
         let bytes = std::fs::read(path).map_err(|source| RecordError::Io { file: file.clone(), source })?;
         Self::parse(&file, &bytes, how)
@@ -69,23 +71,25 @@ impl Survey {
             let log = RunLog::parse(name, bytes)?;
             let text = log.csv(name, false)?;
             let survey = Self::parse(name, text.as_bytes(), how)?;
-            let record = any(|need| Record::parse(name, bytes, how.clone(), need));
+            let record = any(how.rate.is_some(), |need| Record::parse(name, bytes, how.clone(), need));
             return Ok(Self { format: "MCAP log of a run".to_owned(), record, ..survey });
         }
         let unpacked = source::unpack(name, bytes)?;
         let contents = source::open(name, &unpacked)?;
         let channels = channels(contents.as_ref())?;
-        let record = any(|need| Ok(of_contents(name, contents.as_ref(), how, need)?.kept_as(bytes)));
-        Ok(Self { format: contents.format(), channels, record })
+        let record =
+            any(how.rate.is_some(), |need| Ok(of_contents(name, contents.as_ref(), how, need)?.kept_as(bytes)));
+        Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), record })
     }
 }
 
 /// A record with what a file has: input and output, or one of them if there is nothing else. If it is none, the reason is why it has
 /// not both.
-fn any(read: impl Fn(Need) -> Result<Record, RecordError>) -> Result<Record, RecordError> {
+fn any(rated: bool, read: impl Fn(Need) -> Result<Record, RecordError>) -> Result<Record, RecordError> {
     read(Need::InputAndOutput).or_else(|error| match error {
         RecordError::Columns { columns, .. } => {
-            let whole = |record: &Record| record.columns() == columns;
+            // A record at a stated rate may have no column of times.
+            let whole = |record: &Record| record.columns() == columns || rated && record.columns() == columns + 1;
             read(Need::Input).ok().filter(whole).or_else(|| read(Need::Output).ok().filter(whole)).ok_or(error)
         }
         error => Err(error),
@@ -104,14 +108,14 @@ impl Record {
     /// # Errors
     /// As those of [`read`](Self::read).
     pub fn read_any(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
-        any(|need| Self::read(path.as_ref(), how.clone(), need))
+        any(how.rate.is_some(), |need| Self::read(path.as_ref(), how.clone(), need))
     }
 }
 
 fn channels(contents: &dyn Contents) -> Result<Vec<Channel>, RecordError> {
     let heads = &contents.heads()[..contents.heads().len().min(MAX_CHANNELS)];
     let all: Vec<usize> = (0..heads.len()).collect();
-    let values = contents.values(&all)?;
+    let values = contents.values(source::Wanted::all(&all))?;
     let channel = |(head, values): (&source::Head, source::Values)| {
         let there: Vec<f64> = values.numbers.iter().copied().filter(|value| value.is_finite()).collect();
         let (low, high) = range(there.iter().copied());

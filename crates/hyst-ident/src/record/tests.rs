@@ -241,7 +241,7 @@ fn damaged_rows_are_refused_where_they_are() {
     refused(&with("0,0.1,1 V"), Need::Input, &["line 4", "\"voltage_v\"", "\"1 V\"", "1.25"]);
     refused(&with("0.5,0.1,1"), Need::Input, &["line 4", "\"segment\"", "0.5", "integer"]);
     refused(&with("1,0.1,1"), Need::Input, &["line 5", "\"segment\"", "segment 0 returns after segment 1"]);
-    refused(&with("0,-0.1,1"), Need::Input, &["line 4", "\"time_s\"", "-0.1 s follows 0.0 s", "sort"]);
+    refused(&with("0,-0.1,1"), Need::Input, &["line 4", "\"time_s\"", "-0.1 s follows 0.0 s", "another run"]);
 }
 
 #[test]

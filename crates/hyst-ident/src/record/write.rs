@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Write;
+use std::sync::Arc;
 
 use csv::ByteRecord;
 
-use super::Record;
 use super::grid::{self, Printed};
+use super::{OutputUnit, Record};
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -103,7 +104,7 @@ impl<'a> Extra<'a> {
 
 impl Record {
     /// Writes the columns that play a role, in the record format: times in seconds with the decimals that keep them
-    /// even to the last printed digit, other values with as many digits as it takes to read the same values again.
+    /// even to the last printed digit, other values with as many digits as it takes to read the same values again. A missing output is an empty cell.
     ///
     /// # Errors
     /// When `out` refuses, or the record was joined.
@@ -132,8 +133,11 @@ impl Record {
                     let _ = write!(text, "{label},");
                 }
                 let _ = write!(text, "{:.decimals$}", self.time[row]);
-                for (_, values) in &columns {
-                    let _ = write!(text, ",{}", values[row]);
+                for (name, values) in &columns {
+                    text.push(',');
+                    if !(self.is_missing(row) && OutputUnit::of_column(name).is_some()) {
+                        let _ = write!(text, "{}", values[row]);
+                    }
                 }
                 text.push('\n');
             }
@@ -152,7 +156,9 @@ impl Record {
     /// record was joined.
     pub fn write_with(&self, out: impl Write, extra: &[Extra<'_>]) -> Result<(), WriteError> {
         extra.iter().try_for_each(|column| column.check(self.rows()))?;
-        let text = match &self.text {
+        // As many rows, and a header.
+        let whole = |text: &&Arc<[u8]>| rows_of(text).byte_records().count() == self.rows() + 1;
+        let text = match self.text.as_ref().filter(whole) {
             Some(text) => Cow::Borrowed(&text[..]),
             None => {
                 let mut text = Vec::new();
@@ -187,6 +193,11 @@ impl Record {
         }
         writer.flush()?;
         Ok(())
+    }
+
+    /// Whether the output of a row is missing, and its value made up.
+    pub(super) fn is_missing(&self, row: usize) -> bool {
+        self.missing.get(row).copied().unwrap_or(false)
     }
 
     /// The fewest decimals with which the printed times lead back to this record's grid, but enough to show a

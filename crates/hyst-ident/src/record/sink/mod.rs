@@ -7,7 +7,7 @@ mod tdms;
 use std::borrow::Cow;
 use std::io::Write;
 
-use super::{Record, WriteError};
+use super::{OutputUnit, Record, WriteError};
 
 /// A format that a record is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ struct Column<'a> {
 }
 
 impl Record {
-    /// Writes the columns that play a role in a format. Values keep all their bits, but in CSV times are printed with the decimals that
+    /// Writes the columns that play a role in a format; a missing output is NaN. Values keep all their bits, but in CSV times are printed with the decimals that
     /// keep them even.
     ///
     /// # Errors
@@ -64,7 +64,10 @@ impl Record {
             FileKind::Csv => return self.write_csv(out),
             FileKind::Npy => npy::write(&self.role_columns(), &mut out)?,
             FileKind::Mat => mat::write(&self.role_columns(), &mut out)?,
-            FileKind::Tdms => tdms::write(&self.role_columns(), self.sample_period(), &mut out)?,
+            FileKind::Tdms => {
+                let even = (self.segments.len() == 1).then(|| self.sample_period());
+                tdms::write(&self.role_columns(), even, &mut out)?;
+            }
         }
         out.flush()?;
         Ok(())
@@ -88,7 +91,12 @@ impl Record {
             self.load.as_ref().map(|values| ("load_n", "N", values)),
         ];
         for (name, unit, values) in plain.into_iter().flatten() {
-            columns.push(Column { name, unit, values: Cow::Borrowed(values) });
+            let mut values: Cow<'_, [f64]> = Cow::Borrowed(values);
+            if OutputUnit::of_column(name).is_some() && self.missing.contains(&true) {
+                let of = |(row, value): (usize, &f64)| if self.is_missing(row) { f64::NAN } else { *value };
+                values = values.iter().enumerate().map(of).collect();
+            }
+            columns.push(Column { name, unit, values });
         }
         columns
     }

@@ -12,7 +12,7 @@ const VERSION: u32 = 4713;
 const DOUBLE: u32 = 10;
 const TEXT: u32 = 0x20;
 
-pub(super) fn write(columns: &[Column<'_>], period: f64, out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write(columns: &[Column<'_>], period: Option<f64>, out: &mut impl Write) -> io::Result<()> {
     let mut metadata = Vec::new();
     metadata.extend((columns.len() as u32 + 2).to_le_bytes());
     for group in ["/", "/'record'"] {
@@ -29,11 +29,13 @@ pub(super) fn write(columns: &[Column<'_>], period: f64, out: &mut impl Write) -
         metadata.extend(DOUBLE.to_le_bytes());
         metadata.extend(1_u32.to_le_bytes());
         metadata.extend((column.values.len() as u64).to_le_bytes());
-        metadata.extend(3_u32.to_le_bytes());
+        metadata.extend(if period.is_some() { 3_u32 } else { 1 }.to_le_bytes());
         text(&mut metadata, "unit_string");
         metadata.extend(TEXT.to_le_bytes());
         text(&mut metadata, column.unit);
-        for (name, value) in [("wf_start_offset", start.unwrap_or(0.0)), ("wf_increment", period)] {
+        // Rows with an interruption between them have no increment.
+        let even = period.map(|period| [("wf_start_offset", start.unwrap_or(0.0)), ("wf_increment", period)]);
+        for (name, value) in even.into_iter().flatten() {
             text(&mut metadata, name);
             metadata.extend(DOUBLE.to_le_bytes());
             metadata.extend(value.to_le_bytes());

@@ -77,6 +77,23 @@ impl Head {
     }
 }
 
+/// Columns to read, by number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted<'a> {
+    pub(crate) columns: &'a [usize],
+    /// Which of them is the time.
+    pub(crate) time: Option<usize>,
+    /// Which of them is the segment.
+    pub(crate) segment: Option<usize>,
+}
+
+impl<'a> Wanted<'a> {
+    /// These columns, whatever they are.
+    pub(crate) fn all(columns: &'a [usize]) -> Self {
+        Self { columns, time: None, segment: None }
+    }
+}
+
 /// The values of a column; NaN stands for a cell without a number.
 #[derive(Clone, Debug)]
 pub(crate) struct Values {
@@ -96,7 +113,22 @@ pub(crate) trait Contents {
     ///
     /// # Errors
     /// When a cell of them is no number, or the file ends early.
-    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError>;
+    fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError>;
+
+    /// Rows of the file that are averaged into one.
+    fn rows_per_row(&self) -> usize {
+        1
+    }
+
+    /// What reading the values has shown.
+    fn late_notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Columns of text, by name, with a cell of each.
+    fn texts(&self) -> &[(String, String)] {
+        &[]
+    }
 
     /// Where a reader finds a row.
     fn place(&self, row: usize) -> Place {

@@ -19,12 +19,18 @@ pub(super) struct Moment {
     /// Whole seconds since 1970, or since midnight where there is no date.
     whole: i64,
     fraction: f64,
+    /// Digits behind the point of the seconds.
+    pub(super) decimals: i32,
+    /// Whether it has a date.
+    dated: bool,
+    /// Whether it has a time of day.
+    pub(super) timed: bool,
 }
 
 impl Moment {
     /// Seconds since `start`.
     pub(super) fn since(self, start: i64) -> f64 {
-        (self.whole - start) as f64 + self.fraction
+        (self.whole - if self.dated { start } else { 0 }) as f64 + self.fraction
     }
 
     /// The midnight before, in seconds since 1970.
@@ -53,7 +59,7 @@ pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
         match byte {
             b'0'..=b'9' => {
                 mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
-                count += u32::from(mantissa != 0);
+                count += u32::from(count > 0 || *byte != b'0');
                 after += i32::from(pointed);
             }
             _ if *byte == decimal && !pointed => pointed = true,
@@ -105,7 +111,7 @@ pub(super) fn cell(cell: &[u8], decimal: u8) -> Cell {
 
 /// Words that stand for no value in files of instruments and spreadsheets.
 fn is_missing(cell: &[u8]) -> bool {
-    const WORDS: [&str; 17] = [
+    const WORDS: [&str; 23] = [
         "nan",
         "na",
         "n/a",
@@ -123,6 +129,12 @@ fn is_missing(cell: &[u8]) -> bool {
         "infinity",
         "-infinity",
         "---",
+        "ovld",
+        "ovl",
+        "ol",
+        "overload",
+        "overflow",
+        "over",
     ];
     cell.is_empty() || cell.len() <= 10 && WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
 }
@@ -130,22 +142,32 @@ fn is_missing(cell: &[u8]) -> bool {
 /// The moment of `2024-05-31T12:30:01.25`, with a blank for the T, a time zone, or the date left out.
 fn date_time(text: &str) -> Option<Moment> {
     let (days, clock) = match text.split_once(['T', ' ']) {
-        Some((date, clock)) => (days(date)?, clock.trim()),
-        None if text.contains(':') => (0, text),
-        None => return Some(Moment { whole: days(text)? * 86_400, fraction: 0.0 }),
+        Some((date, clock)) => (Some(days(date)?), clock.trim()),
+        None if text.contains(':') => (None, text),
+        None => {
+            return Some(Moment { whole: days(text)? * 86_400, fraction: 0.0, decimals: 0, dated: true, timed: false });
+        }
     };
     let (clock, offset) = zone(clock)?;
     let mut parts = clock.split(':');
     let (hour, minute) = (whole(parts.next()?, 0..=24)?, whole(parts.next()?, 0..=59)?);
     let second = parts.next().unwrap_or("0");
     // A decimal comma is as much ISO 8601 as a point is.
+    let pointed = second.contains(['.', ',']);
     let (second, fraction) = second.split_once(['.', ',']).unwrap_or((second, "0"));
     let second = whole(second, 0..=60)?;
     if parts.next().is_some() || fraction.is_empty() || !fraction.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let whole_seconds = days * 86_400 + hour * 3600 + minute * 60 + second - offset;
-    Some(Moment { whole: whole_seconds, fraction: format!("0.{fraction}").parse().ok()? })
+    let whole = days.unwrap_or(0) * 86_400 + hour * 3600 + minute * 60 + second - offset;
+    let decimals = if pointed { fraction.len() as i32 } else { 0 };
+    Some(Moment {
+        whole,
+        fraction: format!("0.{fraction}").parse().ok()?,
+        decimals,
+        dated: days.is_some(),
+        timed: true,
+    })
 }
 
 fn whole(text: &str, range: std::ops::RangeInclusive<i64>) -> Option<i64> {
@@ -153,10 +175,14 @@ fn whole(text: &str, range: std::ops::RangeInclusive<i64>) -> Option<i64> {
     plain.then(|| text.parse().ok()).flatten().filter(|value| range.contains(value))
 }
 
-/// Days since 1970-01-01 of `2024-05-31` or `2024/05/31` (Hinnant's algorithm, proleptic Gregorian calendar).
+/// Days since 1970-01-01 of `2024-05-31`, `2024/05/31` or `31.05.2024` (Hinnant's algorithm, proleptic Gregorian calendar).
 fn days(date: &str) -> Option<i64> {
-    let mut parts = date.split(['-', '/']);
-    let (y, m, d) = (parts.next()?, parts.next()?, parts.next()?);
+    let mut parts = date.split(['-', '/', '.']);
+    let (mut y, m, mut d) = (parts.next()?, parts.next()?, parts.next()?);
+    // 31.05.2024; with a slash it might as well be the month that comes first.
+    if date.contains('.') && d.len() == 4 {
+        std::mem::swap(&mut y, &mut d);
+    }
     if parts.next().is_some() || y.len() != 4 {
         return None;
     }
@@ -178,7 +204,7 @@ fn zone(clock: &str) -> Option<(&str, i64)> {
     let sign = if clock[at..].starts_with('-') { -1 } else { 1 };
     let (hours, minutes) = match clock[at + 1..].split_once(':') {
         Some((hours, minutes)) => (hours, minutes),
-        None if clock.len() - at == 5 => clock[at + 1..].split_at(2),
+        None if clock.len() - at == 5 => clock[at + 1..].split_at_checked(2)?,
         None => (&clock[at + 1..], "0"),
     };
     Some((&clock[..at], sign * (whole(hours, 0..=14)? * 3600 + whole(minutes, 0..=59)? * 60)))
@@ -213,6 +239,7 @@ mod tests {
             "0.1",
             "2.2250738585072014e-308",
             "9007199254740993",
+            "18446744073709551616",
         ] {
             assert_eq!(number(text.as_bytes(), b'.'), text.parse().ok(), "{text}");
         }
@@ -231,6 +258,7 @@ mod tests {
         assert_eq!(date_time("2024-02-29 12:00:00.250"), Some(1_709_208_000.25));
         assert_eq!(date_time("2024-02-29T13:00:00+01:00"), Some(1_709_208_000.0));
         assert_eq!(date_time("00:00:01.5"), Some(1.5));
+        assert_eq!(date_time("29.02.2024 12:00:00.250"), Some(1_709_208_000.25));
         for wrong in ["2024-13-01", "24-01-01", "12:61:00", "abc", "2024-01-01T", "1:2:3:4", "2024-01-01T00:00:00+99"] {
             assert_eq!(date_time(wrong), None, "{wrong}");
         }
@@ -243,6 +271,11 @@ mod tests {
             prop_assert_eq!(number(format!("{value:e}").as_bytes(), b'.'), Some(value));
             let short = format!("{:.decimals$}", value % 1e6);
             prop_assert_eq!(number(short.as_bytes(), b'.'), short.parse().ok());
+        }
+
+        #[test]
+        fn any_clock_is_some_cell(text in "[0-9:+aµ.T -]{1,24}") {
+            let _ = cell(text.as_bytes(), b'.');
         }
 
         #[test]

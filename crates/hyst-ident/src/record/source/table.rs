@@ -1,6 +1,6 @@
 //! Columns in memory, as most formats hold them.
 
-use super::{Contents, Head, Values};
+use super::{Contents, Head, Values, Wanted};
 use crate::record::error::RecordError;
 use crate::record::grid::Printed;
 
@@ -40,7 +40,7 @@ impl Contents for Table {
         &self.heads
     }
 
-    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError> {
+    fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError> {
         let of = |at: &usize| {
             let numbers = self.values[*at].clone();
             // Numbers of 32 bits have seven digits.
@@ -49,7 +49,7 @@ impl Contents for Table {
             let printed = if single { Printed { digits: 7, ..Printed::EXACT } } else { Printed::EXACT };
             Values { numbers, printed }
         };
-        Ok(wanted.iter().map(of).collect())
+        Ok(wanted.columns.iter().map(of).collect())
     }
 
     fn notes(&self) -> &[String] {

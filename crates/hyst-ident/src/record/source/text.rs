@@ -11,7 +11,7 @@ mod stream;
 use std::borrow::Cow;
 
 use super::numbers::number;
-use super::{Axis, Contents, Head, Values};
+use super::{Axis, Contents, Head, Values, Wanted};
 use crate::record::error::{Place, RecordError};
 pub(crate) use stream::LargeText;
 
@@ -23,6 +23,7 @@ pub(crate) struct Text<'a> {
     text: Cow<'a, str>,
     dialect: Dialect,
     heads: Vec<Head>,
+    texts: Vec<(String, String)>,
     notes: Vec<String>,
 }
 
@@ -36,9 +37,9 @@ impl<'a> Text<'a> {
             return Err(empty());
         }
         let dialect = Dialect::find(&text).ok_or_else(|| no_numbers(file, &text))?;
-        let heads = dialect.heads(&text);
+        let (heads, texts) = (dialect.heads(&text), dialect.texts(&text));
         notes.extend(dialect.note());
-        Ok(Self { file: file.to_owned(), text, dialect, heads, notes })
+        Ok(Self { file: file.to_owned(), text, dialect, heads, texts, notes })
     }
 }
 
@@ -61,8 +62,12 @@ impl Contents for Text<'_> {
         &self.heads
     }
 
-    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError> {
-        let cells: Vec<usize> = wanted.iter().map(|at| self.dialect.field_of(*at)).collect();
+    fn texts(&self) -> &[(String, String)] {
+        &self.texts
+    }
+
+    fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError> {
+        let cells: Vec<usize> = wanted.columns.iter().map(|at| self.dialect.field_of(*at)).collect();
         rows::read(&self.text, &self.dialect, &cells).map_err(|fault| {
             let head =
                 |field: usize| self.dialect.column_of(field).map_or(String::new(), |at| self.heads[at].name.clone());
@@ -80,7 +85,7 @@ impl Contents for Text<'_> {
 
     fn plain_text(&self) -> Option<&str> {
         let remarks = || lines(&self.text, 0).any(|(_, line)| remark(line).is_some());
-        (self.dialect.is_plain() && self.notes.is_empty() && !remarks()).then_some(&*self.text)
+        (self.dialect.is_plain(&self.text) && self.notes.is_empty() && !remarks()).then_some(&*self.text)
     }
 
     fn notes(&self) -> &[String] {
@@ -106,9 +111,17 @@ fn period_of_remark(line: &str) -> Option<f64> {
     let rate = ["sample rate", "sample_rate", "samplerate", "sampling rate", "sampling frequency"];
     let behind = |keys: &[&str]| {
         let key = keys.iter().find(|key| lower.starts_with(**key))?;
-        let rest = lower[key.len()..].trim_start_matches(|c: char| !(c.is_ascii_digit() || c == '.'));
+        // The number comes next, or behind a unit in brackets: "rate of card 2: 5000" says something else.
+        let rest = lower[key.len()..].trim_start();
+        let rest =
+            rest.strip_prefix(['(', '[']).and_then(|rest| rest.split_once([')', ']'])).map_or(rest, |(_, rest)| rest);
+        let rest = rest.trim_start_matches([' ', '\t', ':', '=', ',', ';', '"']);
         let end =
             rest.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '+'))).unwrap_or(rest.len());
+        // "44,100" and "2,5" are other numbers than they begin with.
+        if rest[end..].strip_prefix(',').is_some_and(|more| more.starts_with(|c: char| c.is_ascii_digit())) {
+            return None;
+        }
         let value = number(&rest.as_bytes()[..end], b'.').filter(|value| *value > 0.0 && value.is_finite())?;
         Some((value, rest[end..].trim_matches(|c: char| !c.is_alphabetic()).to_owned()))
     };
@@ -177,7 +190,7 @@ mod tests {
     fn table(bytes: &[u8]) -> (Vec<String>, Vec<Vec<f64>>) {
         let text = Text::open("x.csv", bytes).unwrap();
         let all: Vec<usize> = (0..text.heads.len()).collect();
-        let values = text.values(&all).unwrap_or_else(|error| panic!("{error}"));
+        let values = text.values(Wanted::all(&all)).unwrap_or_else(|error| panic!("{error}"));
         (text.heads.iter().map(|head| head.name.clone()).collect(), values.into_iter().map(|v| v.numbers).collect())
     }
 
@@ -227,9 +240,10 @@ mod tests {
         let (_, values) = table(b"a,b\n0,NaN\n1,\n2,5\n3,inf\n");
         assert!(values[1][0].is_nan() && values[1][1].is_nan() && values[1][2] == 5.0 && values[1][3].is_nan());
         let text = Text::open("x.csv", b"a,b\n0,1\n1,2\n2,x y\n3,4\n").unwrap();
-        let message = text.values(&[1]).unwrap_err().to_string();
+        let message = text.values(Wanted::all(&[1])).unwrap_err().to_string();
         assert!(message.contains("x.csv, line 4, column \"b\"") && message.contains("\"x y\""), "{message}");
-        let message = Text::open("x.csv", b"a,b\n0,1\n1,2\n2\n3,4\n").unwrap().values(&[0]).unwrap_err().to_string();
+        let message =
+            Text::open("x.csv", b"a,b\n0,1\n1,2\n2\n3,4\n").unwrap().values(Wanted::all(&[0])).unwrap_err().to_string();
         assert!(message.contains("line 4") && message.contains("1 field"), "{message}");
     }
 }

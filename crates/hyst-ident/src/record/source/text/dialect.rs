@@ -37,8 +37,10 @@ pub(super) struct Dialect {
     units: Option<usize>,
     /// Fields that are columns.
     columns: Vec<usize>,
-    /// Those of them that hold dates and times.
+    /// Those of them that hold dates or times of day.
     dates: Vec<usize>,
+    /// Those of them that hold times of day: a date alone is no clock.
+    clocks: Vec<usize>,
 }
 
 /// A line, and the byte at which it begins.
@@ -106,6 +108,7 @@ impl Dialect {
         let trailing = usize::from(names.last().is_some_and(|name| name.is_empty()));
         let columns = (0..names.len() - trailing).collect();
         let dates = (0..cells.len()).filter(|field| matches!(cells[*field], Cell::Time(_))).collect();
+        let clocks = (0..cells.len()).filter(|field| is_clock(&cells[*field])).collect();
         Some(Self {
             delimiter,
             decimal: b'.',
@@ -115,6 +118,7 @@ impl Dialect {
             units: None,
             columns,
             dates,
+            clocks,
         })
     }
 
@@ -143,8 +147,8 @@ impl Dialect {
         };
         let alike: Vec<usize> = (0..cells.len()).filter(|k| like_row(*k)).collect();
         // Fields that hold numbers in most rows, and so in the first: remarks begin with a word.
-        let texts = |field: &usize| alike.iter().filter(|k| cells[**k][*field] == Cell::Other).count();
-        let usual: Vec<usize> = (0..count).filter(|field| 2 * texts(field) < alike.len()).collect();
+        let numbers = |field: &usize| alike.iter().filter(|k| is_number(&cells[**k][*field])).count();
+        let usual: Vec<usize> = (0..count).filter(|field| 2 * numbers(field) >= alike.len()).collect();
         let is_row = |k: usize| like_row(k) && usual.iter().all(|field| cells[k][*field] != Cell::Other);
         // A line of remarks may look like a row, but two in sequence are rows.
         let begins = |k: &usize| is_row(*k) && (alike.len() < 3 || *k + 1 == cells.len() || is_row(*k + 1));
@@ -162,7 +166,9 @@ impl Dialect {
         let start = sample[first].0;
         let is_date = |field: &usize| matches!(cells[first][*field], Cell::Time(_));
         let dates = columns.iter().copied().filter(is_date).collect();
-        let mut dialect = Self { delimiter, decimal, fields: count, start, names: None, units: None, columns, dates };
+        let clocks = columns.iter().copied().filter(|field| is_clock(&cells[first][*field])).collect();
+        let mut dialect =
+            Self { delimiter, decimal, fields: count, start, names: None, units: None, columns, dates, clocks };
         dialect.find_names(&sample[..first]);
         Some((score, dialect))
     }
@@ -216,7 +222,7 @@ impl Dialect {
             let unit = units.as_ref().and_then(|units| unit_in(units[*field]));
             let name = name.map_or_else(|| (field + 1).to_string(), str::to_owned);
             // Dates are read as seconds.
-            let unit = unit.or_else(|| self.dates.contains(field).then_some("s"));
+            let unit = unit.or_else(|| self.clocks.contains(field).then_some("s"));
             Head { unit: unit.map(str::to_owned), axis, ..Head::new(name) }
         };
         let mut heads: Vec<Head> = self.columns.iter().map(head).collect();
@@ -236,6 +242,18 @@ impl Dialect {
             }
         }
         heads
+    }
+
+    /// Named fields that hold text in the first row, with that.
+    pub(super) fn texts(&self, text: &str) -> Vec<(String, String)> {
+        let line = |at: usize| lines(text, at).next().map(|(_, line)| line);
+        let names = self.names.and_then(line).and_then(|line| self.titles(line)).unwrap_or_default();
+        let row = line(self.start).map(|line| fields(line, self.delimiter)).unwrap_or_default();
+        let is_text = |field: &usize| {
+            let filled = row.get(*field).is_some_and(|cell| !cell.is_empty());
+            filled && !names[*field].is_empty() && !self.columns.contains(field)
+        };
+        (0..names.len()).filter(is_text).map(|field| (names[field].to_owned(), row[field].to_owned())).collect()
     }
 
     /// The same, of a text whose rows begin at this byte.
@@ -269,8 +287,14 @@ impl Dialect {
         self.names.map(|at| super::rows::line_at(text, at))
     }
 
-    /// Whether the table is written as the record format is.
-    pub(super) fn is_plain(&self) -> bool {
+    /// Whether the table is written as the record format is: nothing but a header and rows.
+    pub(super) fn is_plain(&self, text: &str) -> bool {
+        let header_first = self.names.is_some() && self.names == lines(text, 0).next().map(|(at, _)| at);
+        let blanks = || text.lines().any(|line| !line.is_empty() && line.trim().is_empty());
+        header_first && self.is_comma() && !blanks()
+    }
+
+    fn is_comma(&self) -> bool {
         let comma = self.delimiter == Delimiter::One(b',') && self.decimal == b'.';
         comma && self.names.is_some() && self.units.is_none() && self.columns.len() == self.fields
     }
@@ -291,6 +315,10 @@ impl Dialect {
         let decimal = if self.decimal == b',' { " and a decimal comma" } else { "" };
         format!("{between} between columns{decimal}")
     }
+}
+
+fn is_clock(cell: &Cell) -> bool {
+    matches!(cell, Cell::Time(moment) if moment.timed)
 }
 
 fn is_number(cell: &Cell) -> bool {

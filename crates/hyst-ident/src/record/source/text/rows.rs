@@ -65,7 +65,9 @@ pub(super) fn read(text: &str, dialect: &Dialect, wanted: &[usize]) -> Result<Ve
 /// The same, with dates counted from `midnight` \[s\].
 pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[usize]) -> Result<Vec<Values>, Fault> {
     let read = |piece| piece_of(text, piece, dialect, midnight, wanted);
-    let pieces: Vec<Vec<Values>> = pieces(text, dialect.start).into_par_iter().map(read).collect::<Result<_, _>>()?;
+    // Of several faults the first in the text counts, whichever thread finds one first.
+    let pieces: Vec<Result<Vec<Values>, Fault>> = pieces(text, dialect.start).into_par_iter().map(read).collect();
+    let pieces: Vec<Vec<Values>> = pieces.into_iter().collect::<Result<_, _>>()?;
     let rows: usize = pieces.iter().map(|piece| piece.first().map_or(0, |column| column.numbers.len())).sum();
     let mut all: Vec<Values> = wanted.iter().map(|_| with_room(rows)).collect();
     for piece in pieces {
@@ -150,9 +152,16 @@ impl Rows<'_> {
         for field in fields {
             let text = field.as_bytes().trim_ascii();
             if let Some(goals) = self.goals.get(found).filter(|goals| !goals.is_empty()) {
-                let value = match cell(text, self.dialect.decimal) {
+                let cell = cell(text, self.dialect.decimal);
+                let is_moment = matches!(cell, Cell::Time(_));
+                let value = match cell {
                     Cell::Number(value) => value,
-                    Cell::Time(moment) => moment.since(self.midnight),
+                    Cell::Time(moment) => {
+                        // Seconds of a day have five digits before the point.
+                        let printed = Printed { decimals: moment.decimals, digits: 5 + moment.decimals };
+                        goals.iter().for_each(|goal| self.columns[*goal].printed.join(printed));
+                        moment.since(self.midnight)
+                    }
                     Cell::Missing => f64::NAN,
                     Cell::Other if open_quote => break,
                     Cell::Other => {
@@ -167,7 +176,7 @@ impl Rows<'_> {
                     let column = &mut self.columns[*goal];
                     column.numbers.push(value);
                     // The digits of times matter, and those come first.
-                    if *goal == 0 {
+                    if *goal == 0 && !is_moment {
                         take_digits(&mut column.printed, text, self.dialect.decimal);
                     }
                 }

@@ -1,11 +1,11 @@
 //! Tables of text that are too large to hold: read block by block, several rows averaged into one.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::super::{Contents, Head, Values};
+use super::super::{Contents, Head, Values, Wanted};
 use super::dialect::Dialect;
 use super::rows;
 use super::{Text, encoding};
@@ -37,6 +37,8 @@ pub(crate) struct LargeText<'a> {
     /// Rows of the file that become one.
     factor: usize,
     watch: RefCell<Watch<'a>>,
+    /// Rows that filled no mean.
+    dropped: Cell<u64>,
 }
 
 impl<'a> LargeText<'a> {
@@ -77,7 +79,8 @@ impl<'a> LargeText<'a> {
         let dialect = dialect.starting_at(dialect.start + mark);
         let watch = RefCell::new(watch);
         drop(text);
-        Ok(Some(Self { file, path: path.to_owned(), bytes, dialect, heads, notes, factor, watch }))
+        let dropped = Cell::new(0);
+        Ok(Some(Self { file, path: path.to_owned(), bytes, dialect, heads, notes, factor, watch, dropped }))
     }
 
     /// Reads the blocks; `take` gets the columns of each.
@@ -104,10 +107,14 @@ impl<'a> LargeText<'a> {
             let whole =
                 if ended { block.len() } else { block.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1) };
             if whole == 0 {
-                if ended || block.len() >= BLOCK_BYTES {
+                if ended {
                     break;
                 }
-                continue;
+                if block.len() < BLOCK_BYTES {
+                    continue;
+                }
+                let what = format!("line {line} has no end within 32 MB; write a row on each line");
+                return Err(RecordError::Damaged { file: self.file.clone(), format: "table of text", what });
             }
             let (text, _) = encoding::decode(&self.file, &block[..whole])?;
             let columns = rows::read_from(&text, &dialect, midnight, fields).map_err(|fault| {
@@ -144,10 +151,9 @@ impl Contents for LargeText<'_> {
         &self.heads
     }
 
-    fn values(&self, wanted: &[usize]) -> Result<Vec<Values>, RecordError> {
-        let fields: Vec<usize> = wanted.iter().map(|at| self.dialect.field_of(*at)).collect();
-        let labels = wanted.iter().position(|at| self.heads[*at].name.eq_ignore_ascii_case("segment"));
-        let mut means = Means::new(wanted.len(), self.factor, labels);
+    fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError> {
+        let fields: Vec<usize> = wanted.columns.iter().map(|at| self.dialect.field_of(*at)).collect();
+        let mut means = Means::new(wanted, self.factor);
         let mut printed = Printed::default();
         self.blocks(&fields, |columns| {
             if let Some(first) = columns.first() {
@@ -155,13 +161,23 @@ impl Contents for LargeText<'_> {
             }
             means.take(&columns);
         })?;
-        let printed = if self.factor > 1 { Printed::EXACT } else { printed };
+        self.dropped.set(means.dropped());
         Ok(means.finish().into_iter().map(|numbers| Values { numbers, printed }).collect())
     }
 
+    fn rows_per_row(&self) -> usize {
+        self.factor
+    }
+
+    fn late_notes(&self) -> Vec<String> {
+        let dropped = self.dropped.get();
+        let note = format!("{dropped} rows before breaks do not fill a mean: left out");
+        (dropped > 0).then_some(note).into_iter().collect()
+    }
+
     fn place(&self, row: usize) -> Place {
-        // Where rows are averaged, about.
-        Place::Line((row * self.factor) as u64 + 2)
+        // Where rows are averaged, the first of them.
+        Place::Row(row * self.factor)
     }
 
     fn notes(&self) -> &[String] {
@@ -172,19 +188,43 @@ impl Contents for LargeText<'_> {
 /// Means of some rows each, not across a change of segment or an interruption.
 struct Means {
     factor: usize,
-    /// Which column is the segment.
+    /// Which columns are time and segment.
+    time: Option<usize>,
     labels: Option<usize>,
+    /// Step in time beyond which there is an interruption.
+    longest: Option<f64>,
     /// Sum and number of the values of each column.
     sums: Vec<(f64, usize)>,
     rows: usize,
-    /// First column and label of the row before, and the step to it.
-    before: Option<(f64, f64, f64)>,
+    /// Time and label of the row before.
+    before: Option<(f64, f64)>,
     means: Vec<Vec<f64>>,
+    /// Rows that filled no mean.
+    dropped: u64,
 }
 
 impl Means {
-    fn new(columns: usize, factor: usize, labels: Option<usize>) -> Self {
-        Self { factor, labels, sums: vec![(0.0, 0); columns], rows: 0, before: None, means: vec![Vec::new(); columns] }
+    fn new(wanted: Wanted<'_>, factor: usize) -> Self {
+        let columns = wanted.columns.len();
+        Self {
+            factor,
+            time: wanted.time,
+            labels: wanted.segment,
+            longest: None,
+            sums: vec![(0.0, 0); columns],
+            rows: 0,
+            before: None,
+            means: vec![Vec::new(); columns],
+            dropped: 0,
+        }
+    }
+
+    /// The step of the first rows beyond which there is an interruption: the median of those that are not zero, as times may be printed coarsely.
+    fn longest_step(time: &[f64]) -> f64 {
+        let mut steps: Vec<f64> =
+            time.windows(2).take(10_000).map(|t| t[1] - t[0]).filter(|step| *step > 0.0).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        steps.get(steps.len() / 2).map_or(f64::INFINITY, |usual| MIN_GAP * usual)
     }
 
     fn take(&mut self, columns: &[Values]) {
@@ -193,12 +233,14 @@ impl Means {
             return;
         }
         let rows = columns.first().map_or(0, |column| column.numbers.len());
+        let times = self.time.map(|at| columns[at].numbers.as_slice());
+        let longest = *self.longest.get_or_insert_with(|| times.map_or(f64::INFINITY, Self::longest_step));
         for row in 0..rows {
-            let first = columns[0].numbers[row];
+            let time = self.time.map_or(0.0, |at| columns[at].numbers[row]);
             let label = self.labels.map_or(0.0, |at| columns[at].numbers[row]);
-            let step = self.before.map_or(f64::NAN, |(before, ..)| first - before);
-            let breaks = self.before.is_some_and(|(_, other, usual)| label != other || step > MIN_GAP * usual);
+            let breaks = self.before.is_some_and(|(before, other)| label != other || time - before > longest);
             if breaks {
+                self.dropped += self.rows as u64;
                 // The rest of a block would be off the even grid.
                 self.clear();
             }
@@ -216,13 +258,18 @@ impl Means {
                 }
                 self.clear();
             }
-            self.before = Some((first, label, if breaks { f64::NAN } else { step }));
+            self.before = Some((time, label));
         }
     }
 
     fn clear(&mut self) {
         self.sums.fill((0.0, 0));
         self.rows = 0;
+    }
+
+    /// Rows that filled no mean, the last ones included.
+    fn dropped(&self) -> u64 {
+        self.dropped + self.rows as u64
     }
 
     fn finish(self) -> Vec<Vec<f64>> {
@@ -240,11 +287,12 @@ mod tests {
         let time: Vec<f64> = (0..10).map(f64::from).chain((0..7).map(|k| f64::from(k) + 100.0)).collect();
         let label: Vec<f64> = (0..17).map(|k| if k < 13 { 0.0 } else { 1.0 }).collect();
         let value: Vec<f64> = (0..17).map(|k| if k == 1 { f64::NAN } else { f64::from(k) }).collect();
-        let mut means = Means::new(3, 3, Some(1));
+        let mut means = Means::new(Wanted { columns: &[0, 1, 2], time: Some(0), segment: Some(1) }, 3);
         let all = [time, label, value].map(column);
         // In two blocks, as if the file were cut there.
         means.take(&all.clone().map(|c| column(c.numbers[..5].to_vec())));
         means.take(&all.map(|c| column(c.numbers[5..].to_vec())));
+        assert_eq!(means.dropped(), 2);
         assert_eq!(
             means.finish(),
             [vec![1.0, 4.0, 7.0, 101.0, 104.0], vec![0.0, 0.0, 0.0, 0.0, 1.0], vec![1.0, 4.0, 7.0, 11.0, 14.0]]

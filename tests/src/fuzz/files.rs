@@ -1,0 +1,82 @@
+//! Files of other programs, damaged: each is a record or an error, and takes no more than its size justifies.
+
+use hyst_ident::record::{Need, Reading, Record, Survey};
+
+use super::luck::Luck;
+
+/// Reads one of some sound files after chance has been at it.
+fn damaged(luck: &mut Luck, sound: &[&[u8]]) {
+    let mut bytes = luck.of(sound).to_vec();
+    luck.damage(&mut bytes);
+    let need = *luck.of(&[Need::InputAndOutput, Need::Input, Need::Output]);
+    match Record::parse("a.bin", &bytes, Reading::default(), need) {
+        Ok(record) => {
+            assert!(record.time().iter().chain(record.input()).all(|value| value.is_finite()));
+            assert!(record.sample_period() > 0.0);
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.starts_with("a.bin") && message.len() < 4000, "{message}");
+        }
+    }
+    let _ = Survey::parse("a.bin", &bytes, &Reading::default());
+}
+
+pub(super) fn tables(luck: &mut Luck) {
+    const EUROPEAN: &[u8] = b"\"Zeit (s)\";\"Spannung [V]\";\"Weg \xb5m\"\r\n0,000;1,5;0,3\r\n0,001;2,5;;\r\n0,003;3,5;0,7\r\n0,004;4,5;0,9\r\n";
+    const SCOPE: &[u8] =
+        b"Model,X\nSample Interval,0.001,s\nTIME,CH1,CH2\n(s),(V),(um)\n\n0.0,1,2\n0.001,2,NaN\n0.002,3,4\n";
+    const DATES: &[u8] =
+        b"# made\ntime voltage_v displacement_um\n2024-05-31T12:00:00.000 1 2\n2024-05-31T12:00:00.001 2 3\n";
+    damaged(luck, &[EUROPEAN, SCOPE, DATES]);
+}
+
+pub(super) fn matlab(luck: &mut Luck) {
+    const V4: &[u8] = include_bytes!("../../seeds/v4.mat");
+    const V5: &[u8] = include_bytes!("../../seeds/v5.mat");
+    const V7: &[u8] = include_bytes!("../../seeds/v7.mat");
+    damaged(luck, &[V4, V5, V7]);
+}
+
+pub(super) fn hdf5(luck: &mut Luck) {
+    const PLAIN: &[u8] = include_bytes!("../../seeds/plain.h5");
+    const LATEST: &[u8] = include_bytes!("../../seeds/latest.h5");
+    const MATLAB: &[u8] = include_bytes!("../../seeds/matlab73.mat");
+    damaged(luck, &[PLAIN, LATEST, MATLAB]);
+}
+
+pub(super) fn labview(luck: &mut Luck) {
+    const TDMS: &[u8] = include_bytes!("../../seeds/plain.tdms");
+    const LVM: &[u8] = b"LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\t\n\t\nChannels\t2\t\nSamples\t3\t3\t\nY_Unit_Label\tV\tum\t\nX0\t0.0\t0.0\t\nDelta_X\t0.001\t0.001\t\n***End_of_Header***\t\t\t\nX_Value\tvoltage_v\tdisplacement_um\tComment\n0.000\t1.0\t2.0\t\n0.001\t2.0\t3.0\t\n0.002\t3.0\t4.0\t\n";
+    damaged(luck, &[TDMS, LVM]);
+}
+
+pub(super) fn numpy(luck: &mut Luck) {
+    const FIELDS: &[u8] = include_bytes!("../../seeds/fields.npy");
+    const ARCHIVE: &[u8] = include_bytes!("../../seeds/plain.npz");
+    damaged(luck, &[FIELDS, ARCHIVE]);
+}
+
+pub(super) fn parquet(luck: &mut Luck) {
+    const SNAPPY: &[u8] = include_bytes!("../../seeds/snappy.parquet");
+    const NULLS: &[u8] = include_bytes!("../../seeds/nulls.parquet");
+    damaged(luck, &[SNAPPY, NULLS]);
+}
+
+pub(super) fn arrow(luck: &mut Luck) {
+    const FEATHER: &[u8] = include_bytes!("../../seeds/lz4.feather");
+    const STREAM: &[u8] = include_bytes!("../../seeds/stream.arrow");
+    damaged(luck, &[FEATHER, STREAM]);
+}
+
+pub(super) fn excel(luck: &mut Luck) {
+    const PLAIN: &[u8] = include_bytes!("../../seeds/plain.xlsx");
+    damaged(luck, &[PLAIN]);
+}
+
+pub(super) fn messages(luck: &mut Luck) {
+    const JSON: &[u8] = include_bytes!("../../seeds/json.mcap");
+    const ROS2: &[u8] = include_bytes!("../../seeds/ros2.mcap");
+    const PROTOBUF: &[u8] = include_bytes!("../../seeds/protobuf.mcap");
+    damaged(luck, &[JSON, ROS2, PROTOBUF]);
+}
