@@ -93,12 +93,14 @@ def compare_resampled(entry: Entry, table: Table, truth: Table, limit: dict[str,
     def at(name: str, shift: float) -> np.ndarray:
         return np.interp(times + shift, truth["time_s"], truth[name])
 
+    kept = ~np.isin(np.arange(len(times)), entry.get("free_rows", []))
+    times = times[kept]
     shifts = np.linspace(-tolerance, tolerance, GRID_SHIFTS)
-    best = min(shifts, key=lambda shift: np.abs(table["voltage_v"] - at("voltage_v", shift)).max())
+    best = min(shifts, key=lambda shift: np.abs(table["voltage_v"][kept] - at("voltage_v", shift)).max())
     problems = []
     for name in truth:
         if name != "time_s":
-            problems += differences(name, table[name], at(name, best), limit[name], truth[name])
+            problems += differences(name, table[name][kept], at(name, best), limit[name], truth[name])
     return problems
 
 
