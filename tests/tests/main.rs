@@ -1,8 +1,8 @@
-//! All cross-crate tests, in one program: it links once, and its tests share the cores.
+//! All cross-crate tests, in one program: it links once, and its tests share the cores. Those that
+//! other checks run by themselves are programs of their own.
 
 mod block_format;
 mod bouc_wen_benchmark;
-mod cli_can;
 mod cli_close_loop;
 mod cli_compare;
 mod cli_compensate;
@@ -36,5 +36,4 @@ mod other_laws;
 mod readme;
 mod records_of_others;
 mod report;
-mod servo;
 mod studies;

@@ -126,7 +126,7 @@ pub(crate) fn refuse_still(record: &Record) -> CommandResult {
     {
         if still(x) {
             let message = format!(
-                "{}, column \"{column}\": it is {} throughout; nothing can be learned of what never moves: choose another column with --map",
+                "{}, column \"{column}\": the value is {} in every row. A record needs an input and an output that move; choose another column with --map",
                 record.name(),
                 text::short(x[0])
             );
@@ -156,7 +156,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     let measured = record.output().filter(|_| !record.input().is_empty());
     for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
         odd.push(format!(
-            "the sensor stands at the end of its range, {} {unit}, in {} (the first at {} s); they are left out: lower the drive or widen the range",
+            "the sensor is at the end of its range, {} {unit}, in {} (the first at {} s). These rows are not fitted. Lower the drive or widen the range",
             text::short(end.at),
             text::count(end.rows, "row"),
             text::short(record.time()[end.first])
@@ -165,7 +165,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     let spikes = spikes_of(record);
     if let Some(largest) = spikes.first() {
         odd.push(format!(
-            "{} of the output left out; the largest, in row {} at {} s, is {} spans away from the rows beside it",
+            "{} of the output left out; the largest, in row {} at {} s, is {} spans from its neighbours",
             text::count(spikes.len(), "spike"),
             largest.row + 1,
             text::short(record.time()[largest.row]),

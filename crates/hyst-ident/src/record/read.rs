@@ -175,6 +175,7 @@ pub(super) fn of_contents(
     }
     let done = repair(&mut samples, &mut printed, need == Need::Output, &origin)?;
     let place = place_of(&done, &place);
+    finite(&samples, &place)?;
     let mut record = Record::assemble(samples, printed, &Origin { place: &place, ..origin })?;
     record.missing.clone_from(&done.missing);
     record.notes = contents
@@ -291,6 +292,26 @@ fn convert(choice: &Choice, values: &mut [f64]) {
     if let Some(factor) = choice.factor {
         values.iter_mut().for_each(|value| *value *= factor);
     }
+}
+
+/// Numbers near the largest that there are can overflow on the way.
+fn finite(samples: &Columns, place: &dyn Fn(usize) -> Place) -> Result<(), RecordError> {
+    let Columns { name, time, input_column, input, output, temperature, load, .. } = samples;
+    let columns = [
+        ("time_s", Some(time)),
+        (input_column.as_str(), input.as_ref()),
+        (output.as_ref().map_or("", |(unit, _)| unit.column()), output.as_ref().map(|(_, y)| y)),
+        ("temperature_degc", temperature.as_ref()),
+        ("load_n", load.as_ref()),
+    ];
+    for (column, values) in columns.into_iter().filter_map(|(column, values)| Some((column, values?))) {
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let value = format!("{}, as its neighbours are too large", values[row]);
+            let (file, column) = (name.clone(), column.to_owned());
+            return Err(RecordError::NotFinite { file, place: place(row), column, value });
+        }
+    }
+    Ok(())
 }
 
 /// Labels of segments.

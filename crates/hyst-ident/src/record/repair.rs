@@ -243,7 +243,7 @@ fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let repeats = |row: usize| row > 0 && samples.time[row] == samples.time[row - 1] && label(row) == label(row - 1);
     let repeated: Vec<bool> = (0..rows).map(repeats).collect();
     let count = repeated.iter().filter(|repeated| **repeated).count();
-    // Of times that are printed too coarsely many rows share each: these are told apart by nobody.
+    // Where times are printed too coarsely, many rows share each: these are different samples.
     let values: Vec<Vec<f64>> = channels(samples).map(|values| values.clone()).collect();
     let differs = |row: usize| values.iter().any(|v| v[row].to_bits() != v[row - 1].to_bits());
     let differing = (1..rows).filter(|row| repeated[*row] && differs(*row)).count();

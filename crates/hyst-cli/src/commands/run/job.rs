@@ -283,6 +283,12 @@ impl Job {
                 let rate_hz = args.map.rate.unwrap_or(usual);
                 shape.record(reference, recording::unit(device.output), rate_hz)?
             }
+            // At another rate than its own a reference would move the actuator faster or slower than its file says.
+            None if args.map.rate.is_some() => {
+                return Err(CommandError::bad_input(
+                    "--rate is for a reference as sine:LOW,HIGH,HZ,SECONDS; a file needs times of its own",
+                ));
+            }
             None => input::record(reference, &args.map, Need::Output)?,
         };
         if args.pid.is_some() && !args.control.closes() {
@@ -463,6 +469,11 @@ impl Job {
         if args.settle.is_some() {
             return Err(CommandError::bad_input(
                 "--settle needs --model and --reference: a drive is played as it stands",
+            ));
+        }
+        if args.map.rate.is_some() {
+            return Err(CommandError::bad_input(
+                "--rate is for a reference: a drive is played at the times of its file",
             ));
         }
         let drive = input::record(path, &args.map, Need::Input)?;

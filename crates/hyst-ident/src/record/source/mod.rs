@@ -109,7 +109,7 @@ pub(crate) trait Contents {
     /// The columns.
     fn heads(&self) -> &[Head];
 
-    /// Values of the columns with these numbers, in their order; how they are printed is told of the first alone, which is the time.
+    /// Values of the columns with these numbers, in their order. Only the first one, the time, says how finely it is printed.
     ///
     /// # Errors
     /// When a cell of them is no number, or the file ends early.
