@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Error over time, a row of panels for each reference.
 fn draw(study: &Study, path: &PathBuf) -> Result<(), Box<dyn Error>> {
+    hyst_tests::register_letters();
     let root = SVGBackend::new(path, (1200, 900)).into_drawing_area();
     root.fill(&WHITE)?;
     let colours =

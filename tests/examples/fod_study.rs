@@ -44,6 +44,7 @@ fn print(study: &FodStudy) {
 
 /// Two surfaces above, the tracked sine below.
 fn draw(study: &FodStudy, path: &str) -> Drawn {
+    hyst_tests::register_letters();
     let root = SVGBackend::new(path, (1300, 1000)).into_drawing_area();
     root.fill(&WHITE)?;
     let (above, below) = root.split_vertically(500);

@@ -99,6 +99,7 @@ fn bins(samples: &[(Weighed, bool)]) -> Vec<(f64, f64, usize)> {
 }
 
 fn draw(path: &str, bins: &[(f64, f64, usize)], error: f64) -> Result<(), Box<dyn std::error::Error>> {
+    hyst_tests::register_letters();
     let root = SVGBackend::new(path, (520, 480)).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)

@@ -26,6 +26,12 @@ use hyst_ident::record::{Columns, OutputUnit, Record};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+/// Registers the font of pictures that examples draw with plotters as `sans-serif`.
+pub fn register_letters() {
+    // Fails only for a font that is damaged; drawing says so then.
+    let _ = plotters::style::register_font("sans-serif", plotters::style::FontStyle::Normal, dejavu::sans::regular());
+}
+
 /// A simulated actuator with hysteresis and a lag, quick to simulate: 0 to 100 V, about 20 µm.
 pub const PLANT: &str = "\
 seed = 3

@@ -43,5 +43,30 @@ fn plot_draws_records_and_what_models_miss() {
     for part in ["loops: output over input", "amplitude density", "measured minus predicted by pi", "train.csv, RMS"] {
         assert!(svg.contains(part), "{part}");
     }
-    assert!(lab.refuses("plot train.csv -o a.png", 2).contains("SVG"));
+    // A picture of pixels has the same panels: its header, and not all one colour.
+    lab.ok("plot train.csv --model pi.json -o a.png");
+    let png = std::fs::read(lab.path("a.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 20_000, "{} bytes", png.len());
+    assert!(lab.refuses("plot train.csv -o a.pdf", 2).contains(".svg or .png"));
+    lab.write("force.csv", "time_s,voltage_v,force_n\n0,1,2\n1,2,3\n2,3,5\n");
+    assert!(lab.refuses("plot train.csv force.csv -o b.svg", 2).contains("do not share an axis"));
+}
+
+#[test]
+fn a_dropout_is_reported_and_not_fitted() {
+    let lab = Lab::with_train("");
+    let text = lab.read("train.csv");
+    let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+    for row in &mut rows[801..821] {
+        let (kept, _) = row.rsplit_once(',').unwrap();
+        *row = format!("{kept},0");
+    }
+    lab.write("dropout.csv", rows.join("\n"));
+    let told = lab.ok("info dropout.csv").stdout;
+    assert!(told.contains("repeats one value and then jumps: 20 rows, the most from row 801"), "{told}");
+    let rmse = |file: &str| {
+        lab.ok(&format!("fit {file} --model pi -o pi.json --json")).json()["errors"]["rmse"].as_f64().unwrap()
+    };
+    let (with, without) = (rmse("dropout.csv"), rmse("train.csv"));
+    assert!((with / without - 1.0).abs() < 0.05, "{with} {without}");
 }

@@ -1,21 +1,10 @@
-//! Panels of pictures: axes, a legend and lines, as SVG.
+//! Panels of pictures: axes, a legend and lines.
 
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::exit::{CommandError, CommandResult};
-
-/// What drawing returns.
-pub(crate) type Drawn = Result<(), Box<dyn std::error::Error>>;
-
-/// The picture that `panels` draws, as SVG.
-pub(crate) fn drawn(panels: impl FnOnce(&mut String) -> Drawn) -> CommandResult<String> {
-    let mut svg = String::new();
-    // Drawing into a string fails only on a bug in the numbers' ranges.
-    panels(&mut svg).map_err(|e| CommandError::failed(format!("the picture could not be drawn: {e}")))?;
-    Ok(svg)
-}
+use crate::canvas::{Area, Canvas, Drawn};
 
 /// Name, colour and pieces of a line.
 type Curve = (String, RGBColor, Vec<Vec<(f64, f64)>>);
@@ -29,10 +18,13 @@ pub(crate) struct Chart {
     log: bool,
     log_across: bool,
     bounds: Option<(f64, f64)>,
-    legend: SeriesLabelPosition,
     small: bool,
 }
 
+/// Room around the entries of a legend, length of its lines, and height of a row of it \[pixels\].
+const LEGEND_MARGIN: i32 = 14;
+const LEGEND_LINE: i32 = 18;
+const LEGEND_HEIGHT: i32 = 17;
 /// Points of one curve that are drawn: more than this no screen shows.
 const POINTS: usize = 4000;
 
@@ -47,7 +39,6 @@ impl Chart {
             log: false,
             log_across: false,
             bounds: None,
-            legend: SeriesLabelPosition::UpperLeft,
             small: false,
         }
     }
@@ -86,21 +77,13 @@ impl Chart {
         Self { bounds: Some((low, high)), ..self }
     }
 
-    /// The same with its legend at the right.
-    pub(crate) fn legend_right(self) -> Self {
-        Self { legend: SeriesLabelPosition::UpperRight, ..self }
-    }
-
     /// The same with a logarithmic horizontal axis too.
     pub(crate) fn log_across(self) -> Self {
         Self { log_across: true, ..self }
     }
 
     /// Draws it, unless there is nothing to draw.
-    pub(crate) fn draw_if_any<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn
-    where
-        B::ErrorType: 'static,
-    {
+    pub(crate) fn draw_if_any(&self, area: &Area<'_>) -> Drawn {
         if self.curves.iter().any(|(_, _, pieces)| pieces.iter().any(|piece| !piece.is_empty())) {
             self.draw(area)
         } else {
@@ -109,10 +92,7 @@ impl Chart {
     }
 
     /// Draws it.
-    pub(crate) fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn
-    where
-        B::ErrorType: 'static,
-    {
+    pub(crate) fn draw(&self, area: &Area<'_>) -> Drawn {
         let shown = |p: &&(f64, f64)| !self.log || p.1 > 0.0;
         let points = || self.curves.iter().flat_map(|c| c.2.iter().flatten()).filter(shown);
         let ends = |f: fn(&(f64, f64)) -> f64| {
@@ -123,10 +103,17 @@ impl Chart {
             let room = margin * (high - low).max(1e-9);
             low - room..high + room
         };
-        let (title, room) = if self.small { (14, (18, 48)) } else { (18, (38, 62)) };
-        let mut builder = ChartBuilder::on(area);
+        let room = if self.small { (18, 48) } else { (38, 62) };
+        let below;
+        let mut builder = if self.small {
+            let mut builder = ChartBuilder::on(area);
+            builder.caption(&self.title, ("sans-serif", 14));
+            builder
+        } else {
+            below = self.legend(area)?;
+            ChartBuilder::on(&below)
+        };
         builder
-            .caption(&self.title, ("sans-serif", title))
             .margin(if self.small { 4 } else { 8 })
             .x_label_area_size(if self.x.is_empty() { room.0.min(22) } else { room.0 })
             .y_label_area_size(room.1);
@@ -145,10 +132,8 @@ impl Chart {
         }
     }
 
-    fn lines<'a, B, X, Y>(&self, mut chart: ChartContext<'a, B, Cartesian2d<X, Y>>) -> Drawn
+    fn lines<'a, X, Y>(&self, mut chart: ChartContext<'a, Canvas<'a>, Cartesian2d<X, Y>>) -> Drawn
     where
-        B: DrawingBackend + 'a,
-        B::ErrorType: 'static,
         X: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
@@ -163,28 +148,37 @@ impl Chart {
             mesh.x_labels(4).y_labels(6);
         }
         mesh.draw()?;
-        for (name, colour, pieces) in &self.curves {
+        for (_, colour, pieces) in &self.curves {
             let colour = *colour;
             let shown = |piece: &Vec<(f64, f64)>| piece.iter().copied().filter(|p| !self.log || p.1 > 0.0).collect();
             let lines = pieces.iter().map(|piece| {
                 let points: Vec<(f64, f64)> = shown(piece);
                 PathElement::new(points, colour.stroke_width(1))
             });
-            chart
-                .draw_series(lines)?
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
-        }
-        if !self.small {
-            chart
-                .configure_series_labels()
-                .position(self.legend.clone())
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font(("sans-serif", 13))
-                .draw()?;
+            chart.draw_series(lines)?;
         }
         Ok(())
+    }
+
+    /// Draws the legend over the panel, where it covers no line, and returns what is left below it.
+    fn legend<'a>(&self, area: &Area<'a>) -> Result<Area<'a>, Box<dyn std::error::Error>> {
+        let (width, _) = area.dim_in_pixel();
+        let style = ("sans-serif", 13).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
+        let title = ("sans-serif", 18).into_text_style(area);
+        area.draw_text(&self.title, &title, (LEGEND_MARGIN, 6))?;
+        // Right of the title while there is room, then line by line below it.
+        let mut x = 2 * LEGEND_MARGIN + area.estimate_text_size(&self.title, &title)?.0 as i32;
+        let mut y = 17;
+        for (name, colour, _) in self.curves.iter().filter(|(name, _, _)| !name.is_empty()) {
+            let wide = LEGEND_LINE + 6 + area.estimate_text_size(name, &style)?.0 as i32;
+            if x + wide > width as i32 && x > 2 * LEGEND_MARGIN {
+                (x, y) = (LEGEND_MARGIN, y + LEGEND_HEIGHT);
+            }
+            area.draw(&PathElement::new([(x, y), (x + LEGEND_LINE, y)], colour.stroke_width(3)))?;
+            area.draw_text(name, &style, (x + LEGEND_LINE + 6, y))?;
+            x += wide + LEGEND_MARGIN;
+        }
+        Ok(area.margin(y + 10, 0, 0, 0))
     }
 }
 

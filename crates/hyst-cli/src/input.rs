@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use hyst_hw::{Plant, PlantConfig};
 use hyst_ident::clipping::clipped;
+use hyst_ident::frozen::frozen_of;
 use hyst_ident::model::{Model, ModelError};
 use hyst_ident::range;
 use hyst_ident::record::{ColumnMap, Losses, Need, OutputUnit, Reading, Record};
@@ -64,7 +65,11 @@ pub(crate) fn any(path: &Path, map: &MapArg) -> CommandResult<Record> {
 
 /// Whether the output goes against the input.
 fn falls(record: &Record) -> bool {
-    let (u, y) = (record.input(), record.output().unwrap_or_default());
+    opposed(record.input(), record.output().unwrap_or_default())
+}
+
+/// Whether one signal falls where the other rises.
+fn opposed(u: &[f64], y: &[f64]) -> bool {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (mean_u, mean_y) = (mean(u), mean(y));
     u.iter().zip(y).map(|(u, y)| (u - mean_u) * (y - mean_y)).sum::<f64>() < 0.0
@@ -76,6 +81,12 @@ const OPEN: f64 = 0.003;
 /// Whether loops are passed the other way round than hysteresis makes them: with a falling branch below the rising one.
 fn leads(record: &Record) -> bool {
     let (u, Some(y)) = (record.input(), record.output()) else { return false };
+    let mut y = y.to_vec();
+    for run in frozen_of(record) {
+        let before = y[run.first.saturating_sub(1)];
+        y[run.first..run.first + run.rows].fill(before);
+    }
+    let y = y.as_slice();
     let (wide, high) = (span(u), span(y));
     let (mut area, mut path) = (0.0, 0.0);
     for rows in record.segments() {
@@ -92,7 +103,7 @@ fn leads(record: &Record) -> bool {
         }
     }
     // Of an output whose sign is turned a loop is passed the other way, and nothing is exchanged.
-    let area = if falls(record) { -area } else { area };
+    let area = if opposed(u, y) { -area } else { area };
     let loops = path / (2.0 * wide);
     loops >= 1.0 && area > OPEN * loops * wide * high
 }
@@ -154,7 +165,23 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     let unit = record.output_unit().map_or("", |unit| unit.symbol());
     // A reference may stand where it likes.
     let measured = record.output().filter(|_| !record.input().is_empty());
+    let frozen = frozen_of(record);
+    if let Some(longest) = frozen.iter().max_by_key(|run| run.rows) {
+        let rows = frozen.iter().map(|run| run.rows).sum();
+        odd.push(format!(
+            "the sensor repeats one value and then jumps: {}, the most from row {} at {} s ({} of {} {unit}). These rows are not fitted. Look for dropouts or a stopped data stream",
+            text::count(rows, "row"),
+            longest.first + 1,
+            text::short(record.time()[longest.first]),
+            longest.rows,
+            text::short(longest.at)
+        ));
+    }
+    let is_frozen = |row: usize| frozen.iter().any(|run| (run.first..run.first + run.rows).contains(&row));
     for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
+        if is_frozen(end.first) {
+            continue;
+        }
         odd.push(format!(
             "the sensor is at the end of its range, {} {unit}, in {} (the first at {} s). These rows are not fitted. Lower the drive or widen the range",
             text::short(end.at),

@@ -3,6 +3,7 @@
 //! Every command is thin: it reads files, calls the library, writes files and says what happened. Results go to
 //! stdout or to the file of `-o`, everything else to stderr; the exit code tells scripts how it ended ([`exit::Exit`]).
 
+mod canvas;
 mod chart;
 mod cli;
 mod commands;

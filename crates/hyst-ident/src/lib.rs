@@ -23,6 +23,7 @@ pub mod excite;
 pub mod export;
 pub mod fit;
 pub mod force;
+pub mod frozen;
 pub mod full_memory;
 pub mod identify;
 pub mod linear;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use hyst_core::Env;
 
 use crate::clipping::clipped_rows;
+use crate::frozen::frozen_rows;
 use crate::record::Record;
 use crate::spikes::{spiked_residual, spiked_rows};
 
@@ -35,7 +36,7 @@ pub struct Samples {
     pub(crate) pasts: Vec<Vec<f64>>,
     /// Rows that are left out of fits and of the settled error: those that show no motion, and a start-up transient once it is found.
     pub settling: Vec<bool>,
-    /// Rows in which the sensor shows no motion: it stands at the end of its range, or spikes.
+    /// Rows in which the sensor shows no motion: it stands at the end of its range, is frozen, or spikes.
     pub(crate) blind: Vec<bool>,
 }
 
@@ -252,13 +253,14 @@ fn own_periods(periods: Vec<f64>) -> Vec<f64> {
     if periods.windows(2).all(|w| w[0] == w[1]) { Vec::new() } else { periods }
 }
 
-/// Rows in which the sensor stands at the end of its range, or spikes.
+/// Rows in which the sensor stands at the end of its range, is frozen, or spikes.
 fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
     let mut blind = clipped_rows(output, record.segments());
     // A reference has no drive that a spike could be held against.
     if record.input().len() == output.len() {
         let spiked = spiked_rows(record.input(), output, record.segments());
-        blind.iter_mut().zip(spiked).for_each(|(blind, spiked)| *blind |= spiked);
+        let frozen = frozen_rows(record.input(), output, record.segments());
+        blind.iter_mut().zip(spiked).zip(frozen).for_each(|((blind, spiked), frozen)| *blind |= spiked || frozen);
     }
     blind.iter_mut().zip(record.missing()).for_each(|(blind, missing)| *blind |= missing);
     blind

@@ -95,7 +95,7 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], segments: &[Range<usize
 }
 
 /// The number below which a share of some lies, whose order changes; zero of none.
-fn quantile(x: &mut [f64], share: f64) -> f64 {
+pub(crate) fn quantile(x: &mut [f64], share: f64) -> f64 {
     if x.is_empty() {
         return 0.0;
     }

@@ -37,8 +37,8 @@ pub(crate) struct CompareArgs {
     /// Most evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
-    /// Picture to write: errors of all, and what each leaves (SVG)
-    #[arg(long, value_name = "SVG")]
+    /// Picture to write, .svg or .png: errors of all models, and their residuals
+    #[arg(long, value_name = "PICTURE")]
     pub(crate) picture: Option<Target>,
     #[command(flatten)]
     pub(crate) zero: ZeroArg,

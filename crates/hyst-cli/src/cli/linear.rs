@@ -66,8 +66,8 @@ pub(crate) struct ResponseArgs {
     /// Response to write (CSV); - for stdout
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Option<Target>,
-    /// Picture to write (SVG): gain, phase, coherence
-    #[arg(long, value_name = "SVG")]
+    /// Picture to write, .svg or .png: gain, phase, coherence
+    #[arg(long, value_name = "PICTURE")]
     pub(crate) picture: Option<Target>,
     #[command(flatten)]
     pub(crate) map: MapArg,

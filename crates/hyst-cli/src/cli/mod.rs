@@ -109,8 +109,8 @@ pub(crate) struct FitArgs {
     /// Table of how the search went, to write: every generation of every trial (CSV)
     #[arg(long, value_name = "CSV")]
     pub(crate) trace: Option<Target>,
-    /// Picture of how the search went, to write (SVG)
-    #[arg(long, value_name = "SVG")]
+    /// Picture of how the search went, to write, .svg or .png
+    #[arg(long, value_name = "PICTURE")]
     pub(crate) picture: Option<Target>,
     #[command(flatten)]
     pub(crate) search: SearchArgs,
@@ -588,8 +588,8 @@ pub(crate) struct PlotArgs {
     /// Model files to compare with them; may be given several times
     #[arg(long)]
     pub(crate) model: Vec<PathBuf>,
-    /// Picture to write (SVG); - for stdout
-    #[arg(short, long, value_name = "SVG")]
+    /// Picture to write, .svg or .png; - for SVG on stdout
+    #[arg(short, long, value_name = "PICTURE")]
     pub(crate) output: Target,
     #[command(flatten)]
     pub(crate) zero: ZeroArg,

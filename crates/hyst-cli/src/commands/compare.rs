@@ -10,6 +10,7 @@ use hyst_ident::record::{Need, Record};
 use hyst_ident::simulate::Zero;
 use serde::Serialize;
 
+use crate::canvas::Format;
 use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report};
@@ -45,6 +46,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let read: Vec<&Path> = args.train.iter().chain(&args.test).map(AsRef::as_ref).collect();
     let written: Vec<_> = args.picture.iter().collect();
     output::check(&read, &written)?;
+    args.picture.as_ref().map(Format::of).transpose()?;
     let report = Report::new(args.json.json, &written)?;
     let train = input::training(&args.train, &args.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map, Need::InputAndOutput)).transpose()?;
@@ -73,8 +75,8 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
             Some(test) => (test, |model| &model.test_predicted),
             None => (&train, |model| &model.train_predicted),
         };
-        let svg = picture::draw(&comparison, record, predicted)?;
-        target.write(|out| out.write_all(svg.as_bytes()))?;
+        let picture = picture::draw(Format::of(target)?, &comparison, record, predicted)?;
+        target.write(|out| out.write_all(&picture))?;
     }
     let settling = |rows: &[bool]| rows.iter().filter(|settling| **settling).count();
     let summary = Summary {

@@ -19,6 +19,7 @@ use hyst_ident::simulate::{Zero, simulate};
 use hyst_ident::{BetweenSamples, range};
 use serde::Serialize;
 
+use crate::canvas::Format;
 use crate::cli::{FitArgs, FitFrom};
 use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report};
@@ -105,6 +106,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let read: Vec<&Path> = args.train.iter().map(AsRef::as_ref).collect();
     let written: Vec<_> = [&args.output].into_iter().chain(&args.trace).chain(&args.picture).collect();
     output::check(&read, &written)?;
+    args.picture.as_ref().map(Format::of).transpose()?;
     let report = Report::new(args.json.json, &written)?;
     let record = input::training(&args.train, &args.map)?;
     let zero = args.zero.get();

@@ -8,7 +8,8 @@ use hyst_ident::record::Record;
 use hyst_ident::simulate::{SimulateOptions, simulate_with};
 use plotters::prelude::*;
 
-use crate::chart::{Chart, Drawn, drawn};
+use crate::canvas::{Area, Drawn, Format};
+use crate::chart::Chart;
 use crate::cli::PlotArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::{input, output, text};
@@ -43,16 +44,15 @@ struct Missed {
 pub(super) fn run(args: &PlotArgs) -> CommandResult {
     let read: Vec<&Path> = args.records.iter().chain(&args.model).map(AsRef::as_ref).collect();
     output::check(&read, &[&args.output])?;
-    if args.output.file().is_some_and(|path| path.extension().is_some_and(|ending| ending != "svg")) {
-        let message = format!("{}: the picture is written as SVG; end its name in .svg", args.output);
-        return Err(CommandError::bad_input(message));
-    }
+    let format = Format::of(&args.output)?;
     let records: Vec<Record> =
         args.records.iter().map(|path| input::any(path, &args.map)).collect::<CommandResult<_>>()?;
     let missed: Vec<Missed> =
         args.model.iter().map(|path| missed(path, &records, args)).collect::<CommandResult<_>>()?;
-    let svg = drawn(|svg| panels(svg, &records, &missed))?;
-    args.output.write(|out| out.write_all(svg.as_bytes()))
+    same_units(&records)?;
+    let size = (WIDTH, (2 + missed.len() as u32) * HEIGHT);
+    let picture = format.draw(size, |root| panels(root, &records, &missed))?;
+    args.output.write(|out| out.write_all(&picture))
 }
 
 fn missed(path: &Path, records: &[Record], args: &PlotArgs) -> CommandResult<Missed> {
@@ -80,11 +80,25 @@ fn pieces(record: &Record, of: impl Fn(usize) -> Option<(f64, f64)>) -> Pieces {
     record.segments().iter().map(|rows| rows.clone().filter_map(&of).collect()).collect()
 }
 
-fn panels(svg: &mut String, records: &[Record], missed: &[Missed]) -> Drawn {
-    let rows = 2 + missed.len() as u32;
-    let root = SVGBackend::with_string(svg, (WIDTH, rows * HEIGHT)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let areas = root.split_evenly((rows as usize, 1));
+/// Refuses records whose inputs, or outputs, have different units: they do not share an axis.
+fn same_units(records: &[Record]) -> CommandResult {
+    let inputs = records.iter().filter(|record| !record.input().is_empty()).map(|r| (r, r.input_column().to_owned()));
+    let outputs = records.iter().filter_map(|r| Some((r, r.output_unit()?.column().to_owned())));
+    for columns in [inputs.collect::<Vec<_>>(), outputs.collect()] {
+        let Some(((first, column), others)) = columns.split_first() else { continue };
+        if let Some((other, different)) = others.iter().find(|(_, own)| own != column) {
+            return Err(CommandError::bad_input(format!(
+                "{} has {column} and {} has {different}: they do not share an axis; plot them one by one",
+                first.name(),
+                other.name()
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn panels(root: &Area<'_>, records: &[Record], missed: &[Missed]) -> Drawn {
+    let areas = root.split_evenly((2 + missed.len(), 1));
     let unit = records.iter().find_map(Record::output_unit).map_or("", |unit| unit.symbol());
     let output = format!("output [{unit}]");
     let drive = records
@@ -117,19 +131,19 @@ fn panels(svg: &mut String, records: &[Record], missed: &[Missed]) -> Drawn {
 
     let mut spectra = Chart::new("amplitude density (Welch)", "frequency [Hz]", &format!("output [{unit}/√Hz]"))
         .logarithmic()
-        .log_across()
-        .legend_right();
+        .log_across();
     for (record, colour) in coloured() {
         let density = |x: &[f64]| amplitude_density(x, record.segments(), record.sample_period());
         if let Some(y) = record.output() {
             spectra.curve(&name(record), *colour, &[density(y)]);
         }
     }
-    for (at, missed) in missed.iter().enumerate() {
+    let mut further = COLOURS.iter().cycle().skip(records.len());
+    for missed in missed {
         for (record, residual) in records.iter().zip(&missed.residuals) {
             let Some(residual) = residual else { continue };
             let density = amplitude_density(residual, record.segments(), record.sample_period());
-            let colour = COLOURS[(records.len() + at) % COLOURS.len()];
+            let colour = *further.next().unwrap_or(&BLACK);
             spectra.curve(&format!("{} − {}", name(record), missed.model), colour, &[density]);
         }
     }
@@ -156,6 +170,5 @@ fn panels(svg: &mut String, records: &[Record], missed: &[Missed]) -> Drawn {
         }
         chart.draw_if_any(area)?;
     }
-    root.present()?;
     Ok(())
 }

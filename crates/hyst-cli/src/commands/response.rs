@@ -8,6 +8,7 @@ use hyst_ident::linear::{
 };
 use serde::Serialize;
 
+use crate::canvas::Format;
 use crate::cli::ResponseArgs;
 use crate::exit::CommandResult;
 use crate::output::{self, Report, Target};
@@ -62,6 +63,7 @@ struct At {
 pub(super) fn run(args: &ResponseArgs) -> CommandResult {
     let written: Vec<&Target> = args.output.iter().chain(&args.picture).collect();
     output::check(&args.records.iter().map(AsRef::as_ref).collect::<Vec<_>>(), &written)?;
+    args.picture.as_ref().map(Format::of).transpose()?;
     let report = Report::new(args.json.json, &written)?;
     let record = input::training(&args.records, &args.map)?;
     let unit = text::gain_unit(&record);
@@ -81,8 +83,8 @@ pub(super) fn run(args: &ResponseArgs) -> CommandResult {
     }
     if let Some(target) = &args.picture {
         let title = format!("{}: response and ARMAX model of order {}", record.name(), found.model.order());
-        let svg = picture::draw(&found, &unit, &title)?;
-        target.write(|out| out.write_all(svg.as_bytes()))?;
+        let picture = picture::draw(Format::of(target)?, &found, &unit, &title)?;
+        target.write(|out| out.write_all(&picture))?;
     }
     let summary = Summary::new(&found, &unit, &args.at);
     let mut said = summary.text();

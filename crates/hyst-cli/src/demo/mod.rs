@@ -111,8 +111,8 @@ fn experiment(plant: &mut Plant, drive: &Drive, name: &str) -> CommandResult<Rec
     recording::to_record(&recording, name, recording::unit(Daq::capabilities(plant).output))
 }
 
-fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
-    Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_bytes()))?)
+fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> CommandResult {
+    Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_ref()))?)
 }
 
 /// Writes a record, which knows its file from then on.

@@ -5,7 +5,8 @@ use hyst_ident::record::Record;
 use plotters::prelude::*;
 
 use super::Runs;
-use crate::chart::{Chart, Drawn, drawn};
+use crate::canvas::{Area, Drawn, Format};
+use crate::chart::Chart;
 use crate::exit::CommandResult;
 use crate::text;
 
@@ -20,13 +21,11 @@ pub(super) fn draw(
     after: &[f64],
     runs: &Runs,
     findings: &Findings,
-) -> CommandResult<String> {
-    drawn(|svg| panels(svg, test, before, after, runs, findings))
+) -> CommandResult<Vec<u8>> {
+    Format::Svg.draw((1400, 1000), |root| panels(root, test, before, after, runs, findings))
 }
 
-fn panels(svg: &mut String, test: &Record, before: &[f64], after: &[f64], runs: &Runs, findings: &Findings) -> Drawn {
-    let root = SVGBackend::with_string(svg, (1400, 1000)).into_drawing_area();
-    root.fill(&WHITE)?;
+fn panels(root: &Area<'_>, test: &Record, before: &[f64], after: &[f64], runs: &Runs, findings: &Findings) -> Drawn {
     let names: Vec<&str> = findings.effects.iter().map(|e| e.name.name()).collect();
     let found =
         if names.is_empty() { "no effect named".to_owned() } else { format!("named: {}", text::listed(&names)) };
@@ -69,6 +68,5 @@ fn panels(svg: &mut String, test: &Record, before: &[f64], after: &[f64], runs: 
         errors.curve(&format!("{name}, RMS {} {unit}", text::short(run.rmse)), colour, &with(&run.error));
     }
     errors.draw(&below)?;
-    root.present()?;
     Ok(())
 }

@@ -117,12 +117,13 @@ const TOLD: usize = 8;
 /// Which rows were left out, if some were.
 pub(crate) fn rows(findings: &Findings) -> Option<String> {
     let rows = &findings.rows;
-    let LeftOut { gaps, spikes, start_up, saturated } = rows.left_out;
+    let LeftOut { gaps, spikes, start_up, saturated, frozen } = rows.left_out;
     let told: Vec<String> = rows.spikes.iter().take(TOLD).map(usize::to_string).collect();
     let more = if rows.spikes.len() > TOLD { ", …" } else { "" };
     let left: Vec<String> = [
         (spikes, format!("{} (rows {}{more})", count(spikes, "spike"), told.join(", "))),
         (start_up, format!("{} of a start-up transient", count(start_up, "row"))),
+        (frozen, format!("{} in which the sensor is frozen", count(frozen, "row"))),
         (saturated, format!("{} at the end of the sensor's range", count(saturated, "row"))),
         (gaps, count(gaps, "gap")),
     ]

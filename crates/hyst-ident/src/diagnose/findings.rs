@@ -181,6 +181,9 @@ pub struct LeftOut {
     pub start_up: usize,
     /// The sensor stands at the end of its range.
     pub saturated: usize,
+    /// The sensor repeats one value and jumps.
+    #[serde(default)]
+    pub frozen: usize,
 }
 
 /// Spikes that are listed at most.

@@ -53,15 +53,35 @@ impl Printed {
         self.decimals = self.decimals.max(other.decimals);
     }
 
-    /// One unit of the last printed digit of the time `t` \[s\].
-    fn resolution(self, t: f64) -> f64 {
+    /// The units of the last printed digit of times.
+    fn resolution(self) -> Resolution {
         let fixed = 10_f64.powi(-self.decimals);
-        if t.abs() < 10_f64.powi(self.digits.saturating_sub(self.decimals)) {
-            return fixed;
+        // With more digits than a double has, rounding alone counts.
+        let below =
+            if self.digits > 17 { f64::INFINITY } else { 10_f64.powi(self.digits.saturating_sub(self.decimals)) };
+        Resolution { fixed, below, digits: self.digits }
+    }
+}
+
+/// How finely a time is printed.
+#[derive(Clone, Copy, Debug)]
+struct Resolution {
+    /// One unit of the last decimal \[s\], which holds for times `below` this.
+    fixed: f64,
+    below: f64,
+    digits: i32,
+}
+
+impl Resolution {
+    /// One unit of the last printed digit of the time `t` \[s\].
+    fn at(self, t: f64) -> f64 {
+        if t.abs() < self.below {
+            return self.fixed;
         }
         // 1e-3 decades of slack keep 10 from counting as 9.99…
         let leading = (t.abs().log10() + 1e-3).floor();
-        if leading.is_finite() { fixed.max(10_f64.powf(leading + 1.0 - f64::from(self.digits))) } else { fixed }
+        let own = || 10_f64.powf(leading + 1.0 - f64::from(self.digits));
+        if leading.is_finite() { self.fixed.max(own()) } else { self.fixed }
     }
 }
 
@@ -161,8 +181,10 @@ impl Tolerance {
     /// The periods that fit a segment's times.
     fn fits(&self, t: &[f64]) -> Fits {
         let mut own = Fits::ALL;
+        let resolution = self.printed.resolution();
+        let first = t.first().map_or(0.0, |t| resolution.at(*t));
         for (k, tk) in t.iter().enumerate().skip(1) {
-            let r = self.printed.resolution(*tk).max(self.printed.resolution(t[0]));
+            let r = resolution.at(*tk).max(first);
             own.narrow(tk - t[0], r + self.slack, k as f64);
         }
         own
@@ -195,7 +217,8 @@ fn shared(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<O
     if let Some(fault) = gap(time, segments, printed, guess) {
         return Err(fault);
     }
-    if let Some(rows) = segments.iter().find(odd) {
+    // Where all have a period in common, none is uneven.
+    if let Some(rows) = all.is_empty().then(|| segments.iter().find(odd)).flatten() {
         return Err(uneven(&time[rows.clone()], printed, loose.slack, rows.start));
     }
     let grid = Grid { time, segments, printed, rounding, strict };
@@ -262,7 +285,8 @@ fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
 /// 1 kHz. Rounding makes such longer steps again and again; those that come once or twice, or less than every
 /// twentieth time, are gaps. Where a period is more than three units, the tolerance of one unit shows any gap.
 fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) -> Option<Fault> {
-    let is_coarse = |row: &usize| guess <= 3.0 * printed.resolution(time[*row]);
+    let resolution = printed.resolution();
+    let is_coarse = |row: &usize| guess <= 3.0 * resolution.at(time[*row]);
     let steps = || segments.iter().flat_map(|rows| rows.clone().skip(1)).filter(is_coarse);
     let mut lengths: Vec<f64> = steps().map(|row| time[row] - time[row - 1]).collect();
     if lengths.is_empty() {
@@ -270,7 +294,7 @@ fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) ->
     }
     let count = lengths.len();
     let usual = *lengths.select_nth_unstable_by((count - 1) / 2, f64::total_cmp).1;
-    let is_odd = |row: &usize| (time[*row] - time[*row - 1] - usual).abs() > 0.5 * printed.resolution(time[*row]);
+    let is_odd = |row: &usize| (time[*row] - time[*row - 1] - usual).abs() > 0.5 * resolution.at(time[*row]);
     let odd = steps().filter(is_odd).count();
     let row = steps().find(is_odd)?;
     (odd < 3 || 20 * odd < count).then(|| Fault::Uneven { row, expected: time[row - 1] + usual })
@@ -282,7 +306,8 @@ fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
     // Of two steps the shorter: a row is sooner missing than added.
     let middle = (steps.len() - 1) / 2;
     let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let tolerance = |tk: f64| printed.resolution(tk) + slack;
+    let resolution = printed.resolution();
+    let tolerance = |tk: f64| resolution.at(tk) + slack;
     // A step that is missing, added or moved stands out against the usual step.
     let jump = t.windows(2).position(|w| (w[1] - w[0] - usual).abs() > 2.0 * tolerance(w[1]));
     if let Some(k) = jump {

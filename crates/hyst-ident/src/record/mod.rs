@@ -227,22 +227,23 @@ impl Record {
     }
 
     /// The same record, with the sum of the file in which it is kept: models that are fitted to it state the sum.
-    pub fn kept_as(mut self, file: &[u8]) -> Self {
+    pub fn kept_as(self, file: &[u8]) -> Self {
+        self.kept_with(sum_of(file))
+    }
+
+    fn kept_with(mut self, sum: String) -> Self {
         if let [source] = self.sources.as_mut_slice() {
-            source.sha256 = Some(format!("{:x}", Sha256::digest(file)));
+            source.sha256 = Some(sum);
         }
         self
     }
 
     /// The same, with the sum of the file at `path`, which is read in blocks.
-    fn kept_in(mut self, path: &Path) -> Result<Self, RecordError> {
+    fn kept_in(self, path: &Path) -> Result<Self, RecordError> {
         let io = |source| RecordError::Io { file: path.display().to_string(), source };
         let mut sum = Sha256::new();
         std::io::copy(&mut std::fs::File::open(path).map_err(io)?, &mut sum).map_err(io)?;
-        if let [source] = self.sources.as_mut_slice() {
-            source.sha256 = Some(format!("{:x}", sum.finalize()));
-        }
-        Ok(self)
+        Ok(self.kept_with(format!("{:x}", sum.finalize())))
     }
 
     /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
@@ -420,4 +421,9 @@ fn split(labels: &[i64]) -> Result<(Vec<i64>, Vec<Range<usize>>), usize> {
         row += run.len();
     }
     Ok((of_segment, segments))
+}
+
+/// SHA-256 of a file's bytes, in hexadecimal digits.
+fn sum_of(file: &[u8]) -> String {
+    format!("{:x}", Sha256::digest(file))
 }

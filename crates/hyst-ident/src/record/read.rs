@@ -13,7 +13,7 @@ use super::repair::{place_of, repair};
 use super::roles::{Choice, Clock, File, Layout};
 use super::source::{self, Axis, Contents, Values, Wanted};
 use super::unit::OutputUnit;
-use super::{Columns, Origin, Record};
+use super::{Columns, Origin, Record, sum_of};
 
 /// How a file is read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -69,9 +69,16 @@ impl Record {
         if is_run_log(bytes) {
             return Self::parse_log(name, bytes, &how.map, need);
         }
-        let unpacked = source::unpack(name, bytes)?;
-        let contents = source::open(name, &unpacked)?;
-        Ok(of_contents(name, contents.as_ref(), &how, need)?.kept_as(bytes))
+        // The sum over the file's bytes takes as long as reading them.
+        let (record, sum) = rayon::join(
+            || {
+                let unpacked = source::unpack(name, bytes)?;
+                let contents = source::open(name, &unpacked)?;
+                of_contents(name, contents.as_ref(), &how, need)
+            },
+            || sum_of(bytes),
+        );
+        Ok(record?.kept_with(sum))
     }
 }
 

@@ -23,6 +23,8 @@ const MAX_JITTER: f64 = 0.2;
 const MAX_WILD_SHARE: f64 = 0.02;
 /// How far the times around lost rows may be off the grid \[periods\].
 const MAX_OFF_GRID: f64 = 0.3;
+/// The same where every step is a multiple of the usual one \[periods\].
+const MAX_OFF_CLEAR_GRID: f64 = 0.1;
 /// Share of steps beyond which long steps are no interruptions but the clock.
 const MAX_GAP_SHARE: f64 = 0.05;
 
@@ -59,11 +61,18 @@ pub(super) fn repair(
 ) -> Result<Repaired, RecordError> {
     let mut done = Repaired::default();
     leave_out_without(samples, &mut done, wanted, origin)?;
-    pass_midnight(samples, &mut done);
+    continue_clock(samples, &mut done);
     join_repeated(samples, &mut done);
-    insert_lost(samples, &mut done, *printed);
+    let mut uneven = is_uneven(samples, *printed);
+    if let Some(segments) = &uneven
+        && insert_lost(samples, &mut done, segments)
+    {
+        uneven = is_uneven(samples, *printed);
+    }
     bridge(samples);
-    even_out(samples, printed, &mut done);
+    if let Some(segments) = uneven {
+        even_out(samples, printed, &mut done, segments);
+    }
     Ok(done)
 }
 
@@ -199,6 +208,9 @@ fn runs(values: &[f64]) -> Vec<Range<usize>> {
 
 /// Fills what is missing by straight lines; at an end by the nearest value.
 fn bridge(samples: &mut Columns) {
+    if channels(samples).all(|values| values.iter().all(|value| value.is_finite())) {
+        return;
+    }
     let time = samples.time.clone();
     for values in channels(samples) {
         for run in runs(values) {
@@ -215,30 +227,89 @@ fn bridge(samples: &mut Columns) {
     }
 }
 
+/// Seconds after which clocks begin again: a time of day without a date, counters of 32 bits that count ns, µs or ms, one of 16 bits that counts ms.
+const CLOCK_PERIODS_S: [f64; 5] = [86_400.0, 4.294_967_296, 4_294.967_296, 4_294_967.296, 65.536];
+/// Rows that a run has at least before its clock may begin again.
+const MIN_RUN: usize = 10;
+/// Share of the rows beyond which times that decrease are in no order.
+const MAX_RESTART_SHARE: f64 = 0.02;
+
+/// Lets times increase where a clock passes the end of its period, and where it begins again for another run, which becomes a segment.
+fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
+    let rows = samples.time.len();
+    let back: Vec<usize> = (1..rows).filter(|row| samples.time[*row] < samples.time[row - 1]).collect();
+    if back.is_empty() || back.len() as f64 > (MAX_RESTART_SHARE * rows as f64).max(1.0) {
+        return;
+    }
+    let mut steps: Vec<f64> = samples.time.windows(2).map(|t| t[1] - t[0]).filter(|step| *step > 0.0).collect();
+    if steps.is_empty() {
+        return;
+    }
+    let middle = (steps.len() - 1) / 2;
+    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let (mut offset, mut starts, mut periods) = (0.0, vec![0], Vec::new());
+    let (first, mut time) = (samples.time[0], samples.time.clone());
+    let mut due = back.iter().copied().peekable();
+    for row in 1..rows {
+        if due.next_if_eq(&row).is_some() {
+            let (before, own) = (samples.time[row - 1], samples.time[row]);
+            let continues = |period: &&f64| {
+                let step = own + **period - before;
+                step > 0.0 && step <= MIN_GAP * usual && own >= 0.0
+            };
+            // A day may pass within an interruption.
+            let midnight = before <= DAY_S && before - own > MIN_MIDNIGHT_S && own >= 0.0;
+            if let Some(period) = CLOCK_PERIODS_S.iter().find(continues).or(midnight.then_some(&DAY_S)) {
+                offset += period;
+                periods.push(*period);
+            } else if (own - first).abs() <= 2.0 * usual && row - starts.last().unwrap_or(&0) >= MIN_RUN {
+                offset = time[row - 1] + usual - own;
+                starts.push(row);
+            } else {
+                return;
+            }
+        }
+        time[row] = samples.time[row] + offset;
+    }
+    samples.time = time;
+    match periods.first() {
+        Some(period) if *period == DAY_S => {
+            done.note("the clock passes midnight: the times after it continue".to_owned())
+        }
+        Some(period) => {
+            done.note(format!("the clock begins again after {period} s, where its counter is full: the times continue"))
+        }
+        None => {}
+    }
+    if starts.len() > 1 {
+        let labels = samples.segment.take();
+        let begins = |row: usize| {
+            row == 0 || starts.contains(&row) || labels.as_ref().is_some_and(|labels| labels[row] != labels[row - 1])
+        };
+        let segments: Vec<usize> = (0..rows).filter(|row| begins(*row)).chain([rows]).collect();
+        let segments: Vec<Range<usize>> = segments.windows(2).map(|w| w[0]..w[1]).collect();
+        relabel(samples, &segments);
+        done.note(format!(
+            "the clock begins again {}: a segment begins there, and its times follow those before",
+            if starts.len() == 2 {
+                format!("in row {}", done.row(starts[1]) + 1)
+            } else {
+                format!("{} times", starts.len() - 1)
+            }
+        ));
+    }
+}
+
 /// Seconds of a day, and how much of it a clock without a date may go back by at midnight.
 const DAY_S: f64 = 86_400.0;
 const MIN_MIDNIGHT_S: f64 = 80_000.0;
 
-/// Lets a clock without a date go on at midnight.
-fn pass_midnight(samples: &mut Columns, done: &mut Repaired) {
-    let back = |t: &[f64]| t[0] - t[1] > MIN_MIDNIGHT_S && t[0] <= DAY_S && t[1] >= 0.0;
-    if !samples.time.windows(2).any(back) {
-        return;
-    }
-    let (mut days, mut before) = (0.0, samples.time[0]);
-    for t in &mut samples.time {
-        if back(&[before, *t]) {
-            days += DAY_S;
-        }
-        before = *t;
-        *t += days;
-    }
-    done.note("the clock passes midnight: the times after it continue".to_owned());
-}
-
 /// Joins rows of one time: their values are averaged.
 fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let rows = samples.time.len();
+    if samples.time.windows(2).all(|t| t[0] != t[1]) {
+        return;
+    }
     let label = |row: usize| samples.segment.as_ref().map(|labels| labels[row]);
     let repeats = |row: usize| row > 0 && samples.time[row] == samples.time[row - 1] && label(row) == label(row - 1);
     let repeated: Vec<bool> = (0..rows).map(repeats).collect();
@@ -281,17 +352,19 @@ fn is_uneven(samples: &Columns, printed: Printed) -> Option<Vec<Range<usize>>> {
     matches!(grid::fit(&samples.time, &segments, printed), Err(Fault::Uneven { .. })).then_some(segments)
 }
 
-/// Puts back rows that are lost where only a few in sequence are: without values.
-fn insert_lost(samples: &mut Columns, done: &mut Repaired, printed: Printed) {
-    let Some(segments) = is_uneven(samples, printed) else { return };
+/// Puts back rows that are lost where only a few in sequence are, without values; says whether there were any.
+fn insert_lost(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>]) -> bool {
     let rows = samples.time.len();
     // Rows to insert before each row.
     let mut lost = vec![0; rows];
+    // Where every step is a multiple of the usual one, many rows may be lost and the grid is clear all the same.
+    let mut is_clear = true;
     for rows in segments.iter().filter(|rows| rows.len() > 2) {
         let usual = usual_step(&samples.time[rows.clone()]);
         for (row, lost) in lost.iter_mut().enumerate().take(rows.end).skip(rows.start + 1) {
             let steps = (samples.time[row] - samples.time[row - 1]) / usual;
             let whole = steps.round();
+            is_clear &= whole >= 1.0 && (steps - whole).abs() < MAX_OFF_CLEAR_GRID;
             if whole >= 2.0 && whole <= MAX_BRIDGE as f64 + 1.0 && (steps - whole).abs() < MAX_OFF_GRID {
                 *lost = whole as usize - 1;
             }
@@ -299,8 +372,9 @@ fn insert_lost(samples: &mut Columns, done: &mut Repaired, printed: Printed) {
     }
     let gaps = lost.iter().filter(|lost| **lost > 0).count();
     let count: usize = lost.iter().sum();
-    if count == 0 || gaps as f64 > (MAX_GAP_SHARE * rows as f64).max(1.0) {
-        return;
+    let share = if is_clear { MAX_MISSING_SHARE } else { MAX_GAP_SHARE };
+    if count == 0 || gaps as f64 > (share * rows as f64).max(1.0) {
+        return false;
     }
     let times: Vec<f64> = (0..rows)
         .flat_map(|row| {
@@ -326,11 +400,11 @@ fn insert_lost(samples: &mut Columns, done: &mut Repaired, printed: Printed) {
     insert(&mut own, &lost, |_, row| row);
     done.rows = Some(own);
     done.note(format!("{} lost between others: interpolated, and not fitted", rows_word(count)));
+    true
 }
 
 /// Begins a segment behind each interruption, and resamples times that jitter. Times that do not increase are left to the checks.
-fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired) {
-    let Some(mut segments) = is_uneven(samples, *printed) else { return };
+fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, mut segments: Vec<Range<usize>>) {
     let rows = samples.time.len();
     let mut gaps = Vec::new();
     segments = segments.into_iter().flat_map(|rows| at_gaps(&samples.time, rows, &mut gaps)).collect();
@@ -547,6 +621,31 @@ mod tests {
         let record = read(&table(&times));
         assert_eq!((record.segments(), record.labels()), (&[0..40, 40..100][..], &[0, 1][..]));
         assert!(record.notes()[0].contains("interruption of up to 2.001 s"), "{:?}", record.notes());
+    }
+
+    #[test]
+    fn a_clock_that_begins_again_begins_a_segment() {
+        let run = |rows: i32| (0..rows).map(|k| 1e-3 * f64::from(k));
+        let record = read(&table(&run(40).chain(run(60)).collect::<Vec<_>>()));
+        assert_eq!((record.segments(), record.labels()), (&[0..40, 40..100][..], &[0, 1][..]));
+        assert!(record.notes()[0].contains("begins again in row 41"), "{:?}", record.notes());
+        assert!((record.time()[99] - 0.099).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_full_counter_continues() {
+        let times: Vec<f64> = (0..100).map(|k| (4294.9 + 1e-3 * f64::from(k)) % 4294.967296).collect();
+        let record = read(&table(&times));
+        assert_eq!((record.rows(), record.segments().len(), record.sample_period()), (100, 1, 1e-3));
+        assert!(record.notes()[0].contains("after 4294.967296 s"), "{:?}", record.notes());
+    }
+
+    #[test]
+    fn many_rows_may_be_lost_from_a_clear_grid() {
+        let times: Vec<f64> = (0..300).filter(|k| k % 7 != 3).map(|k| 1e-3 * f64::from(k)).collect();
+        let record = read(&table(&times));
+        assert_eq!((record.rows(), record.segments().len()), (300, 1));
+        assert!(record.notes()[0].contains("43 rows lost between others"), "{:?}", record.notes());
     }
 
     #[test]

@@ -2,61 +2,76 @@
 
 use hyst_ident::compare::{Compared, Comparison, SortedBy};
 use hyst_ident::record::Record;
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::chart::{Chart, Drawn, drawn};
+use crate::canvas::{Area, Drawn, Format};
+use crate::chart::Chart;
 use crate::exit::CommandResult;
 use crate::text;
 
 const TRAIN: RGBColor = RGBColor(30, 110, 190);
 const TEST: RGBColor = RGBColor(200, 80, 40);
 
-/// The picture as SVG; what is left is shown of `record`.
+/// The picture; the residuals are those of `record`.
 pub(super) fn draw(
+    format: Format,
     comparison: &Comparison,
     record: &Record,
     predicted: fn(&Compared) -> &[f64],
-) -> CommandResult<String> {
-    drawn(|svg| panels(svg, comparison, record, predicted))
+) -> CommandResult<Vec<u8>> {
+    let (_, lines) = panels_of(&comparison.models);
+    let size = (1500, 230 + 190 * u32::try_from(lines.max(2)).unwrap_or(2));
+    format.draw(size, |root| panels(root, comparison, record, predicted))
 }
 
-fn panels(svg: &mut String, comparison: &Comparison, record: &Record, predicted: fn(&Compared) -> &[f64]) -> Drawn {
-    let models = &comparison.models;
+/// Columns and rows of residual panels.
+fn panels_of(models: &[Compared]) -> (usize, usize) {
     let columns = (models.len() as f64).sqrt().ceil() as usize;
-    let lines = models.len().div_ceil(columns);
-    let root = SVGBackend::with_string(svg, (1500, u32::try_from(230 + 190 * lines.max(2))?)).into_drawing_area();
-    root.fill(&WHITE)?;
+    (columns, models.len().div_ceil(columns.max(1)))
+}
+
+fn panels(root: &Area<'_>, comparison: &Comparison, record: &Record, predicted: fn(&Compared) -> &[f64]) -> Drawn {
+    let models = &comparison.models;
+    let (columns, lines) = panels_of(models);
     let unit = record.output_unit().map_or("", |unit| unit.symbol());
     let tested = comparison.sorted_by == SortedBy::TestRmse;
     let shown = if tested { "test" } else { "training" };
-    let title = format!("{}: errors, and what each leaves of the {shown} record", text::count(models.len(), "model"));
+    let title = format!("{}: errors, and residuals on the {shown} record", text::count(models.len(), "model"));
     let root = root.titled(&title, ("sans-serif", 24))?;
     let (left, right) = root.split_horizontally(520);
-    bars(&left, models, unit)?;
+    errors(&left, models, unit)?;
     let input = models.first().map_or("", |m| &m.fit.model.input.unit);
-    let caption = format!("measured − model [{unit}] against the input [{input}], each on its own scale");
+    let caption = format!("measured − model [{unit}] against the input [{input}], all on one scale");
     let right = right.titled(&caption, ("sans-serif", 16))?;
     let settling = if tested { &comparison.test_settling } else { &comparison.train_settling };
-    for (area, model) in right.split_evenly((lines, columns)).iter().zip(models) {
+    let measured = record.output().unwrap_or_default();
+    // In a piece for each segment, without the rows that do not count.
+    let residual = |model: &Compared| -> Vec<Vec<(f64, f64)>> {
+        let row = |k: usize| (!settling[k]).then(|| (record.input()[k], measured[k] - predicted(model)[k]));
+        record.segments().iter().map(|rows| rows.clone().filter_map(row).collect()).collect()
+    };
+    let residuals: Vec<_> = models.iter().map(residual).collect();
+    // A model that is far off would flatten all others: the scale is that of the median model, and the far ones leave it.
+    let mut most: Vec<f64> = residuals
+        .iter()
+        .map(|pieces| pieces.iter().flatten().fold(0.0, |most: f64, (_, r)| most.max(r.abs())))
+        .collect();
+    most.sort_unstable_by(f64::total_cmp);
+    let scale = 1.5 * most.get(most.len() / 2).copied().unwrap_or(0.0);
+    for ((area, model), residual) in right.split_evenly((lines, columns)).iter().zip(models).zip(&residuals) {
         let rmse = model.test.unwrap_or(model.train).errors.rmse;
         let mut chart = Chart::new(&format!("{}, RMS {}", model.kind, text::short(rmse)), "", "").small();
-        let measured = record.output().unwrap_or_default();
-        let counted = || (0..record.rows()).filter(|k| !settling[*k]);
-        let input: Vec<f64> = counted().map(|k| record.input()[k]).collect();
-        let left_over: Vec<f64> = counted().map(|k| measured[k] - predicted(model)[k]).collect();
-        chart.path("", if tested { TEST } else { TRAIN }, &input, &left_over);
+        if scale > 0.0 && scale.is_finite() {
+            chart = chart.between(-scale, scale);
+        }
+        chart.paths("", if tested { TEST } else { TRAIN }, residual);
         chart.draw(area)?;
     }
-    root.present()?;
     Ok(())
 }
 
-/// Bars of RMSE on a logarithmic axis, the best on top.
-fn bars<B: DrawingBackend>(area: &DrawingArea<B, Shift>, models: &[Compared], unit: &str) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+/// Dots of RMSE on a logarithmic axis, the best on top.
+fn errors(area: &Area<'_>, models: &[Compared], unit: &str) -> Drawn {
     let of = |m: &Compared| [Some((m.train, TRAIN)), m.test.map(|test| (test, TEST))];
     let all = || models.iter().flat_map(of).flatten().map(|(figures, _)| figures.errors.rmse).filter(|x| *x > 0.0);
     let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
@@ -79,15 +94,13 @@ where
         .draw()?;
     let tested = models.iter().any(|m| m.test.is_some());
     for (name, which, colour) in [("training record", 0, TRAIN), ("test record", 1, TEST)] {
-        let bar = |(i, m): (usize, &Compared)| {
+        let dot = |(i, m): (usize, &Compared)| {
             let (figures, _) = of(m)[which]?;
-            let top = count - i as f64 - if which == 0 { 0.12 } else { 0.5 };
-            let height = if tested { 0.36 } else { 0.76 };
-            Some(Rectangle::new([(low, top - height), (figures.errors.rmse.max(low), top)], colour.mix(0.85).filled()))
+            Some(Circle::new((figures.errors.rmse.max(low), count - i as f64 - 0.5), 5, colour.mix(0.85).filled()))
         };
-        let series = chart.draw_series(models.iter().enumerate().filter_map(bar))?;
+        let series = chart.draw_series(models.iter().enumerate().filter_map(dot))?;
         if tested {
-            series.label(name).legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 18, y + 5)], colour.filled()));
+            series.label(name).legend(move |(x, y)| Circle::new((x + 9, y), 5, colour.filled()));
         }
     }
     if tested {

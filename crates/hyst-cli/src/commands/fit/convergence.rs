@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use hyst_ident::fit::Fit;
 use hyst_ident::optimize::{Found, Scale, Spread, TraceRow, Trials};
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::chart::{Chart, Drawn, drawn};
+use crate::canvas::{Area, Drawn, Format};
+use crate::chart::Chart;
 use crate::cli::FitArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::text;
@@ -23,8 +23,10 @@ pub(super) fn write(args: &FitArgs, trials: &Trials, polished: Option<f64>, unit
     }
     if let Some(target) = &args.picture {
         let title = format!("{}, {}: how the search went", args.model, text::count(trials.found.len(), "trial"));
-        let svg = drawn(|svg| panels(svg, &title, trials, polished, unit))?;
-        target.write(|out| out.write_all(svg.as_bytes()))?;
+        let lines = trials.variables.len().div_ceil(columns(trials));
+        let size = (1400, 460 + 260 * u32::try_from(lines).unwrap_or(1));
+        let picture = Format::of(target)?.draw(size, |root| panels(root, &title, trials, polished, unit))?;
+        target.write(|out| out.write_all(&picture))?;
     }
     Ok(())
 }
@@ -60,11 +62,14 @@ fn table(out: &mut dyn Write, trials: &Trials) -> io::Result<()> {
     Ok(())
 }
 
-fn panels(svg: &mut String, title: &str, trials: &Trials, polished: Option<f64>, unit: &str) -> Drawn {
-    let columns = trials.variables.len().clamp(1, 4);
+/// Variables side by side.
+fn columns(trials: &Trials) -> usize {
+    trials.variables.len().clamp(1, 4)
+}
+
+fn panels(root: &Area<'_>, title: &str, trials: &Trials, polished: Option<f64>, unit: &str) -> Drawn {
+    let columns = columns(trials);
     let lines = trials.variables.len().div_ceil(columns);
-    let root = SVGBackend::with_string(svg, (1400, u32::try_from(460 + 260 * lines)?)).into_drawing_area();
-    root.fill(&WHITE)?;
     let root = root.titled(title, ("sans-serif", 24))?;
     let (above, below) = root.split_vertically(420);
     let several = trials.found.len() > 1;
@@ -88,7 +93,6 @@ fn panels(svg: &mut String, title: &str, trials: &Trials, polished: Option<f64>,
         every_trial(&mut chart, trials, &|row: &TraceRow| (row.generation as f64, row.values[d]));
         chart.draw(area)?;
     }
-    root.present()?;
     Ok(())
 }
 
@@ -104,10 +108,7 @@ fn every_trial(chart: &mut Chart, trials: &Trials, point: &dyn Fn(&TraceRow) -> 
 }
 
 /// Quartiles and extremes of the costs at the end, and each of them as a point.
-fn box_plot<B: DrawingBackend>(area: &DrawingArea<B, Shift>, found: &[Found], spread: &Spread, unit: &str) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+fn box_plot(area: &Area<'_>, found: &[Found], spread: &Spread, unit: &str) -> Drawn {
     let Spread { lowest, lower_quartile, median, upper_quartile, highest } = *spread;
     let room = 0.08 * (highest - lowest).max(1e-3 * highest.abs()).max(f64::MIN_POSITIVE);
     let mut chart = ChartBuilder::on(area)

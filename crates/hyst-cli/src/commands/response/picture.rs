@@ -3,27 +3,20 @@
 use std::ops::Range;
 
 use hyst_ident::linear::{Mode, ResponseLine, Structure};
-use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::exit::{CommandError, CommandResult};
+use crate::canvas::{Area, Drawn, Format};
+use crate::exit::CommandResult;
 use crate::text;
 
 const MEASURED: RGBColor = RGBColor(30, 110, 190);
 const MODEL: RGBColor = RGBColor(200, 80, 40);
 const FAINT: RGBColor = RGBColor(150, 150, 150);
 
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// The picture as SVG.
-pub(super) fn draw(found: &Structure, unit: &str, title: &str) -> CommandResult<String> {
-    let mut svg = String::new();
-    // Drawing into a string fails only on a bug in the numbers' ranges.
-    panels(&mut svg, &Shown::new(found), unit, title)
-        .map_err(|e| CommandError::failed(format!("the picture could not be drawn: {e}")))?;
-    Ok(svg)
+/// The picture.
+pub(super) fn draw(format: Format, found: &Structure, unit: &str, title: &str) -> CommandResult<Vec<u8>> {
+    format.draw((1100, 1000), |root| panels(root, &Shown::new(found), unit, title))
 }
 
 /// What is shown, up to the end of the band: above it is noise.
@@ -56,16 +49,13 @@ impl<'a> Shown<'a> {
     }
 }
 
-fn panels(svg: &mut String, shown: &Shown<'_>, unit: &str, title: &str) -> Drawn {
-    let root = SVGBackend::with_string(svg, (1100, 1000)).into_drawing_area();
-    root.fill(&WHITE)?;
+fn panels(root: &Area<'_>, shown: &Shown<'_>, unit: &str, title: &str) -> Drawn {
     let root = root.titled(title, ("sans-serif", 22))?;
     let (above, below) = root.split_vertically(440);
     let (middle, below) = below.split_vertically(280);
     gain(&above, shown, unit)?;
     phase(&middle, shown)?;
     coherence(&below, shown)?;
-    root.present()?;
     Ok(())
 }
 

@@ -6,6 +6,8 @@ use crate::record::grid::Printed;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
     Number(f64),
+    /// A number with a sign between its thousands, as `1'250.5` or, with a decimal comma, `1.250,5`.
+    Grouped(f64),
     /// Nothing, or a word for it, as `NaN`.
     Missing,
     /// A date and time, as ISO 8601 writes it.
@@ -45,21 +47,37 @@ const POWERS: [f64; 23] = [
     1e21, 1e22,
 ];
 
+/// A number at the beginning of some bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scanned {
+    pub(super) value: f64,
+    /// Its digits and decimals.
+    pub(super) printed: Printed,
+    /// Bytes that it takes.
+    pub(super) bytes: usize,
+}
+
 /// The number that a cell without blanks around it prints, rounded to the nearest double.
 pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
-    let (negative, digits) = match cell.first()? {
-        b'-' => (true, &cell[1..]),
-        b'+' => (false, &cell[1..]),
-        _ => (false, cell),
+    scan(cell, decimal).filter(|scanned| scanned.bytes == cell.len()).map(|scanned| scanned.value)
+}
+
+/// The number that some bytes begin with, rounded to the nearest double.
+pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
+    let (negative, signs) = match bytes.first()? {
+        b'-' => (true, 1),
+        b'+' => (false, 1),
+        _ => (false, 0),
     };
-    let (mut mantissa, mut count, mut after) = (0_u64, 0_u32, 0_i32);
+    let digits = &bytes[signs..];
+    let (mut mantissa, mut count, mut after) = (0_u64, 0_i32, 0_i32);
     let mut pointed = false;
     let mut at = 0;
     while let Some(byte) = digits.get(at) {
         match byte {
             b'0'..=b'9' => {
                 mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
-                count += u32::from(count > 0 || *byte != b'0');
+                count += i32::from(count > 0 || *byte != b'0');
                 after += i32::from(pointed);
             }
             _ if *byte == decimal && !pointed => pointed = true,
@@ -73,18 +91,19 @@ pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
     }
     let mut exponent = -after;
     if let Some(b'e' | b'E' | b'd' | b'D') = digits.get(at) {
-        exponent += std::str::from_utf8(&digits[at + 1..]).ok()?.parse::<i32>().ok().filter(|e| e.abs() < 10_000)?;
-        at = digits.len();
-    }
-    if at != digits.len() {
-        return None;
+        let rest = &digits[at + 1..];
+        let signs = usize::from(matches!(rest.first(), Some(b'-' | b'+')));
+        let own = rest[signs..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+        let written = std::str::from_utf8(&rest[..signs + own]).ok()?;
+        exponent += written.parse::<i32>().ok().filter(|e| e.abs() < 10_000)?;
+        at += 1 + written.len();
     }
     // One rounding of two exact numbers (Clinger 1990).
     let magnitude = if count <= 19 && mantissa <= 1 << 53 && exponent.unsigned_abs() <= 22 {
         let power = POWERS[exponent.unsigned_abs() as usize];
         if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power }
     } else {
-        let text: String = digits
+        let text: String = digits[..at]
             .iter()
             .map(|byte| match byte {
                 b'd' | b'D' => 'e',
@@ -94,7 +113,8 @@ pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
             .collect();
         text.parse().ok()?
     };
-    Some(if negative { -magnitude } else { magnitude })
+    let printed = Printed { digits: count, decimals: (-exponent).clamp(-300, 300) };
+    Some(Scanned { value: if negative { -magnitude } else { magnitude }, printed, bytes: signs + at })
 }
 
 /// What a cell without blanks around it is.
@@ -106,7 +126,25 @@ pub(super) fn cell(cell: &[u8], decimal: u8) -> Cell {
     if is_missing(cell) {
         return Cell::Missing;
     }
-    std::str::from_utf8(cell).ok().and_then(date_time).map_or(Cell::Other, Cell::Time)
+    let Ok(text) = std::str::from_utf8(cell) else { return Cell::Other };
+    grouped(text, decimal).map(Cell::Grouped).or_else(|| date_time(text).map(Cell::Time)).unwrap_or(Cell::Other)
+}
+
+/// The number of a text with a sign between its thousands: one sign throughout, groups of three digits, no leading zero.
+fn grouped(text: &str, decimal: u8) -> Option<f64> {
+    let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let (whole, _) = unsigned.split_once(char::from(decimal)).unwrap_or((unsigned, ""));
+    let between = whole.chars().find(|c| !c.is_ascii_digit())?;
+    // A comma or a point, whichever is not the decimal sign; an apostrophe; spaces that do not break a line.
+    let known = ['.', ',', '\'', '\u{2019}', '\u{a0}', '\u{2009}', '\u{202f}'];
+    let mut groups = whole.split(between);
+    let first = groups.next()?;
+    let is_grouped = known.contains(&between)
+        && (1..=3).contains(&first.len())
+        && !first.starts_with('0')
+        && groups.all(|group| group.len() == 3 && group.bytes().all(|byte| byte.is_ascii_digit()));
+    let plain = || text.chars().filter(|c| *c != between).collect::<String>();
+    is_grouped.then(|| number(plain().as_bytes(), decimal)).flatten().filter(|number| number.is_finite())
 }
 
 /// Words that stand for no value in files of instruments and spreadsheets.
@@ -139,8 +177,28 @@ fn is_missing(cell: &[u8]) -> bool {
     cell.is_empty() || cell.len() <= 10 && WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
 }
 
-/// The moment of `2024-05-31T12:30:01.25`, with a blank for the T, a time zone, or the date left out.
+/// The moment of `2024-05-31T12:30:01.25`, with a blank for the T, a time zone, AM or PM, or the date left out.
 fn date_time(text: &str) -> Option<Moment> {
+    // A clock of twelve hours: 12 AM is midnight, 12 PM noon.
+    if let Some((clock, half)) = text.rsplit_once(' ').filter(|(_, half)| half.len() == 2) {
+        let afternoon = match half.to_ascii_uppercase().as_str() {
+            "AM" => 0,
+            "PM" => 12 * 3600,
+            _ => return date_time_of_day(text),
+        };
+        let mut moment = date_time_of_day(clock).filter(|moment| moment.timed)?;
+        let hour = moment.whole.rem_euclid(86_400) / 3600;
+        if !(1..=12).contains(&hour) {
+            return None;
+        }
+        moment.whole += afternoon - if hour == 12 { 12 * 3600 } else { 0 };
+        return Some(moment);
+    }
+    date_time_of_day(text)
+}
+
+/// The same with 24 hours.
+fn date_time_of_day(text: &str) -> Option<Moment> {
     let (days, clock) = match text.split_once(['T', ' ']) {
         Some((date, clock)) => (Some(days(date)?), clock.trim()),
         None if text.contains(':') => (None, text),
@@ -215,7 +273,9 @@ pub(super) fn take_digits(printed: &mut Printed, cell: &[u8], decimal: u8) {
     if decimal == b'.' {
         printed.take(cell);
     } else {
-        let text: Vec<u8> = cell.iter().map(|byte| if *byte == decimal { b'.' } else { *byte }).collect();
+        // A point is between thousands there.
+        let point = |byte: &u8| if *byte == decimal { b'.' } else { *byte };
+        let text: Vec<u8> = cell.iter().filter(|byte| **byte != b'.').map(point).collect();
         printed.take(&text);
     }
 }
@@ -251,6 +311,25 @@ mod tests {
     }
 
     #[test]
+    fn thousands_may_be_grouped() {
+        for (text, decimal, value) in [
+            ("1,050.5", b'.', 1050.5),
+            ("-1'234'567", b'.', -1_234_567.0),
+            ("1.050,25", b',', 1050.25),
+            ("19,999", b'.', 19_999.0),
+            ("1\u{202f}050,5", b',', 1050.5),
+            ("1,050e3", b'.', f64::NAN),
+        ] {
+            let found = cell(text.as_bytes(), decimal);
+            assert_eq!(found, if value.is_nan() { Cell::Other } else { Cell::Grouped(value) }, "{text}");
+        }
+        for (text, decimal) in [("0,123", b'.'), ("1,05", b'.'), ("1,0500", b'.'), ("1,050'000", b'.'), (",050", b'.')]
+        {
+            assert_eq!(cell(text.as_bytes(), decimal), Cell::Other, "{text}");
+        }
+    }
+
+    #[test]
     fn dates_are_seconds() {
         let date_time = |text| date_time(text).map(|moment| moment.since(0));
         assert_eq!(date_time("1970-01-02"), Some(86_400.0));
@@ -259,6 +338,9 @@ mod tests {
         assert_eq!(date_time("2024-02-29T13:00:00+01:00"), Some(1_709_208_000.0));
         assert_eq!(date_time("00:00:01.5"), Some(1.5));
         assert_eq!(date_time("29.02.2024 12:00:00.250"), Some(1_709_208_000.25));
+        assert_eq!(date_time("1:21:14.5 PM"), Some(13.0 * 3600.0 + 21.0 * 60.0 + 14.5));
+        assert_eq!(date_time("12:00:01 am"), Some(1.0));
+        assert_eq!(date_time("13:00:00 PM"), None);
         for wrong in ["2024-13-01", "24-01-01", "12:61:00", "abc", "2024-01-01T", "1:2:3:4", "2024-01-01T00:00:00+99"] {
             assert_eq!(date_time(wrong), None, "{wrong}");
         }

@@ -9,13 +9,14 @@ mod rows;
 mod stream;
 
 use std::borrow::Cow;
+use std::cell::Cell as Told;
 
 use super::numbers::number;
 use super::{Axis, Contents, Head, Values, Wanted};
 use crate::record::error::{Place, RecordError};
 pub(crate) use stream::LargeText;
 
-use dialect::{Delimiter, Dialect, lines, remark};
+use dialect::{Delimiter, Dialect};
 
 /// A table of text, its rows unread.
 pub(crate) struct Text<'a> {
@@ -25,6 +26,11 @@ pub(crate) struct Text<'a> {
     heads: Vec<Head>,
     texts: Vec<(String, String)>,
     notes: Vec<String>,
+    /// Where lines below the rows begin.
+    end: usize,
+    /// Lines among the rows that repeat the header, and other lines that are no rows.
+    headings: Told<usize>,
+    others: Told<usize>,
 }
 
 impl<'a> Text<'a> {
@@ -39,7 +45,25 @@ impl<'a> Text<'a> {
         let dialect = Dialect::find(&text).ok_or_else(|| no_numbers(file, &text))?;
         let (heads, texts) = (dialect.heads(&text), dialect.texts(&text));
         notes.extend(dialect.note());
-        Ok(Self { file: file.to_owned(), text, dialect, heads, texts, notes })
+        let footer = dialect.footer(&text).map(|(at, line)| (at, rows::shortened(line)));
+        if let Some((at, line)) = &footer {
+            notes.push(format!(
+                "the file from line {} (\"{line}\") is not read: no row follows",
+                rows::line_at(&text, *at)
+            ));
+        }
+        let end = footer.map_or(text.len(), |(at, _)| at);
+        Ok(Self {
+            file: file.to_owned(),
+            text,
+            dialect,
+            heads,
+            texts,
+            notes,
+            end,
+            headings: Told::new(0),
+            others: Told::new(0),
+        })
     }
 }
 
@@ -68,11 +92,21 @@ impl Contents for Text<'_> {
 
     fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError> {
         let cells: Vec<usize> = wanted.columns.iter().map(|at| self.dialect.field_of(*at)).collect();
-        rows::read(&self.text, &self.dialect, &cells).map_err(|fault| {
+        let read = rows::read(&self.text[..self.end], &self.dialect, &cells).map_err(|fault| {
             let head =
                 |field: usize| self.dialect.column_of(field).map_or(String::new(), |at| self.heads[at].name.clone());
             fault.error(&self.file, &self.text, head)
-        })
+        })?;
+        self.headings.set(read.headings);
+        self.others.set(read.others);
+        Ok(read.columns)
+    }
+
+    fn late_notes(&self) -> Vec<String> {
+        let word =
+            |lines: usize| if lines == 1 { "1 line repeats".to_owned() } else { format!("{lines} lines repeat") };
+        let note = |lines: usize| format!("{} the header among the rows: not read", word(lines));
+        Some(self.headings.get()).filter(|lines| *lines > 0).map(note).into_iter().collect()
     }
 
     fn place(&self, row: usize) -> Place {
@@ -84,8 +118,8 @@ impl Contents for Text<'_> {
     }
 
     fn plain_text(&self) -> Option<&str> {
-        let remarks = || lines(&self.text, 0).any(|(_, line)| remark(line).is_some());
-        (self.dialect.is_plain(&self.text) && self.notes.is_empty() && !remarks()).then_some(&*self.text)
+        let is_plain = self.dialect.is_plain(&self.text) && self.notes.is_empty();
+        (is_plain && self.headings.get() + self.others.get() == 0).then_some(&*self.text)
     }
 
     fn notes(&self) -> &[String] {
@@ -233,6 +267,28 @@ mod tests {
         assert_eq!(scope.heads[0].axis, Axis::Even { start: 0.0, step: 1e-3 });
         assert_eq!(of(&open("0.0,1,2\n0.1,1,3\n")), [own("1", ""), own("2", ""), own("3", "")]);
         assert_eq!(of(&open("x-axis,1,2\nsecond,Volt,Volt\n-0.1,1,2\n0.1,1,3\n"))[1], own("1", "Volt"));
+    }
+
+    #[test]
+    fn thousands_repeated_headers_and_footers_are_understood() {
+        let expected = vec![vec![0.0, 999.0, 1050.0], vec![0.5, -2.5, 12_004.25]];
+        for text in [
+            "a;b\n0;0,5\n999;-2,5\n1.050;12.004,25\n",
+            "a;b\n0;0.5\n999;-2.5\n1'050;12'004.25\n",
+            "a,b\n0,0.5\n999,-2.5\n\"1,050\",\"12,004.25\"\n",
+            "a\tb\n0\t0.5\n999\t-2.5\na\tb\n1,050\t12,004.25\n",
+            "a,b\n0,0.5\n999,-2.5\n1050,12004.25\nMean,3.2\nEND\n",
+            "a,b\n0,0.5\n999,-2.5\n1050,12004.25\n\nmade by hand\n",
+        ] {
+            assert_eq!(table(text.as_bytes()).1, expected, "{text}");
+        }
+        // Whole numbers alone: 999 and then 1.000 is no step back.
+        let whole: String = (997..1003)
+            .map(|k| format!("{}\n", if k < 1000 { format!("{k};5") } else { format!("1.{:03};5", k - 1000) }))
+            .collect();
+        assert_eq!(table(format!("a;b\n{whole}").as_bytes()).1[0], [997.0, 998.0, 999.0, 1000.0, 1001.0, 1002.0]);
+        // A damaged last row is no footer.
+        assert!(Text::open("x.csv", b"a,b\n0,1\n1,2\n2x,3\n").unwrap().values(Wanted::all(&[0])).is_err());
     }
 
     #[test]

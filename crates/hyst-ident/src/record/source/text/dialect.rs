@@ -22,6 +22,12 @@ const MIN_NUMERIC_SHARE: f64 = 0.5;
 /// Titles that a header may have beyond the fields of a row.
 const MAX_FURTHER_TITLES: usize = 3;
 
+/// Bytes at the end of a file in which lines below the rows are looked for.
+const FOOTER_BYTES: usize = 1 << 12;
+/// Words with which a row of statistics begins.
+const STATISTICS: [&str; 11] =
+    ["mean", "average", "avg", "min", "max", "std", "stdev", "rms", "sum", "total", "median"];
+
 /// How a table is written, and where its rows begin.
 #[derive(Clone, Debug)]
 pub(super) struct Dialect {
@@ -41,6 +47,8 @@ pub(super) struct Dialect {
     dates: Vec<usize>,
     /// Those of them that hold times of day: a date alone is no clock.
     clocks: Vec<usize>,
+    /// The lines with names and units, which files that were put together repeat.
+    headings: Vec<String>,
 }
 
 /// A line, and the byte at which it begins.
@@ -119,6 +127,7 @@ impl Dialect {
             columns,
             dates,
             clocks,
+            headings: vec![sample[0].1.to_owned()],
         })
     }
 
@@ -161,15 +170,32 @@ impl Dialect {
             share(*field, |cell| *cell != Cell::Other) >= MIN_NUMERIC_SHARE && share(*field, is_number) > 0.0
         };
         let columns: Vec<usize> = (0..count).filter(numeric).collect();
-        let surplus = |row: &Vec<Cell>| 2 * numbers_in(row) as i64 - count as i64;
+        // Another decimal sign has to explain grouped thousands worse before these do.
+        let grouped = |row: &[Cell]| row.iter().filter(|cell| matches!(cell, Cell::Grouped(_))).count();
+        let surplus = |row: &Vec<Cell>| 2 * numbers_in(row) as i64 - count as i64 - grouped(row) as i64;
+        if delimiter != Delimiter::One(b',') && hides_thousands(&sample[first..], delimiter, decimal, &columns) {
+            return None;
+        }
         let score = rows.into_iter().map(surplus).sum();
         let start = sample[first].0;
         let is_date = |field: &usize| matches!(cells[first][*field], Cell::Time(_));
         let dates = columns.iter().copied().filter(is_date).collect();
         let clocks = columns.iter().copied().filter(|field| is_clock(&cells[first][*field])).collect();
-        let mut dialect =
-            Self { delimiter, decimal, fields: count, start, names: None, units: None, columns, dates, clocks };
+        let mut dialect = Self {
+            delimiter,
+            decimal,
+            fields: count,
+            start,
+            names: None,
+            units: None,
+            columns,
+            dates,
+            clocks,
+            headings: Vec::new(),
+        };
         dialect.find_names(&sample[..first]);
+        let is_heading = |line: &&Line<'_>| Some(line.0) == dialect.names || Some(line.0) == dialect.units;
+        dialect.headings = sample[..first].iter().filter(is_heading).map(|line| line.1.to_owned()).collect();
         Some((score, dialect))
     }
 
@@ -256,6 +282,43 @@ impl Dialect {
         (0..names.len()).filter(is_text).map(|field| (names[field].to_owned(), row[field].to_owned())).collect()
     }
 
+    /// Whether a line among the rows is a header again.
+    pub(super) fn repeats_heading(&self, line: &str) -> bool {
+        // Nearly all lines begin with a digit, a sign or a blank: the comparison is for the others.
+        line.starts_with(|c: char| c.is_alphabetic() || c == '"') && self.headings.iter().any(|heading| heading == line)
+    }
+
+    /// The lines below the last row that are no rows, as `Mean;…` or `END`: the byte at which they begin, and the first of them.
+    pub(super) fn footer<'a>(&self, text: &'a str) -> Option<Line<'a>> {
+        let from = text.len().saturating_sub(FOOTER_BYTES);
+        // A line that the cut divides is no last line.
+        let from = if from > self.start {
+            from + text.as_bytes()[from..].iter().position(|b| *b == b'\n')? + 1
+        } else {
+            self.start
+        };
+        let last: Vec<Line<'a>> = lines(text, from).collect();
+        let is_row =
+            |line: &Line<'_>| remark(line.1).is_some() || self.repeats_heading(line.1) || !self.is_below_rows(line.1);
+        let first = last.iter().rposition(is_row).map_or(0, |row| row + 1);
+        // The first row is one.
+        last.get(first).copied().filter(|line| line.0 > self.start)
+    }
+
+    /// Whether a line says something about the rows above it.
+    fn is_below_rows(&self, line: &str) -> bool {
+        let found = fields(line, self.delimiter);
+        let what = |field: &usize| found.get(*field).map(|text| cell(text.as_bytes(), self.decimal));
+        let begins = what(self.columns.first().unwrap_or(&0)).or_else(|| what(&0));
+        let first = found.iter().find(|text| !text.is_empty()).copied().unwrap_or_default();
+        if begins != Some(Cell::Other) || !first.starts_with(char::is_alphabetic) {
+            return false;
+        }
+        // A row whose first number is damaged is not left out.
+        let is_row = found.len() == self.fields && self.columns.iter().filter_map(what).any(|cell| is_number(&cell));
+        !is_row || STATISTICS.iter().any(|word| first.to_lowercase().starts_with(word))
+    }
+
     /// The same, of a text whose rows begin at this byte.
     pub(super) fn starting_at(&self, start: usize) -> Self {
         Self { start, ..self.clone() }
@@ -287,11 +350,11 @@ impl Dialect {
         self.names.map(|at| super::rows::line_at(text, at))
     }
 
-    /// Whether the table is written as the record format is: nothing but a header and rows.
+    /// Whether the table is written as the record format is: a header and nothing else above the first row.
     pub(super) fn is_plain(&self, text: &str) -> bool {
-        let header_first = self.names.is_some() && self.names == lines(text, 0).next().map(|(at, _)| at);
-        let blanks = || text.lines().any(|line| !line.is_empty() && line.trim().is_empty());
-        header_first && self.is_comma() && !blanks()
+        let mut above = text[..self.start].lines().filter(|line| !line.is_empty());
+        let is_header = above.next().is_some_and(|line| remark(line).is_none());
+        is_header && above.next().is_none() && self.names.is_some() && self.is_comma()
     }
 
     fn is_comma(&self) -> bool {
@@ -322,7 +385,25 @@ fn is_clock(cell: &Cell) -> bool {
 }
 
 fn is_number(cell: &Cell) -> bool {
-    matches!(cell, Cell::Number(_) | Cell::Time(_))
+    matches!(cell, Cell::Number(_) | Cell::Grouped(_) | Cell::Time(_))
+}
+
+/// Whether the decimal sign is one between thousands: a column has numbers of three digits without it, and all numbers with it have three
+/// digits behind it, the zeros at the end included (`998`, `999`, `1.000`).
+fn hides_thousands(rows: &[Line<'_>], delimiter: Delimiter, decimal: u8, columns: &[usize]) -> bool {
+    let sign = char::from(decimal);
+    let rows: Vec<Vec<&str>> = rows.iter().map(|(_, line)| fields(line, delimiter)).collect();
+    columns.iter().any(|field| {
+        let cells = || rows.iter().filter_map(|row| row.get(*field)).map(|cell| cell.trim_start_matches(['-', '+']));
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        let mut signed = cells().filter_map(|cell| cell.split_once(sign)).peekable();
+        signed.peek().is_some()
+            && cells().any(|cell| cell.len() == 3 && digits(cell))
+            && cells().filter_map(|cell| cell.split_once(sign)).any(|(_, behind)| behind.ends_with('0'))
+            && signed.all(|(before, behind)| {
+                behind.len() == 3 && digits(behind) && before.len() <= 3 && !before.starts_with('0')
+            })
+    })
 }
 
 /// The unit in a cell of a row of units, without brackets.

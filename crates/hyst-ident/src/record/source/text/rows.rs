@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use memchr::memchr;
 use rayon::prelude::*;
 
 use super::super::Values;
-use super::super::numbers::{Cell, cell, take_digits};
+use super::super::numbers::{Cell, cell, scan, take_digits};
 use super::dialect::{Delimiter, Dialect, lines, remark};
 use super::fields;
 use crate::record::error::{Place, RecordError};
@@ -57,21 +58,34 @@ impl Fault {
     }
 }
 
+/// The rows of a text.
+#[derive(Debug, Default)]
+pub(super) struct Read {
+    /// Those fields that were asked for.
+    pub(super) columns: Vec<Values>,
+    /// Lines that repeat the header.
+    pub(super) headings: usize,
+    /// Lines of remarks or blanks.
+    pub(super) others: usize,
+}
+
 /// Reads the fields with these numbers of all rows.
-pub(super) fn read(text: &str, dialect: &Dialect, wanted: &[usize]) -> Result<Vec<Values>, Fault> {
+pub(super) fn read(text: &str, dialect: &Dialect, wanted: &[usize]) -> Result<Read, Fault> {
     read_from(text, dialect, dialect.midnight(text), wanted)
 }
 
 /// The same, with dates counted from `midnight` \[s\].
-pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[usize]) -> Result<Vec<Values>, Fault> {
+pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[usize]) -> Result<Read, Fault> {
     let read = |piece| piece_of(text, piece, dialect, midnight, wanted);
     // Of several faults the first in the text counts, whichever thread finds one first.
-    let pieces: Vec<Result<Vec<Values>, Fault>> = pieces(text, dialect.start).into_par_iter().map(read).collect();
-    let pieces: Vec<Vec<Values>> = pieces.into_iter().collect::<Result<_, _>>()?;
-    let rows: usize = pieces.iter().map(|piece| piece.first().map_or(0, |column| column.numbers.len())).sum();
-    let mut all: Vec<Values> = wanted.iter().map(|_| with_room(rows)).collect();
+    let pieces: Vec<Result<Read, Fault>> = pieces(text, dialect.start).into_par_iter().map(read).collect();
+    let pieces: Vec<Read> = pieces.into_iter().collect::<Result<_, _>>()?;
+    let rows: usize = pieces.iter().map(|piece| piece.columns.first().map_or(0, |column| column.numbers.len())).sum();
+    let mut all = Read { columns: wanted.iter().map(|_| with_room(rows)).collect(), headings: 0, others: 0 };
     for piece in pieces {
-        for (column, part) in all.iter_mut().zip(piece) {
+        all.headings += piece.headings;
+        all.others += piece.others;
+        for (column, part) in all.columns.iter_mut().zip(piece.columns) {
             column.numbers.extend(part.numbers);
             column.printed.join(part.printed);
         }
@@ -90,7 +104,7 @@ fn pieces(text: &str, start: usize) -> Vec<Range<usize>> {
     let mut from = start;
     while from < bytes.len() {
         let until = (from + PIECE_BYTES).min(bytes.len());
-        let end = bytes[until..].iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |more| until + more + 1);
+        let end = memchr(b'\n', &bytes[until..]).map_or(bytes.len(), |more| until + more + 1);
         pieces.push(from..end);
         from = end;
     }
@@ -103,7 +117,7 @@ fn piece_of(
     dialect: &Dialect,
     midnight: i64,
     wanted: &[usize],
-) -> Result<Vec<Values>, Fault> {
+) -> Result<Read, Fault> {
     let room = piece.len() / (4 * dialect.fields);
     let mut columns: Vec<Values> = wanted.iter().map(|_| with_room(room)).collect();
     // Columns to which the number of each field goes.
@@ -111,11 +125,15 @@ fn piece_of(
     for (column, field) in wanted.iter().enumerate() {
         goals[*field].push(column);
     }
-    let mut rows = Rows { dialect, midnight, goals: &goals, columns: &mut columns };
-    for (at, line) in lines(&text[..piece.end], piece.start) {
-        rows.take(at, line)?;
+    let mut rows = Rows { dialect, midnight, goals: &goals, columns: &mut columns, headings: 0, others: 0 };
+    let mut at = piece.start;
+    while at < piece.end {
+        let end = memchr(b'\n', &text.as_bytes()[at..piece.end]).map_or(piece.end, |length| at + length);
+        rows.take(at, text[at..end].trim_end_matches('\r'))?;
+        at = end + 1;
     }
-    Ok(columns)
+    let Rows { headings, others, .. } = rows;
+    Ok(Read { columns, headings, others })
 }
 
 /// Where rows go.
@@ -125,11 +143,31 @@ struct Rows<'a> {
     midnight: i64,
     goals: &'a [Vec<usize>],
     columns: &'a mut [Values],
+    /// Lines that repeated the header.
+    headings: usize,
+    /// Lines of remarks or blanks.
+    others: usize,
 }
 
 impl Rows<'_> {
     fn take(&mut self, at: usize, line: &str) -> Result<(), Fault> {
+        // Nearly all lines are numbers alone.
+        if let (Some(b'0'..=b'9' | b'-' | b'+' | b'.'), Delimiter::One(delimiter)) =
+            (line.as_bytes().first(), self.dialect.delimiter)
+            && self.take_numbers(line.as_bytes(), delimiter)
+        {
+            return Ok(());
+        }
+        if line.trim().is_empty() {
+            self.others += usize::from(!line.is_empty());
+            return Ok(());
+        }
         if remark(line).is_some() {
+            self.others += 1;
+            return Ok(());
+        }
+        if self.dialect.repeats_heading(line) {
+            self.headings += 1;
             return Ok(());
         }
         match self.dialect.delimiter {
@@ -140,6 +178,41 @@ impl Rows<'_> {
             }
             Delimiter::One(delimiter) => self.take_fields(at, line.split(char::from(delimiter)), false),
         }
+    }
+
+    /// Takes a line of as many numbers as a row has, without blanks; no other line.
+    fn take_numbers(&mut self, line: &[u8], delimiter: u8) -> bool {
+        let mut at = 0;
+        for (field, goals) in self.goals.iter().enumerate() {
+            let Some(scanned) = scan(&line[at..], self.dialect.decimal).filter(|scanned| scanned.value.is_finite())
+            else {
+                return self.take_back(field);
+            };
+            at += scanned.bytes;
+            let is_last = field + 1 == self.goals.len();
+            match line.get(at) {
+                Some(byte) if *byte == delimiter && !is_last => at += 1,
+                None if is_last => {}
+                _ => return self.take_back(field),
+            }
+            for goal in goals {
+                let column = &mut self.columns[*goal];
+                column.numbers.push(scanned.value);
+                // The digits of times matter, and those come first.
+                if *goal == 0 {
+                    column.printed.join(scanned.printed);
+                }
+            }
+        }
+        true
+    }
+
+    /// Takes back the numbers of a line up to a field.
+    fn take_back(&mut self, field: usize) -> bool {
+        for goal in self.goals[..field].iter().flatten() {
+            self.columns[*goal].numbers.pop();
+        }
+        false
     }
 
     fn take_fields<'t>(
@@ -155,7 +228,7 @@ impl Rows<'_> {
                 let cell = cell(text, self.dialect.decimal);
                 let is_moment = matches!(cell, Cell::Time(_));
                 let value = match cell {
-                    Cell::Number(value) => value,
+                    Cell::Number(value) | Cell::Grouped(value) => value,
                     Cell::Time(moment) => {
                         // Seconds of a day have five digits before the point.
                         let printed = Printed { decimals: moment.decimals, digits: 5 + moment.decimals };
@@ -200,12 +273,13 @@ pub(super) fn line_at(text: &str, at: usize) -> u64 {
 
 /// The number of the line of a row, counted from 0.
 pub(super) fn line_of_row(text: &str, dialect: &Dialect, row: usize) -> u64 {
-    let mut rows = lines(text, dialect.start).filter(|(_, line)| remark(line).is_none());
+    let is_row = |line: &str| remark(line).is_none() && !dialect.repeats_heading(line);
+    let mut rows = lines(text, dialect.start).filter(|(_, line)| is_row(line));
     line_at(text, rows.nth(row).map_or(text.len(), |(at, _)| at))
 }
 
 /// A field as a message shows it: one line, not too long.
-fn shortened(field: &str) -> String {
+pub(super) fn shortened(field: &str) -> String {
     const MOST: usize = 40;
     let field = field.trim();
     let text: String = field.chars().take(MOST).map(|c| if c.is_control() { ' ' } else { c }).collect();

@@ -122,7 +122,7 @@ impl<'a> LargeText<'a> {
                 fault.after(line).error(&self.file, &text, head)
             })?;
             line += text.bytes().filter(|byte| *byte == b'\n').count() as u64;
-            take(columns);
+            take(columns.columns);
             block.drain(..whole);
             (self.watch.borrow_mut())(at as f64 / self.bytes as f64);
         }
@@ -238,7 +238,8 @@ impl Means {
         for row in 0..rows {
             let time = self.time.map_or(0.0, |at| columns[at].numbers[row]);
             let label = self.labels.map_or(0.0, |at| columns[at].numbers[row]);
-            let breaks = self.before.is_some_and(|(before, other)| label != other || time - before > longest);
+            let breaks =
+                self.before.is_some_and(|(before, other)| label != other || time - before > longest || time < before);
             if breaks {
                 self.dropped += self.rows as u64;
                 // The rest of a block would be off the even grid.

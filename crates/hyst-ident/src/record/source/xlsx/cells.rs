@@ -119,7 +119,8 @@ fn text(text: &str) -> Option<Item> {
     let short = &text[..end];
     let read = |decimal| cell(short.as_bytes(), decimal);
     Some(match (read(b'.'), read(b',')) {
-        (Cell::Number(number), _) | (Cell::Other, Cell::Number(number)) => Item::Number(number),
+        (Cell::Number(number), _) | (Cell::Other | Cell::Grouped(_), Cell::Number(number)) => Item::Number(number),
+        (Cell::Grouped(number), _) | (Cell::Other, Cell::Grouped(number)) => Item::Number(number),
         (Cell::Time(moment), _) => {
             let midnight = moment.midnight();
             let day = moment.since(midnight) / SECONDS_PER_DAY;

@@ -1,0 +1,154 @@
+//! Rows in which the sensor is frozen: it repeats one value to the last digit, and jumps before or after.
+//!
+//! A dropout (the sensor shows 0 or a full-scale code for some rows) and a stopped data stream (the last value is repeated) look like this. An actuator
+//! that rests does not: it leaves a rest without a jump, or with one that the drive explains.
+
+use std::ops::Range;
+
+use crate::record::Record;
+use crate::samples::range;
+use crate::spikes::quantile;
+
+/// Least number of rows with one value; fewer are spikes.
+const MIN_ROWS: usize = 4;
+/// Share of the steps from row to row that are usual.
+const USUAL: f64 = 0.99;
+/// How many usual steps, and how many digits of the sensor, a jump is at least.
+const MIN_STEPS: f64 = 5.0;
+/// A jump is more than this many times what a step of the drive explains, each as a share of its own span.
+const MORE_THAN_THE_DRIVE: f64 = 2.0;
+/// Rows before a jump in which a step of the drive may have caused it.
+const BEFORE: usize = 64;
+/// Largest share of the rows that may be frozen; beyond that it is how the output moves.
+const MAX_SHARE: f64 = 0.3;
+
+/// A run of rows with one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frozen {
+    /// The value \[output unit\].
+    pub at: f64,
+    /// The first row, from 0.
+    pub first: usize,
+    /// How many rows.
+    pub rows: usize,
+}
+
+/// Where the output of a record is frozen; nowhere without an input.
+pub fn frozen_of(record: &Record) -> Vec<Frozen> {
+    let Some(y) = record.output().filter(|y| y.len() == record.input().len()) else { return Vec::new() };
+    frozen(record.input(), y, record.segments())
+}
+
+/// Marks the rows in which an output is frozen.
+pub(crate) fn frozen_rows(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
+    let mut marked = vec![false; output.len()];
+    for run in frozen(input, output, segments) {
+        marked[run.first..run.first + run.rows].fill(true);
+    }
+    marked
+}
+
+fn frozen(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<Frozen> {
+    let runs: Vec<(Range<usize>, &Range<usize>)> =
+        segments.iter().flat_map(|s| runs_in(output, s).map(move |run| (run, s))).collect();
+    if runs.is_empty() {
+        return Vec::new();
+    }
+    let mut steps: Vec<f64> =
+        segments.iter().flat_map(|s| output[s.clone()].windows(2)).map(|y| (y[1] - y[0]).abs()).collect();
+    let digit = crate::noise::quantisation(output) * 12f64.sqrt();
+    let least = MIN_STEPS * quantile(&mut steps, USUAL).max(digit);
+    // Jumps at the ends of runs, from the rows beside them.
+    let jump = |run: &Range<usize>, s: &Range<usize>| {
+        let before = if run.start > s.start { (output[run.start] - output[run.start - 1]).abs() } else { 0.0 };
+        let after = if run.end < s.end { (output[run.end] - output[run.end - 1]).abs() } else { 0.0 };
+        before.max(after)
+    };
+    let jumps: Vec<(Range<usize>, &Range<usize>, f64)> =
+        runs.into_iter().map(|(run, s)| (run.clone(), s, jump(&run, s))).filter(|(_, _, jump)| *jump > least).collect();
+    // A dropout widens the output's span itself.
+    let mut moves = vec![true; output.len()];
+    jumps.iter().for_each(|(run, _, _)| moves[run.clone()].fill(false));
+    let span = |(low, high): (f64, f64)| (high - low).max(f64::MIN_POSITIVE);
+    let per_input = MORE_THAN_THE_DRIVE
+        * span(range((0..output.len()).filter(|row| moves[*row]).map(|row| output[row])))
+        / span(range(input.iter().copied()));
+    let explained = |run: &Range<usize>, s: &Range<usize>, jump: f64| {
+        let near = run.start.saturating_sub(BEFORE).max(s.start)..(run.end + 1).min(s.end);
+        let driven = input[near].windows(2).fold(0.0, |most: f64, u| most.max((u[1] - u[0]).abs()));
+        jump <= per_input * driven
+    };
+    let found: Vec<Frozen> = jumps
+        .into_iter()
+        .filter(|(run, s, jump)| !explained(run, s, *jump))
+        .map(|(run, _, _)| Frozen { at: output[run.start], first: run.start, rows: run.len() })
+        .collect();
+    let rows: usize = found.iter().map(|run| run.rows).sum();
+    if rows as f64 > MAX_SHARE * output.len() as f64 { Vec::new() } else { found }
+}
+
+/// Runs of equal values in a segment, as long as they have to be.
+fn runs_in<'a>(output: &'a [f64], s: &Range<usize>) -> impl Iterator<Item = Range<usize>> + 'a {
+    let mut end = s.start;
+    output[s.clone()].chunk_by(|a, b| a == b).filter_map(move |run| {
+        end += run.len();
+        (run.len() >= MIN_ROWS).then(|| end - run.len()..end)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(k: usize) -> f64 {
+        50.0 - 50.0 * (0.01 * k as f64).cos()
+    }
+
+    /// An output with noise, changed by `change`.
+    fn found(drive: impl Fn(usize) -> f64, change: impl Fn(&mut [f64])) -> Vec<Frozen> {
+        let input: Vec<f64> = (0..3000).map(drive).collect();
+        let mut output: Vec<f64> =
+            input.iter().enumerate().map(|(k, u)| 0.1 * u + 1e-3 * (1e4 * (k as f64).sqrt()).sin()).collect();
+        change(&mut output);
+        frozen(&input, &output, &[Range { start: 0, end: 3000 }])
+    }
+
+    #[test]
+    fn a_dropout_and_a_stopped_stream_are_found() {
+        let zeros = found(drive, |y| y[700..710].fill(0.0));
+        assert_eq!(zeros, [Frozen { at: 0.0, first: 700, rows: 10 }]);
+        let stopped = found(drive, |y| {
+            let last = y[1399];
+            y[1400..1480].fill(last);
+        });
+        // The row before has the value that is repeated.
+        assert_eq!((stopped.len(), stopped[0].first, stopped[0].rows), (1, 1399, 81));
+    }
+
+    #[test]
+    fn rests_steps_and_coarse_digits_are_not() {
+        assert_eq!(found(drive, |_| {}), []);
+        assert_eq!(found(drive, |y| y.iter_mut().for_each(|y| *y = (20.0 * *y).round() / 20.0)), []);
+        // A stairs drive, followed without noise.
+        assert_eq!(
+            found(|k| 10.0 * (k / 300) as f64, |y| y.iter_mut().for_each(|y| *y = (10.0 * *y).round() / 10.0)),
+            []
+        );
+        // A play stands after each turn.
+        assert_eq!(
+            found(drive, |y| {
+                let mut p = 0.0;
+                for (k, y) in y.iter_mut().enumerate() {
+                    p = hyst_core::play(p, drive(k), 20.0);
+                    *y = p;
+                }
+            }),
+            []
+        );
+    }
+
+    #[test]
+    fn a_clipped_peak_is_another_fault() {
+        assert_eq!(found(drive, |y| y.iter_mut().for_each(|y| *y = y.min(8.0))), []);
+    }
+}
