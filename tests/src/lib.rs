@@ -58,13 +58,17 @@ period_s = 5.0
 noise_k = 0.01
 ";
 
-/// The binary `hystctl` of the same profile as this test, up to date.
+/// The binary `hystctl`: the one that the variable `HYSTCTL` names, else that of the same profile as this test, up to date.
 ///
 /// # Panics
 /// When it cannot be built.
 pub fn hystctl() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
+        if let Some(binary) = env::var_os("HYSTCTL").map(PathBuf::from) {
+            assert!(binary.is_file(), "HYSTCTL names {}, which is no file", binary.display());
+            return binary;
+        }
         let test = env::current_exe().expect("a test has a path");
         // target/PROFILE/deps/TEST
         let folder = test.parent().and_then(Path::parent).expect("tests lie two folders deep in the target folder");

@@ -4,6 +4,7 @@ use std::env;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::OnceLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -32,7 +33,30 @@ pub(crate) fn cargo() -> Command {
     // Cargo tells its subcommands which cargo they belong to.
     let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
+    if let Some(program) = BUILT.get() {
+        command.env("HYSTCTL", program);
+    }
     command
+}
+
+/// The program `hystctl`, once it is built and up to date.
+static BUILT: OnceLock<PathBuf> = OnceLock::new();
+
+/// The whole workspace, built once. All checks name it as a whole: of a package alone cargo builds most dependencies anew, with fewer
+/// features. Tests take `hystctl` from here.
+pub(crate) const BUILD: [&str; 5] = ["build", "--workspace", "--lib", "--bins", "--tests"];
+
+pub(crate) fn build() -> Outcome {
+    let outcome = passes(cargo().args(BUILD));
+    if matches!(outcome, Outcome::Passed) {
+        let _ = BUILT.set(program());
+    }
+    outcome
+}
+
+/// Where `hystctl` is built.
+pub(crate) fn program() -> PathBuf {
+    target().join("debug").join(format!("hystctl{}", env::consts::EXE_SUFFIX))
 }
 
 pub(crate) fn run(check: &Check) -> Outcome {

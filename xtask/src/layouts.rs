@@ -25,7 +25,8 @@ pub(crate) fn check() -> Outcome {
         let wanted = sources.join("requirements.txt");
         return Outcome::Skipped(format!("{} could not be installed; see what pip says", wanted.display()));
     }
-    let hystctl = command::target().join("debug").join(format!("hystctl{}", std::env::consts::EXE_SUFFIX));
+    let Outcome::Passed = command::build() else { return Outcome::Failed };
+    let hystctl = command::program();
     let _ = std::fs::remove_dir_all(&files);
     match passes(python(&program).arg(sources.join("write.py")).arg(&files)) {
         Outcome::Passed => passes(python(&program).arg(sources.join("check.py")).arg(hystctl).arg(&files)),

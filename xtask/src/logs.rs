@@ -6,15 +6,11 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-use crate::command::{Outcome, cargo, passes, root, which};
+use crate::command::{Outcome, build, cargo, passes, program, root, target, which};
 
 /// Where the command line comes from.
 const TOOL: &str = "github.com/foxglove/mcap/go/cli/mcap@latest";
 const GO: &str = "go";
-
-fn target() -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| root().join(folder))
-}
 
 /// A folder with logs of every kind of run, made once; `None` if they could not be.
 pub(crate) fn made() -> Option<PathBuf> {
@@ -23,9 +19,11 @@ pub(crate) fn made() -> Option<PathBuf> {
         let folder = target().join("logs");
         // What an older version has left is no log of this one.
         let _ = std::fs::remove_dir_all(&folder);
-        let mut make = cargo();
-        make.args(["run", "--quiet", "--package", "hyst-tests", "--example", "every_log", "--"]).arg(&folder);
-        matches!(passes(&mut make), Outcome::Passed).then_some(folder)
+        let example = ["build", "--workspace", "--tests", "--example", "every_log"];
+        let (Outcome::Passed, Outcome::Passed) = (build(), passes(cargo().args(example))) else { return None };
+        let make = target().join("debug/examples").join(format!("every_log{}", env::consts::EXE_SUFFIX));
+        let made = passes(Command::new(make).current_dir(root()).env("HYSTCTL", program()).arg(&folder));
+        matches!(made, Outcome::Passed).then_some(folder)
     };
     MADE.get_or_init(make).clone()
 }

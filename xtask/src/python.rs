@@ -7,7 +7,8 @@ use std::process::Command;
 use crate::command::Outcome;
 
 /// What the tests need besides the package.
-const NEEDED: &[&str] = &["numpy", "scipy", "pytest", "hypothesis", "mcap", "pymcap-cli==0.34.0", "jsonschema"];
+const NEEDED: &[&str] =
+    &["numpy", "scipy", "pytest", "pytest-xdist", "hypothesis", "mcap", "pymcap-cli==0.34.0", "jsonschema"];
 /// Interpreters to try, in this order.
 const INTERPRETERS: &[&str] =
     &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];
@@ -54,7 +55,7 @@ pub(crate) fn check() -> Outcome {
     let package = PathBuf::from("crates").join("hyst-py").display().to_string();
     let package = format!(".{}{package}", std::path::MAIN_SEPARATOR);
     let install = [&["-m", "pip", "install", "--quiet", "--disable-pip-version-check", &package], NEEDED].concat();
-    let tests = ["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "tests/python"];
+    let tests = ["-m", "pytest", "-q", "-rs", "-n", "auto", "-p", "no:cacheprovider", "tests/python"];
     let passed = run(Path::new(python), &["-m", "venv", "--clear", &own.display().to_string()], &[])
         && run(&own_python, &install, &builds)
         && run(&own_python, &tests, &[]);

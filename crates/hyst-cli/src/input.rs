@@ -169,7 +169,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     if let Some(longest) = frozen.iter().max_by_key(|run| run.rows) {
         let rows = frozen.iter().map(|run| run.rows).sum();
         odd.push(format!(
-            "the sensor repeats one value and then jumps: {}, the most from row {} at {} s ({} of {} {unit}). These rows are not fitted. Look for dropouts or a stopped data stream",
+            "the sensor repeats one value: {}, the most from row {} at {} s ({} of {} {unit}). These rows are not fitted. Look for dropouts or a stopped data stream",
             text::count(rows, "row"),
             longest.first + 1,
             text::short(record.time()[longest.first]),

@@ -43,14 +43,20 @@ pub(crate) fn clipped_rows(output: &[f64], segments: &[Range<usize>]) -> Vec<boo
         }
     }
     // A play without noise stands at every turn, and so do digits that are coarser than the noise: that is no end of a range.
-    let inner = || segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !clipped[*k]);
-    let third = |k: usize| output[k] - 3.0 * output[k - 1] + 3.0 * output[k - 2] - output[k - 3];
-    let turns = inner().filter(|k| third(*k) * third(k - 1) < 0.0).count();
-    let rows = inner().count();
-    if rows == 0 || stands as f64 > STILL * rows as f64 || (turns as f64) < TURNS * rows as f64 {
+    let rows = segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !clipped[*k]).count();
+    if stands as f64 > STILL * rows as f64 || !last_digits_move(output, segments, &clipped) {
         clipped.fill(false);
     }
     clipped
+}
+
+/// Whether the last digits of an output move from row to row, in the rows that are not left out: it has noise beyond its digits.
+pub(crate) fn last_digits_move(output: &[f64], segments: &[Range<usize>], left_out: &[bool]) -> bool {
+    let inner = || segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !left_out[*k]);
+    let third = |k: usize| output[k] - 3.0 * output[k - 1] + 3.0 * output[k - 2] - output[k - 3];
+    let turns = inner().filter(|k| third(*k) * third(k - 1) < 0.0).count();
+    let rows = inner().count();
+    rows > 0 && turns as f64 >= TURNS * rows as f64
 }
 
 /// The lower and the upper end of the sensor's range, where rows of an output lie at them.

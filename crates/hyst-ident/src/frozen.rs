@@ -1,16 +1,20 @@
-//! Rows in which the sensor is frozen: it repeats one value to the last digit, and jumps before or after.
+//! Rows in which the sensor is frozen: it repeats one value to the last digit, as in a dropout (0 or a full-scale code for some rows) or a stopped
+//! data stream (the last value is repeated).
 //!
-//! A dropout (the sensor shows 0 or a full-scale code for some rows) and a stopped data stream (the last value is repeated) look like this. An actuator
-//! that rests does not: it leaves a rest without a jump, or with one that the drive explains.
+//! An actuator at rest repeats values too, where the sensor has no noise beyond its digits. Then a run counts only with a jump before or after it that the
+//! drive does not explain. Where the last digits move in all other rows, a long run counts by itself.
 
 use std::ops::Range;
 
+use crate::clipping::last_digits_move;
 use crate::record::Record;
 use crate::samples::range;
 use crate::spikes::quantile;
 
 /// Least number of rows with one value; fewer are spikes.
 const MIN_ROWS: usize = 4;
+/// Least number of rows that count without a jump.
+const MIN_ROWS_ALONE: usize = 10;
 /// Share of the steps from row to row that are usual.
 const USUAL: f64 = 0.99;
 /// How many usual steps, and how many digits of the sensor, a jump is at least.
@@ -64,11 +68,14 @@ fn frozen(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<Froze
         let after = if run.end < s.end { (output[run.end] - output[run.end - 1]).abs() } else { 0.0 };
         before.max(after)
     };
-    let jumps: Vec<(Range<usize>, &Range<usize>, f64)> =
-        runs.into_iter().map(|(run, s)| (run.clone(), s, jump(&run, s))).filter(|(_, _, jump)| *jump > least).collect();
+    let runs: Vec<(Range<usize>, &Range<usize>, f64)> =
+        runs.into_iter().map(|(run, s)| (run.clone(), s, jump(&run, s))).collect();
+    let mut repeats = vec![false; output.len()];
+    runs.iter().for_each(|(run, _, _)| repeats[run.clone()].fill(true));
+    let noisy = last_digits_move(output, segments, &repeats);
     // A dropout widens the output's span itself.
     let mut moves = vec![true; output.len()];
-    jumps.iter().for_each(|(run, _, _)| moves[run.clone()].fill(false));
+    runs.iter().filter(|(_, _, jump)| *jump > least).for_each(|(run, _, _)| moves[run.clone()].fill(false));
     let span = |(low, high): (f64, f64)| (high - low).max(f64::MIN_POSITIVE);
     let per_input = MORE_THAN_THE_DRIVE
         * span(range((0..output.len()).filter(|row| moves[*row]).map(|row| output[row])))
@@ -78,9 +85,13 @@ fn frozen(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<Froze
         let driven = input[near].windows(2).fold(0.0, |most: f64, u| most.max((u[1] - u[0]).abs()));
         jump <= per_input * driven
     };
-    let found: Vec<Frozen> = jumps
+    // At an end of the output's range the sensor may be at the end of its own: another fault.
+    let (low, high) = range(output.iter().copied());
+    let is_inside = |run: &Range<usize>| output[run.start] > low && output[run.start] < high;
+    let alone = |run: &Range<usize>| noisy && run.len() >= MIN_ROWS_ALONE && is_inside(run);
+    let found: Vec<Frozen> = runs
         .into_iter()
-        .filter(|(run, s, jump)| !explained(run, s, *jump))
+        .filter(|(run, s, jump)| alone(run) || *jump > least && !explained(run, s, *jump))
         .map(|(run, _, _)| Frozen { at: output[run.start], first: run.start, rows: run.len() })
         .collect();
     let rows: usize = found.iter().map(|run| run.rows).sum();

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::packages::Packages;
 use super::{SKIPPED, image};
-use crate::command::{Outcome, cargo, install, output, passes, target, wait, which};
+use crate::command::{self, Outcome, cargo, install, output, target, wait, which};
 
 const EMULATOR: &str = "qemu-system-x86_64";
 const EMULATOR_PACKAGE: &str = "qemu-system-x86";
@@ -94,7 +94,7 @@ fn judge(text: &str) -> Result<(), String> {
 
 /// The program of a package's integration test.
 fn built(package: &str, test: &str) -> Result<PathBuf, String> {
-    let arguments = ["test", "--no-run", "--message-format=json-render-diagnostics", "--package", package];
+    let arguments = ["test", "--no-run", "--message-format=json-render-diagnostics", "--workspace"];
     let text = output(cargo().args(arguments).args(["--test", test]).stderr(Stdio::inherit()));
     let text = text.ok_or_else(|| format!("the tests {test} of {package} do not build"))?;
     let named = format!(r#""name":"{test}""#);
@@ -105,8 +105,8 @@ fn built(package: &str, test: &str) -> Result<PathBuf, String> {
 
 /// The command line's program.
 fn hystctl() -> Result<PathBuf, String> {
-    match passes(cargo().args(["build", "--package", "hyst-cli"])) {
-        Outcome::Passed => Ok(target().join("debug/hystctl")),
+    match command::build() {
+        Outcome::Passed => Ok(command::program()),
         _ => Err("hystctl does not build".to_owned()),
     }
 }

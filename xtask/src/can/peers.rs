@@ -21,7 +21,7 @@ pub(super) fn check() -> Outcome {
         Err(why) => return Outcome::Skipped(format!("slcan was not tested against python-can: {why}")),
     };
     let mut command = cargo();
-    command.args(["test", "--package", "hyst-hw", "--test", "peers", "--", "--nocapture", "--test-threads=1"]);
+    command.args(["test", "--workspace", "--test", "peers", "--", "--nocapture", "--test-threads=1"]);
     let Ok(output) = command.env("HYST_PYTHON", python).stderr(Stdio::inherit()).output() else {
         return Outcome::Failed;
     };

@@ -99,10 +99,9 @@ fn steps(write: bool) -> Result<(), Ended> {
             )));
         }
     }
-    let agree = ["test", "--quiet", "--package", "hyst-cases", "--test", "agree", "--", "--nocapture"];
+    let agree = ["test", "--quiet", "--workspace", "--test", "agree", "--", "--nocapture"];
     done(cargo().args(agree).env("HYST_FIRMWARE", &printed))?;
-    let line =
-        ["test", "--quiet", "--package", "hyst-tests", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
+    let line = ["test", "--quiet", "--workspace", "--test", "servo", "--", "--nocapture", "--test-threads=1"];
     done(cargo().args(line).env("HYST_SERVO", built.join("servo")))?;
 
     let figures = Figures::collect(&toolchain, &library, &small, &printed)?;

@@ -93,8 +93,9 @@ impl Contents for Text<'_> {
     fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError> {
         let cells: Vec<usize> = wanted.columns.iter().map(|at| self.dialect.field_of(*at)).collect();
         let read = rows::read(&self.text[..self.end], &self.dialect, &cells).map_err(|fault| {
-            let head =
-                |field: usize| self.dialect.column_of(field).map_or(String::new(), |at| self.heads[at].name.clone());
+            let head = |field: usize| {
+                self.dialect.column_of(field).map_or(String::new(), |at| rows::shortened(&self.heads[at].name))
+            };
             fault.error(&self.file, &self.text, head)
         })?;
         self.headings.set(read.headings);
