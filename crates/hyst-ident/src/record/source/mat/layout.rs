@@ -6,7 +6,7 @@
 mod matrix;
 mod programs;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::tree::{Array, Fields, Structs, Value};
 use crate::record::source::gather::{Clock, Column, Part, Rate, Room, TextList, join, step_of};
@@ -69,11 +69,12 @@ impl<'r> Layout<'r> {
             fields.iter().filter_map(|(name, value)| step_of(name, value.scalar()?, None)).reduce(Rate::or_better);
         let scope = Scope { rate: own.or(outer.rate), ..outer };
         let done = self.programs(scope, fields, columns)?;
-        let lists = lists(fields);
-        for (at, (name, value)) in fields.iter().enumerate().filter(|(at, _)| !done.contains(at)) {
+        let (lists, units) = (lists(fields), Units::of(fields));
+        let done: HashSet<usize> = done.into_iter().collect();
+        for (name, value) in fields.iter().enumerate().filter(|(at, _)| !done.contains(at)).map(|(_, field)| field) {
             let path = scope.path_of(name);
             if value.is_numbers() {
-                let about = About { unit: unit_beside(fields, at), lists: &lists, ..About::new(scope.clock()) };
+                let about = About { unit: units.of_field(name), lists: &lists, ..About::new(scope.clock()) };
                 self.numbers(&path, value, &about, columns)?;
             } else {
                 self.array(Scope { path: &path, ..scope }, value, columns)?;
@@ -143,14 +144,38 @@ fn lists(fields: Fields<'_, '_>) -> Vec<TextList> {
     fields.iter().filter_map(|(name, value)| Some(TextList { name: name.to_owned(), texts: value.texts()? })).collect()
 }
 
-/// The unit that a struct states of one of its fields: in a field `voltage_unit`, or in the struct `units` under the same name.
-fn unit_beside(fields: Fields<'_, '_>, at: usize) -> Option<String> {
-    let name = &fields.names[at];
-    let beside =
-        ["_unit", "_units", "Unit", "Units"].iter().find_map(|ending| fields.text(&[&format!("{name}{ending}")]));
-    let inside = || {
-        let (_, units) = fields.get(&["units", "unit"])?;
-        units.structs()?.iter().next()?.text(&[name])
-    };
-    beside.or_else(inside).map(str::to_owned)
+/// The units that a struct states of its fields, by their names in small letters: in a field `voltage_unit`, or in the struct `units` under the same
+/// name.
+struct Units {
+    beside: HashMap<String, String>,
+    inside: HashMap<String, String>,
+}
+
+impl Units {
+    fn of(fields: Fields<'_, '_>) -> Self {
+        let texts = |fields: Fields<'_, '_>, endings: &[&str]| {
+            let mut texts = HashMap::new();
+            for (name, value) in fields.iter() {
+                let name = name.to_lowercase();
+                if endings.iter().any(|ending| name.ends_with(ending))
+                    && let Some(text) = value.text()
+                {
+                    texts.entry(name).or_insert_with(|| text.to_owned());
+                }
+            }
+            texts
+        };
+        let inside = fields.get(&["units", "unit"]).and_then(|(_, units)| units.structs()?.iter().next());
+        Self {
+            beside: texts(fields, &["unit", "units"]),
+            inside: inside.map(|units| texts(units, &[""])).unwrap_or_default(),
+        }
+    }
+
+    fn of_field(&self, name: &str) -> Option<String> {
+        let name = name.to_lowercase();
+        let beside =
+            || ["_unit", "_units", "unit", "units"].iter().find_map(|e| self.beside.get(&format!("{name}{e}")));
+        beside().or_else(|| self.inside.get(&name)).cloned()
+    }
 }
