@@ -29,7 +29,7 @@ def arguments(node):
 def signature(thing):
     positional, keyword = [], []
     for p in inspect.signature(thing).parameters.values():
-        if p.name not in ("self", "cls"):
+        if p.name not in ("self", "cls") and p.kind is not p.VAR_KEYWORD:
             into = keyword if p.kind is p.KEYWORD_ONLY else positional
             into.append((p.name, p.default))
     return positional, keyword

@@ -7,8 +7,19 @@ use std::process::Command;
 use crate::command::Outcome;
 
 /// What the tests need besides the package.
-const NEEDED: &[&str] =
-    &["numpy", "scipy", "pytest", "pytest-xdist", "hypothesis", "mcap", "pymcap-cli==0.34.0", "jsonschema"];
+const NEEDED: &[&str] = &[
+    "numpy",
+    "scipy",
+    "pandas",
+    "polars",
+    "scikit-learn",
+    "pytest",
+    "pytest-xdist",
+    "hypothesis",
+    "mcap",
+    "pymcap-cli==0.34.0",
+    "jsonschema",
+];
 /// Interpreters to try, in this order.
 const INTERPRETERS: &[&str] =
     &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];

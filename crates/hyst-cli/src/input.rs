@@ -261,12 +261,6 @@ pub(crate) fn is_trained_on(test: &Record, train: &Record) -> bool {
     sums(test).iter().any(|sum| sums(train).contains(sum))
 }
 
-/// Whether one of the record's files is one that the model was fitted to, byte for byte.
-pub(crate) fn was_fitted_to(model: &Model, record: &Record) -> bool {
-    let fitted = |sum: &str| model.fitted_on.iter().any(|file| file.sha256 == sum);
-    record.sources().iter().any(|source| source.sha256.as_deref().is_some_and(fitted))
-}
-
 /// What is said of such a test record.
 pub(crate) const TRAINED_ON: &str =
     "note: the test record is one of those that were fitted; its errors say nothing about new data";

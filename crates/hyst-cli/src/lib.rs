@@ -1,4 +1,4 @@
-//! What `hystctl` has that other programs use too: the log of a run.
+//! What `hystctl` has that other programs use too: the log of a run, the page of a diagnosis.
 //!
 //! ```
 //! use hyst_cli::log::{LoggedSample, RunInfo, RunLog};
@@ -14,4 +14,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[cfg(feature = "program")]
 pub mod log;
+pub mod report;
+pub mod text;

@@ -14,8 +14,6 @@ mod input;
 mod output;
 mod progress;
 mod recording;
-mod report;
-mod text;
 mod tracking;
 
 use std::process::ExitCode;
@@ -23,7 +21,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use exit::Exit;
-use hyst_cli::log;
+use hyst_cli::{log, report, text};
 
 fn main() -> ExitCode {
     // Bad arguments end here: clap prints what is wrong and exits with 2.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-pub(crate) use hyst_ident::digits::short;
+pub use hyst_ident::digits::short;
 use hyst_ident::digits::{decimals_for, rounded};
 use hyst_ident::identify::{TableEstimate, TableOf};
 use hyst_ident::metrics::{Errors, Mape};
@@ -11,7 +11,7 @@ use hyst_ident::record::{OutputUnit, Record};
 use hyst_ident::simulate::Extrapolated;
 
 /// `value ± std_error`, both to the second significant digit of the standard error; the value alone without one.
-pub(crate) fn with_error(value: f64, std_error: Option<f64>) -> String {
+pub fn with_error(value: f64, std_error: Option<f64>) -> String {
     match std_error.filter(|error| *error > 0.0 && error.is_finite()) {
         Some(error) => {
             let decimals = decimals_for(error, 2);
@@ -22,12 +22,12 @@ pub(crate) fn with_error(value: f64, std_error: Option<f64>) -> String {
 }
 
 /// `2.31 %`, or what stands for a span of zero.
-pub(crate) fn percent(x: f64) -> String {
+pub fn percent(x: f64) -> String {
     if x.is_finite() { format!("{} %", rounded(x, decimals_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
 }
 
 /// How much a record says of a table of weights.
-pub(crate) fn known(table: &TableEstimate) -> String {
+pub fn known(table: &TableEstimate) -> String {
     let (what, mean) = match table.of {
         TableOf::Cells => ("cells", "cell"),
         TableOf::Nodes => ("nodes", "node"),
@@ -43,12 +43,12 @@ pub(crate) fn known(table: &TableEstimate) -> String {
 }
 
 /// `1 row`, `2 rows`.
-pub(crate) fn count(n: usize, what: &str) -> String {
+pub fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// `a`, `a and b`, `a, b and c`.
-pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
     match names {
         [] => String::new(),
         [only] => only.as_ref().to_owned(),
@@ -60,12 +60,12 @@ pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
 }
 
 /// The unit of an output as a person reads it, from the ending of its column.
-pub(crate) fn symbol(suffix: &str) -> &str {
+pub fn symbol(suffix: &str) -> &str {
     OutputUnit::of_suffix(suffix).map_or(suffix, |unit| unit.symbol())
 }
 
 /// The unit that a column's name ends in, as a person reads it: `V` of `voltage_v`.
-pub(crate) fn column_unit(column: &str) -> String {
+pub fn column_unit(column: &str) -> String {
     match column.rsplit('_').next().unwrap_or(column) {
         "v" => "V".to_owned(),
         suffix => symbol(suffix).to_owned(),
@@ -73,13 +73,13 @@ pub(crate) fn column_unit(column: &str) -> String {
 }
 
 /// The unit of a record's gain, as `µm/V`.
-pub(crate) fn gain_unit(record: &Record) -> String {
+pub fn gain_unit(record: &Record) -> String {
     let output = record.output_unit().map_or("", OutputUnit::symbol);
     format!("{output}/{}", column_unit(record.input_column()))
 }
 
 /// The errors of a prediction in one line.
-pub(crate) fn errors(e: &Errors, unit: &str) -> String {
+pub fn errors(e: &Errors, unit: &str) -> String {
     format!(
         "RMSE {} {unit} ({} of span), largest {} {unit}, RMSE over all rows {} {unit}",
         short(e.rmse),
@@ -90,12 +90,12 @@ pub(crate) fn errors(e: &Errors, unit: &str) -> String {
 }
 
 /// With the row counted from 1, as people and JSON do.
-pub(crate) fn from_one(found: Extrapolated) -> Extrapolated {
+pub fn from_one(found: Extrapolated) -> Extrapolated {
     Extrapolated { row: found.row + usize::from(found.rows > 0), ..found }
 }
 
 /// Where `what` leaves the range that a model was fitted to; rows count from 1.
-pub(crate) fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -> String {
+pub fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -> String {
     let Channel { low, high, unit, .. } = input;
     format!(
         "in {} the {what} lies beyond {} to {} {unit}, the range that the model was identified on, by {} {unit} at most (row {})",
@@ -108,13 +108,13 @@ pub(crate) fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -
 }
 
 /// The mean relative error in one line, and what it leaves out.
-pub(crate) fn mape(m: &Mape) -> String {
+pub fn mape(m: &Mape) -> String {
     let ratio = m.ratio.map_or_else(|| "none".to_owned(), |ratio| percent(100.0 * ratio));
     format!("MAPE {ratio} ({} below 1 % of span left out)", count(m.left_out, "row"))
 }
 
 /// A table: the first column flush left, the others flush right.
-pub(crate) fn table(rows: &[Vec<String>]) -> String {
+pub fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let length = |cell: &String| cell.chars().count();
     let widths: Vec<usize> =

@@ -32,7 +32,7 @@ impl Default for CompensateOptions {
 }
 
 /// A drive, and what it took to get it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Drive {
     /// Input of the actuator at the reference's rows \[V\].
     pub voltage: Vec<f64>,
@@ -53,7 +53,7 @@ pub struct Drive {
 }
 
 /// Reference minus what the model does with a drive, sensor effects left out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Missed {
     /// Root mean square \[output unit\].
     pub rmse: f64,

@@ -39,7 +39,7 @@ pub struct SimulateOptions {
 }
 
 /// Inputs beyond those that a model was fitted to: what it says of them, its record did not show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Extrapolated {
     /// Rows with such an input.
     pub rows: usize,
@@ -67,7 +67,7 @@ impl Extrapolated {
 }
 
 /// What a model says about a record.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
     /// Output \[output unit\], per row.
     pub predicted: Vec<f64>,

@@ -1,11 +1,14 @@
 //! Numpy arrays in and out.
 
+use std::ops::Deref;
+
 use hyst_core::Env;
-use numpy::{PyArray1, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-/// A signal of the caller: contiguous `float64`, seen in place.
+/// A signal of the caller: contiguous `float64`, seen in place where it is that already, else a copy.
 pub(crate) struct Signal<'py>(PyReadonlyArray1<'py, f64>);
 
 impl<'py> Signal<'py> {
@@ -24,33 +27,25 @@ impl<'py> Signal<'py> {
     /// Looks at the argument `name`, but not at its numbers: who reads them checks them then.
     ///
     /// # Errors
-    /// `TypeError` if it is no array of `float64`, `ValueError` if it has not one dimension or is not contiguous.
+    /// `TypeError` if it is no sequence of real numbers, `ValueError` if it has not one dimension.
     pub(crate) fn unread(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let Ok(array) = x.cast::<PyUntypedArray>() else {
-            return Err(PyTypeError::new_err(format!(
-                "{name} must be a one-dimensional numpy array of float64, not {}; numpy.asarray({name}, dtype=float) makes one",
-                x.get_type().name()?
-            )));
-        };
-        if !array.dtype().is_equiv_to(&numpy::dtype::<f64>(x.py())) {
-            return Err(PyTypeError::new_err(format!(
-                "{name} must be an array of float64, not of {}; {name}.astype(float) converts it",
-                array.dtype().str()?
-            )));
+        if let Some(array) = in_place(x) {
+            return Ok(Self(array));
         }
-        let Ok(array) = x.cast::<PyArray1<f64>>() else {
-            return Err(PyValueError::new_err(format!(
-                "{name} must have one dimension, not {}; {name}.ravel() makes it one",
-                array.ndim()
-            )));
+        let array = numbers(name, x)?;
+        let Ok(array) = array.cast::<PyArray1<f64>>() else {
+            let ndim = array.cast::<PyUntypedArray>().map_or(0, PyUntypedArrayMethods::ndim);
+            return Err(match ndim {
+                0 => PyTypeError::new_err(format!(
+                    "{name} must be a sequence of numbers, not one number ({})",
+                    x.get_type().name()?
+                )),
+                _ => PyValueError::new_err(format!(
+                    "{name} must have one dimension, not {ndim}; {name}.ravel() makes it one"
+                )),
+            });
         };
-        let array = array.try_readonly()?;
-        if array.as_slice().is_err() {
-            return Err(PyValueError::new_err(format!(
-                "{name} is not contiguous in memory; numpy.ascontiguousarray({name}) makes a copy that is"
-            )));
-        }
-        Ok(Self(array))
+        Ok(Self(array.try_readonly()?))
     }
 
     /// What to say about a number at `k` that is not finite.
@@ -61,6 +56,91 @@ impl<'py> Signal<'py> {
 
     pub(crate) fn values(&self) -> PyResult<&[f64]> {
         Ok(self.0.as_slice()?)
+    }
+}
+
+/// A contiguous array of `float64` with one dimension, as it is.
+fn in_place<'py>(x: &Bound<'py, PyAny>) -> Option<PyReadonlyArray1<'py, f64>> {
+    let array = x.cast::<PyArray1<f64>>().ok()?;
+    // The mask of a masked array is in no view of its numbers.
+    if !array.is_contiguous() || x.hasattr("mask").unwrap_or(true) {
+        return None;
+    }
+    array.try_readonly().ok().filter(|array| array.as_slice().is_ok())
+}
+
+/// Anything that NumPy makes an array of real numbers of, as contiguous `float64`: lists, integers, single precision, strided views, columns of
+/// pandas and polars. What is masked is NaN.
+///
+/// # Errors
+/// `TypeError` for anything else.
+fn numbers<'py>(name: &str, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = x.py();
+    let refused = |what: String| {
+        PyTypeError::new_err(format!("{name} must be a one-dimensional array or sequence of real numbers, not {what}"))
+    };
+    if x.is_none() {
+        return Err(refused("None".to_owned()));
+    }
+    let numpy = py.import("numpy")?;
+    let float = numpy.getattr("float64")?;
+    if x.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
+        return x.call_method1("astype", (float,))?.call_method1("filled", (f64::NAN,));
+    }
+    let array = numpy.call_method1("asarray", (x,)).map_err(|error| refused(format!("that ({})", error.value(py))))?;
+    let dtype = array.getattr("dtype")?;
+    let made = |array: &Bound<'py, PyAny>| {
+        let contiguous = PyDict::new(py);
+        contiguous.set_item("dtype", &float)?;
+        numpy.call_method("ascontiguousarray", (array,), Some(&contiguous))
+    };
+    match dtype.getattr("kind")?.extract::<String>()?.as_str() {
+        "f" | "i" | "u" | "b" => {}
+        // Columns of pandas that may have gaps hold objects.
+        "O" if made(&array).is_ok() => {}
+        _ if array.getattr("ndim")?.extract::<usize>()? == 0 => {
+            return Err(refused(x.get_type().name()?.to_string()));
+        }
+        _ => return Err(refused(format!("of {}", dtype.str()?))),
+    }
+    // A number by itself stays without dimension.
+    if array.getattr("ndim")?.extract::<usize>()? == 0 { Ok(array) } else { made(&array) }
+}
+
+/// Whole numbers of the caller, from anything that NumPy makes an array of them of.
+///
+/// # Errors
+/// `TypeError` or `ValueError` if there are other numbers in it.
+pub(crate) fn integers(name: &str, x: &Bound<'_, PyAny>) -> PyResult<Vec<i64>> {
+    let signal = Signal::new(name, x)?;
+    let whole = |(k, value): (usize, &f64)| {
+        // What a double holds exactly.
+        if value.fract() == 0.0 && value.abs() < 9e15 {
+            return Ok(*value as i64);
+        }
+        Err(PyValueError::new_err(format!("{name}[{k}] is {value}; labels are whole numbers")))
+    };
+    signal.values()?.iter().enumerate().map(whole).collect()
+}
+
+/// A list of numbers among the parameters of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct List(pub(crate) Vec<f64>);
+
+impl Deref for List {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for List {
+    type Error = PyErr;
+
+    fn extract(x: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        // A parameter that is not finite is named by the model.
+        Ok(Self(Signal::unread("the list", &x)?.values()?.to_vec()))
     }
 }
 
@@ -89,16 +169,12 @@ impl<'py> Given<'py> {
     /// As [`Signal::new`], and `ValueError` for a number that is not finite.
     pub(crate) fn new(name: &str, x: Option<&Bound<'py, PyAny>>) -> PyResult<Self> {
         let Some(x) = x else { return Ok(Self::Nothing) };
-        if x.cast::<PyUntypedArray>().is_ok_and(|a| a.ndim() > 0) {
-            return Ok(Self::Signal(Signal::new(name, x)?));
-        }
+        // An array of one number says that it is one, too.
+        let is_array = x.hasattr("__len__")? && x.cast::<PyUntypedArray>().map_or(true, |array| array.ndim() > 0);
         match x.extract::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Self::Number(number)),
-            Ok(number) => Err(PyValueError::new_err(format!("{name} is {number}; it must be finite"))),
-            Err(_) => Err(PyTypeError::new_err(format!(
-                "{name} must be a number or a one-dimensional numpy array of float64, not {}",
-                x.get_type().name()?
-            ))),
+            Ok(number) if !is_array && number.is_finite() => Ok(Self::Number(number)),
+            Ok(number) if !is_array => Err(PyValueError::new_err(format!("{name} is {number}; it must be finite"))),
+            _ => Ok(Self::Signal(Signal::new(name, x)?)),
         }
     }
 }

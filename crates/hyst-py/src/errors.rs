@@ -15,6 +15,8 @@ mod python {
     #![allow(missing_docs, unreachable_pub, reason = "declarations of Python's classes, documented there")]
     pyo3::import_exception!(hyst._errors, FitError);
     pyo3::import_exception!(hyst._errors, ModelFileError);
+    pyo3::import_exception!(hyst._errors, NoModelError);
+    pyo3::import_exception!(hyst._errors, NoRecordError);
     pyo3::import_exception!(hyst._errors, NotInvertibleError);
     pyo3::import_exception!(hyst._errors, ParameterError);
     pyo3::import_exception!(hyst._errors, RangeWarning);
@@ -47,10 +49,19 @@ pub(crate) fn record(error: impl std::error::Error) -> PyErr {
     if message.ends_with("--temperature") {
         message.push_str(" (in Python temperature=)");
     }
-    python::RecordError::new_err(message)
+    if is_not_there(&error) { python::NoRecordError::new_err(message) } else { python::RecordError::new_err(message) }
+}
+
+/// Whether a file is not there.
+fn is_not_there(error: &impl std::error::Error) -> bool {
+    let io = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
+    io.is_some_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
 pub(crate) fn model_file(error: impl std::error::Error) -> PyErr {
+    if is_not_there(&error) {
+        return python::NoModelError::new_err(error.to_string());
+    }
     no_model_file(error.to_string())
 }
 

@@ -2,20 +2,28 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::str::FromStr;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
+use hyst_cli::report;
+use hyst_ident::atomic_file::write_atomic;
 use hyst_ident::diagnose::{self as diagnosis, DiagnoseOptions};
 use hyst_ident::fit::{self as fitting, FitOptions, Optimizer, VariableBounds};
 use hyst_ident::identify::Form;
 use hyst_ident::model::Kind;
+use hyst_ident::record::Record;
 use hyst_ident::simulate::Zero;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
-use crate::errors;
 use crate::model::{Model, parse, zero_of};
 use crate::record::{any_record, of_arrays};
+use crate::{errors, pickle};
 
 /// Fits a model to a record or to arrays; start-up rows are left out.
 ///
@@ -134,23 +142,104 @@ fn named<T: FromStr<Err: std::fmt::Display>>(name: &str) -> PyResult<T> {
     name.parse().map_err(|e: T::Err| PyValueError::new_err(e.to_string()))
 }
 
+/// What is kept of a diagnosis. What may leave fields out is JSON.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    json: [String; 5],
+    train: Record,
+    test: Option<Record>,
+    per_record: bool,
+    seed: u64,
+}
+
+impl Kept {
+    fn of(own: &Diagnosis) -> PyResult<Self> {
+        let found = &own.found;
+        let json = [
+            own.model.to_json(),
+            found.extended.to_json(),
+            json(&found.findings)?,
+            json(&found.pictures)?,
+            json(&found.breakdowns)?,
+        ];
+        let (train, test) = ((*own.train).clone(), own.test.as_deref().cloned());
+        Ok(Self { json, train, test, per_record: own.zero == Zero::PerRecord, seed: own.seed })
+    }
+
+    fn diagnosis(self) -> PyResult<Diagnosis> {
+        let [model, extended, findings, pictures, breakdowns] = &self.json;
+        let model_of = |text: &str| hyst_ident::model::Model::parse("pickle", text).map_err(errors::model);
+        Ok(Diagnosis {
+            found: diagnosis::Diagnosis {
+                extended: model_of(extended)?,
+                findings: of_json(findings)?,
+                pictures: of_json(pictures)?,
+                breakdowns: of_json(breakdowns)?,
+                weighed: Vec::new(),
+            },
+            model: model_of(model)?,
+            train: Arc::new(self.train),
+            test: self.test.map(Arc::new),
+            zero: if self.per_record { Zero::PerRecord } else { Zero::None },
+            seed: self.seed,
+        })
+    }
+}
+
+fn json(value: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+fn of_json<T: DeserializeOwned>(text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
 /// What a diagnosis found.
 #[pyclass(frozen, module = "hyst")]
-pub(crate) struct Diagnosis(diagnosis::Diagnosis);
+pub(crate) struct Diagnosis {
+    found: diagnosis::Diagnosis,
+    /// What was diagnosed, for the report.
+    model: hyst_ident::model::Model,
+    train: Arc<Record>,
+    test: Option<Arc<Record>>,
+    zero: Zero,
+    seed: u64,
+}
+
+impl Diagnosis {
+    /// The report as a page.
+    fn page(&self) -> PyResult<String> {
+        let per_record = self.zero == Zero::PerRecord;
+        let reading = if per_record { vec!["--zero".to_owned(), "per-record".to_owned()] } else { Vec::new() };
+        let model = self.model.to_json();
+        let contents = report::Contents {
+            diagnosis: &self.found,
+            model: &self.model,
+            model_file: "model.json",
+            model_path: "model.json",
+            model_sha256: &format!("{:x}", Sha256::digest(&model)),
+            extended_file: None,
+            train: &self.train,
+            test: self.test.as_deref(),
+            reading,
+            seed: self.seed,
+        };
+        report::page(&contents).map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+}
 
 #[pymethods]
 impl Diagnosis {
     /// The model with every effect that was found; the same model if none was.
     #[getter]
     fn extended(&self) -> Model {
-        Model(self.0.extended.clone())
+        Model(self.found.extended.clone())
     }
 
     /// The contents of ``findings.json``.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let json = serde_json::to_string(&self.0.findings).map_err(|e| PyValueError::new_err(e.to_string()))?;
-        parse(py, &json)
+        parse(py, &json(&self.found.findings)?)
     }
 
     /// ``explained``, ``nothing-missing``, ``base-too-coarse`` or ``unexplained``.
@@ -162,7 +251,41 @@ impl Diagnosis {
     /// Names of the effects that were found, in the chain's order.
     #[getter]
     fn effects(&self) -> Vec<&'static str> {
-        self.0.findings.effects.iter().map(|f| f.name.name()).collect()
+        self.found.findings.effects.iter().map(|f| f.name.name()).collect()
+    }
+
+    /// Whether both found the same.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let (own, other) = (&self.found, &other.get().found);
+            own.extended == other.extended && own.findings == other.findings
+        })
+    }
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        pickle::reduced(slf.as_any(), &Kept::of(slf.get())?)
+    }
+
+    /// The object of what `__reduce__` keeps.
+    #[staticmethod]
+    fn _restore(state: &[u8]) -> PyResult<Self> {
+        pickle::restored::<Kept>(state)?.diagnosis()
+    }
+
+    /// Writes the report: one page of HTML with plots, which loads nothing.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path-like
+    ///     The file; one that is there is replaced.
+    fn report(&self, path: PathBuf) -> PyResult<()> {
+        let page = self.page()?;
+        write_atomic(&path, |out| out.write_all(page.as_bytes())).map_err(errors::written)
+    }
+
+    /// The report in a frame of its own: its style and its scripts stay there.
+    fn _repr_html_(&self) -> PyResult<String> {
+        let page = self.page()?.replace('&', "&amp;").replace('"', "&quot;");
+        Ok(format!("<iframe srcdoc=\"{page}\" style=\"width:100%;height:640px;border:1px solid #ccc\"></iframe>"))
     }
 
     fn __repr__(&self) -> String {
@@ -219,6 +342,9 @@ pub(crate) fn diagnose(
     let found = py.detach(|| diagnosis::diagnose(&train, test.as_deref(), model, &options, &tell));
     match raised.into_inner() {
         Ok(Some(error)) => Err(error),
-        _ => found.map(Diagnosis).map_err(errors::fit),
+        _ => {
+            let found = found.map_err(errors::fit)?;
+            Ok(Diagnosis { found, model: model.clone(), train, test, zero: options.zero, seed })
+        }
     }
 }

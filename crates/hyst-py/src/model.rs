@@ -8,14 +8,17 @@ use hyst_ident::atomic_file::{create_atomic, write_atomic};
 use hyst_ident::compensate::{CompensateOptions, compensate};
 use hyst_ident::model::{self as core, Effect};
 use hyst_ident::simulate::{SimulateOptions, Zero, simulate_with};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::Needs;
 use crate::channels::Channels;
 use crate::errors;
 use crate::inversion::{Inverted, Options};
 use crate::operator::Operator;
+use crate::plot;
 use crate::record::any_record;
 use crate::results::{Drive, Simulation};
 use crate::runner::Runner;
@@ -248,6 +251,35 @@ impl Model {
         Ok(Drive { timepts: record.time().to_vec(), drive })
     }
 
+    /// Draws loops of the model, over the range that it was fitted to; needs matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// period : float
+    ///     Sample period [s] of the five turns of a decaying sine, 5000 samples.
+    /// temperature : float, optional
+    ///     Temperature [°C], for models that depend on it.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if not given.
+    /// **options
+    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (*, period=1e-3, temperature=None, ax=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        period: f64,
+        temperature: Option<f64>,
+        ax: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let said = [period.into_bound_py_any(py)?, temperature.into_bound_py_any(py)?];
+        plot::drawn("model", slf.as_any(), &said, ax, options)
+    }
+
     /// The model as an operator on arrays at a sample period [s]: ``simulate``, ``step``, ``inverse``, ``compensate``.
     ///
     /// It takes one sample after the other and sees the drive as linear between them, whatever ``between_samples`` says.
@@ -287,6 +319,11 @@ impl Model {
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self.0 == other.get().0)
+    }
+
+    /// A table and a picture, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("hyst._html")?.call_method1("model", (slf,))
     }
 
     fn __repr__(&self) -> String {

@@ -5,16 +5,20 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::List;
+
 /// A parameter of a model as Python sees it.
 pub(crate) trait Parameter {
     /// The value of the property: a number, or a new array.
     fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>>;
     /// As `repr` shows it.
     fn text(&self) -> String;
+    /// What two equal values share.
+    fn bits(&self) -> Vec<u64>;
 }
 
 macro_rules! plain_parameters {
-    ($($type:ty),*) => { $(
+    ($($type:ty: $bits:expr,)*) => { $(
         impl Parameter for $type {
             fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
                 self.into_py_any(py)
@@ -22,10 +26,19 @@ macro_rules! plain_parameters {
             fn text(&self) -> String {
                 format!("{self:?}")
             }
+            fn bits(&self) -> Vec<u64> {
+                let bits: fn(&$type) -> Vec<u64> = $bits;
+                bits(self)
+            }
         }
     )* };
 }
-plain_parameters!(f64, u16, usize, String);
+plain_parameters! {
+    f64: |x| vec![x.to_bits()],
+    u16: |x| vec![u64::from(*x)],
+    usize: |x| vec![*x as u64],
+    String: |x| x.bytes().map(u64::from).collect(),
+}
 
 impl Parameter for bool {
     fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
@@ -34,17 +47,23 @@ impl Parameter for bool {
     fn text(&self) -> String {
         if *self { "True" } else { "False" }.to_owned()
     }
+    fn bits(&self) -> Vec<u64> {
+        vec![u64::from(*self)]
+    }
 }
 
-impl Parameter for Vec<f64> {
+impl Parameter for List {
     fn to_python(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        PyArray1::from_slice(py, self).into_py_any(py)
+        PyArray1::from_slice(py, &self.0).into_py_any(py)
     }
     fn text(&self) -> String {
-        match self.as_slice() {
-            [a, b, c, .., z] if self.len() > 10 => format!("[{a:?}, {b:?}, {c:?}, ..., {z:?}]"),
+        match self.0.as_slice() {
+            [a, b, c, .., z] if self.0.len() > 10 => format!("[{a:?}, {b:?}, {c:?}, ..., {z:?}]"),
             all => format!("{all:?}"),
         }
+    }
+    fn bits(&self) -> Vec<u64> {
+        self.0.iter().map(|x| x.to_bits()).collect()
     }
 }
 
@@ -54,6 +73,10 @@ impl<P: Parameter> Parameter for Option<P> {
     }
     fn text(&self) -> String {
         self.as_ref().map_or_else(|| "None".to_owned(), Parameter::text)
+    }
+    fn bits(&self) -> Vec<u64> {
+        // Nothing is something else than an empty list.
+        self.as_ref().map_or_else(|| vec![u64::MAX, 0], |p| [vec![1], p.bits()].concat())
     }
 }
 
@@ -130,6 +153,20 @@ macro_rules! models {
 
                 fn __repr__(&self) -> String {
                     $crate::model_macro::repr(stringify!($name), &self.list())
+                }
+
+                /// Whether the parameters are the same to the last bit; the history does not count.
+                fn __eq__(&self, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
+                    let Ok(other) = other.cast::<Self>() else { return false };
+                    self.list().iter().zip(other.get().list()).all(|((_, own), (_, other))| own.bits() == other.bits())
+                }
+
+                fn __hash__(&self) -> u64 {
+                    use std::hash::{DefaultHasher, Hash, Hasher};
+                    let mut hasher = DefaultHasher::new();
+                    stringify!($name).hash(&mut hasher);
+                    self.list().iter().for_each(|(_, own)| own.bits().hash(&mut hasher));
+                    hasher.finish()
                 }
 
                 fn __getnewargs_ex__<'py>(

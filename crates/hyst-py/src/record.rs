@@ -7,25 +7,25 @@ use hyst_ident::record::{self as core, ColumnMap, Columns, Need, OutputUnit, Rea
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyString, PyTuple};
 
-use crate::arrays::{Signal, array};
-use crate::errors;
+use crate::arrays::{Signal, array, integers};
+use crate::{errors, frame, pickle, plot};
 
 /// What an actuator was told and what it did, over the lab's clock: evenly sampled columns, in segments between which the
 /// device rests.
 ///
 /// Parameters
 /// ----------
-/// timepts : ndarray of float64, shape (n,)
+/// timepts : array_like, shape (n,)
 ///     Time [s], even within each segment.
-/// inputs : ndarray of float64, shape (n,), optional
+/// inputs : array_like, shape (n,), optional
 ///     Input, in the unit at the end of ``input_column``.
-/// outputs : ndarray of float64, shape (n,), optional
+/// outputs : array_like, shape (n,), optional
 ///     Output, in the unit at the end of ``output_column``.
-/// temperature, load : ndarray of float64, shape (n,), optional
+/// temperature, load : array_like, shape (n,), optional
 ///     Temperature [°C], external load [N].
-/// segment : sequence of int, length n, optional
+/// segment : array_like of int, shape (n,), optional
 ///     A label per row; the device rests where it changes. One segment if not given.
 /// input_column : str
 ///     ``voltage_v``, or ``QUANTITY_in_UNIT``.
@@ -63,7 +63,7 @@ pub(crate) fn of_arrays(
     outputs: Option<&Bound<'_, PyAny>>,
     temperature: Option<&Bound<'_, PyAny>>,
     load: Option<&Bound<'_, PyAny>>,
-    segment: Option<Vec<i64>>,
+    segment: Option<&Bound<'_, PyAny>>,
     input_column: &str,
     output_column: &str,
     name: &str,
@@ -73,7 +73,7 @@ pub(crate) fn of_arrays(
     let unit = output_unit(output_column)?;
     let columns = Columns {
         name: name.to_owned(),
-        segment,
+        segment: segment.map(|labels| integers("segment", labels)).transpose()?,
         time: column("timepts", timepts)?,
         input_column: input_column.to_owned(),
         input: optional("inputs", inputs)?,
@@ -95,7 +95,7 @@ impl Record {
         outputs: Option<&Bound<'_, PyAny>>,
         temperature: Option<&Bound<'_, PyAny>>,
         load: Option<&Bound<'_, PyAny>>,
-        segment: Option<Vec<i64>>,
+        segment: Option<&Bound<'_, PyAny>>,
         input_column: &str,
         output_column: &str,
         name: &str,
@@ -183,8 +183,148 @@ impl Record {
         self.0.notes().to_vec()
     }
 
+    /// Makes a record of a table: a DataFrame of pandas or polars, a Dataset of xarray, a dict of arrays.
+    ///
+    /// Columns are found by their headings (``Time (s)``, ``Voltage [mV]``, ``disp_nm``), as those of a file are, or by keywords:
+    /// ``Record.from_frame(df, time="t", voltage="V", displacement="x")``. A named index, or one of dates, is a column too. Rows
+    /// without a value are left out, uneven times resampled; ``notes`` says so.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : DataFrame, Dataset or dict
+    ///     The table.
+    /// map : dict of str to str, optional
+    ///     As in ``read_record``: which column stands for which name of the record format.
+    /// need : {"both", "input", "output"}
+    ///     Columns that have to be there.
+    /// rate : float, optional
+    ///     Sample rate [Hz] of a table without times.
+    /// name : str
+    ///     What messages and models call the record.
+    /// **columns : str
+    ///     Names of columns, by ``time`` [s], ``voltage`` [V], ``displacement`` [µm], ``force`` [N, an output], ``temperature`` [°C],
+    ///     ``load`` [N], ``segment``, or a name of the record format as ``displacement_nm``. A unit in the column's heading counts
+    ///     instead.
+    ///
+    /// Raises
+    /// ------
+    /// RecordError
+    ///     Names column and row, and what to do.
+    #[staticmethod]
+    #[pyo3(signature = (frame, *, map=None, need="both", rate=None, name="frame", **columns))]
+    fn from_frame(
+        frame: &Bound<'_, PyAny>,
+        map: Option<&Bound<'_, PyDict>>,
+        need: &str,
+        rate: Option<f64>,
+        name: &str,
+        columns: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut arguments = map_arguments(map)?;
+        for (role, column) in columns.into_iter().flatten() {
+            let role = role.extract::<String>()?;
+            let canonical = match role.as_str() {
+                "time" => "time_s",
+                "voltage" => "voltage_v",
+                "displacement" => "displacement_um",
+                "force" => "force_n",
+                "temperature" => "temperature_degc",
+                "load" => "load_n",
+                other => other,
+            };
+            arguments.push(format!("{canonical}={}", column.str()?));
+        }
+        let how = reading(&arguments, rate)?;
+        let record = core::Record::from_table(name, frame::columns(frame)?, how, needed(need)?);
+        Ok(Self::wrap(record.map_err(errors::record)?))
+    }
+
+    /// The record as a DataFrame, with the columns of the record format.
+    ///
+    /// Parameters
+    /// ----------
+    /// library : {"pandas", "polars"}
+    ///     Which makes it.
+    #[pyo3(signature = (library="pandas"))]
+    fn to_frame<'py>(&self, py: Python<'py>, library: &str) -> PyResult<Bound<'py, PyAny>> {
+        if !["pandas", "polars"].contains(&library) {
+            return Err(PyValueError::new_err(format!("library is {library:?}; it must be \"pandas\" or \"polars\"")));
+        }
+        let columns = PyDict::new(py);
+        if self.0.segments().len() > 1 {
+            let labels = self.0.segments().iter().zip(self.0.labels());
+            let of_rows = labels.flat_map(|(rows, label)| std::iter::repeat_n(*label, rows.len()));
+            columns.set_item("segment", PyArray1::from_iter(py, of_rows))?;
+        }
+        columns.set_item("time_s", self.timepts(py))?;
+        let further = [
+            (self.0.input_column(), self.inputs(py)),
+            (self.output_column().unwrap_or_default(), self.outputs(py)),
+            ("temperature_degc", self.temperature(py)),
+            ("load_n", self.load(py)),
+        ];
+        for (name, values) in further.into_iter().filter_map(|(name, values)| Some((name, values?))) {
+            columns.set_item(name, values)?;
+        }
+        py.import(library)?.getattr("DataFrame")?.call1((columns,))
+    }
+
+    /// Draws output over input, or over time; needs matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// kind : {"loop", "time"}
+    ///     Over the input, or over time.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if not given.
+    /// **options
+    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (*, kind="loop", ax=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        kind: &str,
+        ax: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let kind = PyString::new(slf.py(), kind).into_any();
+        plot::drawn("record", slf.as_any(), &[kind], ax, options)
+    }
+
+    /// Whether names, columns, segments and sample periods are the same, to the last bit.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Self>() else { return false };
+        let (own, other) = (&self.0, &other.get().0);
+        let columns = |r: &core::Record| {
+            [Some(r.time()), Some(r.input()), r.output(), r.temperature(), r.load()].map(|x| x.map(<[f64]>::to_vec))
+        };
+        (own.name(), own.input_column(), own.output_unit()) == (other.name(), other.input_column(), other.output_unit())
+            && (own.segments(), own.labels(), own.sample_periods())
+                == (other.segments(), other.labels(), other.sample_periods())
+            && own.missing() == other.missing()
+            && columns(own) == columns(other)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        pickle::reduced(slf.as_any(), &*slf.get().0)
+    }
+
+    /// The object of what `__reduce__` keeps.
+    #[staticmethod]
+    fn _restore(state: &[u8]) -> PyResult<Self> {
+        pickle::restored(state).map(Self::wrap)
+    }
+
     fn __len__(&self) -> usize {
         self.0.rows()
+    }
+
+    /// A table and a picture, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("hyst._html")?.call_method1("record", (slf,))
     }
 
     fn __repr__(&self) -> String {
@@ -223,30 +363,42 @@ pub(crate) fn read_record(
     need: &str,
     rate: Option<f64>,
 ) -> PyResult<Record> {
-    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        return Err(PyValueError::new_err(format!("rate is {rate}; it must be a positive number of samples a second")));
-    }
-    let need = match need {
-        "both" => Need::InputAndOutput,
-        "input" => Need::Input,
-        "output" => Need::Output,
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "need is {other:?}; it must be \"both\", \"input\" or \"output\""
-            )));
-        }
-    };
-    let mut arguments = Vec::new();
-    for (name, column) in map.into_iter().flatten() {
-        arguments.push(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?));
-    }
-    let how = Reading { map: ColumnMap::parse(&arguments).map_err(errors::record)?, rate };
+    let (need, how) = (needed(need)?, reading(&map_arguments(map)?, rate)?);
     let paths = paths(path)?;
     let read = || {
         let records = paths.iter().map(|path| core::Record::read(path, how.clone(), need)).collect::<Result<_, _>>()?;
         core::Record::join(records)
     };
     Ok(Record::wrap(py.detach(read).map_err(errors::record)?))
+}
+
+/// The argument `need`.
+fn needed(need: &str) -> PyResult<Need> {
+    match need {
+        "both" => Ok(Need::InputAndOutput),
+        "input" => Ok(Need::Input),
+        "output" => Ok(Need::Output),
+        other => {
+            let message = format!("need is {other:?}; it must be \"both\", \"input\" or \"output\"");
+            Err(PyValueError::new_err(message))
+        }
+    }
+}
+
+/// The argument `map`, as the command line takes it.
+fn map_arguments(map: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
+    let argument = |(name, column): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        Ok(format!("{}={}", name.extract::<String>()?, column.extract::<String>()?))
+    };
+    map.into_iter().flatten().map(argument).collect()
+}
+
+/// How columns are read.
+fn reading(arguments: &[String], rate: Option<f64>) -> PyResult<Reading> {
+    if let Some(rate) = rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+        return Err(PyValueError::new_err(format!("rate is {rate}; it must be a positive number of samples a second")));
+    }
+    Ok(Reading { map: ColumnMap::parse(arguments).map_err(errors::record)?, rate })
 }
 
 /// One path, or a sequence of them.
@@ -262,7 +414,7 @@ pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) 
     if let Ok(record) = record.cast::<Record>() {
         return Ok(Arc::clone(&record.get().0));
     }
-    if record.is_instance_of::<PyList>() || record.is_instance_of::<pyo3::types::PyTuple>() {
+    if record.is_instance_of::<PyList>() || record.is_instance_of::<PyTuple>() {
         let each = record.try_iter()?.map(|r| any_record(py, &r?, need).map(|r| (*r).clone()));
         let joined = core::Record::join(each.collect::<PyResult<_>>()?).map_err(errors::record)?;
         return Ok(Arc::new(joined));

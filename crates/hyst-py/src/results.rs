@@ -3,7 +3,10 @@
 use hyst_ident::simulate::Extrapolated;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString, PyTuple};
+use serde::{Deserialize, Serialize};
+
+use crate::{pickle, plot};
 
 /// Errors against a measurement as a dict.
 fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> PyResult<Bound<'py, PyDict>> {
@@ -17,6 +20,7 @@ fn errors_dict<'py>(py: Python<'py>, errors: &hyst_ident::metrics::Errors) -> Py
 
 /// What a model says about a record.
 #[pyclass(frozen, module = "hyst")]
+#[derive(PartialEq, Serialize, Deserialize)]
 pub(crate) struct Simulation {
     pub(crate) timepts: Vec<f64>,
     pub(crate) inputs: Vec<f64>,
@@ -85,6 +89,46 @@ impl Simulation {
         self.simulated.errors.as_ref().map(|e| errors_dict(py, e)).transpose()
     }
 
+    /// Draws the predicted output over the input, or over time, without start-up rows; needs matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// kind : {"loop", "time"}
+    ///     Over the input, or over time.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if not given.
+    /// **options
+    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (*, kind="loop", ax=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        kind: &str,
+        ax: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let kind = PyString::new(slf.py(), kind).into_any();
+        plot::drawn("simulation", slf.as_any(), &[kind], ax, options)
+    }
+
+    /// Whether all values are the same.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self == other.get())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        pickle::reduced(slf.as_any(), slf.get())
+    }
+
+    /// The object of what `__reduce__` keeps.
+    #[staticmethod]
+    fn _restore(state: &[u8]) -> PyResult<Self> {
+        pickle::restored(state)
+    }
+
     fn __repr__(&self) -> String {
         let errors = self.simulated.errors.as_ref().map_or(String::new(), |e| format!(", rmse {:?}", e.rmse));
         format!("<Simulation: {} rows{errors}>", self.timepts.len())
@@ -93,6 +137,7 @@ impl Simulation {
 
 /// A drive, and what it took to get it.
 #[pyclass(frozen, module = "hyst")]
+#[derive(PartialEq, Serialize, Deserialize)]
 pub(crate) struct Drive {
     pub(crate) timepts: Vec<f64>,
     pub(crate) drive: hyst_ident::compensate::Drive,
@@ -140,6 +185,42 @@ impl Drive {
     #[getter]
     fn slew_limited(&self) -> Vec<usize> {
         self.drive.slew_limited.clone()
+    }
+
+    /// Draws the drive over time, with dots where a limit acted; needs matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if not given.
+    /// **options
+    ///     Of the line, as in ``matplotlib.axes.Axes.plot``.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (*, ax=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        plot::drawn("drive", slf.as_any(), &[], ax, options)
+    }
+
+    /// Whether all values are the same.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self == other.get())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        pickle::reduced(slf.as_any(), slf.get())
+    }
+
+    /// The object of what `__reduce__` keeps.
+    #[staticmethod]
+    fn _restore(state: &[u8]) -> PyResult<Self> {
+        pickle::restored(state)
     }
 
     fn __repr__(&self) -> String {

@@ -65,7 +65,7 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         seed: args.seed,
     };
     if let Some(target) = &args.report {
-        let page = report::page(&contents)?;
+        let page = report::page(&contents).map_err(CommandError::failed)?;
         target.write(|out| out.write_all(page.as_bytes()))?;
     }
     let mut said = summary::of(findings, &next::advice(&contents));
@@ -118,7 +118,7 @@ fn warn(model: &Model, train: &Record, test: Option<&Record>) {
         say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
     }
     match test {
-        Some(test) if input::was_fitted_to(model, test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
+        Some(test) if model.was_fitted_to(test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
         Some(test) => input::tell_repeated(test, train),
         None => {}
     }

@@ -87,11 +87,11 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let after = simulate(&diagnosis.extended, &test, Zero::None)?;
     let picture = picture::draw(&test, &before.predicted, &after.predicted, &runs, &diagnosis.findings)?;
 
-    write(out, "model.json", &model.to_json())?;
-    write(out, "extended.json", &diagnosis.extended.to_json())?;
-    write(out, "findings.json", &json(&diagnosis.findings)?)?;
+    write(out, "model.json", model.to_json())?;
+    write(out, "extended.json", diagnosis.extended.to_json())?;
+    write(out, "findings.json", json(&diagnosis.findings)?)?;
     write(out, "picture.svg", &picture)?;
-    write(out, "plant.toml", &config.to_toml().map_err(CommandError::failed)?)?;
+    write(out, "plant.toml", config.to_toml().map_err(CommandError::failed)?)?;
     drop(progress);
 
     let story = Story { diagnosis: &diagnosis, model: &model, runs: &runs, config: &config };

@@ -7,7 +7,6 @@ use hyst_ident::model::Effect;
 use serde_json::Value;
 
 use super::html::{Page, Table, escaped};
-use crate::exit::{CommandError, CommandResult};
 use crate::text::short;
 
 /// Pictures of up to so many points have a table as well.
@@ -90,10 +89,10 @@ fn numbers(picture: &Picture) -> String {
 }
 
 /// The numbers of all pictures, for the plots.
-pub(super) fn data(pictures: &[Picture]) -> CommandResult<String> {
-    let mut all = serde_json::to_value(pictures).map_err(CommandError::failed)?;
+pub(super) fn data(pictures: &[Picture]) -> serde_json::Result<String> {
+    let mut all = serde_json::to_value(pictures)?;
     round(&mut all);
-    serde_json::to_string(&all).map_err(CommandError::failed)
+    serde_json::to_string(&all)
 }
 
 /// Leaves of every number the digits that a plot can show.

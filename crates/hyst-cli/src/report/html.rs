@@ -2,8 +2,6 @@
 
 use std::fmt::{Display, Write};
 
-use crate::exit::CommandResult;
-
 const STYLE: &str = include_str!("../../assets/report/style.css");
 const PLOTS: &str = include_str!("../../assets/report/plots.js");
 const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
@@ -89,7 +87,7 @@ impl Page {
     }
 
     /// The whole file; `data` is the JSON of the plots.
-    pub(super) fn finish(self, data: &str) -> CommandResult<String> {
+    pub(super) fn finish(self, data: &str) -> serde_json::Result<String> {
         let title = escaped(&self.title);
         let links: String = self
             .sections

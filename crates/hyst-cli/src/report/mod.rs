@@ -8,34 +8,38 @@ mod figures;
 mod files;
 mod html;
 mod left;
-pub(crate) mod next;
+pub mod next;
 mod summary;
-pub(crate) mod words;
+pub mod words;
 
 use hyst_ident::diagnose::{Diagnosis, Picture};
 use hyst_ident::model::Model;
 use hyst_ident::record::Record;
 
-use crate::exit::CommandResult;
 use html::Page;
 
 /// What a report is about.
-pub(crate) struct Contents<'a> {
-    pub(crate) diagnosis: &'a Diagnosis,
-    /// The model as it was given, and the name of its file.
-    pub(crate) model: &'a Model,
-    pub(crate) model_file: &'a str,
-    /// The same file as it was given.
-    pub(crate) model_path: &'a str,
-    pub(crate) model_sha256: &'a str,
+pub struct Contents<'a> {
+    /// What was found.
+    pub diagnosis: &'a Diagnosis,
+    /// The model as it was given.
+    pub model: &'a Model,
+    /// The name of the model's file.
+    pub model_file: &'a str,
+    /// Its path as it was given.
+    pub model_path: &'a str,
+    /// SHA-256 of the file, in hexadecimal digits.
+    pub model_sha256: &'a str,
     /// The file of the extended model, if it is written to one.
-    pub(crate) extended_file: Option<&'a str>,
-    pub(crate) train: &'a Record,
-    pub(crate) test: Option<&'a Record>,
+    pub extended_file: Option<&'a str>,
+    /// The record that was searched.
+    pub train: &'a Record,
+    /// The record that was simulated alone.
+    pub test: Option<&'a Record>,
     /// Options with which the records were read.
-    pub(crate) reading: Vec<String>,
+    pub reading: Vec<String>,
     /// Seed of the bootstrap.
-    pub(crate) seed: u64,
+    pub seed: u64,
 }
 
 impl Contents<'_> {
@@ -45,8 +49,11 @@ impl Contents<'_> {
     }
 }
 
-/// The page.
-pub(crate) fn page(c: &Contents<'_>) -> CommandResult<String> {
+/// The page: HTML that loads nothing.
+///
+/// # Errors
+/// When a number of its plots has no JSON, which none of a diagnosis is.
+pub fn page(c: &Contents<'_>) -> serde_json::Result<String> {
     let mut page = Page::new(&format!("Diagnosis of {} on {}", c.model_file, c.train.name()));
     summary::write(&mut page, c);
     let whole: Vec<(usize, &Picture)> = figures::of(&c.diagnosis.pictures, None);

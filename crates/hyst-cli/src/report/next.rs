@@ -7,7 +7,6 @@ use hyst_ident::record::Record;
 
 use super::html::Page;
 use super::{Contents, words};
-use crate::input;
 use crate::text::listed;
 
 /// Up to so many noise floors of error there is little left to look for.
@@ -15,10 +14,11 @@ const NEAR_THE_FLOOR: f64 = 2.0;
 
 /// What to do next, and why.
 #[derive(Debug)]
-pub(crate) struct Advice {
-    pub(crate) text: String,
+pub struct Advice {
+    /// Why, and what it is for.
+    pub text: String,
     /// Commands, in the order in which they are to be run.
-    pub(crate) commands: Vec<String>,
+    pub commands: Vec<String>,
 }
 
 /// Writes what to do next.
@@ -36,7 +36,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
 }
 
 /// What to do next.
-pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
+pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
     let f = &c.diagnosis.findings;
     let mut all = Vec::new();
     let mut advise =
@@ -88,9 +88,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
             );
         }
         // A few loops of a run show less than the record of the fit did.
-        RemainderKind::BaseCapacity
-            if finer && !c.model.fitted_on.is_empty() && !input::was_fitted_to(c.model, c.train) =>
-        {
+        RemainderKind::BaseCapacity if finer && !c.model.fitted_on.is_empty() && !c.model.was_fitted_to(c.train) => {
             let names: Vec<String> = c.model.fitted_on.iter().map(|file| quoted(&file.file)).collect();
             advise(
                 "Most of what is left is the base's own misfit. A finer base is best fitted to what this one was fitted to (from its folder, with the same --map), or to a new record of the whole range:",
@@ -159,7 +157,7 @@ pub(crate) fn advice(c: &Contents<'_>) -> Vec<Advice> {
 }
 
 /// Names of the training files, as the command line takes them.
-pub(crate) fn files(train: &Record) -> String {
+pub fn files(train: &Record) -> String {
     train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
 }
 
@@ -169,13 +167,13 @@ fn test_option(c: &Contents<'_>) -> String {
 }
 
 /// A word of the command line.
-pub(crate) fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:=,@".contains(c);
     if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
 /// Further words of the command line, each behind a space.
-pub(crate) fn further(words: &[String]) -> String {
+pub fn further(words: &[String]) -> String {
     words.iter().map(|word| format!(" {}", quoted(word))).collect()
 }
 

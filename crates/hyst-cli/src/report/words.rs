@@ -10,7 +10,7 @@ use hyst_ident::model::Effect;
 use crate::text::{count, listed, short, symbol, with_error};
 
 /// The diagnosis in a sentence.
-pub(crate) fn verdict(findings: &Findings) -> String {
+pub fn verdict(findings: &Findings) -> String {
     match (findings.verdict, findings.remainder.change) {
         (Verdict::Explained, _) => {
             let mut names: Vec<String> = findings.effects.iter().map(with_ties).collect();
@@ -44,7 +44,7 @@ fn with_ties(effect: &Finding) -> String {
 }
 
 /// What kind of remainder it is.
-pub(crate) fn kind(remainder: &Remainder) -> &'static str {
+pub fn kind(remainder: &Remainder) -> &'static str {
     match (remainder.kind, remainder.change) {
         (RemainderKind::None, _) => "noise",
         (RemainderKind::BaseCapacity, None) => "the base's own misfit",
@@ -57,13 +57,13 @@ pub(crate) fn kind(remainder: &Remainder) -> &'static str {
 
 /// Whether the error on the test record has grown, so that the extended model should not be used. Not where an amplifier has not followed
 /// the drive: what that costs, each model shares out in its own way.
-pub(crate) fn worse_on_test(findings: &Findings) -> bool {
+pub fn worse_on_test(findings: &Findings) -> bool {
     findings.remainder.slew_limit.is_none()
         && findings.before.test.zip(findings.after.test).is_some_and(|(before, after)| after.rmse > 1.02 * before.rmse)
 }
 
 /// That the plays of the extended base stand elsewhere than the model's, if they do.
-pub(crate) fn plays_placed_anew(findings: &Findings) -> Option<String> {
+pub fn plays_placed_anew(findings: &Findings) -> Option<String> {
     let of = |n| {
         format!(
             "the extended base has {} at new places: the model's own were placed while the effects stood in the record",
@@ -74,12 +74,12 @@ pub(crate) fn plays_placed_anew(findings: &Findings) -> Option<String> {
 }
 
 /// A probability; the last digits of one that is nearly certain say nothing.
-pub(crate) fn probability(p: f64) -> String {
+pub fn probability(p: f64) -> String {
     if p > 0.995 { "above 0.99".into() } else { format!("{p:.2}") }
 }
 
 /// What may act too, and how to find out.
-pub(crate) fn suspects(findings: &Findings) -> Vec<String> {
+pub fn suspects(findings: &Findings) -> Vec<String> {
     let of = |s: &Suspect| {
         let p = probability(s.probability);
         format!("{}, probability {p}; the record that would decide: {}", s.name, s.command)
@@ -88,7 +88,7 @@ pub(crate) fn suspects(findings: &Findings) -> Vec<String> {
 }
 
 /// That another kind of model explains the record better.
-pub(crate) fn base_advice(findings: &Findings) -> Option<String> {
+pub fn base_advice(findings: &Findings) -> Option<String> {
     let unit = symbol(&findings.unit);
     let of = |a: &BaseAdvice| {
         let (better, own) = (short(a.cv_rmse), short(a.own_cv_rmse));
@@ -101,7 +101,7 @@ pub(crate) fn base_advice(findings: &Findings) -> Option<String> {
 }
 
 /// Name, size and meaning of the limit of each effect that was not named.
-pub(crate) fn limits(findings: &Findings) -> Vec<(String, String, String)> {
+pub fn limits(findings: &Findings) -> Vec<(String, String, String)> {
     let of = |(effect, limit): (&Effect, &Limit)| match limit {
         Limit::Size { size, unit: of, meaning } => {
             (effect.to_string(), format!("{} {}", short(*size), unit(of)).trim_end().to_owned(), meaning.clone())
@@ -115,7 +115,7 @@ pub(crate) fn limits(findings: &Findings) -> Vec<(String, String, String)> {
 const TOLD: usize = 8;
 
 /// Which rows were left out, if some were.
-pub(crate) fn rows(findings: &Findings) -> Option<String> {
+pub fn rows(findings: &Findings) -> Option<String> {
     let rows = &findings.rows;
     let LeftOut { gaps, spikes, start_up, saturated, frozen } = rows.left_out;
     let told: Vec<String> = rows.spikes.iter().take(TOLD).map(usize::to_string).collect();
@@ -134,7 +134,7 @@ pub(crate) fn rows(findings: &Findings) -> Option<String> {
 }
 
 /// Name and value of every parameter, the elements of a creep bank in their order.
-pub(crate) fn parameters(parameters: &BTreeMap<String, Found>) -> Vec<(&str, String)> {
+pub fn parameters(parameters: &BTreeMap<String, Found>) -> Vec<(&str, String)> {
     let mut sorted: Vec<_> = parameters.iter().collect();
     sorted.sort_by(|a, b| number_in(a.0).total_cmp(&number_in(b.0)));
     let value = |found: &Found| format!("{} {}", with_error(found.value, found.std_error), unit(&found.unit));

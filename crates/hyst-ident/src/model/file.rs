@@ -268,6 +268,12 @@ impl Model {
         Self::parse(&name, &text)
     }
 
+    /// Whether one of the record's files is one that the model was fitted to, byte for byte.
+    pub fn was_fitted_to(&self, record: &crate::record::Record) -> bool {
+        let fitted = |sum: &str| self.fitted_on.iter().any(|file| file.sha256 == sum);
+        record.sources().iter().any(|source| source.sha256.as_deref().is_some_and(fitted))
+    }
+
     /// Reads a model from text; `path` is what errors call it.
     ///
     /// # Errors

@@ -86,7 +86,7 @@ impl Resolution {
 }
 
 /// The sample period of a segment.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Period {
     /// The period \[s\].
     pub(crate) value: f64,

@@ -83,7 +83,7 @@ pub struct RunLog {
 }
 
 /// What a log lost of the run that it tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Losses {
     /// Whether its writer was cut off: the log was never closed.
     pub cut_off: bool,

@@ -44,15 +44,27 @@ pub use unit::{OutputUnit, Quantity};
 pub use write::{Extra, WriteError};
 
 use grid::{Fault, Printed};
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// Where rows come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
     /// The file's path as it was given, or the name of a record made in memory.
     pub name: String,
     /// SHA-256 of the file's bytes in lower-case hexadecimal digits; `None` for a record made in memory.
     pub sha256: Option<String>,
+}
+
+/// A column of a table in memory, for [`Record::from_table`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableColumn {
+    /// Its heading, which may state a unit: `Voltage [mV]`.
+    pub name: String,
+    /// The unit, if it is stated elsewhere.
+    pub unit: Option<String>,
+    /// Values; NaN where one is missing.
+    pub values: Vec<f64>,
 }
 
 /// Columns in memory from which [`Record::from_samples`] makes a record. All have the length of `time`.
@@ -77,7 +89,7 @@ pub struct Columns {
 }
 
 /// A sound record of one or more files; see the [module](self).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     sources: Vec<Source>,
     labelled: bool,
@@ -98,6 +110,7 @@ pub struct Record {
     /// What was done to read the file.
     notes: Vec<String>,
     /// The file's text without a byte-order mark, for writing its columns again as they stand.
+    #[serde(skip)]
     text: Option<Arc<[u8]>>,
 }
 
@@ -224,6 +237,29 @@ impl Record {
             notes: Vec::new(),
             text: None,
         })
+    }
+
+    /// Makes a record of a table in memory, with all that is done for the columns of a file: roles and units by heading or by `how`, missing values,
+    /// uneven times.
+    ///
+    /// # Errors
+    /// As for a file; messages name the row.
+    pub fn from_table(
+        name: &str,
+        columns: Vec<TableColumn>,
+        how: impl Into<Reading>,
+        need: Need,
+    ) -> Result<Self, RecordError> {
+        let rows = columns.first().map_or(0, |column| column.values.len());
+        if let Some(odd) = columns.iter().find(|column| column.values.len() != rows) {
+            let (name, column) = (name.to_owned(), odd.name.clone());
+            return Err(RecordError::Lengths { name, column, found: odd.values.len(), expected: rows });
+        }
+        let mut table = source::Table::new("table in memory");
+        for TableColumn { name, unit, values } in columns {
+            table.push(source::Head { unit, ..source::Head::new(name) }, values);
+        }
+        read::of_contents(name, &table, &how.into(), need)
     }
 
     /// The same record, with the sum of the file in which it is kept: models that are fitted to it state the sum.

@@ -272,15 +272,14 @@ fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
         time[row] = samples.time[row] + offset;
     }
     samples.time = time;
-    match periods.first() {
-        Some(period) if *period == DAY_S => {
-            done.note("the clock passes midnight: the times after it continue".to_owned())
-        }
+    let passed = match periods.first() {
+        Some(period) if *period == DAY_S => Some("the clock passes midnight: the times after it continue".to_owned()),
         Some(period) => {
-            done.note(format!("the clock begins again after {period} s, where its counter is full: the times continue"))
+            Some(format!("the clock begins again after {period} s, where its counter is full: the times continue"))
         }
-        None => {}
-    }
+        None => None,
+    };
+    passed.into_iter().for_each(|note| done.note(note));
     if starts.len() > 1 {
         let labels = samples.segment.take();
         let begins = |row: usize| {

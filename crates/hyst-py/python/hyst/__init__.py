@@ -1,8 +1,8 @@
 """Models of piezo hysteresis, their inverses, identification and diagnosis.
 
 Every model is a class with keyword parameters and the methods of ``Operator``: ``simulate``, ``reset``, ``step``,
-``inverse``, ``compensate``. ``fit``, ``diagnose`` and ``Model`` work on records. Signals are contiguous numpy arrays of
-float64.
+``inverse``, ``compensate``. ``fit``, ``diagnose`` and ``Model`` work on records. A signal is anything that NumPy makes a
+one-dimensional array of numbers of; contiguous arrays of float64 are not copied.
 """
 
 from . import _hyst
@@ -10,6 +10,8 @@ from ._errors import (
     FitError,
     HystError,
     ModelFileError,
+    NoModelError,
+    NoRecordError,
     NotInvertibleError,
     ParameterError,
     RangeWarning,
@@ -23,6 +25,8 @@ __all__ = [
     "FitError",
     "HystError",
     "ModelFileError",
+    "NoModelError",
+    "NoRecordError",
     "NotInvertibleError",
     "ParameterError",
     "RangeWarning",

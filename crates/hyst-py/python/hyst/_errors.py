@@ -9,7 +9,7 @@ class ParameterError(HystError, ValueError):
     """A parameter is not finite, out of range, or a list is too long; the message names it."""
 
 
-class NotInvertibleError(HystError):
+class NotInvertibleError(HystError, ValueError):
     """The model has no inverse; the message says why."""
 
 
@@ -17,11 +17,19 @@ class RecordError(HystError, ValueError):
     """A record cannot be read, made, or used with this model; the message names file, line and column."""
 
 
+class NoRecordError(RecordError, FileNotFoundError):
+    """There is no file of this name to read a record from."""
+
+
 class ModelFileError(HystError, ValueError):
     """A model file cannot be read or written."""
 
 
-class FitError(HystError):
+class NoModelError(ModelFileError, FileNotFoundError):
+    """There is no file of this name to read a model from."""
+
+
+class FitError(HystError, ValueError):
     """A record cannot be fitted or diagnosed."""
 
 

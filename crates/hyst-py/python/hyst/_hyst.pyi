@@ -3,15 +3,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-# One-dimensional, contiguous.
+# A new array of one dimension.
 _Signal = NDArray[np.float64]
+# Anything that NumPy makes a one-dimensional array of real numbers of.
+_Array = ArrayLike
 # A number, or one for each sample.
-_Surrounding = float | NDArray[np.float64]
-_List = Sequence[float] | NDArray[np.float64]
+_Surrounding = ArrayLike
+_List = ArrayLike
 _Path = str | os.PathLike[str]
 # Lowest and highest.
 _Range = tuple[float, float]
@@ -20,7 +22,7 @@ _Zero = Literal["none", "per-record"]
 class Operator:
     def simulate(
         self,
-        u: _Signal,
+        u: _Array,
         *,
         temperature: _Surrounding | None = None,
         load: _Surrounding | None = None,
@@ -42,7 +44,7 @@ class Operator:
     ) -> Inverse: ...
     def compensate(
         self,
-        y_ref: _Signal,
+        y_ref: _Array,
         *,
         temperature: _Surrounding | None = None,
         load: _Surrounding | None = None,
@@ -85,7 +87,7 @@ class Inverse(Operator):
     def inverse(self) -> Operator: ...  # type: ignore[override]
     def compensate(  # type: ignore[override]
         self,
-        y_ref: _Signal,
+        y_ref: _Array,
         *,
         temperature: _Surrounding | None = None,
         load: _Surrounding | None = None,
@@ -525,8 +527,8 @@ class Saturation(Operator):
 class ForceObserver:
     def __new__(cls, *, k_out: float, kappa: float = 1.0, chi: float = 0.0) -> ForceObserver: ...
     @staticmethod
-    def calibrated(x: _Signal, free: _Signal, *, k_out: float) -> ForceObserver: ...
-    def simulate(self, x: _Signal, free: _Signal) -> _Signal: ...
+    def calibrated(x: _Array, free: _Array, *, k_out: float) -> ForceObserver: ...
+    def simulate(self, x: _Array, free: _Array) -> _Signal: ...
     @property
     def k_out(self) -> float: ...
     @property
@@ -648,19 +650,31 @@ class Interference(Operator):
 class Record:
     def __new__(
         cls,
-        timepts: _Signal,
-        inputs: _Signal | None = None,
-        outputs: _Signal | None = None,
+        timepts: _Array,
+        inputs: _Array | None = None,
+        outputs: _Array | None = None,
         *,
-        temperature: _Signal | None = None,
-        load: _Signal | None = None,
-        segment: Sequence[int] | None = None,
+        temperature: _Array | None = None,
+        load: _Array | None = None,
+        segment: _Array | None = None,
         input_column: str = "voltage_v",
         output_column: str = "displacement_um",
         name: str = "record",
     ) -> Record: ...
     @staticmethod
     def join(records: Sequence[Record]) -> Record: ...
+    @staticmethod
+    def from_frame(
+        frame: Any,
+        *,
+        map: dict[str, str] | None = None,
+        need: Literal["both", "input", "output"] = "both",
+        rate: float | None = None,
+        name: str = "frame",
+        **columns: str,
+    ) -> Record: ...
+    def plot(self, *, kind: Literal["loop", "time"] = "loop", ax: Any = None, **options: Any) -> Any: ...
+    def to_frame(self, library: Literal["pandas", "polars"] = "pandas") -> Any: ...
     @property
     def timepts(self) -> _Signal: ...
     @property
@@ -741,6 +755,9 @@ class Model:
         temperature: float | None = None,
     ) -> Drive: ...
     def operator(self, period: float) -> Operator: ...
+    def plot(
+        self, *, period: float = 0.001, temperature: float | None = None, ax: Any = None, **options: Any
+    ) -> Any: ...
 
 class Simulation:
     @property
@@ -761,6 +778,7 @@ class Simulation:
     def extrapolated(self) -> dict[str, float]: ...
     @property
     def errors(self) -> dict[str, float] | None: ...
+    def plot(self, *, kind: Literal["loop", "time"] = "loop", ax: Any = None, **options: Any) -> Any: ...
 
 class Drive:
     @property
@@ -777,6 +795,7 @@ class Drive:
     def voltage_limited(self) -> list[int]: ...
     @property
     def slew_limited(self) -> list[int]: ...
+    def plot(self, *, ax: Any = None, **options: Any) -> Any: ...
 
 class Diagnosis:
     @property
@@ -787,15 +806,16 @@ class Diagnosis:
     def verdict(self) -> Literal["explained", "nothing-missing", "base-too-coarse", "unexplained"]: ...
     @property
     def effects(self) -> list[str]: ...
+    def report(self, path: _Path) -> None: ...
 
 def fit(
     record: _AnyRecord | None = None,
     *,
     model: str = "pi",
-    timepts: _Signal | None = None,
-    inputs: _Signal | None = None,
-    outputs: _Signal | None = None,
-    temperature: _Signal | None = None,
+    timepts: _Array | None = None,
+    inputs: _Array | None = None,
+    outputs: _Array | None = None,
+    temperature: _Array | None = None,
     output_column: str = "displacement_um",
     zero: _Zero = "none",
     optimizer: str = "auto",
@@ -818,9 +838,9 @@ def diagnose(
     seed: int = 1,
     progress: Callable[[str], object] | None = None,
 ) -> Diagnosis: ...
-def rmse(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float: ...
-def nrmse(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float: ...
-def max_abs(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float: ...
-def mape(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float | None: ...
-def smape(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float: ...
-def peak_to_valley(measured: _Signal, predicted: _Signal, *, settling: NDArray[np.bool_] | None = None) -> float: ...
+def rmse(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float: ...
+def nrmse(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float: ...
+def max_abs(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float: ...
+def mape(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float | None: ...
+def smape(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float: ...
+def peak_to_valley(measured: _Array, predicted: _Array, *, settling: NDArray[np.bool_] | None = None) -> float: ...

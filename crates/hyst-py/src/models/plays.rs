@@ -2,6 +2,7 @@
 
 use hyst_core::{Curve, Error, GpiParams, PiParams, TdPiParams, ViscousPiParams};
 
+use crate::arrays::List;
 use crate::inversion::{closed, refused};
 use crate::model_macro::models;
 use hyst_ident::model::capacity::PLAYS;
@@ -50,9 +51,9 @@ models! {
         /// Gain of the identity [y/u].
         gain: f64,
         /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
-        thresholds: Vec<f64>,
+        thresholds: List,
         /// Weights of the plays [y/u], shape (n,).
-        weights: Vec<f64>,
+        weights: List,
     }
     params: |p| Ok(pi(p.gain, &p.thresholds, &p.weights)),
     stage: hyst_core::Pi<f64, PLAYS>,
@@ -69,9 +70,9 @@ models! {
         /// Gain of the identity [y/u].
         gain: f64,
         /// Half-widths of the plays [u], positive and strictly rising, shape (n,), n ≤ 64.
-        thresholds: Vec<f64>,
+        thresholds: List,
         /// Weights of the plays [y/u], shape (n,).
-        weights: Vec<f64>,
+        weights: List,
         /// Drag in proportion to the rate [s].
         seconds: f64,
         /// Sample period [s].
@@ -99,20 +100,20 @@ models! {
         /// Weight of the play of radius 0 [y per unit of the envelope].
         gain: f64,
         /// Radii [unit of the envelope], positive and strictly rising, shape (n,), n ≤ 64.
-        thresholds: Vec<f64>,
+        thresholds: List,
         /// Weights [y per unit of the envelope], shape (n,).
-        weights: Vec<f64>,
+        weights: List,
         /// Envelope of the rising side, shape (2,) or (4,).
-        left: Vec<f64>,
+        left: List,
         /// Envelope of the falling side, shape (2,) or (4,).
-        right: Vec<f64>,
+        right: List,
     }
     params: |p| Ok(GpiParams {
         left: curve("gpi.left", &p.left)?,
         right: curve("gpi.right", &p.right)?,
         gain: p.gain,
-        thresholds: p.thresholds.clone(),
-        weights: p.weights.clone(),
+        thresholds: p.thresholds.to_vec(),
+        weights: p.weights.to_vec(),
     }),
     stage: hyst_core::Gpi<f64, PLAYS>,
     inverse: closed,

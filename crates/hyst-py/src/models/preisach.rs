@@ -4,6 +4,7 @@ use hyst_core::{Build, DpmParams, Error, Everett, MirrorParams, PreisachParams, 
 use hyst_ident::model::capacity::{MIRROR, NODES};
 use hyst_ident::model::searchable;
 
+use crate::arrays::List;
 use crate::errors;
 use crate::inversion::{closed, search};
 use crate::keep::{Keep, Kept};
@@ -80,10 +81,10 @@ models! {
         high: f64,
         /// Output gained by each cell when all its relays switch up [y], shape (cells·(cells + 1)/2,), cells ≤ 64, in the
         /// order of ``numpy.tril_indices(cells)``: (0, 0), (1, 0), (1, 1), (2, 0), …
-        density: Vec<f64>,
+        density: List,
         /// Output gained once per grid interval by relays that switch up there and never down [y], shape (cells,); zeros
         /// if not given.
-        once: Option<Vec<f64>> = None,
+        once: Option<List> = None,
         /// Input at which the virgin memory rests [u]; the lowest if not given.
         rest: Option<f64> = None,
     }
@@ -104,7 +105,7 @@ models! {
         /// Highest input of the Preisach grid [u].
         high: f64,
         /// Output gained by each cell, as in ``Preisach`` [y].
-        density: Vec<f64>,
+        density: List,
         /// Lowest rate of the mirror's grid [u/s].
         rate_low: f64,
         /// Highest rate of the mirror's grid [u/s].
@@ -118,11 +119,11 @@ models! {
         /// Nodes along the change, at most 32.
         changes: usize,
         /// ξ at the nodes, positive, shape (rates·changes,): node (d, p) at d·changes + p.
-        mirror: Vec<f64>,
+        mirror: List,
         /// Sample period [s].
         period: f64,
         /// Output gained once per grid interval by relays that never switch back [y]; zeros if not given.
-        once: Option<Vec<f64>> = None,
+        once: Option<List> = None,
         /// Input at which the virgin memory rests [u]; the lowest if not given.
         rest: Option<f64> = None,
         /// Travel over which the step at a closing loop fades to 1/e [u].
@@ -139,7 +140,7 @@ models! {
             change_low: p.change_low,
             change_high: p.change_high,
             changes: p.changes,
-            weights: p.mirror.clone(),
+            weights: p.mirror.to_vec(),
         };
         Ok(EitherForm { params: DpmParams { preisach, mirror, fade: p.fade }, drifting: p.drifting })
     },

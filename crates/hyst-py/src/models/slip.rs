@@ -2,6 +2,7 @@
 
 use hyst_core::{Error, MaxwellSlipParams, SlipReading, TdEmParams};
 
+use crate::arrays::List;
 use crate::errors;
 use crate::inversion::{Inverted, closed};
 use crate::model_macro::models;
@@ -19,9 +20,9 @@ models! {
     /// With ``elasto_slip`` it is a spring that slips at that deflection: such a bank saturates and has no inverse.
     class MaxwellSlip {
         /// Widths [u], positive and strictly rising, shape (n,), n ≤ 64.
-        widths: Vec<f64>,
+        widths: List,
         /// Gains [y/u], shape (n,).
-        gains: Vec<f64>,
+        gains: List,
         /// Whether an element is a spring that slips at that deflection; a backlash of that total width if not.
         elasto_slip: bool = false,
     }
@@ -37,9 +38,9 @@ models! {
     /// for a current that is linear between samples. Inverse: band-limited with preview, then exact.
     class TdEm {
         /// Widths of the slip elements [u], shape (n,), n ≤ 64.
-        widths: Vec<f64>,
+        widths: List,
         /// Gains of the slip elements [A/u], shape (n,).
-        gains: Vec<f64>,
+        gains: List,
         /// Capacitance [F].
         capacitance: f64,
         /// Resistance [Ω].
@@ -51,7 +52,7 @@ models! {
         /// Damping [N s/m].
         damping: f64,
         /// Coefficients of ``ψ(T) = psi[0] + psi[1]·T + psi[2]·T²`` [N/V, T in °C], shape (3,).
-        psi: Vec<f64>,
+        psi: List,
         /// Sample period [s].
         period: f64,
         /// Whether an element is a spring that slips; a backlash, as the paper's numbers ask for, if not.
@@ -62,7 +63,7 @@ models! {
         filter_degc: f64 = 23.0,
     }
     params: |p| {
-        let coupling = <[f64; 3]>::try_from(p.psi.as_slice())
+        let coupling = <[f64; 3]>::try_from(&*p.psi)
             .map_err(|_| Error::OutOfRange { name: "td-em.psi", must: "three coefficients" })?;
         Ok(TdEmParams {
             slip: bank(p.elasto_slip, &p.widths, &p.gains),

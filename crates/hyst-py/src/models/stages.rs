@@ -6,6 +6,7 @@ use hyst_core::{
 };
 use pyo3::prelude::*;
 
+use crate::arrays::List;
 use crate::errors;
 use crate::inversion::{Built, Inverted, Options, closed, compensator, refused};
 use crate::model_macro::models;
@@ -56,11 +57,11 @@ models! {
     /// Closed-form inverse, if the curve rises.
     class Asymmetry {
         /// Where the dead zones end [y]; on each side of zero moving away from it, shape (n,), n ≤ 8.
-        thresholds: Vec<f64>,
+        thresholds: List,
         /// Changes of slope [ratio], shape (n,).
-        weights: Vec<f64>,
+        weights: List,
     }
-    params: |p| Ok(AsymmetryParams::behind(p.thresholds.clone(), p.weights.clone())),
+    params: |p| Ok(AsymmetryParams::behind(p.thresholds.to_vec(), p.weights.to_vec())),
     stage: hyst_core::Asymmetry<f64, { hyst_core::MAX_DEAD_ZONES }>,
     inverse: closed,
     needs: [],
@@ -119,13 +120,13 @@ models! {
     /// Exact recursive inverse.
     class Creep {
         /// Time constants τ [s], positive, shape (n,), n ≤ 32.
-        seconds: Vec<f64>,
+        seconds: List,
         /// Settled shares [ratio], shape (n,).
-        shares: Vec<f64>,
+        shares: List,
         /// Sample period [s].
         period: f64,
     }
-    params: |p| Ok(CreepParams { seconds: p.seconds.clone(), shares: p.shares.clone() }),
+    params: |p| Ok(CreepParams { seconds: p.seconds.to_vec(), shares: p.shares.to_vec() }),
     stage: hyst_core::Creep<f64, CREEP>,
     period: |p| p.period,
     inverse: closed,

@@ -23,7 +23,6 @@ mod npy;
 mod numbers;
 #[cfg(feature = "parquet")]
 mod parquet;
-#[cfg(feature = "binary")]
 mod table;
 #[cfg(feature = "tdms")]
 mod tdms;
@@ -31,7 +30,6 @@ mod text;
 #[cfg(feature = "xlsx")]
 mod xlsx;
 
-#[cfg(feature = "binary")]
 pub(crate) use table::Table;
 pub(crate) use text::LargeText;
 

@@ -1,0 +1,96 @@
+"""How notebooks show records and models: a table and a small picture, as HTML that loads nothing."""
+
+from html import escape
+
+import numpy as np
+
+from ._plot import _label
+
+#: Points of a picture.
+POINTS = 2000
+WIDTH, HEIGHT, LEFT, BELOW = 380, 270, 58, 40
+
+
+def _table(rows):
+    cells = "".join(f"<tr><th style='text-align:left'>{escape(k)}</th><td>{escape(str(v))}</td></tr>" for k, v in rows)
+    return f"<table>{cells}</table>"
+
+
+def _picture(pieces, x_label, y_label):
+    """Lines through the pieces, as SVG, with the ends of both axes."""
+    pieces = [(np.asarray(x, float), np.asarray(y, float)) for x, y in pieces if len(x)]
+    if not pieces:
+        return ""
+    step = -(-sum(len(x) for x, _ in pieces) // POINTS)
+    pieces = [(x[::step], y[::step]) for x, y in pieces]
+
+    def ends(k):
+        low, high = min(p[k].min() for p in pieces), max(p[k].max() for p in pieces)
+        return (low, high) if high > low else (low - 1.0, high + 1.0)
+
+    (left, right), (low, high) = ends(0), ends(1)
+    wide, tall = WIDTH - LEFT - 8, HEIGHT - BELOW - 8
+    lines = []
+    for x, y in pieces:
+        across = LEFT + wide * (x - left) / (right - left)
+        up = 8 + tall * (high - y) / (high - low)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up))
+        lines.append(f"<polyline points='{points}' fill='none' stroke='#0072b2' stroke-width='1'/>")
+
+    def text(x, y, words, anchor, turn=""):
+        return f"<text x='{x}' y='{y}' text-anchor='{anchor}' font-size='11'{turn}>{escape(words)}</text>"
+
+    below, middle = HEIGHT - BELOW + 14, LEFT + wide / 2
+    axes = [
+        f"<rect x='{LEFT}' y='8' width='{wide}' height='{tall}' fill='none' stroke='#999'/>",
+        text(LEFT, below, f"{left:.4g}", "start"),
+        text(LEFT + wide, below, f"{right:.4g}", "end"),
+        text(middle, below + 16, x_label, "middle"),
+        text(LEFT - 4, 8 + tall, f"{low:.4g}", "end"),
+        text(LEFT - 4, 18, f"{high:.4g}", "end"),
+        text(12, 8 + tall / 2, y_label, "middle", f" transform='rotate(-90 12 {8 + tall / 2})'"),
+    ]
+    return f"<svg width='{WIDTH}' height='{HEIGHT}' style='background:white'>{''.join(axes + lines)}</svg>"
+
+
+def _span(values):
+    return f"{values.min():.4g} to {values.max():.4g}"
+
+
+def record(record):
+    """Rows, segments, sample rate and ranges of a record, and its loops."""
+    u, y, t = record.inputs, record.outputs, record.timepts
+    rows = [
+        ("record", record.name),
+        ("rows", f"{len(record)} in {len(record.segments)} segments"),
+        ("sample rate [Hz]", f"{1.0 / record.period:.6g}"),
+    ]
+    columns = [(record.input_column, u), (record.output_column, y)]
+    columns += [("temperature_degc", record.temperature), ("load_n", record.load)]
+    rows += [(_label(name), _span(values)) for name, values in columns if values is not None]
+    rows += [("note", note) for note in record.notes]
+    if u is not None and y is not None:
+        x, v, x_label, y_label = u, y, _label(record.input_column), _label(record.output_column)
+    else:
+        x, x_label = t, "Time [s]"
+        v, y_label = (u, _label(record.input_column)) if y is None else (y, _label(record.output_column))
+    pieces = [(x[a:b], v[a:b]) for a, b in record.segments]
+    return _table(rows) + _picture(pieces, x_label, y_label)
+
+
+def model(model):
+    """Kind, effects and ranges of a model, and loops of it where it needs no temperature."""
+    low, high = model.input_range
+    rows = [
+        ("model", model.kind),
+        ("effects", ", ".join(model.effects) or "none"),
+        (_label(model.input_column), f"{low:.4g} to {high:.4g}"),
+        (_label(model.output_column), "{:.4g} to {:.4g}".format(*model.output_range)),
+    ]
+    turns = np.linspace(0.0, 4.0, POINTS)
+    u = low + (high - low) * (1.0 - turns / 5.0) * 0.5 * (1.0 - np.cos(2.0 * np.pi * turns))
+    try:
+        y = model.operator(1e-3).simulate(u, load=0.0, time=0.0)
+    except (TypeError, ValueError):
+        return _table(rows)
+    return _table(rows) + _picture([(u, y)], _label(model.input_column), _label(model.output_column))

@@ -1,0 +1,8 @@
+"""How ``pickle`` makes objects of the compiled half again."""
+
+from . import _hyst
+
+
+def restore(kind, state):
+    """The object of a class of ``_hyst`` that has this state."""
+    return getattr(_hyst, kind)._restore(state)

@@ -1,0 +1,85 @@
+"""What ``plot`` of the objects draws, with matplotlib."""
+
+import numpy as np
+
+
+def _axes(ax):
+    if ax is not None:
+        return ax
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise ImportError("plot needs matplotlib: pip install matplotlib") from error
+    return plt.subplots(layout="constrained")[1]
+
+
+def _label(column):
+    """``voltage_v`` as an axis is labelled: Voltage [V]."""
+    units = {"v": "V", "um": "µm", "nm": "nm", "mm": "mm", "n": "N", "degc": "°C", "s": "s"}
+    name, _, unit = column.rpartition("_")
+    if not name:
+        return column
+    name = name.removesuffix("_in").replace("_", " ")
+    return f"{name.capitalize()} [{units.get(unit, unit)}]"
+
+
+def _pieces(segments, x, y):
+    """Values of all segments, with a gap between two of them: lines do not cross it."""
+    gaps = [start for start, _ in segments[1:]]
+    return np.insert(x, gaps, np.nan), np.insert(y, gaps, np.nan)
+
+
+def record(record, kind, ax, options):
+    """Output over input, or output (or without one the input) over time."""
+    ax, segments = _axes(ax), record.segments
+    u, y = record.inputs, record.outputs
+    options = {"linewidth": 0.8, "label": record.name, **options}
+    if kind == "loop":
+        if u is None or y is None:
+            raise ValueError('a loop needs input and output; kind="time" draws what is there over time')
+        ax.plot(*_pieces(segments, u, y), **options)
+        ax.set(xlabel=_label(record.input_column), ylabel=_label(record.output_column))
+    elif kind == "time":
+        values, column = (u, record.input_column) if y is None else (y, record.output_column)
+        ax.plot(*_pieces(segments, record.timepts, values), **options)
+        ax.set(xlabel="Time [s]", ylabel=_label(column))
+    else:
+        raise ValueError(f'kind is {kind!r}; it must be "loop" or "time"')
+    return ax
+
+
+def simulation(simulation, kind, ax, options):
+    """The prediction over the input, or over time; rows of a start-up transient are left out."""
+    ax = _axes(ax)
+    if kind not in ("loop", "time"):
+        raise ValueError(f'kind is {kind!r}; it must be "loop" or "time"')
+    y = np.where(simulation.settling, np.nan, simulation.outputs)
+    options = {"linewidth": 0.8, "label": "predicted", **options}
+    ax.plot(simulation.inputs if kind == "loop" else simulation.timepts, y, **options)
+    ax.set(xlabel="Input" if kind == "loop" else "Time [s]", ylabel="Predicted output")
+    return ax
+
+
+def drive(drive, ax, options):
+    """The drive over time; dots where a limit acted."""
+    ax = _axes(ax)
+    ax.plot(drive.timepts, drive.inputs, **{"linewidth": 0.8, "label": "drive", **options})
+    limited = sorted({*drive.voltage_limited, *drive.slew_limited})
+    if limited:
+        ax.plot(drive.timepts[limited], drive.inputs[limited], ".", color="tab:red", label="limited")
+    ax.set(xlabel="Time [s]", ylabel="Drive [V]")
+    return ax
+
+
+def model(model, period, temperature, ax, options):
+    """Loops of the model: a sine that decays over the range that it was fitted to, from its lower end."""
+    ax = _axes(ax)
+    low, high = model.input_range
+    turns, rows = 5, 5000
+    phase = np.linspace(0.0, turns, rows)
+    u = low + (high - low) * (1.0 - phase / (turns + 1)) * 0.5 * (1.0 - np.cos(2.0 * np.pi * phase))
+    surroundings = {} if temperature is None else {"temperature": temperature}
+    y = model.operator(period).simulate(u, time=0.0, load=0.0, **surroundings)
+    ax.plot(u, y, **{"linewidth": 0.8, "label": model.kind, **options})
+    ax.set(xlabel=_label(model.input_column), ylabel=_label(model.output_column))
+    return ax

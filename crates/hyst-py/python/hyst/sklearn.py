@@ -1,0 +1,138 @@
+"""Models of hysteresis as estimators of scikit-learn.
+
+``HysteresisRegressor`` works in pipelines, ``GridSearchCV`` and ``cross_val_score``. Rows are samples in time, in their order: split
+them with ``TimeSeriesSplit``, and do not shuffle. A prediction begins at rest, with its first row.
+"""
+
+import numpy as np
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+import hyst
+
+__all__ = ["HysteresisRegressor"]
+
+
+class HysteresisRegressor(RegressorMixin, BaseEstimator):
+    """A model of hysteresis that is fitted to rows of input and output.
+
+    Parameters
+    ----------
+    model : str
+        Kind of the hysteresis, as in ``hyst.fit``.
+    period : float
+        Sample period of the rows [s].
+    diagnose : bool
+        Whether effects that the fitted model lacks are looked for and added (``hyst.diagnose``).
+    optimizer : str
+        As in ``hyst.fit``.
+    seed : int
+        Of what is drawn at random.
+    column : int
+        Column of ``X`` that holds the input.
+    temperature, load : int or None
+        Columns of ``X`` that hold the temperature [°C] and the load [N].
+    input_column, output_column : str
+        What input and output are called and measured in, as in ``hyst.Record``.
+
+    Attributes
+    ----------
+    model_ : hyst.Model
+        The fitted model; with ``diagnose``, the extended one.
+    diagnosis_ : hyst.Diagnosis
+        What was found; with ``diagnose`` alone.
+    n_features_in_ : int
+        Columns of ``X``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hyst.sklearn import HysteresisRegressor
+    >>> u = 50 * (1 - np.cos(np.linspace(0, 60, 3000)))
+    >>> y = 0.1 * u + 0.05 * np.clip(u, 20, 80)
+    >>> HysteresisRegressor(period=1e-3).fit(u[:2000, None], y[:2000]).score(u[2000:, None], y[2000:]) > 0.9
+    True
+    """
+
+    def __init__(
+        self,
+        model="pi",
+        *,
+        period=1.0,
+        diagnose=False,
+        optimizer="auto",
+        seed=0,
+        column=0,
+        temperature=None,
+        load=None,
+        input_column="voltage_v",
+        output_column="displacement_um",
+    ):
+        self.model = model
+        self.period = period
+        self.diagnose = diagnose
+        self.optimizer = optimizer
+        self.seed = seed
+        self.column = column
+        self.temperature = temperature
+        self.load = load
+        self.input_column = input_column
+        self.output_column = output_column
+
+    def _record(self, X, y=None):
+        """The rows as a record."""
+
+        def column(at):
+            return None if at is None else X[:, at]
+
+        return hyst.Record(
+            self.period * np.arange(len(X)),
+            column(self.column),
+            y,
+            temperature=column(self.temperature),
+            load=column(self.load),
+            input_column=self.input_column,
+            output_column=self.output_column,
+            name="X",
+        )
+
+    def fit(self, X, y):
+        """Fits the model.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, k)
+            Input, and where there are such columns temperature and load, sample by sample.
+        y : array_like, shape (n,)
+            Output.
+
+        Returns
+        -------
+        self : HysteresisRegressor
+        """
+        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        record = self._record(X, np.asarray(y, dtype=np.float64))
+        self.model_ = hyst.fit(record, model=self.model, optimizer=self.optimizer, seed=self.seed)
+        if self.diagnose:
+            self.diagnosis_ = hyst.diagnose(record, self.model_, seed=self.seed)
+            self.model_ = self.diagnosis_.extended
+        return self
+
+    def predict(self, X):
+        """The output of the model, from rest.
+
+        Parameters
+        ----------
+        X : array_like, shape (n, k)
+            Columns as in ``fit``.
+
+        Returns
+        -------
+        y : ndarray of float64, shape (n,)
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, dtype=np.float64, reset=False)
+        if len(X) == 1:
+            # A record has a sample period, which one row has not: the row is repeated.
+            return self.predict(np.repeat(X, 2, axis=0))[:1]
+        return self.model_.simulate(self._record(X)).outputs
