@@ -64,8 +64,10 @@ def test_a_wrong_record_is_refused():
         hyst.Record(t, np.where(np.arange(300) == 7, np.nan, u), y)
     with pytest.raises(ValueError, match="output_column"):
         hyst.Record(t, u, y, output_column="volume_l")
-    with pytest.raises(TypeError, match="not list"):
-        hyst.Record(list(t), u, y)
+    with pytest.raises(TypeError, match="complex128"):
+        hyst.Record(t, u * 1j, y)
+    with pytest.raises(ValueError, match=r"segment\[2\] is 0.5"):
+        hyst.Record(t[:3], u[:3], y[:3], segment=[0, 0, 0.5])
 
 
 def test_reading(tmp_path):

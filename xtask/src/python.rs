@@ -13,6 +13,7 @@ const NEEDED: &[&str] = &[
     "pandas",
     "polars",
     "scikit-learn",
+    "matplotlib",
     "pytest",
     "pytest-xdist",
     "hypothesis",

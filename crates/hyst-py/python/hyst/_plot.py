@@ -1,9 +1,17 @@
 """What ``plot`` of the objects draws, with matplotlib."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
+
+from ._hyst import Drive, Model, Record, Simulation
+
+_Values = NDArray[np.float64]
 
 
-def _axes(ax):
+def _axes(ax: Any) -> Any:
     if ax is not None:
         return ax
     try:
@@ -13,7 +21,7 @@ def _axes(ax):
     return plt.subplots(layout="constrained")[1]
 
 
-def _label(column):
+def _label(column: str) -> str:
     """``voltage_v`` as an axis is labelled: Voltage [V]."""
     units = {"v": "V", "um": "µm", "nm": "nm", "mm": "mm", "n": "N", "degc": "°C", "s": "s"}
     name, _, unit = column.rpartition("_")
@@ -23,13 +31,13 @@ def _label(column):
     return f"{name.capitalize()} [{units.get(unit, unit)}]"
 
 
-def _pieces(segments, x, y):
+def _pieces(segments: Sequence[tuple[int, int]], x: _Values, y: _Values) -> tuple[_Values, _Values]:
     """Values of all segments, with a gap between two of them: lines do not cross it."""
     gaps = [start for start, _ in segments[1:]]
     return np.insert(x, gaps, np.nan), np.insert(y, gaps, np.nan)
 
 
-def record(record, kind, ax, options):
+def record(record: Record, kind: str, ax: Any, options: dict[str, Any]) -> Any:
     """Output over input, or output (or without one the input) over time."""
     ax, segments = _axes(ax), record.segments
     u, y = record.inputs, record.outputs
@@ -38,17 +46,18 @@ def record(record, kind, ax, options):
         if u is None or y is None:
             raise ValueError('a loop needs input and output; kind="time" draws what is there over time')
         ax.plot(*_pieces(segments, u, y), **options)
-        ax.set(xlabel=_label(record.input_column), ylabel=_label(record.output_column))
+        ax.set(xlabel=_label(record.input_column), ylabel=_label(record.output_column or ""))
     elif kind == "time":
         values, column = (u, record.input_column) if y is None else (y, record.output_column)
-        ax.plot(*_pieces(segments, record.timepts, values), **options)
-        ax.set(xlabel="Time [s]", ylabel=_label(column))
+        if values is not None:
+            ax.plot(*_pieces(segments, record.timepts, values), **options)
+        ax.set(xlabel="Time [s]", ylabel=_label(column or ""))
     else:
         raise ValueError(f'kind is {kind!r}; it must be "loop" or "time"')
     return ax
 
 
-def simulation(simulation, kind, ax, options):
+def simulation(simulation: Simulation, kind: str, ax: Any, options: dict[str, Any]) -> Any:
     """The prediction over the input, or over time; rows of a start-up transient are left out."""
     ax = _axes(ax)
     if kind not in ("loop", "time"):
@@ -60,7 +69,7 @@ def simulation(simulation, kind, ax, options):
     return ax
 
 
-def drive(drive, ax, options):
+def drive(drive: Drive, ax: Any, options: dict[str, Any]) -> Any:
     """The drive over time; dots where a limit acted."""
     ax = _axes(ax)
     ax.plot(drive.timepts, drive.inputs, **{"linewidth": 0.8, "label": "drive", **options})
@@ -71,7 +80,7 @@ def drive(drive, ax, options):
     return ax
 
 
-def model(model, period, temperature, ax, options):
+def model(model: Model, period: float, temperature: float | None, ax: Any, options: dict[str, Any]) -> Any:
     """Loops of the model: a sine that decays over the range that it was fitted to, from its lower end."""
     ax = _axes(ax)
     low, high = model.input_range

@@ -4,16 +4,19 @@
 them with ``TimeSeriesSplit``, and do not shuffle. A prediction begins at rest, with its first row.
 """
 
+from typing import Any
+
 import numpy as np
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin  # type: ignore[import-untyped]
+from sklearn.utils.validation import check_is_fitted, validate_data  # type: ignore[import-untyped]
 
 import hyst
 
 __all__ = ["HysteresisRegressor"]
 
 
-class HysteresisRegressor(RegressorMixin, BaseEstimator):
+class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """A model of hysteresis that is fitted to rows of input and output.
 
     Parameters
@@ -56,18 +59,18 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        model="pi",
+        model: str = "pi",
         *,
-        period=1.0,
-        diagnose=False,
-        optimizer="auto",
-        seed=0,
-        column=0,
-        temperature=None,
-        load=None,
-        input_column="voltage_v",
-        output_column="displacement_um",
-    ):
+        period: float = 1.0,
+        diagnose: bool = False,
+        optimizer: str = "auto",
+        seed: int = 0,
+        column: int = 0,
+        temperature: int | None = None,
+        load: int | None = None,
+        input_column: str = "voltage_v",
+        output_column: str = "displacement_um",
+    ) -> None:
         self.model = model
         self.period = period
         self.diagnose = diagnose
@@ -79,10 +82,10 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):
         self.input_column = input_column
         self.output_column = output_column
 
-    def _record(self, X, y=None):
+    def _record(self, X: NDArray[np.float64], y: NDArray[np.float64] | None = None) -> hyst.Record:
         """The rows as a record."""
 
-        def column(at):
+        def column(at: int | None) -> NDArray[np.float64] | None:
             return None if at is None else X[:, at]
 
         return hyst.Record(
@@ -96,7 +99,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):
             name="X",
         )
 
-    def fit(self, X, y):
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "HysteresisRegressor":
         """Fits the model.
 
         Parameters
@@ -110,15 +113,16 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):
         -------
         self : HysteresisRegressor
         """
-        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
-        record = self._record(X, np.asarray(y, dtype=np.float64))
+        rows: Any
+        rows, measured = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        record = self._record(rows, np.asarray(measured, dtype=np.float64))
         self.model_ = hyst.fit(record, model=self.model, optimizer=self.optimizer, seed=self.seed)
         if self.diagnose:
             self.diagnosis_ = hyst.diagnose(record, self.model_, seed=self.seed)
             self.model_ = self.diagnosis_.extended
         return self
 
-    def predict(self, X):
+    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
         """The output of the model, from rest.
 
         Parameters
@@ -131,8 +135,8 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):
         y : ndarray of float64, shape (n,)
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float64, reset=False)
-        if len(X) == 1:
+        rows = np.asarray(validate_data(self, X, dtype=np.float64, reset=False))
+        if len(rows) == 1:
             # A record has a sample period, which one row has not: the row is repeated.
-            return self.predict(np.repeat(X, 2, axis=0))[:1]
-        return self.model_.simulate(self._record(X)).outputs
+            return self.predict(np.repeat(rows, 2, axis=0))[:1]
+        return self.model_.simulate(self._record(rows)).outputs
