@@ -16,6 +16,7 @@ const NEEDED: &[&str] = &[
     "matplotlib",
     "pytest",
     "pytest-xdist",
+    "mypy",
     "hypothesis",
     "mcap",
     "pymcap-cli==0.34.0",

@@ -1,0 +1,46 @@
+"""Type checkers pass on the package, and on code that uses it."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("mypy")
+
+USE = '''
+import hyst
+import numpy as np
+from hyst.sklearn import HysteresisRegressor
+
+pi = hyst.Pi(gain=0.1, thresholds=[10.0, 20.0], weights=(0.02, 0.01))
+y = pi.simulate([1, 2, 3])
+z = pi.simulate(np.arange(5), temperature=20.0)
+record = hyst.Record([0.0, 0.1, 0.2], [1, 2, 3], y, segment=[0, 0, 1])
+model: hyst.Model = hyst.fit(record, model="pi")
+found = hyst.diagnose(record, model, test="test.csv")
+found.report("report.html")
+again = hyst.Record.from_frame(record.to_frame("polars"), voltage="V")
+ax = record.plot(kind="time", color="k")
+error: dict[str, float] | None = model.simulate(again).errors
+score = HysteresisRegressor("tanh", period=1e-3).fit([[1.0], [2.0]], [0.1, 0.2]).predict([[1.0]])
+'''
+WRONG = "import hyst\nhyst.fit(3, model=4)\nhyst.Play(radius='wide')\nhyst.Record([0.0]).inputs.sum()\n"
+
+
+def checked(*arguments, cwd):
+    ran = subprocess.run([sys.executable, "-m", "mypy", "--strict", *arguments], capture_output=True, text=True, cwd=cwd)
+    return ran.returncode, ran.stdout + ran.stderr
+
+
+def test_the_package_and_its_use_are_typed(tmp_path):
+    (tmp_path / "use.py").write_text(USE)
+    for arguments in (["-p", "hyst"], ["use.py"]):
+        code, said = checked(*arguments, cwd=tmp_path)
+        assert code == 0, said
+
+
+def test_what_is_wrong_is_found(tmp_path):
+    (tmp_path / "wrong.py").write_text(WRONG)
+    code, said = checked("wrong.py", cwd=tmp_path)
+    lines = {line.split(":")[1] for line in said.splitlines() if line.startswith("wrong.py:") and ": error:" in line}
+    assert code == 1 and lines == {"2", "3", "4"}, said
