@@ -150,7 +150,12 @@ impl Chart {
         mesh.draw()?;
         for (_, colour, pieces) in &self.curves {
             let colour = *colour;
-            let shown = |piece: &Vec<(f64, f64)>| piece.iter().copied().filter(|p| !self.log || p.1 > 0.0).collect();
+            // Nothing cuts a line off at the axes: what is beyond them lies on them.
+            let (low, high) = self.bounds.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+            let shown = |piece: &Vec<(f64, f64)>| {
+                let drawn = piece.iter().filter(|p| !self.log || p.1 > 0.0);
+                drawn.map(|(x, y)| (*x, y.clamp(low, high))).collect()
+            };
             let lines = pieces.iter().map(|piece| {
                 let points: Vec<(f64, f64)> = shown(piece);
                 PathElement::new(points, colour.stroke_width(1))
@@ -160,9 +165,10 @@ impl Chart {
         Ok(())
     }
 
-    /// Draws the legend over the panel, where it covers no line, and returns what is left below it.
+    /// Draws title and legend above the panel, where they cover no line, and returns what is left below; at least half of the area, so that of many curves
+    /// the last ones have no entry.
     fn legend<'a>(&self, area: &Area<'a>) -> Result<Area<'a>, Box<dyn std::error::Error>> {
-        let (width, _) = area.dim_in_pixel();
+        let (width, height) = area.dim_in_pixel();
         let style = ("sans-serif", 13).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
         let title = ("sans-serif", 18).into_text_style(area);
         area.draw_text(&self.title, &title, (LEGEND_MARGIN, 6))?;
@@ -173,6 +179,10 @@ impl Chart {
             let wide = LEGEND_LINE + 6 + area.estimate_text_size(name, &style)?.0 as i32;
             if x + wide > width as i32 && x > 2 * LEGEND_MARGIN {
                 (x, y) = (LEGEND_MARGIN, y + LEGEND_HEIGHT);
+            }
+            if y > LEGEND_HEIGHT && y > height as i32 / 2 - LEGEND_HEIGHT {
+                y -= LEGEND_HEIGHT;
+                break;
             }
             area.draw(&PathElement::new([(x, y), (x + LEGEND_LINE, y)], colour.stroke_width(3)))?;
             area.draw_text(name, &style, (x + LEGEND_LINE + 6, y))?;
