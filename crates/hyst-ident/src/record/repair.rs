@@ -144,8 +144,14 @@ fn leave_out_without(
             });
         }
         if count > 0 {
+            let first = missing.iter().position(|missing| *missing).map_or(0, |row| done.row(row) + 1);
             done.missing = missing;
-            done.note(format!("{} without {column} {} not fitted", rows_word(count), was(count)));
+            done.note(format!(
+                "{} without {column} {} not fitted{}",
+                rows_word(count),
+                was(count),
+                first_of(count, first)
+            ));
         }
     }
     let columns = [
@@ -182,6 +188,11 @@ fn leave_out_without(
     }
     notes.into_iter().for_each(|note| done.note(note));
     Ok(())
+}
+
+/// Where rows are: the number of the only one, or of the first.
+fn first_of(count: usize, row: usize) -> String {
+    if count == 1 { format!(" (row {row})") } else { format!(" (the first is row {row})") }
 }
 
 fn was(count: usize) -> &'static str {
@@ -410,8 +421,10 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
     if !gaps.is_empty() {
         let alone = segments.iter().filter(|rows| rows.len() < 2).count();
         let longest = gaps.iter().fold(0.0_f64, |m, g| m.max(*g));
+        let before = |row: &usize| samples.time[*row] - samples.time[row - 1] == longest;
+        let at = (1..rows).find(before).map_or(0, |row| done.row(row) + 1);
         let word = if gaps.len() == 1 { "an interruption".to_owned() } else { format!("{} interruptions", gaps.len()) };
-        done.note(format!("{word} of up to {longest:.3} s: a segment begins after each; what the actuator remembers from before is estimated"));
+        done.note(format!("{word} of up to {longest:.3} s (the longest before row {at}): a segment begins after each; what the actuator remembers from before is estimated"));
         if alone > 0 && alone < segments.len() {
             let mut kept = vec![true; rows];
             segments.iter().filter(|rows| rows.len() < 2).for_each(|rows| kept[rows.clone()].fill(false));
