@@ -26,12 +26,28 @@ fn info_names_channels_units_and_the_next_command() {
     let lab = Lab::with_train("");
     lab.ok("convert train.csv train.mat");
     let told = lab.ok("info train.mat").stdout;
-    for part in ["MATLAB 5", "voltage_v", "µm", "samples a second", "hystctl fit train.mat --model pi -o model.json"] {
+    for part in
+        ["MATLAB 5", "voltage_v", "µm", "samples per second", "hystctl fit train.mat --model pi -o train-pi.json"]
+    {
         assert!(told.contains(part), "\"{part}\" is missing in: {told}");
     }
-    lab.write("asks.csv", "t,V,x\n0,1,2\n1,2,3\n2,3,4\n");
+    lab.write("asks.csv", "t,V,x,w\n0,1,2,5\n1,2,3,7\n2,3,4,1\n");
     let told = lab.ok("info asks.csv").stdout;
     assert!(told.contains("not a record yet") && told.contains("--map time_s=t"), "{told}");
+    // A unit that the map states is marked as such; a factor makes another unit, which the file's values do not have.
+    let told = lab.ok("info asks.csv --map time_ms=t --map voltage_v=V --map displacement_um=2*x").stdout;
+    let line = |name: &str| {
+        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let found = told.lines().map(words).find(|words| words.first().is_some_and(|word| word == name));
+        found.unwrap_or_else(|| panic!("no line of {name} in: {told}"))
+    };
+    assert_eq!(line("t")[1..3], ["time", "ms*"], "{told}");
+    assert_eq!(line("V")[1..3], ["input", "V*"], "{told}");
+    assert_eq!(line("x")[1..3], ["output", "?"], "{told}");
+    assert_eq!(line("w")[1..3], ["-", "?"], "{told}");
+    assert!(told.contains("times from the column \"t\"") && told.contains("the file states no unit"), "{told}");
+    lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
+    assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
     rows.remove(500);
     noted(with_header(HEADER, &rows), "", &["1 row lost between others"]);
     rows.drain(500..600);
-    noted(with_header(HEADER, &rows), "", &["an interruption of up to 0.204 s"]);
+    noted(with_header(HEADER, &rows), "", &["an interruption of 0.204 s"]);
     let mut rows = long();
     rows.insert(300, rows[300].clone());
     noted(with_header(HEADER, &rows), "", &["1 row with the time of the row before: joined"]);

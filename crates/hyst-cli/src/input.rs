@@ -183,16 +183,18 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
             continue;
         }
         odd.push(format!(
-            "the sensor is at the end of its range, {} {unit}, in {} (the first at {} s). These rows are not fitted. Lower the drive or widen the range",
+            "the sensor is at the end of its range, {} {unit}, in {} in {} (the first from row {} at {} s). These rows are not fitted. Lower the drive or widen the range",
             text::short(end.at),
             text::count(end.rows, "row"),
+            text::count(end.intervals, "interval"),
+            end.first + 1,
             text::short(record.time()[end.first])
         ));
     }
     let spikes = spikes_of(record);
     if let Some(largest) = spikes.first() {
         odd.push(format!(
-            "{} of the output left out; the largest, in row {} at {} s, is {} spans from its neighbours",
+            "{} of the output left out; the largest, in row {} at {} s, is {} times the output span away from its neighbours",
             text::count(spikes.len(), "spike"),
             largest.row + 1,
             text::short(record.time()[largest.row]),

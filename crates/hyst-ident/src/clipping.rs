@@ -23,6 +23,8 @@ pub struct Clipped {
     pub rows: usize,
     /// The first of them, from 0.
     pub first: usize,
+    /// In how many uninterrupted intervals they are.
+    pub intervals: usize,
 }
 
 /// Marks the clipped rows of an output.
@@ -65,7 +67,13 @@ pub fn clipped(output: &[f64], segments: &[Range<usize>]) -> Vec<Clipped> {
     let (low, high) = range(output.iter().copied());
     let at = |end: f64| {
         let rows = || (0..output.len()).filter(|k| marked[*k] && output[*k] == end);
-        rows().next().map(|first| Clipped { at: end, rows: rows().count(), first })
+        let starts = |k: &usize| *k == 0 || !marked[k - 1] || output[k - 1] != end;
+        rows().next().map(|first| Clipped {
+            at: end,
+            rows: rows().count(),
+            first,
+            intervals: rows().filter(starts).count(),
+        })
     };
     [at(low), at(high)].into_iter().flatten().collect()
 }

@@ -545,9 +545,11 @@ pub(crate) struct MapArg {
     pub(crate) rate: Option<f64>,
 }
 
-/// Show what a file holds: channels, units, rate, noise, and what is odd about it
+/// Show what a file holds: channels, units, rate, noise, and what may be wrong
 ///
-/// Ends with the command to type next. Nothing is written.
+/// A line for each channel: what the record reads it as (- where it is not read), its unit (? where the file states none), minimum, maximum,
+/// resolution (the smallest difference between two values), rows, and rows without a value. `note` is what was done to read the file,
+/// `warning` what may be wrong with the data. Ends with the command to type next. Nothing is written.
 #[derive(Debug, Args)]
 #[command(after_help = format!("Example:\n  hystctl info scan.csv\n\n{RECORDS}"))]
 pub(crate) struct InfoArgs {

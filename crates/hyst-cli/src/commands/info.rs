@@ -1,10 +1,11 @@
-//! `info`: what a file holds, what is odd about it, and what to type next.
+//! `info`: what a file holds, what may be wrong with it, and what to type next.
 
 use std::collections::HashSet;
+use std::path::Path;
 
 use hyst_ident::noise::noise_floor;
 use hyst_ident::range;
-use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, Reading, Record, Survey};
+use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, OutputUnit, Reading, Record, Survey};
 use hyst_ident::spikes::spikes_of;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -23,12 +24,18 @@ use crate::{input, text};
 #[derive(Debug, Serialize)]
 struct ChannelSummary {
     name: String,
+    /// What the record takes it for.
+    role: Option<&'static str>,
+    /// The unit that the file states.
     unit: Option<&'static str>,
+    /// The unit that `--map` states instead.
+    mapped_unit: Option<&'static str>,
     rows: usize,
     missing: usize,
     min: Option<f64>,
     max: Option<f64>,
-    step: f64,
+    /// Smallest difference between two values.
+    resolution: f64,
 }
 
 /// What the record is.
@@ -38,6 +45,8 @@ struct RecordSummary {
     sample_rate_hz: f64,
     seconds: f64,
     segments: usize,
+    /// Where the times come from.
+    times: Option<String>,
     input: Option<String>,
     output: Option<&'static str>,
     temperature: bool,
@@ -56,7 +65,8 @@ struct Summary {
     record: Option<RecordSummary>,
     /// Why the channels are no record yet, and what to type.
     missing: Option<String>,
-    odd: Vec<String>,
+    /// What may be wrong with the record.
+    warnings: Vec<String>,
     /// What is done to read the record.
     notes: Vec<String>,
     next: Option<String>,
@@ -84,30 +94,32 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         Ok(record) => (Some(record), None),
         Err(error) => (None, Some(error.to_string())),
     };
-    let mut odd: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
+    let mut warnings: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
     let text = |(name, cell): &(String, String)| format!("\"{name}\" is not read: it holds text (\"{cell}\")");
-    odd.extend(survey.texts.iter().map(text));
-    odd.extend(record.iter().flat_map(input::oddities));
+    warnings.extend(survey.texts.iter().map(text));
+    warnings.extend(record.iter().flat_map(input::oddities));
     let notes = record.as_ref().map_or_else(Vec::new, |record| record.notes().to_vec());
     let options = further(&input::columns(&args.map));
     let next = record.as_ref().and_then(|record| next(&file, record, &options));
     let channel = |c: &Channel| ChannelSummary {
         name: c.name.clone(),
+        role: c.role,
         unit: c.unit,
+        mapped_unit: c.mapped_unit,
         rows: c.rows,
         missing: c.missing,
         min: c.range.map(|r| r.0),
         max: c.range.map(|r| r.1),
-        step: c.step,
+        resolution: c.step,
     };
     Summary {
         file,
         format: survey.format,
         channels: survey.channels.iter().map(channel).collect(),
         picture: record.as_ref().map(picture).unwrap_or_default(),
-        record: record.as_ref().map(of_record),
+        record: record.as_ref().map(|record| of_record(record, survey.times)),
         missing,
-        odd,
+        warnings,
         notes,
         next,
     }
@@ -118,7 +130,7 @@ fn never_moves(channel: &Channel) -> Option<String> {
     (low == high).then(|| format!("\"{}\" never moves: it is {} throughout", channel.name, text::short(low)))
 }
 
-fn of_record(record: &Record) -> RecordSummary {
+fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
     let noise = record.output().map(|y| noise_floor(y, record.segments()));
     let spikes = spikes_of(record);
     let spiked: HashSet<usize> = spikes.iter().map(|spike| spike.row).collect();
@@ -133,6 +145,7 @@ fn of_record(record: &Record) -> RecordSummary {
         sample_rate_hz: 1.0 / record.sample_period(),
         seconds: time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0),
         segments: record.segments().len(),
+        times,
         input: (!record.input().is_empty()).then(|| record.input_column().to_owned()),
         output: record.output_unit().map(|unit| unit.column()),
         temperature: record.temperature().is_some(),
@@ -144,9 +157,11 @@ fn of_record(record: &Record) -> RecordSummary {
 
 /// What to type next with this record.
 fn next(file: &str, record: &Record, options: &str) -> Option<String> {
+    let model = Path::new(file).file_stem().map_or("model".into(), |stem| stem.to_string_lossy());
+    let model = quoted(&format!("{model}-pi.json"));
     let file = quoted(file);
     match (record.input().is_empty(), record.output().is_some()) {
-        (false, true) => Some(format!("hystctl fit {file}{options} --model pi -o model.json")),
+        (false, true) => Some(format!("hystctl fit {file}{options} --model pi -o {model}")),
         (false, false) => Some(format!("hystctl simulate --model model.json {file}{options} -o predicted.csv")),
         (true, true) => Some(format!("hystctl compensate --model model.json {file}{options} -o drive.csv")),
         (true, false) => None,
@@ -207,40 +222,54 @@ impl Summary {
         let mut lines = vec![format!("{}: {}", self.file, self.format), String::new()];
         let wide = self.channels.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).clamp(7, 40);
         lines.push(format!(
-            "  {:wide$}  {:>5}  {:>11}  {:>11}  {:>10}  {:>8}  {:>7}",
-            "channel", "unit", "min", "max", "step", "rows", "missing"
+            "  {:wide$}  {:11}  {:>5}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
+            "channel", "read as", "unit", "min", "max", "resolution", "rows", "missing"
         ));
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
             let name: String = c.name.chars().take(40).collect();
+            let unit = match (c.unit, c.mapped_unit) {
+                (Some(unit), _) => unit.to_owned(),
+                (None, Some(unit)) => format!("{unit}*"),
+                (None, None) if matches!(c.role, Some("segment")) || c.name == "segment" => "-".to_owned(),
+                (None, None) => "?".to_owned(),
+            };
             lines.push(format!(
-                "  {name:wide$}  {:>5}  {:>11}  {:>11}  {:>10}  {:>8}  {:>7}",
-                c.unit.unwrap_or(if c.name == "segment" { "-" } else { "?" }),
+                "  {name:wide$}  {:11}  {unit:>5}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
+                c.role.unwrap_or("-"),
                 number(c.min),
                 number(c.max),
-                text::short(c.step),
+                text::short(c.resolution),
                 c.rows,
                 c.missing
             ));
+        }
+        if self.channels.iter().any(|c| c.unit.is_none() && c.mapped_unit.is_some()) {
+            lines.push("  * as --map says; the file states no unit".to_owned());
         }
         if self.channels.len() == MAX_CHANNELS {
             lines.push(format!("  (the first {MAX_CHANNELS})"));
         }
         lines.push(String::new());
         if let Some(record) = &self.record {
-            let output = record.output.map_or(String::new(), |column| format!(", output {column}"));
-            let input = record.input.as_ref().map_or(String::new(), |column| format!(", input {column}"));
-            let more = [(record.temperature, ", temperature"), (record.load, ", load")];
-            let more: String = more.iter().filter(|(there, _)| *there).map(|(_, word)| *word).collect();
             lines.push(format!(
-                "record: {} over {} s in {}, {} samples a second{input}{output}{more}",
+                "record: {} over {} s in {}, {} samples per second",
                 text::count(record.rows, "row"),
                 text::short(record.seconds),
                 text::count(record.segments, "segment"),
                 text::short(record.sample_rate_hz)
             ));
+            let uses = [
+                ("times from", record.times.as_deref()),
+                ("input", record.input.as_deref()),
+                ("output", record.output),
+                ("temperature", record.temperature.then_some("temperature_degc")),
+                ("load", record.load.then_some("load_n")),
+            ];
+            let uses = uses.into_iter().filter_map(|(what, name)| Some(format!("{what} {}", name?)));
+            lines.push(uses.collect::<Vec<_>>().join(", "));
             if let (Some(noise), Some(share), Some(column)) = (record.noise, record.noise_share, record.output) {
-                let unit = column.rsplit_once('_').map_or("", |(_, unit)| unit);
+                let unit = OutputUnit::of_column(column).map_or("", OutputUnit::symbol);
                 lines.push(format!(
                     "white noise of the output: {} {unit} rms, {} of its span",
                     text::short(noise),
@@ -249,10 +278,10 @@ impl Summary {
             }
         }
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
-        if self.odd.is_empty() && self.notes.is_empty() && self.record.is_some() {
-            lines.push("odd: nothing".to_owned());
+        match (self.warnings.as_slice(), &self.record) {
+            ([], Some(_)) => lines.push("warnings: none".to_owned()),
+            (warnings, _) => lines.extend(warnings.iter().map(|what| format!("warning: {what}"))),
         }
-        lines.extend(self.odd.iter().map(|odd| format!("odd: {odd}")));
         if !self.picture.is_empty() {
             lines.extend([String::new(), self.picture.clone()]);
         }

@@ -184,7 +184,7 @@ impl Role {
         match self {
             Self::Segment => "segment".to_owned(),
             Self::Time => TimeUnit::ALL.map(TimeUnit::column).join("|"),
-            Self::Input => "voltage_v (or QUANTITY_in_UNIT, as force_in_n)".to_owned(),
+            Self::Input => "voltage_v (or QUANTITY_in_UNIT)".to_owned(),
             Self::Output => OutputUnit::ALL.map(OutputUnit::column).join("|"),
             Self::Temperature => "temperature_degc".to_owned(),
             Self::Load => "load_n".to_owned(),

@@ -89,6 +89,16 @@ pub(super) fn of_contents(
     how: &Reading,
     need: Need,
 ) -> Result<Record, RecordError> {
+    Ok(with_layout(name, contents, how, need)?.0)
+}
+
+/// The record in a file's columns, and which of them it was read from.
+pub(super) fn with_layout(
+    name: &str,
+    contents: &dyn Contents,
+    how: &Reading,
+    need: Need,
+) -> Result<(Record, Layout), RecordError> {
     if let Some(rate) = how.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
         let problems = format!("the sample rate is {rate} Hz");
         let advice = "give a positive number of samples a second".to_owned();
@@ -195,7 +205,7 @@ pub(super) fn of_contents(
         .cloned()
         .collect();
     record.text = contents.plain_text().filter(|_| !done.changed).map(|text| Arc::from(text.as_bytes()));
-    Ok(record)
+    Ok((record, layout))
 }
 
 /// Interpolates columns that have other times than the output (or, without one, the input) to its times, by straight lines. Before its first value

@@ -423,8 +423,13 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
         let longest = gaps.iter().fold(0.0_f64, |m, g| m.max(*g));
         let before = |row: &usize| samples.time[*row] - samples.time[row - 1] == longest;
         let at = (1..rows).find(before).map_or(0, |row| done.row(row) + 1);
-        let word = if gaps.len() == 1 { "an interruption".to_owned() } else { format!("{} interruptions", gaps.len()) };
-        done.note(format!("{word} of up to {longest:.3} s (the longest before row {at}): a segment begins after each; what the actuator remembers from before is estimated"));
+        let what = match gaps.len() {
+            1 => format!("an interruption of {longest:.3} s before row {at}: a segment begins there"),
+            more => format!(
+                "{more} interruptions of up to {longest:.3} s (the longest before row {at}): a segment begins after each"
+            ),
+        };
+        done.note(format!("{what}; the state that the actuator keeps from before is estimated"));
         if alone > 0 && alone < segments.len() {
             let mut kept = vec![true; rows];
             segments.iter().filter(|rows| rows.len() < 2).for_each(|rows| kept[rows.clone()].fill(false));
@@ -632,7 +637,7 @@ mod tests {
         let times: Vec<f64> = (0..100).map(|k| 1e-3 * f64::from(k) + if k >= 40 { 2.0 } else { 0.0 }).collect();
         let record = read(&table(&times));
         assert_eq!((record.segments(), record.labels()), (&[0..40, 40..100][..], &[0, 1][..]));
-        assert!(record.notes()[0].contains("interruption of up to 2.001 s"), "{:?}", record.notes());
+        assert!(record.notes()[0].contains("an interruption of 2.001 s before row"), "{:?}", record.notes());
     }
 
     #[test]

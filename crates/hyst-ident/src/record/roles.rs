@@ -282,16 +282,19 @@ impl Search<'_> {
                 }
             });
         }
-        // Words without a unit.
-        let worded: Vec<usize> = free().filter(|at| self.headings[*at].suggests(words_of(role))).collect();
-        let unknown = worded.iter().find(|at| required || self.states_unknown_unit(role, **at));
+        // Words without a unit: of the heading, else of the path before it.
+        let without = |at: &usize| self.headings[*at].unit.is_none();
+        let worded = |at: &usize| without(at) && self.headings[*at].suggests(words_of(role));
+        let unknown = free().filter(worded).find(|at| required || self.states_unknown_unit(role, *at));
+        let by_path = |at: &usize| self.is_unstated(*at) && self.path_suggests(role, *at);
+        let unknown = unknown.or_else(|| if required { free().find(by_path) } else { None });
         match unknown {
-            Some(at) if self.headings[*at].unit.is_none() => {
-                let why = match &self.headings[*at].unknown {
+            Some(at) => {
+                let why = match &self.headings[at].unknown {
                     Some(unit) => format!("the unit {} is not known", quoted(unit)),
                     None => "its unit is not stated".to_owned(),
                 };
-                problems.add(role, Some(*at), format!("{} may be {}, but {why}", self.quoted(*at), role.words()));
+                problems.add(role, Some(at), format!("{} may be {}, but {why}", self.quoted(at), role.words()));
             }
             _ if required && self.text_of(role).is_some() => {
                 let (name, example) = self.text_of(role).unwrap_or_default();
@@ -302,11 +305,22 @@ impl Search<'_> {
                 );
             }
             _ if required => {
-                problems.add(role, None, format!("no column is {} ({})", role.words(), role.accepted()));
+                let what = format!("no heading states a unit of {}, as {} does", role.words(), role.accepted());
+                problems.add(role, None, what);
             }
             _ => {}
         }
         None
+    }
+
+    /// Whether a column goes by no unit, neither a known one nor another.
+    fn is_unstated(&self, column: usize) -> bool {
+        self.headings[column].unit.is_none() && self.headings[column].unknown.is_none()
+    }
+
+    /// Whether a word of a column's whole name, its path included, is one of `role`'s.
+    fn path_suggests(&self, role: Role, column: usize) -> bool {
+        words(self.name(column)).iter().any(|word| words_of(role).contains(&word.as_str()))
     }
 
     /// A column of text whose heading states a unit of `role`.
@@ -464,16 +478,12 @@ impl Search<'_> {
     fn refuse(&self, problems: Problems, map: &ColumnMap, taken: &[usize]) -> RecordError {
         // A column with a unit would have been found.
         let is_free = |at: &usize| {
-            self.headings[*at].unit.is_none()
-                && self.headings[*at].unknown.is_none()
-                && !taken.contains(at)
-                && !problems.open.iter().any(|(_, guess)| *guess == Some(*at))
+            self.is_unstated(*at) && !taken.contains(at) && !problems.open.iter().any(|(_, guess)| *guess == Some(*at))
         };
         let mut free: Vec<usize> = self.columns().filter(is_free).collect();
         // Of columns that say nothing of themselves, one whose path does, else the next.
         let mut next = |role: Role| {
-            let says = |at: &usize| words(self.name(*at)).iter().any(|word| words_of(role).contains(&word.as_str()));
-            let place = free.iter().position(says).or((!free.is_empty()).then_some(0))?;
+            let place = free.iter().position(|at| self.path_suggests(role, *at)).or((!free.is_empty()).then_some(0))?;
             Some(free.remove(place))
         };
         let mut open: Vec<(Role, Option<usize>)> = problems.open.clone();

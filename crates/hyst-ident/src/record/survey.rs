@@ -4,10 +4,12 @@ use std::path::Path;
 
 use super::columns::Need;
 use super::error::RecordError;
-use super::heading::Heading;
+use super::heading::{Heading, Unit};
 use super::log::is_run_log;
-use super::read::{Reading, of_contents};
+use super::read::{Reading, with_layout};
+use super::roles::{Clock, Layout};
 use super::source::{self, Contents};
+use super::unit::TimeUnit;
 use super::{Record, RunLog};
 use crate::noise::quantisation;
 use crate::samples::range;
@@ -27,6 +29,10 @@ pub struct Channel {
     pub range: Option<(f64, f64)>,
     /// Smallest difference between two values, in its unit; 0 where all are one.
     pub step: f64,
+    /// What the record takes it for: `segment`, `time`, `input`, `output`, `temperature` or `load`.
+    pub role: Option<&'static str>,
+    /// The unit that `--map` gives it, where the file states none.
+    pub mapped_unit: Option<&'static str>,
 }
 
 /// What a file holds.
@@ -38,6 +44,8 @@ pub struct Survey {
     pub channels: Vec<Channel>,
     /// Columns that hold text, with a cell of each.
     pub texts: Vec<(String, String)>,
+    /// Where the times of the record come from, as `the column "t"` or `the sample interval in the file`.
+    pub times: Option<String>,
     /// The record, or why it is none yet.
     pub record: Result<Record, RecordError>,
 }
@@ -54,9 +62,7 @@ impl Survey {
         let path = path.as_ref();
         let file = path.display().to_string();
         if let Some(contents) = source::LargeText::open(path, &mut |_| {})? {
-            let channels = channels(&contents)?;
-            let record = any(how.rate.is_some(), |need| of_contents(&file, &contents, how, need));
-            return Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), record });
+            return Self::of(&file, &contents, how);
         }
         let bytes = std::fs::read(path).map_err(|source| RecordError::Io { file: file.clone(), source })?;
         Self::parse(&file, &bytes, how)
@@ -71,25 +77,90 @@ impl Survey {
             let log = RunLog::parse(name, bytes)?;
             let text = log.csv(name, false)?;
             let survey = Self::parse(name, text.as_bytes(), how)?;
-            let record = any(how.rate.is_some(), |need| Record::parse(name, bytes, how.clone(), need));
+            let record = any(how.rate.is_some(), |need| Record::parse(name, bytes, how.clone(), need), |record| record);
             return Ok(Self { format: "MCAP log of a run".to_owned(), record, ..survey });
         }
         let unpacked = source::unpack(name, bytes)?;
         let contents = source::open(name, &unpacked)?;
-        let channels = channels(contents.as_ref())?;
-        let record =
-            any(how.rate.is_some(), |need| Ok(of_contents(name, contents.as_ref(), how, need)?.kept_as(bytes)));
-        Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), record })
+        let survey = Self::of(name, contents.as_ref(), how)?;
+        Ok(Self { record: survey.record.map(|record| record.kept_as(bytes)), ..survey })
+    }
+
+    /// Looks at the columns of a file.
+    fn of(name: &str, contents: &dyn Contents, how: &Reading) -> Result<Self, RecordError> {
+        let mut channels = channels(contents)?;
+        let read = |need| with_layout(name, contents, how, need);
+        let (record, times) = match any(how.rate.is_some(), read, |(record, _)| record) {
+            Ok((record, layout)) => {
+                mark(&mut channels, contents, &layout);
+                (Ok(record), Some(times(contents, how, &layout)))
+            }
+            Err(error) => (Err(error), None),
+        };
+        Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), times, record })
+    }
+}
+
+/// Notes which channels a record is read from.
+fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
+    let mut note = |column: usize, role: &'static str, canonical: &str| {
+        let stated = contents.heads().get(column).is_some_and(|head| !has_unit(head));
+        if let Some(channel) = channels.get_mut(column) {
+            channel.role = Some(role);
+            channel.mapped_unit = Unit::of_canonical(canonical).filter(|_| stated).map(|unit| unit.symbol);
+        }
+    };
+    if let Some(column) = layout.segment {
+        note(column, "segment", "");
+    }
+    if let Clock::Column { column, per_second } = layout.time {
+        let unit = TimeUnit::ALL.into_iter().find(|unit| unit.per_second() == per_second);
+        note(column, "time", unit.map_or("", TimeUnit::column));
+    }
+    let choices = [
+        ("input", &layout.input),
+        ("output", &layout.output),
+        ("temperature", &layout.temperature),
+        ("load", &layout.load),
+    ];
+    for (role, choice) in choices {
+        if let Some(choice) = choice {
+            // Values in the table are those of the file: a factor makes another unit of them.
+            let same = choice.factor.is_none_or(|factor| factor == -1.0);
+            note(choice.column, role, if same { &choice.canonical } else { "" });
+        }
+    }
+}
+
+fn has_unit(head: &source::Head) -> bool {
+    Heading::parse(&head.name, head.unit.as_deref()).unit.is_some()
+}
+
+/// Where times come from.
+fn times(contents: &dyn Contents, how: &Reading, layout: &Layout) -> String {
+    match layout.time {
+        Clock::Column { column, .. } => {
+            format!("the column \"{}\"", contents.heads().get(column).map_or("", |head| &head.name))
+        }
+        Clock::Even { .. } if how.rate.is_some() => "--rate".to_owned(),
+        Clock::Even { .. } => "the sample interval in the file".to_owned(),
     }
 }
 
 /// A record with what a file has: input and output, or one of them if there is nothing else. If it is none, the reason is why it has
 /// not both.
-fn any(rated: bool, read: impl Fn(Need) -> Result<Record, RecordError>) -> Result<Record, RecordError> {
+fn any<T>(
+    rated: bool,
+    read: impl Fn(Need) -> Result<T, RecordError>,
+    record: impl Fn(&T) -> &Record,
+) -> Result<T, RecordError> {
     read(Need::InputAndOutput).or_else(|error| match error {
         RecordError::Columns { columns, .. } => {
             // A record at a stated rate may have no column of times.
-            let whole = |record: &Record| record.columns() == columns || rated && record.columns() == columns + 1;
+            let whole = |read: &T| {
+                let own = record(read).columns();
+                own == columns || rated && own == columns + 1
+            };
             read(Need::Input).ok().filter(whole).or_else(|| read(Need::Output).ok().filter(whole)).ok_or(error)
         }
         error => Err(error),
@@ -108,7 +179,7 @@ impl Record {
     /// # Errors
     /// As those of [`read`](Self::read).
     pub fn read_any(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
-        any(how.rate.is_some(), |need| Self::read(path.as_ref(), how.clone(), need))
+        any(how.rate.is_some(), |need| Self::read(path.as_ref(), how.clone(), need), |record| record)
     }
 }
 
@@ -126,6 +197,8 @@ fn channels(contents: &dyn Contents) -> Result<Vec<Channel>, RecordError> {
             missing: values.numbers.len() - there.len(),
             range: (!there.is_empty()).then_some((low, high)),
             step: quantisation(&there) * 12f64.sqrt(),
+            role: None,
+            mapped_unit: None,
         }
     };
     Ok(heads.iter().zip(values).map(channel).collect())
