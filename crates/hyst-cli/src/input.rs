@@ -147,6 +147,9 @@ pub(crate) fn refuse_still(record: &Record) -> CommandResult {
     Ok(())
 }
 
+/// Intervals of rows that a sentence lists.
+const MAX_INTERVALS: usize = 4;
+
 /// What is legal in a record but seldom meant, a sentence each.
 pub(crate) fn oddities(record: &Record) -> Vec<String> {
     let mut odd = Vec::new();
@@ -179,22 +182,26 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     }
     let is_frozen = |row: usize| frozen.iter().any(|run| (run.first..run.first + run.rows).contains(&row));
     for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
-        if is_frozen(end.first) {
+        if end.intervals.iter().any(|interval| is_frozen(interval.start)) {
             continue;
         }
+        let rows = end.intervals.iter().map(Range::len).sum();
+        let shown: Vec<String> =
+            end.intervals.iter().take(MAX_INTERVALS).map(|i| format!("{} to {}", i.start + 1, i.end)).collect();
+        let more = end.intervals.len().saturating_sub(MAX_INTERVALS);
+        let more = if more > 0 { format!(" and {more} more intervals") } else { String::new() };
         odd.push(format!(
-            "the sensor is at the end of its range, {} {unit}, in {} in {} (the first from row {} at {} s). These rows are not fitted. Lower the drive or widen the range",
+            "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). These rows are not fitted. Lower the drive or widen the range to see them",
             text::short(end.at),
-            text::count(end.rows, "row"),
-            text::count(end.intervals, "interval"),
-            end.first + 1,
-            text::short(record.time()[end.first])
+            text::count(rows, "row"),
+            shown.join(", ")
         ));
     }
     let spikes = spikes_of(record);
     if let Some(largest) = spikes.first() {
+        let largest_is = if spikes.len() == 1 { "it" } else { "the largest" };
         odd.push(format!(
-            "{} of the output left out; the largest, in row {} at {} s, is {} times the output span away from its neighbours",
+            "{} of the output not fitted: {largest_is} is in row {} at {} s and is {} times the output span away from its neighbours",
             text::count(spikes.len(), "spike"),
             largest.row + 1,
             text::short(record.time()[largest.row]),

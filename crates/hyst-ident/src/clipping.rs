@@ -19,12 +19,8 @@ const TURNS: f64 = 0.3;
 pub struct Clipped {
     /// What the sensor shows there \[output unit\].
     pub at: f64,
-    /// How many rows.
-    pub rows: usize,
-    /// The first of them, from 0.
-    pub first: usize,
-    /// In how many uninterrupted intervals they are.
-    pub intervals: usize,
+    /// The rows, from 0, in uninterrupted intervals.
+    pub intervals: Vec<Range<usize>>,
 }
 
 /// Marks the clipped rows of an output.
@@ -66,14 +62,14 @@ pub fn clipped(output: &[f64], segments: &[Range<usize>]) -> Vec<Clipped> {
     let marked = clipped_rows(output, segments);
     let (low, high) = range(output.iter().copied());
     let at = |end: f64| {
-        let rows = || (0..output.len()).filter(|k| marked[*k] && output[*k] == end);
-        let starts = |k: &usize| *k == 0 || !marked[k - 1] || output[k - 1] != end;
-        rows().next().map(|first| Clipped {
-            at: end,
-            rows: rows().count(),
-            first,
-            intervals: rows().filter(starts).count(),
-        })
+        let mut intervals: Vec<Range<usize>> = Vec::new();
+        for row in (0..output.len()).filter(|k| marked[*k] && output[*k] == end) {
+            match intervals.last_mut() {
+                Some(interval) if interval.end == row => interval.end += 1,
+                _ => intervals.push(row..row + 1),
+            }
+        }
+        (!intervals.is_empty()).then_some(Clipped { at: end, intervals })
     };
     [at(low), at(high)].into_iter().flatten().collect()
 }
@@ -98,8 +94,8 @@ mod tests {
         let found = found_in(&y);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].at, 0.8);
-        assert_eq!(found[0].rows, y.iter().filter(|y| **y == 0.8).count());
-        assert_eq!(y[found[0].first], 0.8);
+        assert_eq!(found[0].intervals.iter().map(Range::len).sum::<usize>(), y.iter().filter(|y| **y == 0.8).count());
+        assert!(found[0].intervals.iter().all(|rows| y[rows.clone()].iter().all(|y| *y == 0.8)));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hyst_ident::noise::noise_floor;
 use hyst_ident::range;
-use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, OutputUnit, Reading, Record, Survey};
+use hyst_ident::record::{Channel, ColumnMap, MAX_CHANNELS, OutputUnit, Reading, Record, RecordError, Survey};
 use hyst_ident::spikes::spikes_of;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -88,19 +88,31 @@ pub(super) fn run(args: &InfoArgs) -> CommandResult {
     }
 }
 
+/// What a map may say instead of V, µm and s.
+const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, 0.001*COLUMN for mV";
+
 fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     let file = args.file.display().to_string();
-    let (record, missing) = match survey.record {
-        Ok(record) => (Some(record), None),
-        Err(error) => (None, Some(error.to_string())),
+    let (record, missing, advice) = match survey.record {
+        Ok(record) => (Some(record), None, None),
+        Err(RecordError::Columns { problems, options, .. }) if !options.is_empty() => {
+            let next = format!(
+                "hystctl info {} {options}  (if the columns are right; other units: {OTHER_UNITS})",
+                quoted(&file)
+            );
+            (None, Some(problems), Some(next))
+        }
+        Err(error) => (None, Some(error.to_string()), None),
     };
     let mut warnings: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
     let text = |(name, cell): &(String, String)| format!("\"{name}\" is not read: it holds text (\"{cell}\")");
     warnings.extend(survey.texts.iter().map(text));
     warnings.extend(record.iter().flat_map(input::oddities));
-    let notes = record.as_ref().map_or_else(Vec::new, |record| record.notes().to_vec());
+    // The table of channels says already what is read as what.
+    let told = |note: &&String| !note.contains(" is read as ") || note.contains("converted");
+    let notes = record.iter().flat_map(|record| record.notes().iter().filter(told).cloned()).collect();
     let options = further(&input::columns(&args.map));
-    let next = record.as_ref().and_then(|record| next(&file, record, &options));
+    let next = record.as_ref().and_then(|record| next(&file, record, &options)).or(advice);
     let channel = |c: &Channel| ChannelSummary {
         name: c.name.clone(),
         role: c.role,

@@ -89,14 +89,16 @@ pub enum RecordError {
         file: String,
     },
     /// Columns that are needed are missing, of unknown unit, or several.
-    #[error("{file}: {problems}; {advice}")]
+    #[error("{file}: {problems}; {advice}{}", if_right(options))]
     Columns {
         /// The file and the line of its header.
         file: String,
         /// Every problem.
         problems: String,
-        /// What to type.
+        /// What to do.
         advice: String,
+        /// The options to type if columns and units are right; empty where none are known.
+        options: String,
         /// How many columns the file has.
         columns: usize,
     },
@@ -317,4 +319,8 @@ pub enum RecordError {
     /// Nothing was given to join.
     #[error("no record was given")]
     Nothing,
+}
+
+fn if_right(options: &str) -> String {
+    if options.is_empty() { String::new() } else { format!("; if the columns and units are right: {options}") }
 }

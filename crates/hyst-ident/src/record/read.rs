@@ -102,7 +102,13 @@ pub(super) fn with_layout(
     if let Some(rate) = how.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
         let problems = format!("the sample rate is {rate} Hz");
         let advice = "give a positive number of samples a second".to_owned();
-        return Err(RecordError::Columns { file: name.to_owned(), problems, advice, columns: 0 });
+        return Err(RecordError::Columns {
+            file: name.to_owned(),
+            problems,
+            advice,
+            options: String::new(),
+            columns: 0,
+        });
     }
     let heads = contents.heads();
     let file = File { name, header: contents.header(), heads, texts: contents.texts() };

@@ -435,6 +435,7 @@ impl Search<'_> {
                 file: self.place(),
                 problems,
                 advice,
+                options: String::new(),
                 columns: self.file.heads.len() + self.file.texts.len(),
             };
         }
@@ -466,6 +467,7 @@ impl Search<'_> {
             file: self.place(),
             problems: what,
             advice: "map another column, or convert the values".to_owned(),
+            options: String::new(),
             columns: self.file.heads.len() + self.file.texts.len(),
         }
     }
@@ -507,7 +509,8 @@ impl Search<'_> {
         RecordError::Columns {
             file: self.place(),
             problems: problems.list.join("; "),
-            advice: format!("columns found: {}{rate}; if the columns and units are right: {line}", self.listed()),
+            advice: format!("columns found: {}{rate}", self.listed()),
+            options: line,
             columns: self.file.heads.len() + self.file.texts.len(),
         }
     }
