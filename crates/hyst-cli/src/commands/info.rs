@@ -89,18 +89,21 @@ pub(super) fn run(args: &InfoArgs) -> CommandResult {
 }
 
 /// What a map may say instead of V, µm and s.
-const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, 0.001*COLUMN for mV";
+const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, and 0.001*COLUMN for mV";
 
 fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     let file = args.file.display().to_string();
     let (record, missing, advice) = match survey.record {
         Ok(record) => (Some(record), None, None),
         Err(RecordError::Columns { problems, options, .. }) if !options.is_empty() => {
-            let next = format!(
-                "hystctl info {} {options}  (if the columns are right; other units: {OTHER_UNITS})",
-                quoted(&file)
-            );
-            (None, Some(problems), Some(next))
+            let next = format!("hystctl info {} {options}", quoted(&file));
+            (
+                None,
+                Some(format!(
+                    "{problems}. If columns and units are right, continue as below; --map also takes {OTHER_UNITS}"
+                )),
+                Some(next),
+            )
         }
         Err(error) => (None, Some(error.to_string()), None),
     };

@@ -349,7 +349,7 @@ fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let kept: Vec<bool> = repeated.iter().map(|repeated| !repeated).collect();
     let at = (0..rows).find(|row| repeated[*row]).map_or(0, |row| done.row(row) + 1);
     let how = match differing {
-        0 => "all with its values too".to_owned(),
+        0 => "with the same values".to_owned(),
         more => format!("{more} with other values, of which the mean is taken"),
     };
     keep(samples, done, &kept);
@@ -676,7 +676,12 @@ mod tests {
         times.insert(41, 0.040);
         let record = read(&table(&times));
         assert_eq!((record.rows(), record.sample_period()), (100, 1e-3));
-        assert!(record.notes()[0].contains("1 row with the time of the row before (1 with other values, of which the mean is taken; the first is row 42)"), "{:?}", record.notes());
+        assert!(
+            record.notes()[0]
+                .contains("1 row with the time of the row before (with the same values; the first is row 42)"),
+            "{:?}",
+            record.notes()
+        );
     }
 
     #[test]
