@@ -9,7 +9,7 @@ import pytest
 
 STUB = ast.parse((Path(hyst.__file__).parent / "_hyst.pyi").read_text())
 CLASSES = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef)}
-FUNCTIONS = {node.name: node for node in STUB.body if isinstance(node, ast.FunctionDef)}
+FUNCTIONS = {node.name: node for node in STUB.body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")}
 COMPILED = {name for name in vars(hyst._hyst) if not name.startswith("_")}
 
 

@@ -10,6 +10,7 @@ use hyst_hw::{
 
 use crate::cli::Device;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
+use crate::host::{self, HostDaq, HostDaqError};
 use crate::input;
 
 /// A device of any kind.
@@ -17,6 +18,8 @@ pub(crate) enum AnyDevice {
     Plant(Box<Plant>),
     /// At the other end of a line.
     Remote(Box<Remote<Box<dyn Line>>>),
+    /// Of the program that runs the command.
+    Host(Box<dyn HostDaq>),
 }
 
 /// What any of them may say.
@@ -26,6 +29,8 @@ pub(crate) enum DeviceError {
     Plant(#[from] PlantError),
     #[error(transparent)]
     Remote(#[from] RemoteError),
+    #[error(transparent)]
+    Host(#[from] HostDaqError),
 }
 
 impl Classified for DeviceError {
@@ -40,6 +45,7 @@ impl Classified for DeviceError {
                 | RemoteError::Version { .. },
             ) => Exit::BadInput,
             Self::Remote(_) => Exit::DeviceLost,
+            Self::Host(error) => error.exit(),
         }
     }
 }
@@ -69,6 +75,9 @@ impl AnyDevice {
         if let Device::Simulated(described) = device {
             return Ok(Self::Plant(Box::new(input::plant(described, wishes.noise)?)));
         }
+        if *device == Device::Host {
+            return host::daq().map(Self::Host).ok_or_else(|| CommandError::bad_input(NO_HOST));
+        }
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
         let (line, name) = line(device)?;
         let remote = Remote::open(line, name, options(wishes)).map_err(lost)?;
@@ -79,7 +88,7 @@ impl AnyDevice {
     pub(crate) fn clear(&mut self) -> Result<Option<Fault>, DeviceError> {
         match self {
             // It begins with the command that plays it.
-            Self::Plant(_) => Ok(None),
+            Self::Plant(_) | Self::Host(_) => Ok(None),
             Self::Remote(remote) => Ok(remote.clear()?),
         }
     }
@@ -87,7 +96,7 @@ impl AnyDevice {
     /// The device at the other end of a line.
     pub(crate) fn remote(&mut self) -> Option<&mut Remote<Box<dyn Line>>> {
         match self {
-            Self::Plant(_) => None,
+            Self::Plant(_) | Self::Host(_) => None,
             Self::Remote(remote) => Some(remote),
         }
     }
@@ -117,6 +126,8 @@ fn options(wishes: &Wishes) -> RemoteOptions {
     }
 }
 
+const NO_HOST: &str = "the device of the program that runs the command can only be played, by one command at a time";
+
 /// The line to a device, and what it is called.
 fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
     let port = |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
@@ -127,6 +138,7 @@ fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
                 "a simulated plant runs in the command that plays it; press Ctrl-C there",
             ));
         }
+        Device::Host => return Err(CommandError::bad_input(NO_HOST)),
         Device::Serial { port: name, baud } => (Box::new(port(name, *baud)?), name),
         Device::Slcan { port: name, baud, bits_per_s } => {
             let bus = Slcan::open(port(name, *baud)?, *bits_per_s)
@@ -164,7 +176,7 @@ impl AnyDevice {
     pub(crate) fn observe(&mut self) {
         match self {
             // It is given the voltage at which it rests.
-            Self::Plant(_) => {}
+            Self::Plant(_) | Self::Host(_) => {}
             Self::Remote(remote) => remote.observe(),
         }
     }
@@ -174,6 +186,7 @@ impl AnyDevice {
         match self {
             // It is gone with the command that plays it.
             Self::Plant(_) => {}
+            Self::Host(daq) => daq.gentle(slew_v_per_s),
             Self::Remote(remote) => remote.gentle(slew_v_per_s),
         }
     }
@@ -181,8 +194,8 @@ impl AnyDevice {
     /// Lets the device follow references with this controller; drives are references from then on.
     pub(crate) fn follow(&mut self, recipe: &[u8], range: (f64, f64)) -> Result<(), CommandError> {
         match self {
-            // It has no controller, and needs none: what it measures comes at once.
-            Self::Plant(_) => Ok(()),
+            // They have no controller, and need none: what they measure comes at once.
+            Self::Plant(_) | Self::Host(_) => Ok(()),
             Self::Remote(remote) => Ok(remote.follow(recipe, range).map_err(DeviceError::from)?),
         }
     }
@@ -194,6 +207,7 @@ macro_rules! each {
         match $device {
             AnyDevice::Plant($it) => $call,
             AnyDevice::Remote($it) => $call,
+            AnyDevice::Host($it) => $call,
         }
     };
 }

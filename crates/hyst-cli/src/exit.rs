@@ -3,7 +3,6 @@
 use std::error::Error;
 use std::fmt;
 use std::io::{self, Write};
-use std::process::ExitCode;
 
 use hyst_core::BlockError;
 use hyst_hw::{ConfigError, PlantError};
@@ -31,12 +30,6 @@ pub(crate) enum Exit {
     DeviceLost = 3,
 }
 
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(exit as u8)
-    }
-}
-
 /// Why a command ended before its time.
 #[derive(Debug)]
 pub(crate) struct CommandError {
@@ -61,6 +54,11 @@ impl CommandError {
     /// Something failed that is nobody's fault.
     pub(crate) fn failed(message: impl fmt::Display) -> Self {
         Self { exit: Exit::Failed, cause: anyhow::anyhow!("{message}") }
+    }
+
+    /// The exit code.
+    pub(crate) fn exit(&self) -> Exit {
+        self.exit
     }
 
     /// Says on stderr what happened, and returns the exit code.
@@ -113,7 +111,9 @@ always!(DeviceLost: LogError);
 impl Classified for FitError {
     fn exit(&self) -> Exit {
         match self {
-            Self::Unsolvable { .. } | Self::Compare { source: MetricsError::NotFinite { .. }, .. } => Exit::Failed,
+            Self::Stopped { .. }
+            | Self::Unsolvable { .. }
+            | Self::Compare { source: MetricsError::NotFinite { .. }, .. } => Exit::Failed,
             _ => Exit::BadInput,
         }
     }

@@ -12,6 +12,7 @@ use hyst_ident::record::WriteError;
 use serde::Serialize;
 
 use crate::exit::{CommandError, CommandResult, Exit};
+use crate::host;
 
 /// The target of one result.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,6 +87,12 @@ impl Target {
                 if let Some(older) = write_over_alike(path, content)? {
                     tell_set_aside(path, &older);
                 }
+                Ok(())
+            }
+            Self::Stdout if host::is_lent() => {
+                let mut bytes = Vec::new();
+                content(&mut bytes)?;
+                host::take_stdout(&bytes);
                 Ok(())
             }
             Self::Stdout => {
@@ -196,7 +203,9 @@ impl Report {
 
     /// Prints one of the two.
     pub(crate) fn print(self, text: &str, json: &impl Serialize) -> CommandResult {
-        if self.json {
+        if host::take_report(text, json)? {
+            Ok(())
+        } else if self.json {
             print_json(json)
         } else if self.text_to_stderr {
             say(text);
@@ -227,6 +236,9 @@ pub(crate) fn print(text: &str) -> CommandResult {
 
 /// Prints a line (or more) to stderr.
 pub(crate) fn say(text: &str) {
+    if host::take_said(text.trim_end()) {
+        return;
+    }
     // Where stderr is closed there is nobody to tell.
     let _ = writeln!(io::stderr().lock(), "{}", text.trim_end());
 }

@@ -48,6 +48,12 @@ pub enum FitError {
     /// The record cannot be used as it is.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// It was ended from outside.
+    #[error("{record}: stopped before it was done")]
+    Stopped {
+        /// The record.
+        record: String,
+    },
     /// Not enough rows.
     #[error(
         "{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model"

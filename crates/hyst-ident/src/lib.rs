@@ -41,6 +41,7 @@ mod samples;
 mod settle;
 pub mod simulate;
 pub mod spikes;
+pub mod stop;
 mod tone_phase;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};

@@ -8,6 +8,7 @@ use crate::clipping::clipped_rows;
 use crate::frozen::frozen_rows;
 use crate::record::Record;
 use crate::spikes::{spiked_residual, spiked_rows};
+use crate::stop::Stop;
 
 /// Columns of one or more records with the same units.
 #[derive(Clone, Debug)]
@@ -38,6 +39,8 @@ pub struct Samples {
     pub settling: Vec<bool>,
     /// Rows in which the sensor shows no motion: it stands at the end of its range, is frozen, or spikes.
     pub(crate) blind: Vec<bool>,
+    /// Ends fits of them.
+    pub(crate) stop: Stop,
 }
 
 impl Samples {
@@ -58,6 +61,7 @@ impl Samples {
             file_of_segment: record.file_of_segment().to_vec(),
             settling: blind.clone(),
             blind,
+            stop: Stop::default(),
         }
     }
 
@@ -103,6 +107,7 @@ impl Samples {
             file_of_segment: keep.iter().map(|s| self.file_of_segment[*s]).collect(),
             settling: keep.iter().flat_map(|s| self.settling[self.segments[*s].clone()].iter().copied()).collect(),
             blind: keep.iter().flat_map(|s| self.blind[self.segments[*s].clone()].iter().copied()).collect(),
+            stop: self.stop.clone(),
         }
     }
 
@@ -132,6 +137,7 @@ impl Samples {
             file_of_segment: vec![0],
             settling: vec![false; rows],
             blind: vec![false; rows],
+            stop: Stop::default(),
         }
     }
 

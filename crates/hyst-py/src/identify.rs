@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex};
 
 use hyst_cli::report;
@@ -12,8 +14,10 @@ use hyst_ident::diagnose::{self as diagnosis, DiagnoseOptions};
 use hyst_ident::fit::{self as fitting, FitOptions, Optimizer, VariableBounds};
 use hyst_ident::identify::Form;
 use hyst_ident::model::Kind;
+use hyst_ident::optimize::Progress;
 use hyst_ident::record::Record;
 use hyst_ident::simulate::Zero;
+use hyst_ident::stop::Stop;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -21,7 +25,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::interrupt::interruptible;
 use crate::model::{Model, parse, zero_of};
+use crate::progress::Bar;
 use crate::record::{any_record, of_arrays};
 use crate::{errors, pickle};
 
@@ -62,6 +68,8 @@ use crate::{errors, pickle};
 ///     Plays of ``gpi`` and ``td-pi``, of ``pi`` when it is searched; elements of ``td-em``; most elements of ``maxwell-slip``.
 /// thresholds : int, optional
 ///     Most thresholds of ``pi``, chosen where the record calls for them.
+/// progress : bool, optional
+///     Whether a search shows a bar (tqdm); in a terminal or a notebook if not given. Ctrl-C ends the search.
 ///
 /// Raises
 /// ------
@@ -72,7 +80,7 @@ use crate::{errors, pickle};
 /// ValueError
 ///     If there is no such model, optimizer or form, or a search has no seed.
 #[pyfunction]
-#[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", optimizer="auto", seed=None, trials=1, evaluations=None, population=None, bounds=None, form=None, between_samples=None, elements=None, thresholds=None))]
+#[pyo3(signature = (record=None, *, model="pi", timepts=None, inputs=None, outputs=None, temperature=None, output_column="displacement_um", zero="none", optimizer="auto", seed=None, trials=1, evaluations=None, population=None, bounds=None, form=None, between_samples=None, elements=None, thresholds=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keywords of one call")]
 pub(crate) fn fit(
     py: Python<'_>,
@@ -94,6 +102,7 @@ pub(crate) fn fit(
     between_samples: Option<&str>,
     elements: Option<usize>,
     thresholds: Option<usize>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Model> {
     let kind: Kind = named(model)?;
     let optimizer: Optimizer = named(optimizer)?;
@@ -122,19 +131,18 @@ pub(crate) fn fit(
         _ => return Err(PyTypeError::new_err("give either a record, or timepts=, inputs= and outputs=")),
     };
     // A search can take minutes: Ctrl-C ends it.
-    let mut interrupted = None;
-    let mut watch = |_| match Python::attach(|py| py.check_signals()) {
-        Ok(()) => ControlFlow::Continue(()),
-        Err(error) => {
-            interrupted = Some(error);
-            ControlFlow::Break(())
-        }
+    let work = |stop: &Arc<AtomicBool>, reports: Sender<Progress>| {
+        let mut watch = |progress| {
+            // Nobody listens once an exception is under way.
+            let _ = reports.send(progress);
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        fitting::fit_with(&record, kind, &options, &mut watch)
     };
-    let found = py.detach(|| fitting::fit_with(&record, kind, &options, &mut watch));
-    match interrupted {
-        Some(error) => Err(error),
-        None => found.map(|fit| Model(fit.model)).map_err(errors::fit),
-    }
+    let mut bar = Bar::new("fit", progress);
+    let found = interruptible(py, work, |py, Progress { evaluations, budget, .. }| bar.at(py, evaluations, budget));
+    bar.close(py)?;
+    found?.map(|fit| Model(fit.model)).map_err(errors::fit)
 }
 
 /// What has this name.
@@ -308,8 +316,9 @@ impl Diagnosis {
 ///     What is done with the sensor's zero.
 /// seed : int
 ///     Seed of the bootstrap.
-/// progress : callable, optional
-///     Told in words what is being done. An exception that it raises is raised when the diagnosis is over.
+/// progress : bool or callable, optional
+///     Whether a bar (tqdm) shows what is being done; in a terminal or a notebook if not given. A function is given it in words; an exception that it
+///     raises ends the diagnosis, as Ctrl-C does.
 ///
 /// Raises
 /// ------
@@ -330,21 +339,17 @@ pub(crate) fn diagnose(
     let test = test.map(|t| any_record(py, t, "both")).transpose()?;
     let options = DiagnoseOptions { zero: zero_of(zero)?, seed };
     let model = &model.get().0;
-    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let tell = |doing: &str| {
-        let Some(progress) = &progress else { return };
-        if let Err(error) = Python::attach(|py| progress.call1(py, (doing,)).map(|_| ()))
-            && let Ok(mut raised) = raised.lock()
-        {
-            raised.get_or_insert(error);
-        }
+    let work = |stop: &Arc<AtomicBool>, says: Sender<String>| {
+        let says = Mutex::new(says);
+        let tell = |doing: &str| {
+            // Nobody listens once an exception is under way.
+            let _ = says.lock().map(|says| says.send(doing.to_owned()));
+        };
+        diagnosis::diagnose_until(&train, test.as_deref(), model, &options, &tell, &Stop::from(Arc::clone(stop)))
     };
-    let found = py.detach(|| diagnosis::diagnose(&train, test.as_deref(), model, &options, &tell));
-    match raised.into_inner() {
-        Ok(Some(error)) => Err(error),
-        _ => {
-            let found = found.map_err(errors::fit)?;
-            Ok(Diagnosis { found, model: model.clone(), train, test, zero: options.zero, seed })
-        }
-    }
+    let mut bar = Bar::new("diagnose", progress);
+    let found = interruptible(py, work, |py, doing: String| bar.say(py, &doing));
+    bar.close(py)?;
+    let found = found?.map_err(errors::fit)?;
+    Ok(Diagnosis { found, model: model.clone(), train, test, zero: options.zero, seed })
 }

@@ -8,10 +8,13 @@
 mod arrays;
 mod channels;
 mod clamp;
+mod command;
 mod control;
+mod daq;
 mod errors;
 mod frame;
 mod identify;
+mod interrupt;
 mod inverse;
 mod inversion;
 mod keep;
@@ -23,6 +26,7 @@ mod of_class;
 mod operator;
 mod pickle;
 mod plot;
+mod progress;
 mod record;
 mod results;
 mod runner;
@@ -32,6 +36,8 @@ use pyo3::prelude::*;
 /// The compiled half of the package `hyst`; import `hyst` instead.
 #[pymodule]
 mod _hyst {
+    #[pymodule_export]
+    use crate::command::{_command, _main};
     #[pymodule_export]
     use crate::control::{ForceObserver, Pid};
     #[pymodule_export]

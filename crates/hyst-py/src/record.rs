@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hyst_ident::record::{self as core, ColumnMap, Columns, Need, OutputUnit, Reading};
+use hyst_ident::atomic_file::{create_atomic, write_atomic};
+use hyst_ident::record::{self as core, ColumnMap, Columns, FileKind, Need, OutputUnit, Reading};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -237,6 +238,33 @@ impl Record {
         let how = reading(&arguments, rate)?;
         let record = core::Record::from_table(name, frame::columns(frame)?, how, needed(need)?);
         Ok(Self::wrap(record.map_err(errors::record)?))
+    }
+
+    /// Writes the record in the format that the name ends in: ``.csv``, ``.npy``, ``.mat`` or ``.tdms``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path-like
+    ///     The file.
+    /// overwrite : bool
+    ///     Whether a file that is there already is replaced.
+    ///
+    /// Raises
+    /// ------
+    /// FileExistsError
+    ///     If the file is there already and ``overwrite`` is false; it stays as it is.
+    /// ValueError
+    ///     If the name ends in no format that can be written.
+    #[pyo3(signature = (path, *, overwrite=true))]
+    fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().into_owned()).unwrap_or_default();
+        let Some(kind) = FileKind::of_ending(&ending) else {
+            let known: Vec<String> = FileKind::ALL.iter().map(|kind| format!(".{}", kind.ending())).collect();
+            let message = format!("{}: the name has to end in one of {}", path.display(), known.join(", "));
+            return Err(PyValueError::new_err(message));
+        };
+        let write = |out: &mut dyn std::io::Write| self.0.write_as(kind, out).map_err(std::io::Error::other);
+        if overwrite { write_atomic(&path, write) } else { create_atomic(&path, write) }.map_err(errors::written)
     }
 
     /// The record as a DataFrame, with the columns of the record format.

@@ -56,6 +56,8 @@ pub(crate) enum Device {
     },
     /// At a socket, as `host:port`.
     Tcp(String),
+    /// The device of the program that runs the command.
+    Host,
 }
 
 /// Bits a second of a serial port, if nothing is said.
@@ -68,7 +70,7 @@ impl Device {
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Simulated(path) => Some(path),
-            Self::Serial { .. } | Self::Slcan { .. } | Self::Can { .. } | Self::Tcp(_) => None,
+            Self::Serial { .. } | Self::Slcan { .. } | Self::Can { .. } | Self::Tcp(_) | Self::Host => None,
         }
     }
 }
@@ -77,6 +79,7 @@ impl FromStr for Device {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
+            Some(("host", "")) if crate::host::is_lent() => Ok(Self::Host),
             Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
             Some(("serial", port)) if !port.is_empty() => {
                 let (port, baud) = at_rate(port, USUAL_BAUD, "serial:/dev/ttyACM0@921600")?;

@@ -1,12 +1,11 @@
 //! `close-loop`: measure, find what the model lacks, add it, compensate, measure again.
 
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use hyst_hw::{Daq, RecordOptions};
 use hyst_ident::atomic_file::write_atomic;
-use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, RemainderKind, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, RemainderKind, diagnose_until};
 use hyst_ident::excite::{Drive, Identification, Limits};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
@@ -18,6 +17,7 @@ use serde::Serialize;
 use crate::cli::CloseLoopArgs;
 use crate::device::{AnyDevice, Wishes};
 use crate::exit::{CommandError, CommandResult, Exit};
+use crate::host;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::tracking::{Files, Run, Task};
@@ -110,7 +110,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         };
         let told = |what: &str| progress.say(&format!("turn {turn}: {what}"));
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
-        let found = diagnose(&train, None, &start, &options, &told)?;
+        let found = diagnose_until(&train, None, &start, &options, &told, &host::stopping())?;
         progress.say(&format!("turn {turn}: following a reference"));
         let task = Task::of(&found.extended, &train, args.rate);
         if turn == 1 {
@@ -171,7 +171,7 @@ fn experiment<D: Daq>(daq: &mut D, args: &CloseLoopArgs, turn: u32, slew: Option
     let seed = args.seed.wrapping_add(u64::from(turn) << 32);
     let drive: Drive = Identification::at_rate(args.rate, seed).within_slew(&limits, &|_| true).drive(&limits)?;
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
-    let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(args.rate), |_| ControlFlow::Continue(()))
+    let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(args.rate), |_| host::going())
         .map_err(|failure| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}")))?;
     recording::to_record(&recording, &format!("train-{turn}.csv"), recording::unit(daq.capabilities().output))
 }

@@ -2,7 +2,6 @@
 
 mod picture;
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use hyst_ident::compare::{Compared, Comparison, Figures, Skipped, SortedBy, Step, compare};
@@ -13,6 +12,7 @@ use serde::Serialize;
 use crate::canvas::Format;
 use crate::cli::CompareArgs;
 use crate::exit::CommandResult;
+use crate::host;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
@@ -66,7 +66,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
             (0, _) => format!("fitting {}", step.kind),
             (done, budget) => format!("fitting {}: {done} of at most {budget} evaluations", step.kind),
         });
-        ControlFlow::Continue(())
+        host::going()
     })?;
     drop(progress);
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose_until};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{Need, Record};
@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
 use crate::exit::{CommandError, CommandResult};
+use crate::host;
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
 use crate::report::{self, Contents, next};
@@ -37,7 +38,14 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         Some((model, text)) => {
             warn(&model, &train, test.as_ref());
             let progress = Progress::spinner("diagnosing");
-            let diagnosis = diagnose(&train, test.as_ref(), &model, &options, &|doing| progress.say(doing))?;
+            let diagnosis = diagnose_until(
+                &train,
+                test.as_ref(),
+                &model,
+                &options,
+                &|doing| progress.say(doing),
+                &host::stopping(),
+            )?;
             (model, text, diagnosis)
         }
         None => fitted(&train, test.as_ref(), &options)?,
@@ -93,7 +101,7 @@ fn fitted(
     let of = |kind: Kind| {
         let progress = Progress::spinner(&format!("fitting and diagnosing {kind}"));
         let model = fit(train, kind, &fitting)?;
-        let diagnosis = diagnose(train, test, &model, options, &|doing| progress.say(doing))?;
+        let diagnosis = diagnose_until(train, test, &model, options, &|doing| progress.say(doing), &host::stopping())?;
         let text = model.to_json();
         Ok::<_, CommandError>((model, text, diagnosis))
     };

@@ -5,8 +5,6 @@ use std::path::Path;
 mod convergence;
 mod surface;
 
-use std::ops::ControlFlow;
-
 use hyst_core::PiParams;
 use hyst_ident::everett::{DpmReport, FodOptions, FodReport, fit_dpm, fit_fod, shows_only_curves};
 use hyst_ident::fit::{Fit, FitOptions, fit_with};
@@ -22,6 +20,7 @@ use serde::Serialize;
 use crate::canvas::Format;
 use crate::cli::{FitArgs, FitFrom};
 use crate::exit::{CommandError, CommandResult};
+use crate::host;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
@@ -216,7 +215,7 @@ fn identify(
     }
     let fit = fit_with(record, args.model, options, &mut |p| {
         tell(p.evaluations, p.budget);
-        ControlFlow::Continue(())
+        host::going()
     })?;
     Ok(Identified { fit, surface: None, dynamics: None })
 }

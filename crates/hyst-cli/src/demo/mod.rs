@@ -8,12 +8,11 @@ mod picture;
 
 use std::fs;
 use std::io;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use hyst_hw::{Daq, Plant, PlantConfig, RecordOptions, Sample};
 use hyst_ident::atomic_file::write_atomic;
-use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, Verdict, diagnose_until};
 use hyst_ident::excite::{Drive, Identification, Limits};
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
@@ -23,6 +22,7 @@ use hyst_ident::simulate::{Zero, simulate};
 
 use crate::cli::DemoArgs;
 use crate::exit::{CommandError, CommandResult};
+use crate::host;
 use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::tracking::{Files, Run, Task};
@@ -68,7 +68,8 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     progress.say("fitting Prandtl-Ishlinskii");
     let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, ..FitOptions::default() })?;
     let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
-    let diagnosis = diagnose(&train, Some(&test), &model, &options, &|what| progress.say(what))?;
+    let diagnosis =
+        diagnose_until(&train, Some(&test), &model, &options, &|what| progress.say(what), &host::stopping())?;
 
     progress.say("compensating a reference on the actuator");
     let task = Task::of(&diagnosis.extended, &train, RATE_HZ);
@@ -106,7 +107,7 @@ fn json(value: &impl serde::Serialize) -> CommandResult<String> {
 /// Plays a designed drive, segment by segment with rests between, and returns the record.
 fn experiment(plant: &mut Plant, drive: &Drive, name: &str) -> CommandResult<Record> {
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
-    let recording = hyst_hw::record(plant, &segments, &RecordOptions::at(RATE_HZ), |_| ControlFlow::Continue(()))
+    let recording = hyst_hw::record(plant, &segments, &RecordOptions::at(RATE_HZ), |_| host::going())
         .map_err(|failure| CommandError::failed(format!("the simulated actuator: {failure}")))?;
     recording::to_record(&recording, name, recording::unit(Daq::capabilities(plant).output))
 }

@@ -58,6 +58,7 @@ use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Zero, simulate};
+use crate::stop::{Stop, until_stopped};
 use trial::Trial;
 
 /// What a diagnosis may be told.
@@ -111,8 +112,35 @@ pub fn diagnose(
     options: &DiagnoseOptions,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, FitError> {
+    diagnose_until(train, test, model, options, progress, &Stop::default())
+}
+
+/// As [`diagnose`]; `stop` ends it from another thread, within moments.
+///
+/// # Errors
+/// See [`FitError`]; [`FitError::Stopped`] where it was ended.
+pub fn diagnose_until(
+    train: &Record,
+    test: Option<&Record>,
+    model: &Model,
+    options: &DiagnoseOptions,
+    progress: &(dyn Fn(&str) + Sync),
+    stop: &Stop,
+) -> Result<Diagnosis, FitError> {
+    let found = until_stopped(|| found_in(train, test, model, options, progress, stop));
+    found.unwrap_or_else(|| Err(FitError::Stopped { record: train.name() }))
+}
+
+fn found_in(
+    train: &Record,
+    test: Option<&Record>,
+    model: &Model,
+    options: &DiagnoseOptions,
+    progress: &(dyn Fn(&str) + Sync),
+    stop: &Stop,
+) -> Result<Diagnosis, FitError> {
     let before = simulate(model, train, options.zero)?;
-    let mut samples = Samples::from_record(train);
+    let mut samples = Samples { stop: stop.clone(), ..Samples::from_record(train) };
     samples.falls &= sign_matters(model.base.kind());
     check(train, &samples, samples.falls != model.falls)?;
     let stage = |source| FitError::Stage { record: train.name(), source };

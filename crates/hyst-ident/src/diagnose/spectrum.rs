@@ -120,6 +120,7 @@ pub(super) fn explained(samples: &Samples, segments: &[Range<usize>], residual: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stop::Stop;
 
     #[test]
     fn a_tone_is_found_across_gaps() {
@@ -139,6 +140,7 @@ mod tests {
             settling: Vec::new(),
             falls: false,
             blind: Vec::new(),
+            stop: Stop::default(),
         };
         for t0 in starts {
             let first = samples.time.len();

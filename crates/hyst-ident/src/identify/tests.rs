@@ -1,5 +1,6 @@
 //! Parameters that the papers print, recovered from records simulated with them plus noise.
 
+use crate::stop::Stop;
 use std::ops::ControlFlow;
 
 use super::search::Identified;
@@ -40,6 +41,7 @@ fn record(
         settling: Vec::new(),
         falls: false,
         blind: Vec::new(),
+        stop: Stop::default(),
     };
     for t in degc {
         let start = samples.time.len();

@@ -50,6 +50,7 @@ pub fn decimate(samples: &Samples, band_hz: f64) -> Decimated {
         file_of_segment: samples.file_of_segment.clone(),
         settling: Vec::new(),
         blind: Vec::new(),
+        stop: samples.stop.clone(),
     };
     for s in &samples.segments {
         let first = kept.time.len();

@@ -371,6 +371,7 @@ impl<'a> Problem<'a> {
         let mut damping = 1e-3;
         let mut jacobian = self.jacobian(&h, &here.solution)?;
         for _ in 0..iterations {
+            self.samples.stop.check();
             if jacobian.is_empty() {
                 break;
             }

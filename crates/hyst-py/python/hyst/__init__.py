@@ -5,10 +5,14 @@ Every model is a class with keyword parameters and the methods of ``Operator``: 
 one-dimensional array of numbers of; contiguous arrays of float64 are not copied.
 """
 
-from . import _hyst
+from . import _commands, _hyst, daq
+from ._commands import *  # noqa: F403
 from ._errors import (
+    CommandError,
+    DeviceError,
     FitError,
     HystError,
+    InputError,
     ModelFileError,
     NoModelError,
     NoRecordError,
@@ -22,8 +26,11 @@ from ._hyst import *  # noqa: F403
 from ._hyst import __version__ as __version__
 
 __all__ = [
+    "CommandError",
+    "DeviceError",
     "FitError",
     "HystError",
+    "InputError",
     "ModelFileError",
     "NoModelError",
     "NoRecordError",
@@ -32,5 +39,7 @@ __all__ = [
     "RangeWarning",
     "ReachError",
     "RecordError",
+    "daq",
+    *_commands.__all__,
     *(name for name in dir(_hyst) if not name.startswith("_")),
 ]

@@ -40,3 +40,15 @@ class RangeWarning(UserWarning):
 
 class ReachError(HystError, ValueError):
     """A reference leaves what the actuator reaches."""
+
+
+class CommandError(HystError, RuntimeError):
+    """What was asked for could not be done, though nothing was wrong with what was given."""
+
+
+class InputError(HystError, ValueError):
+    """An argument or an input file is wrong; the message names it and says what to do."""
+
+
+class DeviceError(HystError, RuntimeError):
+    """A device is lost, or what was measured is at risk; the message says what is safe."""

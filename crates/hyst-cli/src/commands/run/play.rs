@@ -14,6 +14,7 @@ use super::job::Job;
 use super::lookout::Lookout;
 use super::view::View;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
+use crate::host;
 use crate::log::{LogError, RunLog, RunStream};
 use crate::output::say;
 use crate::text;
@@ -35,7 +36,8 @@ pub(in crate::commands) fn play<D: Daq>(daq: &mut D, job: &mut Job, log: Option<
 where
     D::Error: Classified,
 {
-    let (stop, over) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let lent = host::stop();
+    let (stop, over) = (lent.clone().unwrap_or_default(), Arc::new(AtomicBool::new(false)));
     let (asked, ended, warned) = (Arc::clone(&stop), Arc::clone(&over), AtomicBool::new(false));
     let logged = Arc::new(AtomicBool::new(false));
     let kept = {
@@ -66,7 +68,10 @@ where
             std::process::exit(i32::from(Exit::DeviceLost as u8));
         }
     };
-    if let Err(error) = ctrlc::set_handler(again) {
+    // A host looks after Ctrl-C itself.
+    if lent.is_none()
+        && let Err(error) = ctrlc::set_handler(again)
+    {
         say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
     }
     let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
@@ -82,7 +87,7 @@ where
         beside: job.beside()?,
         guard,
         gaps: GapFinder::new(job.options.rate_hz),
-        view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain),
+        view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain || lent.is_some()),
         wanted: &job.wanted,
         unit: job.symbol,
         fault: None,

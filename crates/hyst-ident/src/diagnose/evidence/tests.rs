@@ -1,5 +1,6 @@
 //! Evidence on records whose truth is known: a model's own prediction, with one more effect and noise.
 
+use crate::stop::Stop;
 use hyst_core::{
     AsymmetryParams, CreepParams, DelayParams, DriftParams, InterferenceParams, LagParams, LoadParams, PiParams,
     ResonanceParams, SaturationParams, TemperatureParams, ViscousPiParams,
@@ -27,6 +28,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
         settling: Vec::new(),
         falls: false,
         blind: Vec::new(),
+        stop: Stop::default(),
     };
     let mut start = 0.0;
     for segment in segments {

@@ -1,0 +1,386 @@
+"""The commands of the command line as functions: the same work, on records, models and arrays, with reports to read and to compute with.
+
+Each function takes the options of its command by keyword, with ``_`` for ``-``: what ``hystctl compare --help`` lists as ``--max-error Y`` is
+``max_error=Y``; ``True`` is an option without a value, a list or tuple one with several.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from html import escape
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._errors import CommandError, DeviceError, InputError
+from ._hyst import Drive, Model, Record, _command, _main, read_record
+from .daq import Daq
+
+__all__ = [
+    "Report",
+    "Run",
+    "close_loop",
+    "compare",
+    "devices",
+    "excite",
+    "export",
+    "force",
+    "gain",
+    "info",
+    "loop",
+    "record",
+    "response",
+    "run",
+    "separate",
+]
+
+_PathLike: TypeAlias = str | os.PathLike[str]
+_AnyRecord: TypeAlias = Record | _PathLike
+_Records: TypeAlias = _AnyRecord | Sequence[_AnyRecord]
+
+
+_PACKAGE = os.path.dirname(__file__)
+#: How folders begin that vanish with a call.
+_PREFIX = "hyst-call-"
+
+
+class Report(Mapping[str, Any]):
+    """What a command reports: in words (``print(report)``), and as what ``--json`` prints (``report["rows"]``).
+
+    ``columns`` has the arrays of the file that the command line writes with ``-o``, if the command has one.
+    """
+
+    def __init__(self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]]) -> None:
+        self.text = text
+        self.columns = dict(columns)
+        self._content = dict(content)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._content[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._content)
+
+    def __len__(self) -> int:
+        return len(self._content)
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.text)}</pre>"
+
+
+class Run(Report):
+    """What a run reports, with what was measured as ``record``."""
+
+    def __init__(
+        self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]], record: Record | None
+    ) -> None:
+        super().__init__(text, content, columns)
+        self.record = record
+
+
+class _Files:
+    """Arguments of a command; objects are written to files that vanish with it."""
+
+    def __init__(self, folder: str) -> None:
+        self._folder = Path(folder)
+        self._used: set[str] = set()
+
+    def new(self, name: str) -> Path:
+        """A name that is free, like ``name``."""
+        stem, ending = os.path.splitext(os.path.basename(name))
+        k = 1
+        while name in self._used:
+            k += 1
+            name = f"{stem}-{k}{ending}"
+        self._used.add(name)
+        return self._folder / name
+
+    def record(self, given: _AnyRecord) -> str:
+        if not isinstance(given, Record):
+            return os.fspath(given)
+        path = self.new("record.npy")
+        given.save(path)
+        return str(path)
+
+    def records(self, given: _Records) -> list[str]:
+        if isinstance(given, (Record, str, os.PathLike)):
+            given = [given]
+        return [self.record(one) for one in given]
+
+    def model(self, given: Model | _PathLike) -> str:
+        if not isinstance(given, Model):
+            return os.fspath(given)
+        path = self.new("model.json")
+        given.save(path)
+        return str(path)
+
+    def signal(self, given: ArrayLike | _AnyRecord | Drive, rate: float | None, column: str) -> str:
+        """A drive or a reference: a file, a record, or values at ``rate`` [Hz]."""
+        if isinstance(given, (str, os.PathLike, Record)):
+            return self.record(given)
+        if isinstance(given, Drive):
+            made = Record(given.timepts, given.inputs, name="drive")
+        else:
+            values = np.asarray(given, float)
+            if rate is None:
+                raise InputError("values without times need rate= [Hz]")
+            times = np.arange(len(values)) / rate
+            made = Record(times, values) if column == "voltage_v" else Record(times, None, values, output_column=column)
+        path = self.new("drive.csv" if column == "voltage_v" else "reference.csv")
+        made.save(path)
+        return str(path)
+
+
+@contextmanager
+def _files() -> Iterator[_Files]:
+    with tempfile.TemporaryDirectory(prefix=_PREFIX) as folder:
+        yield _Files(folder)
+
+
+def _options(options: Mapping[str, Any]) -> list[str]:
+    """Keywords as the command line's options."""
+    arguments: list[str] = []
+    for name, value in options.items():
+        option = "--" + name.rstrip("_").replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            arguments.append(option)
+        elif isinstance(value, Mapping):
+            arguments += [f"{option}={key}={column}" for key, column in value.items()]
+        elif isinstance(value, (list, tuple)):
+            arguments.append(f"{option}=" + ",".join(str(part) for part in value))
+        else:
+            arguments.append(f"{option}={os.fspath(value) if isinstance(value, os.PathLike) else value}")
+    return arguments
+
+
+def _say(line: str) -> None:
+    """What the command line prints to stderr; files of one call are gone after it."""
+    if f"{os.sep}{_PREFIX}" in line:
+        return
+    level, frame = 1, sys._getframe()
+    # The caller's own line.
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(line.removeprefix("note: "), UserWarning, stacklevel=level)
+
+
+def _call(arguments: Sequence[str], daq: object = None) -> tuple[str, dict[str, Any], bytes]:
+    code, error, text, content, stdout, raised = _command(list(arguments), daq, _say)
+    if raised is not None:
+        if hasattr(raised, "add_note") and error:
+            raised.add_note(error)
+        raise raised
+    if code:
+        kind = {2: InputError, 3: DeviceError}.get(code, CommandError)
+        raise kind(error or f"ended with {code}")
+    return text, json.loads(content) if content else {}, stdout
+
+
+def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
+    """The columns of a file of results; what has no number in a row is nan there."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+    values = np.genfromtxt(path, delimiter=",", skip_header=1, ndmin=2)
+    return {name: values[:, k] for k, name in enumerate(names)}
+
+
+def _reported(command: Sequence[str], options: Mapping[str, Any], files: _Files, *, writes: bool = False) -> Report:
+    """Runs a command that looks at files; ``writes`` says that it has a file of results."""
+    arguments = [*command, *_options(options)]
+    path = files.new("result.csv")
+    if writes:
+        arguments += ["-o", str(path)]
+    text, content, _ = _call(arguments)
+    return Report(text, content, _columns(path))
+
+
+def info(path: _AnyRecord, **options: Any) -> Report:
+    """Looks at a file: format, channels, units, rate, noise, and what may be wrong (``hystctl info``)."""
+    with _files() as files:
+        return _reported(["info", files.record(path)], options, files)
+
+
+def compare(records: _Records, *, test: _AnyRecord | None = None, models: Sequence[str] | str = "all", **options: Any) -> Report:
+    """Fits every model to a record and shows them side by side (``hystctl compare``)."""
+    with _files() as files:
+        options |= {"models": models, "test": None if test is None else files.record(test)}
+        return _reported(["compare", *files.records(records)], options, files)
+
+
+def excite(kind: str, *, output: _PathLike | None = None, **options: Any) -> Record:
+    """Makes a drive with which to identify or test an actuator (``hystctl excite``).
+
+    Parameters
+    ----------
+    kind : str
+        ``identification``, ``sine``, ``sweep`` and the others that ``hystctl excite --help`` lists.
+    output : path, optional
+        Where to write it; else it is only returned.
+    """
+    return _drive(["excite", kind], output, options)
+
+
+def separate(effect: str, other: str, *, output: _PathLike | None = None, **options: Any) -> Record:
+    """Makes the drive whose record tells two effects apart (``hystctl excite separate``)."""
+    return _drive(["excite", "separate", effect, other], output, options)
+
+
+def _drive(command: Sequence[str], output: _PathLike | None, options: Mapping[str, Any]) -> Record:
+    with _files() as files:
+        path = Path(output) if output is not None else files.new("drive.csv")
+        _call([*command, *_options(options), "-o", str(path)])
+        return read_record(path, need="input")
+
+
+def response(records: _Records, **options: Any) -> Report:
+    """Frequency response with coherence, and the modes of the structure (``hystctl response``)."""
+    with _files() as files:
+        return _reported(["response", *files.records(records)], options, files, writes=True)
+
+
+def gain(records: _Records, **options: Any) -> Report:
+    """Gain and phase of sines over amplitude and frequency (``hystctl gain``)."""
+    with _files() as files:
+        return _reported(["gain", *files.records(records)], options, files, writes=True)
+
+
+def loop(record: _AnyRecord, *, phase: float, **options: Any) -> Report:
+    """Width and straightness of a loop, before and after the structure's phase [deg] is removed (``hystctl loop``)."""
+    with _files() as files:
+        options |= {"phase": phase}
+        return _reported(["loop", files.record(record)], options, files, writes=True)
+
+
+def force(record: _AnyRecord, model: Model | _PathLike, *, free: _AnyRecord | None = None, **options: Any) -> Report:
+    """Estimates an external force without a force sensor (``hystctl force``); its columns have it row by row [N]."""
+    with _files() as files:
+        options |= {"model": files.model(model), "free": None if free is None else files.record(free)}
+        return _reported(["force", files.record(record)], options, files, writes=True)
+
+
+def export(model: Model | _PathLike, format: Literal["c", "rust", "postcard"], *, name: str | None = None) -> bytes:
+    """A model's parameters for a board: a C header, Rust source or a block of bytes (``hystctl export``)."""
+    with _files() as files:
+        path = files.new("export")
+        _call(["export", files.model(model), *_options({"format": format, "name": name}), "-o", str(path)])
+        return path.read_bytes()
+
+
+def devices() -> Report:
+    """Lists the serial ports and CAN interfaces at which a device may be (``hystctl devices``)."""
+    text, content, stdout = _call(["devices"])
+    return Report(text or stdout.decode().rstrip(), content, {})
+
+
+def _device(daq: Daq | _PathLike) -> tuple[list[str], Daq | None]:
+    if isinstance(daq, (str, os.PathLike)):
+        return ["--daq", os.fspath(daq)], None
+    return ["--daq", "host:"], daq
+
+
+def run(
+    daq: Daq | str,
+    *,
+    drive: ArrayLike | _AnyRecord | Drive | None = None,
+    reference: ArrayLike | _AnyRecord | None = None,
+    model: Model | _PathLike | None = None,
+    rate: float | None = None,
+    record: _PathLike | None = None,
+    log: _PathLike | None = None,
+    output_column: str | None = None,
+    **options: Any,
+) -> Run:
+    """Plays a drive, or a reference through a model, on a device and records what it does (``hystctl run``).
+
+    Everything that can be refused is refused before anything moves; ramps go to the first value and back to rest; however the run ends, the
+    drive ends at rest and the log is kept. Ctrl-C ends it in this way.
+
+    Parameters
+    ----------
+    daq : hyst.daq.Daq or str
+        A device of one's own, or one that the command line knows: ``sim:plant.toml``, ``serial:/dev/ttyACM0``, ``can:can0``, …
+    drive : array, Record, Drive or path, optional
+        Voltages to play [V]; an array needs ``rate``.
+    reference : array, Record or path, optional
+        Wanted output; it needs ``model``. An array needs ``rate`` and, if it is no displacement in µm, ``output_column``.
+    model : Model or path, optional
+        What makes the drive of a reference.
+    rate : float, optional
+        Sample rate of arrays [Hz].
+    record, log : path, optional
+        Where to write the record, and the log (MCAP) that takes every sample as it comes in.
+    **options
+        What ``hystctl run --help`` lists: ``control``, ``limit=(low, high)``, ``slew``, ``max_error``, ``settle``, …
+
+    Raises
+    ------
+    InputError
+        If something was refused; nothing has moved.
+    DeviceError
+        If the device was lost or broke its contract.
+    Exception
+        What a device of one's own raised, once the run is over. What was measured until then is its attribute ``record`` (``None`` if it was little, or
+        if ``record`` names a file, which has it).
+    """
+    with _files() as files:
+        device, own = _device(daq)
+        path = Path(record) if record is not None else files.new("measured.csv")
+        column = output_column or (model.output_column if isinstance(model, Model) else "displacement_um")
+        options |= {
+            "drive": None if drive is None else files.signal(drive, rate, "voltage_v"),
+            "reference": None if reference is None else files.signal(reference, rate, column),
+            "model": None if model is None else files.model(model),
+            "log": log,
+            "record": path,
+        }
+        try:
+            text, content, _ = _call(["run", *device, *_options(options)], own)
+        except BaseException as error:
+            # What was measured until then, for who catches it; a log has more.
+            error.record = read_record(path) if record is None and path.exists() else None  # type: ignore[attr-defined]
+            raise
+        measured = read_record(path) if path.exists() else None
+        if record is None:
+            content.pop("record", None)
+        return Run(_without(text, path if record is None else None), content, _columns(path), measured)
+
+
+def record(daq: Daq | str, seconds: float, *, output: _PathLike | None = None, **options: Any) -> Run:
+    """Records what the sensors show while nothing moves (``hystctl record``)."""
+    with _files() as files:
+        device, own = _device(daq)
+        path = Path(output) if output is not None else files.new("measured.csv")
+        options |= {"seconds": seconds}
+        text, content, _ = _call(["record", *device, *_options(options), "-o", str(path)], own)
+        return Run(_without(text, path if output is None else None), content, _columns(path), read_record(path))
+
+
+def close_loop(daq: str, out: _PathLike, **options: Any) -> Report:
+    """Experiments, fits, diagnoses, extends, compensates and measures again, until nothing more is found (``hystctl close-loop``)."""
+    text, content, _ = _call(["close-loop", "--daq", daq, *_options({**options, "out": out})])
+    return Report(text, content, {})
+
+
+def _without(text: str, path: Path | None) -> str:
+    """A report without the lines that name a file that is gone."""
+    return text if path is None else "\n".join(line for line in text.splitlines() if str(path) not in line)
+
+
+def main() -> None:
+    """The command line ``hystctl``."""
+    sys.exit(_main(["hystctl", *sys.argv[1:]]))

@@ -1,0 +1,67 @@
+"""Progress of long work: a bar of tqdm where somebody looks, else nothing."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+
+class _Calls:
+    """A function of the caller's, which is given each line."""
+
+    def __init__(self, function: Callable[[str], object]) -> None:
+        self._function = function
+
+    def say(self, text: str) -> None:
+        self._function(text)
+
+    def at(self, done: int) -> None:
+        """How far it is; lines alone are handed on."""
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+class _Bar:
+    """A bar of tqdm. It vanishes when it is closed."""
+
+    def __init__(self, tqdm: Any, what: str, total: int | None) -> None:
+        # Work of unknown length has no rate and no end to tell.
+        form = None if total else "{desc} [{elapsed}]"
+        self._what = what
+        self._tqdm = tqdm(desc=what, total=total, leave=False, bar_format=form)
+
+    def say(self, text: str) -> None:
+        self._tqdm.set_description_str(f"{self._what}: {text}")
+
+    def at(self, done: int) -> None:
+        self._tqdm.update(done - self._tqdm.n)
+
+    def close(self) -> None:
+        self._tqdm.close()
+
+
+def _is_seen() -> bool:
+    """Whether a terminal or a notebook shows what goes to stderr."""
+    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+
+
+def bar(what: str, total: int | None, progress: Callable[[str], object] | bool | None) -> _Calls | _Bar | None:
+    """The bar that ``progress=`` asks for, if any.
+
+    ``None`` shows one in a terminal or a notebook if tqdm is installed, ``True`` anywhere, ``False`` none; a function is given each line.
+    """
+    if callable(progress):
+        return _Calls(progress)
+    if progress is False or progress is None and not _is_seen():
+        return None
+    try:
+        # Not `from`: tqdm has no types.
+        tqdm = import_module("tqdm.auto").tqdm
+    except ImportError:
+        if progress is None:
+            return None
+        raise ImportError("progress=True needs tqdm: pip install tqdm") from None
+    return _Bar(tqdm, what, total)

@@ -1,0 +1,50 @@
+//! Commands of the command line, run within Python: no process, no parsing of what is printed.
+
+use std::ffi::OsString;
+use std::sync::Arc;
+
+use hyst_cli::host::{Ended, Host, HostDaq, command as run_command};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::daq::PythonDaq;
+use crate::interrupt::interruptible;
+
+/// Runs one command: its arguments without the program's name, the device for ``--daq host:``, and what is called with each line that the command line prints to stderr.
+///
+/// Gives the exit code, the error's message, the report in words and as JSON text, what else goes to stdout, and the exception of the device.
+#[pyfunction]
+#[pyo3(signature = (arguments, daq=None, say=None))]
+#[allow(clippy::type_complexity, reason = "a tuple for Python")]
+pub(crate) fn _command<'py>(
+    py: Python<'py>,
+    arguments: Vec<String>,
+    daq: Option<Py<PyAny>>,
+    say: Option<Py<PyAny>>,
+) -> PyResult<(u8, Option<String>, String, Option<String>, Bound<'py, PyBytes>, Option<Py<PyAny>>)> {
+    let device = daq.map(|daq| PythonDaq::new(py, daq)).transpose()?;
+    let raised = device.as_ref().map(PythonDaq::raised);
+    let arguments = std::iter::once("hystctl".to_owned()).chain(arguments).map(OsString::from);
+    let work = move |stop: &Arc<_>, says: std::sync::mpsc::Sender<String>| {
+        let daq = device.map(|daq| Box::new(daq) as Box<dyn HostDaq>);
+        let say = Box::new(move |line: &str| {
+            // Where nobody listens any more there is nobody to tell.
+            let _ = says.send(line.to_owned());
+        });
+        run_command(arguments, Host { daq, stop: Arc::clone(stop), say: Some(say) })
+    };
+    let tell = |py: Python<'_>, line: String| match &say {
+        Some(say) => say.call1(py, (line,)).map(|_| ()),
+        None => Ok(()),
+    };
+    let Ended { exit, error, text, json, stdout } = interruptible(py, work, tell)?;
+    let raised = raised.and_then(|raised| raised.lock().ok()?.take());
+    let raised = raised.map(|error| error.into_value(py).into_any());
+    Ok((exit, error, text, json.map(|json| json.to_string()), PyBytes::new(py, &stdout), raised))
+}
+
+/// The command line: runs it with these arguments, the first of which is the program's name, and gives its exit code.
+#[pyfunction]
+pub(crate) fn _main(py: Python<'_>, arguments: Vec<String>) -> u8 {
+    py.detach(|| hyst_cli::run(arguments.into_iter().map(OsString::from)))
+}
