@@ -8,7 +8,7 @@ import hyst
 import pytest
 
 STUB = ast.parse((Path(hyst.__file__).parent / "_hyst.pyi").read_text())
-CLASSES = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef)}
+CLASSES = {node.name: node for node in STUB.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")}
 FUNCTIONS = {node.name: node for node in STUB.body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")}
 COMPILED = {name for name in vars(hyst._hyst) if not name.startswith("_")}
 

@@ -99,7 +99,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
     };
     noted(with(100, "0.200,9.5,NaN"), "", &["1 row without displacement_um is not fitted"]);
     noted(with(100, "0.200,,1.9"), "", &["1 row without voltage_v: interpolated"]);
-    noted(with(100, "0.200,9.5,95"), "", &["1 spike of the output left out", "row 101"]);
+    noted(with(100, "0.200,9.5,95"), "", &["1 spike of the output not fitted", "row 101"]);
     let jitter = |k: usize, row: &String| {
         format!("{:.6},{}", 0.002 * k as f64 + 1e-6 * (k % 3) as f64, row.split_once(',').unwrap().1)
     };
@@ -112,7 +112,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
     noted(with_header(HEADER, &rows), "", &["an interruption of 0.204 s"]);
     let mut rows = long();
     rows.insert(300, rows[300].clone());
-    noted(with_header(HEADER, &rows), "", &["1 row with the time of the row before: joined"]);
+    noted(with_header(HEADER, &rows), "", &["1 row with the time of the row before"]);
 }
 
 #[test]

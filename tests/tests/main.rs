@@ -13,6 +13,7 @@ mod cli_everett;
 mod cli_excite;
 mod cli_export;
 mod cli_fit;
+mod cli_fleet;
 mod cli_formats;
 mod cli_linear;
 mod cli_lines;

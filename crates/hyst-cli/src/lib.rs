@@ -25,6 +25,7 @@ mod commands;
 mod demo;
 mod device;
 mod exit;
+pub mod fleet;
 pub mod host;
 mod input;
 pub mod log;

@@ -89,7 +89,7 @@ impl Inverted {
     pub(crate) fn exact<I>(inverse: I) -> Self
     where
         I: Stage<f64> + Send + Sync + 'static,
-        I::State: Send,
+        I::State: Send + Sync,
     {
         Self::in_band(inverse, 0, None)
     }
@@ -99,7 +99,7 @@ impl Inverted {
     pub(crate) fn in_band<I>(inverse: I, lead: usize, band: Option<(f64, f64)>) -> Self
     where
         I: Stage<f64> + Send + Sync + 'static,
-        I::State: Send,
+        I::State: Send + Sync,
     {
         let (bandwidth_hz, band_error) = (band.map(|(hz, _)| hz), band.map_or(0.0, |(_, error)| error));
         Self { engine: Arc::new(Runner::new(inverse)), lead, bandwidth_hz, band_error, ends: None }
@@ -116,7 +116,7 @@ pub(crate) fn closed<P, Q, S>(built: &Built<'_, P, Q, S>, options: &Options) -> 
 where
     S: Invert<f64>,
     S::Inverse: Send + Sync + 'static,
-    <S::Inverse as Stage<f64>>::State: Send,
+    <S::Inverse as Stage<f64>>::State: Send + Sync,
 {
     options.only(&[])?;
     Ok(Inverted::exact(built.stage.invert().map_err(errors::core)?))
@@ -126,7 +126,7 @@ where
 pub(crate) fn search<P, Q, S>(built: &Built<'_, P, Q, S>, options: &Options) -> PyResult<Inverted>
 where
     S: Probe<f64> + Clone + Send + Sync + 'static,
-    S::State: Send,
+    S::State: Send + Sync,
 {
     let (low, high, tolerance) = options.range()?;
     let search = Search::new(built.stage.clone(), low, high, tolerance).map_err(errors::core)?;

@@ -12,6 +12,7 @@ mod command;
 mod control;
 mod daq;
 mod errors;
+mod fleet;
 mod frame;
 mod identify;
 mod interrupt;
@@ -41,6 +42,8 @@ mod _hyst {
     #[pymodule_export]
     use crate::control::{ForceObserver, Pid};
     #[pymodule_export]
+    use crate::fleet::{_FleetJournal, _fleet_entries, _fleet_row};
+    #[pymodule_export]
     use crate::identify::{Diagnosis, diagnose, fit};
     #[pymodule_export]
     use crate::inverse::Inverse;
@@ -49,7 +52,7 @@ mod _hyst {
     #[pymodule_export]
     use crate::model::Model;
     #[pymodule_export]
-    use crate::operator::Operator;
+    use crate::operator::{_History, Operator};
     #[pymodule_export]
     use crate::record::{Record, read_record};
     #[pymodule_export]

@@ -48,7 +48,7 @@ impl Operator {
         P: Clone + Send + Sync + 'static,
         Q: Build<S, Context: Context> + Keep + Send + Sync + 'static,
         S: Stage<f64> + Send + Sync + 'static,
-        S::State: Send,
+        S::State: Send + Sync,
     {
         let params = Arc::new(params(given).map_err(errors::core)?);
         let runner = Arc::new(Runner::new(params.build(&Context::at(period)).map_err(errors::core)?));

@@ -14,7 +14,7 @@ use crate::clamp::Clamp;
 use crate::inverse::Inverse;
 use crate::inversion::{Inverted, Options};
 use crate::model::{Model, save};
-use crate::runner::{Engine, NotFinite};
+use crate::runner::{AnyHistory, Engine, NotFinite};
 
 type Inversion = dyn Fn(&Options) -> PyResult<Inverted> + Send + Sync;
 type Filing = dyn Fn(&Channels) -> PyResult<core::Model> + Send + Sync;
@@ -34,6 +34,10 @@ pub(crate) struct Operator {
     /// Where it stays for references that are out of reach, if it is an inverse that does.
     clamp: Option<Clamp>,
 }
+
+/// What an operator remembers at one instant.
+#[pyclass(frozen, module = "hyst")]
+pub(crate) struct _History(AnyHistory);
 
 impl Operator {
     /// Of an engine, how it is inverted and how a file comes of it.
@@ -167,6 +171,17 @@ impl Operator {
         time: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<f64> {
         self.one(u, [temperature, load, time], |engine, env, u| engine.step(env, u))
+    }
+
+    /// The object's own history, to ``_resume`` from; ``None`` before the first sample.
+    fn _history(&self) -> Option<_History> {
+        self.engine.history().map(_History)
+    }
+
+    /// Continues from a history of this object.
+    fn _resume(&self, history: &_History) -> PyResult<()> {
+        let own = self.engine.resume(&history.0);
+        own.then_some(()).ok_or_else(|| PyValueError::new_err("this is the history of another operator"))
     }
 
     /// The inverse: from a reference to the input that makes the model follow it.

@@ -1,5 +1,6 @@
 //! One stage of any kind behind one interface.
 
+use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
 use hyst_core::{Env, Stage};
@@ -31,7 +32,14 @@ pub(crate) trait Engine: Send + Sync {
     /// One sample of the stage's own history; the first one sets it to rest. An input that is not finite counts as the
     /// last finite one; `None` if there was none yet.
     fn step(&self, env: &Env<f64>, u: f64) -> Option<f64>;
+    /// A copy of the stage's own history; none before the first sample.
+    fn history(&self) -> Option<AnyHistory>;
+    /// Continues from a history of this engine; whether it is one.
+    fn resume(&self, history: &AnyHistory) -> bool;
 }
+
+/// A history of any engine.
+pub(crate) type AnyHistory = Box<dyn Any + Send + Sync>;
 
 /// Refuses inputs, the first of which is the one with the number `from`.
 fn finite(from: usize, inputs: &[f64]) -> Result<(), NotFinite> {
@@ -58,8 +66,8 @@ impl<S: Stage<f64>> Runner<S> {
 
 impl<S> Engine for Runner<S>
 where
-    S: Stage<f64> + Send + Sync,
-    S::State: Send,
+    S: Stage<f64> + Send + Sync + 'static,
+    S::State: Send + Sync,
 {
     fn simulate(&self, env: &Surroundings<'_>, u: &[f64]) -> Result<Vec<f64>, NotFinite> {
         let Some((first, rest)) = u.split_first() else { return Ok(Vec::new()) };
@@ -118,5 +126,17 @@ where
         }
         drop(history);
         u.is_finite().then(|| self.reset(env, u))
+    }
+
+    fn history(&self) -> Option<AnyHistory> {
+        let history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        history.as_deref().map(|own| -> AnyHistory { Box::new((own.state.clone(), own.last)) })
+    }
+
+    fn resume(&self, history: &AnyHistory) -> bool {
+        let Some((state, last)) = history.downcast_ref::<(S::State, f64)>() else { return false };
+        let mut own = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        *own = Some(Box::new(History { state: state.clone(), last: *last }));
+        true
     }
 }

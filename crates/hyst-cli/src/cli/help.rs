@@ -41,6 +41,14 @@ Examples:
   hystctl diagnose train.csv --test test.csv --model model.json --report report.html
   hystctl diagnose a.csv b.csv --model model.json --zero per-record --findings findings.json";
 
+pub(super) const FLEET: &str = "\
+Examples:
+  hystctl fleet records/ -o results.parquet --page fleet.html --reports reports/
+  hystctl fleet serials.csv -o results.parquet
+
+A list, as serials.csv: file,serial,date
+                        run0001.csv,P-1001,2026-05-02";
+
 pub(super) const COMPENSATE: &str = "\
 Example:
   hystctl compensate --model extended.json reference.csv -o drive.csv --limit 0,120 --slew 5000";

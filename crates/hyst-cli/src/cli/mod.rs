@@ -23,7 +23,7 @@ use crate::output::Target;
 pub(crate) use close_loop::CloseLoopArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
-use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
+use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, FLEET, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
 pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
 pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, PidGains, VoltageLimits};
@@ -43,6 +43,7 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     Simulate(SimulateArgs),
     Diagnose(DiagnoseArgs),
+    Fleet(FleetArgs),
     CloseLoop(CloseLoopArgs),
     Compensate(CompensateArgs),
     Excite(ExciteArgs),
@@ -250,6 +251,43 @@ pub(crate) struct DiagnoseArgs {
     /// Report to write: one page with the evidence in plots, to read, check and hand on (HTML); - for stdout
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<Target>,
+    /// Seed of the bootstrap that judges effects
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) zero: ZeroArg,
+    #[command(flatten)]
+    pub(crate) map: MapArg,
+    #[command(flatten)]
+    pub(crate) json: JsonArg,
+}
+
+/// Fit and diagnose many actuators: a row of results each, and a page that shows them together
+///
+/// Every record is one actuator, as a file of a folder or a line of a list. What is done is kept in a journal beside the results as it comes, so
+/// that the same command continues where it was ended, by whatever; files that have changed are done again. A record that
+/// cannot be read or fitted is a row with the reason.
+#[derive(Debug, Args)]
+#[command(after_help = FLEET)]
+pub(crate) struct FleetArgs {
+    /// Folder of records, or a list of them: a path in each line, or a CSV table with the column file and, as it has them, test, serial and date
+    #[arg(value_name = "DIR|LIST")]
+    pub(crate) records: PathBuf,
+    /// Results to write (Parquet): errors, effects, probabilities, parameters with standard errors
+    #[arg(short, long, value_name = "PARQUET")]
+    pub(crate) output: PathBuf,
+    /// Page to write: effects, control charts of parameters, what stands out, what failed (HTML)
+    #[arg(long, value_name = "HTML")]
+    pub(crate) page: Option<PathBuf>,
+    /// Folder for the report of each actuator
+    #[arg(long, value_name = "DIR")]
+    pub(crate) reports: Option<PathBuf>,
+    /// Kind of the model that is fitted; `auto` takes pi or preisach, whichever explains a record better
+    #[arg(long, default_value = "auto", value_name = "KIND")]
+    pub(crate) model: String,
+    /// Actuators at a time; one for each core if not given
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) jobs: Option<usize>,
     /// Seed of the bootstrap that judges effects
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,

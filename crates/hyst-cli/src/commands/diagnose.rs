@@ -7,6 +7,7 @@ use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{Need, Record};
 use hyst_ident::simulate::Zero;
+use hyst_ident::stop::Stop;
 use sha2::{Digest, Sha256};
 
 use crate::cli::DiagnoseArgs;
@@ -48,7 +49,11 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
             )?;
             (model, text, diagnosis)
         }
-        None => fitted(&train, test.as_ref(), &options)?,
+        None => {
+            let progress = Progress::spinner("fitting and diagnosing");
+            let tell = |doing: &str| progress.say(doing);
+            fitted_and_diagnosed(&train, test.as_ref(), None, &options, &tell, &host::stopping())?
+        }
     };
 
     let findings = &diagnosis.findings;
@@ -90,25 +95,36 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
 /// Name that stands for a model that is fitted here.
 const AUTO: &str = "auto";
 
-/// A model of the kind that explains the records best, its file's text, and its diagnosis. Another kind is fitted once the diagnosis of the first
-/// says that it explains the record better with the same effects.
-fn fitted(
+/// The kind that a name stands for; none for `auto`.
+pub(crate) fn kind_of(name: &str) -> CommandResult<Option<Kind>> {
+    match name {
+        AUTO => Ok(None),
+        name => name.parse().map(Some).map_err(|error| CommandError::bad_input(format!("{error}, or {AUTO}"))),
+    }
+}
+
+/// A model that is fitted to the records, its file's text, and its diagnosis. Without a kind it is the one that explains the records best: another one
+/// is fitted once the diagnosis of the first says that it explains the record better with the same effects.
+pub(crate) fn fitted_and_diagnosed(
     train: &Record,
     test: Option<&Record>,
+    kind: Option<Kind>,
     options: &DiagnoseOptions,
+    tell: &(dyn Fn(&str) + Sync),
+    stop: &Stop,
 ) -> CommandResult<(Model, String, Diagnosis)> {
     let fitting = FitOptions { zero_per_record: options.zero == Zero::PerRecord, ..FitOptions::default() };
     let of = |kind: Kind| {
-        let progress = Progress::spinner(&format!("fitting and diagnosing {kind}"));
+        tell(&format!("fitting {kind}"));
         let model = fit(train, kind, &fitting)?;
-        let diagnosis = diagnose_until(train, test, &model, options, &|doing| progress.say(doing), &host::stopping())?;
+        let diagnosis = diagnose_until(train, test, &model, options, tell, stop)?;
         let text = model.to_json();
         Ok::<_, CommandError>((model, text, diagnosis))
     };
-    let first = of(Kind::Pi)?;
+    let first = of(kind.unwrap_or(Kind::Pi))?;
     match &first.2.findings.base_advice {
-        Some(advice) => of(advice.model),
-        None => Ok(first),
+        Some(advice) if kind.is_none() => of(advice.model),
+        _ => Ok(first),
     }
 }
 

@@ -5,10 +5,11 @@ mod compare;
 mod compensate;
 mod convert;
 mod devices;
-mod diagnose;
+pub(crate) mod diagnose;
 mod excite;
 mod export;
 mod fit;
+mod fleet;
 mod force;
 mod gain;
 mod hysteresis_loop;
@@ -37,6 +38,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Simulate(args) => simulate::run(&args),
         Command::Force(args) => force::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::Fleet(args) => fleet::run(&args),
         Command::CloseLoop(args) => close_loop::run(&args),
         Command::Compensate(args) => compensate::run(&args),
         Command::Excite(args) => excite::run(&args),

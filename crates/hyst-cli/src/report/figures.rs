@@ -15,12 +15,12 @@ const TABLED: usize = 60;
 const DIGITS: i32 = 7;
 
 /// The pictures of one effect, or of the whole, each with its place in the list.
-pub(super) fn of(pictures: &[Picture], effect: Option<Effect>) -> Vec<(usize, &Picture)> {
+pub(crate) fn of(pictures: &[Picture], effect: Option<Effect>) -> Vec<(usize, &Picture)> {
     pictures.iter().enumerate().filter(|(_, p)| p.effect == effect).collect()
 }
 
 /// Their places in the page.
-pub(super) fn write(page: &mut Page, pictures: &[(usize, &Picture)]) {
+pub(crate) fn write(page: &mut Page, pictures: &[(usize, &Picture)]) {
     if pictures.is_empty() {
         return;
     }
@@ -89,7 +89,7 @@ fn numbers(picture: &Picture) -> String {
 }
 
 /// The numbers of all pictures, for the plots.
-pub(super) fn data(pictures: &[Picture]) -> serde_json::Result<String> {
+pub(crate) fn data(pictures: &[Picture]) -> serde_json::Result<String> {
     let mut all = serde_json::to_value(pictures)?;
     round(&mut all);
     serde_json::to_string(&all)

@@ -9,7 +9,7 @@ const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
 const UPLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
 
 /// Text where HTML is expected.
-pub(super) fn escaped(text: impl Display) -> String {
+pub(crate) fn escaped(text: impl Display) -> String {
     let text = text.to_string();
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -26,12 +26,12 @@ pub(super) fn escaped(text: impl Display) -> String {
 }
 
 /// JSON inside a script element: no `<` is left that could end it or begin a comment.
-pub(super) fn inlined(json: &str) -> String {
+pub(crate) fn inlined(json: &str) -> String {
     json.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
 }
 
 /// A sentence as prose has it: a capital at its beginning, a full stop at its end.
-pub(super) fn sentence(text: &str) -> String {
+pub(crate) fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     let stop = if text.ends_with(['.', '!', '?', ':']) { "" } else { "." };
@@ -39,31 +39,31 @@ pub(super) fn sentence(text: &str) -> String {
 }
 
 /// A page in the making.
-pub(super) struct Page {
+pub(crate) struct Page {
     title: String,
     body: String,
     sections: Vec<(&'static str, &'static str)>,
 }
 
 impl Page {
-    pub(super) fn new(title: &str) -> Self {
+    pub(crate) fn new(title: &str) -> Self {
         Self { title: title.into(), body: String::new(), sections: Vec::new() }
     }
 
     /// Adds HTML as it stands.
-    pub(super) fn raw(&mut self, html: &str) {
+    pub(crate) fn raw(&mut self, html: &str) {
         self.body.push_str(html);
         self.body.push('\n');
     }
 
     /// Adds a paragraph of text.
-    pub(super) fn paragraph(&mut self, class: &str, text: &str) {
+    pub(crate) fn paragraph(&mut self, class: &str, text: &str) {
         let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
         self.raw(&format!("<p{class}>{}</p>", sentence(text)));
     }
 
     /// Adds a list of sentences.
-    pub(super) fn list<S: AsRef<str>>(&mut self, sentences: &[S]) {
+    pub(crate) fn list<S: AsRef<str>>(&mut self, sentences: &[S]) {
         let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", sentence(s.as_ref()))).collect();
         if !items.is_empty() {
             self.raw(&format!("<ul>\n{items}</ul>"));
@@ -71,23 +71,23 @@ impl Page {
     }
 
     /// Begins a section.
-    pub(super) fn section(&mut self, id: &'static str, heading: &'static str) {
+    pub(crate) fn section(&mut self, id: &'static str, heading: &'static str) {
         self.sections.push((id, heading));
         self.raw(&format!("<h2 id=\"{id}\">{}</h2>", escaped(heading)));
     }
 
     /// Adds a command to copy.
-    pub(super) fn command(&mut self, line: &str) {
+    pub(crate) fn command(&mut self, line: &str) {
         self.raw(&format!("<pre><code>{}</code></pre>", escaped(line)));
     }
 
     /// Adds a table that scrolls by itself where the screen is too narrow.
-    pub(super) fn table(&mut self, table: &Table) {
+    pub(crate) fn table(&mut self, table: &Table) {
         self.raw(&table.html());
     }
 
     /// The whole file; `data` is the JSON of the plots.
-    pub(super) fn finish(self, data: &str) -> serde_json::Result<String> {
+    pub(crate) fn finish(self, data: &str) -> serde_json::Result<String> {
         let title = escaped(&self.title);
         let links: String = self
             .sections
@@ -126,36 +126,36 @@ const SHARP: &str =
 
 /// A table: the first column names the rows.
 #[derive(Default)]
-pub(super) struct Table {
+pub(crate) struct Table {
     caption: String,
     head: Vec<(String, bool)>,
     rows: Vec<(bool, Vec<String>)>,
 }
 
 impl Table {
-    pub(super) fn new(caption: &str) -> Self {
+    pub(crate) fn new(caption: &str) -> Self {
         Self { caption: escaped(caption), ..Self::default() }
     }
 
     /// Adds a column of words.
-    pub(super) fn words(mut self, heading: &str) -> Self {
+    pub(crate) fn words(mut self, heading: &str) -> Self {
         self.head.push((escaped(heading), false));
         self
     }
 
     /// Adds a column of numbers.
-    pub(super) fn numbers(mut self, heading: &str) -> Self {
+    pub(crate) fn numbers(mut self, heading: &str) -> Self {
         self.head.push((escaped(heading), true));
         self
     }
 
     /// Adds a row of text.
-    pub(super) fn row<S: AsRef<str>>(&mut self, cells: &[S]) {
+    pub(crate) fn row<S: AsRef<str>>(&mut self, cells: &[S]) {
         self.rows.push((false, cells.iter().map(|c| escaped(c.as_ref())).collect()));
     }
 
     /// Adds a row of text that stands out.
-    pub(super) fn named_row<S: AsRef<str>>(&mut self, cells: &[S]) {
+    pub(crate) fn named_row<S: AsRef<str>>(&mut self, cells: &[S]) {
         self.row(cells);
         if let Some(last) = self.rows.last_mut() {
             last.0 = true;
@@ -163,7 +163,7 @@ impl Table {
     }
 
     /// Adds a row whose last cell is a bar of that share of the column's width.
-    pub(super) fn bar_row(&mut self, cells: &[&str], share: f64) {
+    pub(crate) fn bar_row(&mut self, cells: &[&str], share: f64) {
         self.row(cells);
         if let Some((_, cells)) = self.rows.last_mut() {
             let percent = 100.0 * share.clamp(0.0, 1.0);
@@ -171,8 +171,16 @@ impl Table {
         }
     }
 
+    /// Adds a row of text whose last cell is HTML.
+    pub(crate) fn linked_row<S: AsRef<str>>(&mut self, cells: &[S], link: &str) {
+        self.row(cells);
+        if let Some((_, cells)) = self.rows.last_mut() {
+            cells.push(link.to_owned());
+        }
+    }
+
     /// The table's markup.
-    pub(super) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let class = |number: bool| if number { " class=\"number\"" } else { "" };
         let head: String =
             self.head.iter().map(|(name, number)| format!("<th scope=\"col\"{}>{name}</th>", class(*number))).collect();

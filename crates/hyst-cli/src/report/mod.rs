@@ -4,9 +4,9 @@
 //! in it too; nothing is loaded from anywhere, and the page forbids it to itself.
 
 mod effects;
-mod figures;
+pub(crate) mod figures;
 mod files;
-mod html;
+pub(crate) mod html;
 mod left;
 pub mod next;
 mod summary;

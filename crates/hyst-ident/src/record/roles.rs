@@ -318,9 +318,13 @@ impl Search<'_> {
         self.headings[column].unit.is_none() && self.headings[column].unknown.is_none()
     }
 
-    /// Whether a word of a column's whole name, its path included, is one of `role`'s.
+    /// Whether a word of a column's whole name, its path included, is one of `role`'s, and its own name is not that of another role, as
+    /// in `voltage.Time`.
     fn path_suggests(&self, role: Role, column: usize) -> bool {
-        words(self.name(column)).iter().any(|word| words_of(role).contains(&word.as_str()))
+        const OTHERS: [Role; 5] = [Role::Time, Role::Input, Role::Output, Role::Temperature, Role::Load];
+        let own = |other: &Role| self.headings[column].suggests(words_of(*other));
+        let is_another = !own(&role) && OTHERS.iter().any(own);
+        !is_another && words(self.name(column)).iter().any(|word| words_of(role).contains(&word.as_str()))
     }
 
     /// A column of text whose heading states a unit of `role`.
@@ -729,6 +733,14 @@ mod tests {
         let found =
             layout(&["t", "V", "x"], &["time_s=1", "voltage_v=V", "displacement_um=-3"], Need::InputAndOutput).unwrap();
         assert_eq!(of(&found.output), (2, "displacement_um", None));
+    }
+
+    #[test]
+    fn a_path_says_what_its_channels_are() {
+        let message = train(&["voltage.Time", "voltage.Data", "displacement.Data"]).unwrap_err();
+        let map = "--map time_s=voltage.Time --map voltage_v=voltage.Data --map displacement_um=displacement.Data";
+        assert!(message.contains(map), "{message}");
+        assert!(message.contains("\"voltage.Data\" may be the input"), "{message}");
     }
 
     #[test]

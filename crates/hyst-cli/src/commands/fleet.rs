@@ -1,0 +1,155 @@
+//! `fleet`: many actuators, each fitted and diagnosed, as one table and one page.
+
+use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use hyst_ident::record::ColumnMap;
+use hyst_ident::simulate::Zero;
+use hyst_ident::stop::Stop;
+use serde::Serialize;
+
+use super::diagnose::kind_of;
+use crate::cli::FleetArgs;
+use crate::exit::{CommandError, CommandResult};
+use crate::fleet::journal::Journal;
+use crate::fleet::{self, Entry, Options, Row, entries, one, page, table};
+use crate::output::{self, Report, Target};
+use crate::progress::Progress;
+use crate::{host, text};
+
+/// What is said about a fleet.
+#[derive(Debug, Serialize)]
+struct Summary {
+    actuators: usize,
+    /// Done in this call and in earlier ones.
+    done: usize,
+    failed: usize,
+    /// Done by earlier calls.
+    kept: usize,
+    seconds: f64,
+    output: String,
+    journal: String,
+    page: Option<String>,
+}
+
+/// How long the bar stands still at most.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Runs the command.
+pub(super) fn run(args: &FleetArgs) -> CommandResult {
+    ColumnMap::parse(&args.map.map)?;
+    kind_of(&args.model)?;
+    let path = args.output.clone();
+    let (output, summary) = (Target::File(path.clone()), args.page.clone().map(Target::File));
+    let written: Vec<&Target> = std::iter::once(&output).chain(&summary).collect();
+    output::check(&[&args.records], &written)?;
+    let report = Report::new(args.json.json, &written)?;
+    let all = entries::of(&args.records).map_err(CommandError::bad_input)?;
+    if let Some(folder) = &args.reports {
+        std::fs::create_dir_all(folder)?;
+    }
+    let options = Options {
+        model: args.model.clone(),
+        zero_per_record: args.zero.get() == Zero::PerRecord,
+        seed: args.seed,
+        map: args.map.map.clone(),
+        rate: args.map.rate,
+        reports: args.reports.clone(),
+    };
+    let place = fleet::journal_of(&path);
+    let in_journal = |error: io::Error| CommandError::bad_input(format!("{}: {error}", place.display()));
+    let mut journal = Journal::open(&place).map_err(in_journal)?;
+    let began = Instant::now();
+    let bar = Progress::bar("looking at files", all.len());
+    let due = fleet::due(&all, &journal, &options.fingerprint(), &mut |k| bar.at(k));
+    drop(bar);
+    let kept = all.len() - due.len();
+    if kept > 0 {
+        output::say(&format!("note: {} done already, by {}", text::count(kept, "actuator"), place.display()));
+    }
+    let jobs = args.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+    let lost = work(&due, &options, jobs, &mut |row| journal.add(row));
+    // What is done is shown in any case.
+    output.write_beside_older(|out| table::write(out, &journal, &all))?;
+    if let Some(target) = &summary {
+        let html = page::page(&page::title(&args.records), &journal, &all)?;
+        target.write(|out| out.write_all(html.as_bytes()))?;
+    }
+    lost.map_err(in_journal)?;
+    let (done, failed) = journal.count(&all);
+    let summary = Summary {
+        actuators: all.len(),
+        done,
+        failed,
+        kept,
+        seconds: began.elapsed().as_secs_f64(),
+        output: path.display().to_string(),
+        journal: place.display().to_string(),
+        page: args.page.as_ref().map(|path| path.display().to_string()),
+    };
+    report.print(&summary.text(), &summary)?;
+    if host::stopping().is_stopped() {
+        Err(CommandError::failed("stopped; the same command continues"))
+    } else {
+        Ok(())
+    }
+}
+
+/// Does what is due, a thread for each job, and gives each row to `keep` as it comes.
+fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row) -> io::Result<()>) -> io::Result<()> {
+    let (next, stop) = (AtomicUsize::new(0), host::stopping());
+    let lost = Stop::default();
+    let bar = Progress::bar("diagnosing", due.len());
+    let (rows, came) = channel();
+    thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, due.len().max(1)) {
+            let (rows, next, stop, lost) = (rows.clone(), &next, &stop, &lost);
+            scope.spawn(move || {
+                // An actuator has one thread: more of them side by side waste nothing on waiting for one another.
+                let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return };
+                while let Some(entry) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let row = pool.install(|| one::row(entry, options, stop));
+                    if row.is_none_or(|row| rows.send(row).is_err()) || lost.is_stopped() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(rows);
+        let mut done = 0;
+        let mut kept = Ok(());
+        loop {
+            match came.recv_timeout(LOOK) {
+                Ok(row) => {
+                    done += 1;
+                    bar.at(done);
+                    if let (Ok(()), Err(error)) = (&kept, keep(&row)) {
+                        kept = Err(error);
+                        lost.stop();
+                    }
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => bar.at(done),
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        kept
+    })
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let mut lines = vec![format!(
+            "{} of {} done in {} s, {} without a diagnosis",
+            self.done,
+            text::count(self.actuators, "actuator"),
+            text::short(self.seconds),
+            self.failed
+        )];
+        lines.push(format!("results: {}", self.output));
+        lines.extend(self.page.iter().map(|path| format!("page: {path}")));
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,134 @@
+//! One actuator: read, fitted, diagnosed, on the threads of the pool that calls.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use hyst_ident::atomic_file::write_atomic;
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis};
+use hyst_ident::model::Model;
+use hyst_ident::record::{ColumnMap, Need, Reading, Record};
+use hyst_ident::simulate::Zero;
+use hyst_ident::stop::Stop;
+use sha2::{Digest, Sha256};
+
+use super::{Entry, Found, NamedEffect, Options, Parameter, Row};
+use crate::commands::diagnose::{fitted_and_diagnosed, kind_of};
+use crate::exit::{CommandError, CommandResult};
+use crate::report::{self, Contents};
+
+/// How parameters of single creep elements begin.
+const CREEP_ELEMENT: &str = "share_";
+
+/// SHA-256 of an actuator's files; `None` where one cannot be read.
+pub fn sum_of(entry: &Entry) -> Option<String> {
+    let mut sum = Sha256::new();
+    for path in [Some(&entry.file), entry.test.as_ref()].into_iter().flatten() {
+        // The length first: two files are not one that is longer.
+        let bytes = fs::read(path).ok()?;
+        sum.update((bytes.len() as u64).to_le_bytes());
+        sum.update(&bytes);
+    }
+    Some(format!("{:x}", sum.finalize()))
+}
+
+/// The row of an actuator, whatever is wrong with its files; `None` where `stop` has ended it.
+pub fn row(entry: &Entry, options: &Options, stop: &Stop) -> Option<Row> {
+    let began = Instant::now();
+    // Before anything is read: a file that changes meanwhile is done again.
+    let sha256 = sum_of(entry);
+    let outcome = catch_unwind(AssertUnwindSafe(|| found(entry, options, stop)));
+    if stop.is_stopped() {
+        return None;
+    }
+    let outcome = match outcome {
+        Ok(found) => found.map_err(|error| error.text()),
+        Err(_) => Err("an error of the program itself; please report it with this file".to_owned()),
+    };
+    Some(Row {
+        entry: entry.clone(),
+        sha256,
+        options: options.fingerprint(),
+        took_s: began.elapsed().as_secs_f64(),
+        outcome,
+    })
+}
+
+fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> {
+    let how = Reading { map: ColumnMap::parse(&options.map)?, rate: options.rate };
+    let train = Record::read(&entry.file, how.clone(), Need::InputAndOutput)?;
+    let test = entry.test.as_ref().map(|path| Record::read(path, how, Need::InputAndOutput)).transpose()?;
+    let zero = if options.zero_per_record { Zero::PerRecord } else { Zero::None };
+    let diagnosing = DiagnoseOptions { zero, seed: options.seed };
+    let kind = kind_of(&options.model)?;
+    let (model, text, diagnosis) = fitted_and_diagnosed(&train, test.as_ref(), kind, &diagnosing, &|_| {}, stop)?;
+    let report = written(entry, options, (&train, test.as_ref()), (&model, &text), &diagnosis)?;
+    let Diagnosis { findings, .. } = diagnosis;
+    let effects = findings.effects.iter().map(|finding| NamedEffect {
+        name: finding.name.name().to_owned(),
+        probability: finding.probability,
+        parameters: finding
+            .parameters
+            .iter()
+            // The elements of a creep are others in each record; its total is not.
+            .filter(|(name, _)| !name.starts_with(CREEP_ELEMENT))
+            .map(|(name, found)| {
+                let (value, std_error, unit) = (found.value, found.std_error, found.unit.clone());
+                (name.clone(), Parameter { value, std_error, unit })
+            })
+            .collect(),
+    });
+    let rmse = |errors: &Option<hyst_ident::metrics::Errors>| errors.as_ref().map(|errors| errors.rmse);
+    Ok(Found {
+        rows: train.rows(),
+        model: findings.base.name().to_owned(),
+        verdict: serde_json::to_value(findings.verdict)
+            .ok()
+            .and_then(|v| Some(v.as_str()?.to_owned()))
+            .unwrap_or_default(),
+        noise: findings.noise_floor,
+        rmse_before: rmse(&findings.before.train),
+        rmse_after: rmse(&findings.after.train),
+        test_rmse_before: rmse(&findings.before.test),
+        test_rmse_after: rmse(&findings.after.test),
+        effects: effects.collect(),
+        suspects: findings
+            .suspects
+            .iter()
+            .map(|s| (s.name.name().to_owned(), s.probability))
+            .collect::<BTreeMap<_, _>>(),
+        unit: findings.unit,
+        report,
+    })
+}
+
+/// Writes the report, if reports are wanted; its path.
+fn written(
+    entry: &Entry,
+    options: &Options,
+    (train, test): (&Record, Option<&Record>),
+    (model, text): (&Model, &str),
+    diagnosis: &Diagnosis,
+) -> CommandResult<Option<String>> {
+    let Some(folder) = &options.reports else { return Ok(None) };
+    let contents = Contents {
+        diagnosis,
+        model,
+        model_file: "its model",
+        model_path: "model.json",
+        model_sha256: &format!("{:x}", Sha256::digest(text)),
+        extended_file: None,
+        train,
+        test,
+        reading: options.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]).collect(),
+        seed: options.seed,
+    };
+    let page = report::page(&contents).map_err(CommandError::failed)?;
+    // Files of one name in two folders have two reports.
+    let name: String =
+        entry.file.chars().map(|c| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' }).collect();
+    let path = folder.join(format!("{}.html", name.trim_matches(['_', '.'])));
+    write_atomic(&path, |out| out.write_all(page.as_bytes()))?;
+    Ok(Some(path.display().to_string()))
+}

@@ -1,0 +1,164 @@
+//! All rows as a Parquet file: one row an actuator, columns for what any of them has.
+//!
+//! Two passes over the journal, in blocks: the first finds the columns, the second writes them.
+
+use std::collections::BTreeSet;
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use parquet::basic::Compression;
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::parser::parse_message_type;
+
+use super::journal::Journal;
+use super::{Entry, Found, Row};
+
+/// Rows that are held at a time.
+const BLOCK: usize = 4096;
+
+/// What a column holds.
+enum Cells {
+    Texts(Vec<Option<String>>),
+    Numbers(Vec<Option<f64>>),
+    Counts(Vec<Option<i64>>),
+}
+
+type Text = fn(&Row) -> Option<String>;
+type Number = fn(&Found) -> Option<f64>;
+
+const TEXTS: &[(&str, Text)] = &[
+    ("file", |row| Some(row.entry.file.clone())),
+    ("serial", |row| row.entry.serial.clone()),
+    ("date", |row| row.entry.date.clone()),
+    ("error", |row| row.outcome.as_ref().err().cloned()),
+    ("verdict", |row| found(row).map(|found| found.verdict.clone())),
+    ("effects", |row| {
+        found(row).map(|found| found.effects.iter().map(|effect| effect.name.as_str()).collect::<Vec<_>>().join(","))
+    }),
+    ("model", |row| found(row).map(|found| found.model.clone())),
+    ("unit", |row| found(row).map(|found| found.unit.clone())),
+    ("report", |row| found(row).and_then(|found| found.report.clone())),
+    ("sha256", |row| row.sha256.clone()),
+    ("options", |row| Some(row.options.clone())),
+];
+
+const NUMBERS: &[(&str, Number)] = &[
+    ("noise", |found| Some(found.noise)),
+    ("rmse_before", |found| found.rmse_before),
+    ("rmse_after", |found| found.rmse_after),
+    ("test_rmse_before", |found| found.test_rmse_before),
+    ("test_rmse_after", |found| found.test_rmse_after),
+];
+
+fn found(row: &Row) -> Option<&Found> {
+    row.outcome.as_ref().ok()
+}
+
+/// What an effect has as columns: its probability, its parameters and their standard errors.
+fn of_effects(found: &Found) -> impl Iterator<Item = (String, Option<f64>)> + '_ {
+    let suspected = found.suspects.iter().map(|(name, p)| (format!("{name}_suspected"), Some(*p)));
+    let named = found.effects.iter().flat_map(|effect| {
+        let own = &effect.name;
+        let parameters = effect.parameters.iter().flat_map(move |(name, parameter)| {
+            [(format!("{own}_{name}"), Some(parameter.value)), (format!("{own}_{name}_std_error"), parameter.std_error)]
+        });
+        std::iter::once((format!("{own}_probability"), Some(effect.probability))).chain(parameters)
+    });
+    named.chain(suspected)
+}
+
+/// Writes the rows of these actuators.
+///
+/// # Errors
+/// When the journal cannot be read or `out` not written.
+pub fn write(out: &mut dyn Write, journal: &Journal, entries: &[Entry]) -> io::Result<()> {
+    let mut further = BTreeSet::new();
+    for row in journal.rows(entries)? {
+        let row = row?;
+        further.extend(found(&row).into_iter().flat_map(of_effects).map(|(name, _)| name));
+    }
+    let texts = TEXTS.iter().map(|(name, _)| format!("OPTIONAL BYTE_ARRAY {name} (UTF8);"));
+    let counts = std::iter::once("OPTIONAL INT64 rows;".to_owned());
+    let numbers =
+        NUMBERS.iter().map(|(name, _)| (*name).to_owned()).chain(["took_s".to_owned()]).chain(further.iter().cloned());
+    // A hyphen is no letter of the schema's language.
+    let numbers = numbers.map(|name| format!("OPTIONAL DOUBLE {};", column(&name)));
+    let schema = format!("message fleet {{ {} }}", texts.chain(counts).chain(numbers).collect::<Vec<_>>().join(" "));
+    let schema = Arc::new(parse_message_type(&schema).map_err(failed)?);
+    let properties = Arc::new(WriterProperties::builder().set_compression(Compression::SNAPPY).build());
+    // The writer wants something that may go to another thread: a block at a time waits in memory.
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).map_err(failed)?;
+    let mut rows = journal.rows(entries)?;
+    loop {
+        let block: Vec<Row> = rows.by_ref().take(BLOCK).collect::<io::Result<_>>()?;
+        if block.is_empty() {
+            break;
+        }
+        let mut group = writer.next_row_group().map_err(failed)?;
+        for cells in cells(&block, &further) {
+            write_cells(&mut group, cells).map_err(failed)?;
+        }
+        group.close().map_err(failed)?;
+        out.write_all(writer.inner())?;
+        writer.inner_mut().clear();
+    }
+    writer.finish().map_err(failed)?;
+    out.write_all(writer.inner())
+}
+
+/// A name as columns have it.
+fn column(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+fn failed(error: ParquetError) -> io::Error {
+    io::Error::other(error)
+}
+
+/// The cells of each column, in the order of the schema.
+fn cells(block: &[Row], further: &BTreeSet<String>) -> Vec<Cells> {
+    let texts = TEXTS.iter().map(|(_, of)| Cells::Texts(block.iter().map(of).collect()));
+    let rows = |row: &Row| found(row).map(|found| found.rows as i64);
+    let counts = std::iter::once(Cells::Counts(block.iter().map(rows).collect()));
+    let numbers =
+        NUMBERS.iter().map(|(_, of)| Cells::Numbers(block.iter().map(|row| found(row).and_then(of)).collect()));
+    let took = std::iter::once(Cells::Numbers(block.iter().map(|row| Some(row.took_s)).collect()));
+    let own: Vec<Vec<(String, Option<f64>)>> =
+        block.iter().map(|row| found(row).into_iter().flat_map(of_effects).collect()).collect();
+    let of_effects = further.iter().map(|name| {
+        let of = |own: &Vec<(String, Option<f64>)>| {
+            own.iter().find(|(other, _)| other == name).and_then(|(_, value)| *value)
+        };
+        Cells::Numbers(own.iter().map(of).collect())
+    });
+    texts.chain(counts).chain(numbers).chain(took).chain(of_effects).collect()
+}
+
+fn write_cells(group: &mut SerializedRowGroupWriter<'_, Vec<u8>>, cells: Cells) -> Result<(), ParquetError> {
+    let Some(mut column) = group.next_column()? else { return Ok(()) };
+    match cells {
+        Cells::Texts(cells) => {
+            let levels = levels(&cells);
+            let values: Vec<ByteArray> =
+                cells.into_iter().flatten().map(|text| ByteArray::from(text.into_bytes())).collect();
+            column.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
+        }
+        Cells::Numbers(cells) => {
+            let values: Vec<f64> = cells.iter().flatten().copied().collect();
+            column.typed::<DoubleType>().write_batch(&values, Some(&levels(&cells)), None)?;
+        }
+        Cells::Counts(cells) => {
+            let values: Vec<i64> = cells.iter().flatten().copied().collect();
+            column.typed::<Int64Type>().write_batch(&values, Some(&levels(&cells)), None)?;
+        }
+    }
+    column.close()
+}
+
+/// 1 where there is a value.
+fn levels<T>(cells: &[Option<T>]) -> Vec<i16> {
+    cells.iter().map(|cell| i16::from(cell.is_some())).collect()
+}

@@ -1,0 +1,245 @@
+"""Many actuators: each fitted and diagnosed, as one table, one page, and a row each to compute with.
+
+::
+
+    import hyst.fleet
+
+    fleet = hyst.fleet.diagnose("records/", "results.parquet", reports="reports/")
+    print(fleet)                      # 295 of 300 actuators …
+    fleet.failed                      # {"records/P-017.csv": "…, line 1: …"}
+    hyst.fleet.summary("records/", "results.parquet", "fleet.html")
+    pandas.read_parquet("results.parquet")
+
+What is done is kept in a journal beside the table as it comes: the same call continues where the last one was ended, by whatever; files that have
+changed are done again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from hashlib import sha256
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from ._hyst import Record, _fleet_entries, _fleet_row, _FleetJournal
+from ._progress import bar
+
+__all__ = ["Fleet", "diagnose", "summary"]
+
+_PathLike: TypeAlias = str | os.PathLike[str]
+#: A folder, a list (text or CSV with the column ``file``), or records with what is known of them.
+_Records: TypeAlias = _PathLike | Sequence[_PathLike | Record | Mapping[str, str]]
+
+#: Tasks that wait with Ray for each core: enough that none is idle, and few enough that a driver's memory does not grow with the fleet.
+WAITING = 4
+
+
+class Fleet:
+    """What is known of a fleet: a row each, as a dictionary, read from the journal as it is asked for."""
+
+    def __init__(self, journal: _FleetJournal, entries: list[str], output: Path) -> None:
+        self._journal, self._entries = journal, entries
+        self.output = output
+        self.done, self._failed = journal.count(entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        for entry in self._entries:
+            for row in self._journal.rows([entry]):
+                yield json.loads(row)
+
+    @property
+    def failed(self) -> dict[str, str]:
+        """Why records have no diagnosis, by their files."""
+        return {row["file"]: row["outcome"]["Err"] for row in self if "Err" in row["outcome"]}
+
+    def __repr__(self) -> str:
+        return f"{self.done - self._failed} of {len(self)} actuators diagnosed, {self._failed} failed: {self.output}"
+
+
+def _entries(records: _Records, output: Path) -> list[str]:
+    """The actuators, as JSON."""
+    if isinstance(records, (str, os.PathLike)):
+        return _fleet_entries(records)
+    entries = []
+    for record in records:
+        if isinstance(record, Mapping):
+            entries.append(json.dumps({key: os.fspath(value) for key, value in record.items()}))
+        elif isinstance(record, Record):
+            entries.append(json.dumps({"file": str(_kept(record, output))}))
+        else:
+            entries.append(json.dumps({"file": os.fspath(record)}))
+    return entries
+
+
+def _kept(record: Record, output: Path) -> Path:
+    """A file of a record of this process, which other processes read too; one of the same content is there already."""
+    folder = output.with_name(output.name + ".records")
+    folder.mkdir(exist_ok=True)
+    name = "".join(c if c.isalnum() or c in "._-" else "_" for c in Path(record.name).stem)
+    new = folder / f".{name}-{os.getpid()}.npy"
+    record.save(new)
+    path = folder / f"{name}-{sha256(new.read_bytes()).hexdigest()[:12]}.npy"
+    new.replace(path)
+    return path
+
+
+def diagnose(
+    records: _Records,
+    output: _PathLike,
+    *,
+    model: str = "auto",
+    zero: Literal["none", "per-record"] = "none",
+    seed: int = 1,
+    map: Mapping[str, str] | None = None,
+    rate: float | None = None,
+    reports: _PathLike | None = None,
+    jobs: int | None = None,
+    address: str | None = None,
+    progress: bool | Callable[[str], object] | None = None,
+) -> Fleet:
+    """Fits and diagnoses every actuator, and writes the table of results.
+
+    Parameters
+    ----------
+    records : path, or sequence of paths, Records or mappings
+        A folder of records; a list (a path in each line, or a CSV table with the column ``file`` and, as it has them, ``test``, ``serial`` and
+        ``date``); or the same as mappings.
+    output : path
+        The table (Parquet): one row an actuator. Its journal lies beside it.
+    model : str
+        Kind of the model that is fitted; ``auto`` takes pi or preisach, whichever explains a record better.
+    zero, seed, map, rate
+        As for ``diagnose`` and ``read_record``.
+    reports : path, optional
+        Folder for the report of each actuator.
+    jobs : int, optional
+        Actuators at a time, one for each core if not given. Each has one thread, which does not need Python's lock.
+    address : str, optional
+        Of a Ray cluster (``"auto"``, ``"local"``, ``"ray://head:10001"``): its workers do the work instead. Needs ``pip install ray``, and that
+        they see the files. A worker that dies is replaced, and its actuator is done again.
+    progress : bool or callable, optional
+        Whether a bar is shown; in a terminal or a notebook if not given.
+
+    Returns
+    -------
+    Fleet
+        Its rows one at a time, and what ``failed``. Records that cannot be read or fitted are rows with the reason.
+    """
+    path = Path(output)
+    entries = _entries(records, path)
+    options = json.dumps(
+        {
+            "model": model,
+            "zero_per_record": zero == "per-record",
+            "seed": seed,
+            "map": [f"{name}={column}" for name, column in (map or {}).items()],
+            "rate": rate,
+        }
+    )
+    if reports is not None:
+        Path(reports).mkdir(parents=True, exist_ok=True)
+    folder = None if reports is None else os.path.abspath(reports)
+    journal = _FleetJournal(path)
+    due = journal.due(entries, options)
+    done = _on_ray(due, options, folder, address) if address else _on_threads(due, options, folder, jobs)
+    shown = bar("fleet", len(due), progress)
+    try:
+        for k, row in enumerate(done):
+            journal.add(row)
+            if shown is not None:
+                shown.say(json.loads(row)["file"])
+                shown.at(k + 1)
+    finally:
+        # What is done is shown in any case.
+        done.close()
+        if shown is not None:
+            shown.close()
+        journal.write(entries, path)
+    return Fleet(journal, entries, path)
+
+
+def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | None) -> Any:
+    """Rows as they come, on the cores of this machine."""
+    workers = jobs or os.cpu_count() or 1
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: set[Future[str]] = set()
+        rest = iter(due)
+        try:
+            while True:
+                while len(waiting) < 2 * workers and (entry := next(rest, None)) is not None:
+                    waiting.add(pool.submit(_fleet_row, entry, options, reports))
+                if not waiting:
+                    return
+                ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for row in ready:
+                    yield row.result()
+        finally:
+            for row in waiting:
+                row.cancel()
+
+
+def _row(entry: str, options: str, reports: str | None) -> str:
+    """A task: Ray takes no compiled function."""
+    return _fleet_row(entry, options, reports)
+
+
+def _on_ray(due: list[str], options: str, reports: str | None, address: str) -> Any:
+    """Rows as they come, on a Ray cluster."""
+    try:
+        ray = import_module("ray")
+    except ImportError:
+        raise ImportError("address= needs Ray: pip install ray") from None
+    if not due:
+        return
+    if not ray.is_initialized():
+        ray.init(address=address, log_to_driver=False)
+    # A worker that dies takes its actuator with it: Ray does it again on another.
+    task = ray.remote(num_cpus=1, max_retries=5)(_row)
+    most = WAITING * max(1, int(ray.cluster_resources().get("CPU", 1)))
+    waiting: list[Any] = []
+    rest = iter(due)
+    try:
+        while True:
+            while len(waiting) < most and (entry := next(rest, None)) is not None:
+                waiting.append(task.remote(entry, options, reports))
+            if not waiting:
+                return
+            ready, waiting = ray.wait(waiting, num_returns=1)
+            for row in ready:
+                yield ray.get(row)
+    finally:
+        for row in waiting:
+            ray.cancel(row, force=True)
+
+
+def summary(records: _Records, output: _PathLike, page: _PathLike | None = None) -> str:
+    """The page of a fleet: which actuators show which effects, parameters with control limits in the order of dates or serial numbers, what
+    stands out, what failed, with links to the reports.
+
+    Parameters
+    ----------
+    records, output
+        As for ``diagnose``, whose journal beside ``output`` is read.
+    page : path, optional
+        Where to write it (HTML).
+
+    Returns
+    -------
+    str
+        The page.
+    """
+    path = Path(output)
+    if not path.with_name(path.name + ".journal").exists():
+        raise FileNotFoundError(f"{path}.journal: there is no such fleet; hyst.fleet.diagnose makes it")
+    title = f"Fleet {Path(records).name}" if isinstance(records, (str, os.PathLike)) else f"Fleet {path.stem}"
+    html = _FleetJournal(path).page(_entries(records, path), title)
+    if page is not None:
+        Path(page).write_text(html, encoding="utf-8")
+    return html

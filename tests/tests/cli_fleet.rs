@@ -1,0 +1,124 @@
+//! `fleet`: a row for each actuator, whatever ends the command and whatever is wrong with a file.
+
+use std::fs;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::Duration;
+
+use hyst_ident::record::{ColumnMap, Need, Record};
+use hyst_tests::Lab;
+use serde_json::Value;
+
+/// A lab with the records of `n` actuators, which differ in the scale of their output, and two files that are none.
+fn lab(n: usize) -> Lab {
+    let lab = Lab::with_train("");
+    fs::create_dir(lab.path("fleet")).unwrap();
+    let text = lab.read("train.csv");
+    let (header, rows) = text.split_once('\n').unwrap();
+    for k in 0..n {
+        let scaled = rows.lines().map(|row| {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            let last = cells.len() - 1;
+            cells[last] = (cells[last].parse::<f64>().unwrap() * (1.0 + 0.1 * k as f64)).to_string();
+            cells.join(",")
+        });
+        lab.write(&format!("fleet/p{k}.csv"), format!("{header}\n{}\n", scaled.collect::<Vec<_>>().join("\n")));
+    }
+    lab.write("fleet/torn.csv", "time_s,voltage_v,displacement_um\n0,1\n");
+    lab.write("fleet/noise.mat", [7_u8; 300]);
+    lab
+}
+
+/// The rows of a journal by their files, without what differs from run to run; of several rows of a file the last.
+fn rows(lab: &Lab, journal: &str) -> std::collections::BTreeMap<String, Value> {
+    let row = |line: &str| {
+        let mut row: Value = serde_json::from_str(line).unwrap();
+        row.as_object_mut().unwrap().remove("took_s");
+        (row["file"].as_str().unwrap().to_owned(), row)
+    };
+    lab.read(journal).lines().map(row).collect()
+}
+
+#[test]
+fn every_actuator_is_a_row_and_is_what_a_diagnosis_of_it_says() {
+    let lab = lab(3);
+    let said = lab.ok("fleet fleet -o results.parquet --page fleet.html --reports reports --model pi --jobs 2").stdout;
+    assert!(said.contains("5 of 5 actuators done") && said.contains("2 without a diagnosis"), "{said}");
+    let rows = rows(&lab, "results.parquet.journal");
+    assert_eq!(rows.len(), 5);
+    let failed = |name: &str| rows[name]["outcome"]["Err"].as_str().unwrap().to_owned();
+    for (name, why) in [("fleet/torn.csv", "line 2"), ("fleet/noise.mat", "fleet/noise.mat: ")] {
+        assert!(failed(name).contains(why), "{}", failed(name));
+    }
+    // The same numbers as one by one, bit for bit.
+    lab.ok("fit fleet/p1.csv --model pi -o one.json");
+    let one = lab.ok("diagnose fleet/p1.csv --model one.json --json").json();
+    let own = &rows["fleet/p1.csv"]["outcome"]["Ok"];
+    assert_eq!(own["rmse_before"], one["before"]["train"]["rmse"]);
+    assert_eq!(own["rmse_after"], one["after"]["train"]["rmse"]);
+    assert_eq!(own["verdict"], one["verdict"]);
+    let names = |list: &Value| list.as_array().unwrap().iter().map(|e| e["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(names(&own["effects"]), names(&one["effects"]));
+    assert_eq!(
+        own["effects"][0]["parameters"]["seconds"]["value"],
+        one["effects"][0]["parameters"]["seconds"]["value"]
+    );
+    // The table is one that the reader of records takes too.
+    let table = Record::read(
+        lab.path("results.parquet"),
+        &ColumnMap::parse(["time_s=rows", "voltage_v=rmse_before", "displacement_um=rmse_after"]).unwrap(),
+        Need::InputAndOutput,
+    );
+    assert!(table.unwrap_err().to_string().contains("results.parquet"));
+    let page = lab.read("fleet.html");
+    for part in
+        ["3 of 5 actuators diagnosed", "Records without a diagnosis", "torn.csv", "href=\"reports/fleet_p1.csv.html\""]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(lab.path("reports/fleet_p1.csv.html").exists());
+}
+
+#[test]
+fn a_killed_fleet_continues_and_a_changed_file_is_done_again() {
+    let lab = lab(6);
+    let line = "fleet fleet -o results.parquet --model pi --jobs 1";
+    let mut child = lab.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let journal = lab.path("results.parquet.journal");
+    let lines = || fs::read_to_string(&journal).map_or(0, |text| text.lines().count());
+    while lines() < 3 && child.try_wait().unwrap().is_none() {
+        sleep(Duration::from_millis(5));
+    }
+    // SIGKILL: nothing of it can be handled.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let kept = fs::read_to_string(&journal).unwrap();
+    let whole = kept.split_inclusive('\n').filter(|line| line.ends_with('\n')).count();
+    assert!((1..8).contains(&whole), "{whole} rows were done");
+    let again = lab.ok(&format!("{line} --json")).json();
+    assert_eq!((again["done"].as_u64(), again["failed"].as_u64()), (Some(8), Some(2)), "{again}");
+    assert_eq!(again["kept"].as_u64(), Some(whole as u64), "{again}");
+    let whole_rows: String = kept.split_inclusive('\n').take(whole).collect();
+    assert!(lab.read("results.parquet.journal").starts_with(&whole_rows), "rows that were done stay as they are");
+    let continued = rows(&lab, "results.parquet.journal");
+    lab.ok("fleet fleet -o fresh.parquet --model pi --jobs 2");
+    assert_eq!(continued, rows(&lab, "fresh.parquet.journal"));
+    // Nothing is due; then one file, then all for other options.
+    assert_eq!(lab.ok(&format!("{line} --json")).json()["kept"].as_u64(), Some(8));
+    lab.write("fleet/torn.csv", lab.read("fleet/p0.csv"));
+    let mended = lab.ok(&format!("{line} --json")).json();
+    assert_eq!((mended["kept"].as_u64(), mended["failed"].as_u64()), (Some(7), Some(1)), "{mended}");
+    assert_eq!(lab.ok(&format!("{line} --seed 2 --json")).json()["kept"].as_u64(), Some(0));
+}
+
+#[test]
+fn what_is_no_fleet_is_refused() {
+    let lab = lab(1);
+    assert!(lab.refuses("fleet absent -o r.parquet", 2).contains("give a folder"));
+    assert!(lab.refuses("fleet fleet -o r.parquet --model nonsense", 2).contains("auto"));
+    assert!(lab.refuses("fleet fleet -o fleet/none/r.parquet", 2).contains("does not exist"));
+    lab.write("r.parquet.journal", "time_s,voltage_v\n0,1\n");
+    assert!(lab.refuses("fleet fleet -o r.parquet", 2).contains("no row of a fleet"));
+    fs::create_dir(lab.path("empty")).unwrap();
+    assert!(lab.refuses("fleet empty -o s.parquet", 2).contains("no records"));
+}
