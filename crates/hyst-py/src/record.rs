@@ -1,10 +1,11 @@
 //! Records (`hyst_ident::record`).
 
+use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use hyst_ident::atomic_file::{create_atomic, write_atomic};
-use hyst_ident::record::{self as core, ColumnMap, Columns, FileKind, Need, OutputUnit, Reading};
+use hyst_ident::record::{self as core, ColumnMap, Columns, FileKind, Need, OutputUnit, Reading, RecordError};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -377,23 +378,31 @@ impl Record {
 ///     Columns that have to be there: both to fit, the input to simulate, the output for a reference.
 /// rate : float, optional
 ///     Sample rate [Hz] of files without times; times that a file has are not read.
+/// name : str, optional
+///     What the record of a single file is called in messages and reports, if not by its path.
 ///
 /// Raises
 /// ------
 /// RecordError
 ///     Names file, line and column, and what to do.
 #[pyfunction]
-#[pyo3(signature = (path, *, map=None, need="both", rate=None))]
+#[pyo3(signature = (path, *, map=None, need="both", rate=None, name=None))]
 pub(crate) fn read_record(
     py: Python<'_>,
     path: &Bound<'_, PyAny>,
     map: Option<&Bound<'_, PyDict>>,
     need: &str,
     rate: Option<f64>,
+    name: Option<&str>,
 ) -> PyResult<Record> {
     let (need, how) = (needed(need)?, reading(&map_arguments(map)?, rate)?);
     let paths = paths(path)?;
     let read = || {
+        if let (Some(name), [path]) = (name, paths.as_slice()) {
+            let bytes =
+                fs::read(path).map_err(|source| RecordError::Io { file: path.display().to_string(), source })?;
+            return core::Record::parse(name, &bytes, how, need);
+        }
         let records = paths.iter().map(|path| core::Record::read(path, how.clone(), need)).collect::<Result<_, _>>()?;
         core::Record::join(records)
     };

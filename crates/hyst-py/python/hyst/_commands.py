@@ -12,7 +12,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from html import escape
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._errors import CommandError, DeviceError, InputError
+from ._errors import CommandError, DeviceError, InputError, RecordError
 from ._hyst import Drive, Model, Record, _command, _main, read_record
 from .daq import Daq
 
@@ -95,6 +95,10 @@ class _Files:
     def __init__(self, folder: str) -> None:
         self._folder = Path(folder)
         self._used: set[str] = set()
+
+    def shown(self, text: str) -> str:
+        """A report as it is shown: files that vanish go by their names alone."""
+        return text.replace(str(self._folder) + os.sep, "")
 
     def new(self, name: str) -> Path:
         """A name that is free, like ``name``."""
@@ -206,7 +210,7 @@ def _reported(command: Sequence[str], options: Mapping[str, Any], files: _Files,
     if writes:
         arguments += ["-o", str(path)]
     text, content, _ = _call(arguments)
-    return Report(text, content, _columns(path))
+    return Report(files.shown(text), content, _columns(path))
 
 
 def info(path: _AnyRecord, **options: Any) -> Report:
@@ -244,7 +248,7 @@ def _drive(command: Sequence[str], output: _PathLike | None, options: Mapping[st
     with _files() as files:
         path = Path(output) if output is not None else files.new("drive.csv")
         _call([*command, *_options(options), "-o", str(path)])
-        return read_record(path, need="input")
+        return read_record(path, need="input", name=str(path) if output is not None else " ".join(command))
 
 
 def response(records: _Records, **options: Any) -> Report:
@@ -334,8 +338,8 @@ def run(
     DeviceError
         If the device was lost or broke its contract.
     Exception
-        What a device of one's own raised, once the run is over. What was measured until then is its attribute ``record`` (``None`` if it was little, or
-        if ``record`` names a file, which has it).
+        What a device of one's own raised, once the run is over. What was measured until then is its attribute ``record``
+        (``None`` if there is none, or if ``record`` names a file, which has it).
     """
     with _files() as files:
         device, own = _device(daq)
@@ -352,11 +356,12 @@ def run(
             text, content, _ = _call(["run", *device, *_options(options)], own)
         except BaseException as error:
             # What was measured until then, for who catches it; a log has more.
-            error.record = read_record(path) if record is None and path.exists() else None  # type: ignore[attr-defined]
+            with suppress(RecordError):
+                error.record = _measured(path, None) if record is None else None  # type: ignore[attr-defined]
             raise
-        measured = read_record(path) if path.exists() else None
         if record is None:
             content.pop("record", None)
+        measured = _measured(path, record)
         return Run(_without(text, path if record is None else None), content, _columns(path), measured)
 
 
@@ -367,13 +372,18 @@ def record(daq: Daq | str, seconds: float, *, output: _PathLike | None = None, *
         path = Path(output) if output is not None else files.new("measured.csv")
         options |= {"seconds": seconds}
         text, content, _ = _call(["record", *device, *_options(options), "-o", str(path)], own)
-        return Run(_without(text, path if output is None else None), content, _columns(path), read_record(path))
+        return Run(_without(text, path if output is None else None), content, _columns(path), _measured(path, output))
 
 
 def close_loop(daq: str, out: _PathLike, **options: Any) -> Report:
     """Experiments, fits, diagnoses, extends, compensates and measures again, until nothing more is found (``hystctl close-loop``)."""
     text, content, _ = _call(["close-loop", "--daq", daq, *_options({**options, "out": out})])
     return Report(text, content, {})
+
+
+def _measured(path: Path, kept: _PathLike | None) -> Record | None:
+    """The record of a run, if it came to one."""
+    return read_record(path, name=None if kept is not None else "measured") if path.exists() else None
 
 
 def _without(text: str, path: Path | None) -> str:

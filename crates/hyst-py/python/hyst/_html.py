@@ -12,7 +12,7 @@ from ._plot import _label
 _Piece = tuple[ArrayLike, ArrayLike]
 
 #: Points of a picture.
-POINTS = 2000
+POINTS = 10_000
 WIDTH, HEIGHT, LEFT, BELOW = 390, 270, 68, 40
 
 

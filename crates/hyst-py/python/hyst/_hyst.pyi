@@ -714,6 +714,7 @@ def read_record(
     map: dict[str, str] | None = None,
     need: Literal["both", "input", "output"] = "both",
     rate: float | None = None,
+    name: str | None = None,
 ) -> Record: ...
 
 class Model:

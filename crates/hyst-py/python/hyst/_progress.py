@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 
@@ -44,8 +45,10 @@ class _Bar:
 
 
 def _is_seen() -> bool:
-    """Whether a terminal or a notebook shows what goes to stderr."""
-    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+    """Whether a terminal, or a notebook that has bars, shows them."""
+    if "ipykernel" in sys.modules:
+        return find_spec("ipywidgets") is not None
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 def bar(what: str, total: int | None, progress: Callable[[str], object] | bool | None) -> _Calls | _Bar | None:

@@ -1,0 +1,24 @@
+"""The notebook of the docs runs from top to bottom; what it shows is there."""
+
+from pathlib import Path
+
+import pytest
+
+nbformat = pytest.importorskip("nbformat")
+nbclient = pytest.importorskip("nbclient")
+pytest.importorskip("ipykernel")
+
+NOTEBOOK = Path(__file__).parents[2] / "docs" / "python.ipynb"
+
+
+def test_it_runs_from_top_to_bottom():
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells), "outputs are not kept in the file"
+    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    pictures = [output for output in shown if "image/png" in output.get("data", {})]
+    pages = [output for output in shown if "text/html" in output.get("data", {})]
+    assert len(pictures) == 3 and len(pages) >= 3
+    text = "".join(str(output) for output in shown)
+    for part in ["samples per second", "lag", "srcdoc", "3 of 3 actuators diagnosed", "lag_seconds"]:
+        assert part in text, part
