@@ -3,8 +3,9 @@
 //! ```
 //! use hyst_cli::host::{Host, command};
 //!
-//! let ended = command(["hystctl", "excite", "sine", "--json", "-o", "/dev/null"].map(Into::into), Host::default());
+//! let ended = command(["hystctl", "excite", "sine", "--high", "100", "-o", "-"].map(Into::into), Host::default());
 //! assert_eq!(ended.exit, 0, "{:?}", ended.error);
+//! assert!(ended.stdout.starts_with(b"segment,time_s,voltage_v"));
 //! ```
 
 use std::cell::RefCell;

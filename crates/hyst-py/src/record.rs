@@ -459,5 +459,5 @@ pub(crate) fn any_record(py: Python<'_>, record: &Bound<'_, PyAny>, need: &str) 
     if record.extract::<PathBuf>().is_err() {
         return Err(PyTypeError::new_err("record must be a Record, a path, or a list of them"));
     }
-    read_record(py, record, None, need, None).map(|r| r.0)
+    read_record(py, record, None, need, None, None).map(|r| r.0)
 }
