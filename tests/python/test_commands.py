@@ -1,8 +1,12 @@
 """The commands of the command line as functions of Python."""
 
+import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -84,6 +88,40 @@ def test_force_export_and_loop(train, plant):
     assert hyst.loop(sine, phase=-5.0).columns
     forced = hyst.force(sine, model, kout=20)
     assert any("force" in name for name in forced.columns), forced.columns
+
+
+@pytest.mark.parametrize("progress", [False, None, lambda line: None])
+def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
+    began = time.monotonic()
+    timer = threading.Timer(0.5, os.kill, [os.getpid(), signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        hyst.fit(train, model="bouc-wen", optimizer="de", seed=1, evaluations=10_000_000, progress=progress)
+    model = hyst.fit(train)
+    timer = threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            hyst.diagnose(train, model, progress=progress)
+    # Ten million evaluations take longer by far on any machine.
+    assert time.monotonic() - began < 300
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
+def test_the_wheels_command_line_ends_at_ctrl_c(train, tmp_path):
+    train.save(tmp_path / "a.csv")
+    line = [sys.executable, "-m", "hyst", "fit", "a.csv", "--model", "bouc-wen", "--optimizer", "de", "--seed", "1"]
+    process = subprocess.Popen([*line, "--evaluations", "10000000", "-o", "b.json"], cwd=tmp_path)
+    time.sleep(2)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) != 0 and not (tmp_path / "b.json").exists()
+
+
+def test_notes_on_records_in_memory_are_warnings_too(train):
+    y = np.minimum(train.outputs, 15.0)
+    clipped = hyst.Record(train.timepts, train.inputs, y)
+    with pytest.warns(UserWarning, match="end of its range"):
+        hyst.compare(clipped, models=["pi"])
 
 
 def test_the_wheel_has_the_command_line(train, tmp_path):

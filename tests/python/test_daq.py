@@ -1,5 +1,6 @@
 """A device that is a Python object: well-behaved, raising, blocking, lying, slow. However a run ends, the drive ends at rest."""
 
+import dataclasses
 import signal
 import threading
 import time
@@ -117,6 +118,46 @@ def test_what_it_raises_comes_out_once_it_is_at_rest(tmp_path):
     assert len(hyst.read_record(log)) > 0
 
 
+def test_a_ramp_begins_where_the_device_says_that_it_is():
+    class HalfWay(Bench):
+        """Puts its block out, and fails when it reads."""
+
+        failed = False
+
+        def capabilities(self):
+            return dataclasses.replace(self.told, present_v=self.put_out[-1] if self.put_out else None)
+
+        def exchange(self, drive):
+            outputs = super().exchange(drive)
+            if len(self.put_out) > 600 and not self.failed:
+                self.failed = True
+                raise TimeoutError("no samples came")
+            return outputs
+
+    bench = HalfWay()
+    with pytest.raises(TimeoutError, match="no samples came"):
+        hyst.run(bench, drive=drive(2000), rate=RATE)
+    assert bench.is_at_rest()
+    assert np.abs(np.diff(bench.put_out)).max() <= 1.6 * np.abs(np.diff(drive(2000))).max()
+
+
+def test_a_device_that_is_still_driven_counts_for_more_than_ctrl_c():
+    class Fails(Bench):
+        def exchange(self, drive):
+            if len(self.put_out) > 512:
+                signal.raise_signal(signal.SIGINT)
+                time.sleep(0.2)
+                raise OSError("the cable is out")
+            return super().exchange(drive)
+
+        def stop(self):
+            raise OSError("the cable is out")
+
+    with pytest.raises(hyst.DeviceError, match="the cable is out") as caught:
+        hyst.run(Fails(), drive=drive(4000), rate=RATE)
+    assert isinstance(caught.value.__cause__, KeyboardInterrupt)
+
+
 def test_what_raises_for_good_is_stopped():
     class Dead(Bench):
         def exchange(self, drive):
@@ -176,7 +217,9 @@ def test_nonsense_ends_the_run_at_rest(answer, message):
     bench = Lies()
     with pytest.raises((hyst.DeviceError, TypeError), match=message):
         hyst.run(bench, drive=drive(2000), rate=RATE)
-    assert bench.calls[-1] == "stop"
+    # Measurements without sense do not keep it from the ramp.
+    assert bench.is_at_rest()
+    assert np.abs(np.diff(bench.put_out)).max() <= 1.6 * np.abs(np.diff(drive(2000))).max()
 
 
 def test_a_slow_device_is_waited_for():

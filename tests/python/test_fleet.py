@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -90,7 +91,24 @@ def test_an_exception_on_the_way_keeps_what_is_done(folder, tmp_path):
     assert hyst.fleet.diagnose(folder, tmp_path / "r.parquet", model="pi").done == 3
 
 
-def test_what_is_no_fleet(tmp_path):
+def test_ctrl_c_ends_it_within_moments_and_keeps_what_is_done(folder, tmp_path):
+    begun = threading.Event()
+    timer = threading.Thread(target=lambda: (begun.wait(60), os.kill(os.getpid(), signal.SIGINT)))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        hyst.fleet.diagnose(folder, tmp_path / "r.parquet", model="pi", jobs=1, progress=lambda line: begun.set())
+        time.sleep(60)
+    assert len((tmp_path / "r.parquet.journal").read_text().splitlines()) >= 1
+
+
+def test_what_is_no_fleet(tmp_path, folder):
+    for wrong in ({"model": "nonsense"}, {"zero": "per_record"}, {"map": {"nonsense": "x"}}):
+        with pytest.raises(ValueError, match=next(iter(wrong.values())) if "map" not in wrong else "nonsense"):
+            hyst.fleet.diagnose(folder, tmp_path / "r.parquet", **wrong)
+    with pytest.raises(ValueError, match="'name' is not known"):
+        hyst.fleet.diagnose([{"file": "a", "name": "b"}], tmp_path / "r.parquet")
+    with pytest.raises(ValueError, match="named twice"):
+        hyst.fleet.diagnose(["a", "a"], tmp_path / "r.parquet")
     with pytest.raises(ValueError, match="give a folder"):
         hyst.fleet.diagnose(tmp_path / "absent", tmp_path / "r.parquet")
     with pytest.raises(FileNotFoundError, match="there is no such fleet"):

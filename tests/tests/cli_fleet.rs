@@ -5,7 +5,6 @@ use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hyst_ident::record::{ColumnMap, Need, Record};
 use hyst_tests::Lab;
 use serde_json::Value;
 
@@ -63,20 +62,11 @@ fn every_actuator_is_a_row_and_is_what_a_diagnosis_of_it_says() {
         own["effects"][0]["parameters"]["seconds"]["value"],
         one["effects"][0]["parameters"]["seconds"]["value"]
     );
-    // The table is one that the reader of records takes too.
-    let table = Record::read(
-        lab.path("results.parquet"),
-        &ColumnMap::parse(["time_s=rows", "voltage_v=rmse_before", "displacement_um=rmse_after"]).unwrap(),
-        Need::InputAndOutput,
-    );
-    assert!(table.unwrap_err().to_string().contains("results.parquet"));
     let page = lab.read("fleet.html");
-    for part in
-        ["3 of 5 actuators diagnosed", "Records without a diagnosis", "torn.csv", "href=\"reports/fleet_p1.csv.html\""]
-    {
+    for part in ["3 of 5 actuators diagnosed", "Records without a diagnosis", "torn.csv", "href=\"reports/p1-"] {
         assert!(page.contains(part), "{part}");
     }
-    assert!(lab.path("reports/fleet_p1.csv.html").exists());
+    assert_eq!(fs::read_dir(lab.path("reports")).unwrap().count(), 3);
 }
 
 #[test]
@@ -118,7 +108,7 @@ fn what_is_no_fleet_is_refused() {
     assert!(lab.refuses("fleet fleet -o r.parquet --model nonsense", 2).contains("auto"));
     assert!(lab.refuses("fleet fleet -o fleet/none/r.parquet", 2).contains("does not exist"));
     lab.write("r.parquet.journal", "time_s,voltage_v\n0,1\n");
-    assert!(lab.refuses("fleet fleet -o r.parquet", 2).contains("no row of a fleet"));
+    assert!(lab.refuses("fleet fleet -o r.parquet", 2).contains("not a row of a fleet"));
     fs::create_dir(lab.path("empty")).unwrap();
     assert!(lab.refuses("fleet empty -o s.parquet", 2).contains("no records"));
 }

@@ -87,9 +87,8 @@ thread_local! {
 
 /// Runs one command on this thread; `arguments` begin with the name of the program.
 pub fn command(arguments: impl IntoIterator<Item = OsString>, host: Host) -> Ended {
-    LENT.set(Some(Lent { host, ended: Ended::default() }));
-    // What is lent goes back, even if a command panics.
-    let _back = Back;
+    // What is lent goes back, even if a command panics; a command within another leaves that as it was.
+    let _back = Back(LENT.replace(Some(Lent { host, ended: Ended::default() })));
     let done = match Cli::try_parse_from(arguments) {
         Ok(cli) => commands::dispatch(cli.command),
         Err(asked) if asked.use_stderr() => Err(CommandError::bad_input(asked.to_string().trim_end())),
@@ -102,11 +101,12 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>, host: Host) -> End
     }
 }
 
-struct Back;
+/// What a command found in its place.
+struct Back(Option<Lent>);
 
 impl Drop for Back {
     fn drop(&mut self) {
-        LENT.set(None);
+        LENT.set(self.0.take());
     }
 }
 

@@ -182,13 +182,15 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     }
     let is_frozen = |row: usize| frozen.iter().any(|run| (run.first..run.first + run.rows).contains(&row));
     for end in measured.map_or_else(Vec::new, |y| clipped(y, record.segments())) {
-        if end.intervals.iter().any(|interval| is_frozen(interval.start)) {
+        let intervals: Vec<&Range<usize>> =
+            end.intervals.iter().filter(|interval| !is_frozen(interval.start)).collect();
+        if intervals.is_empty() {
             continue;
         }
-        let rows = end.intervals.iter().map(Range::len).sum();
+        let rows = intervals.iter().map(|interval| interval.len()).sum();
         let shown: Vec<String> =
-            end.intervals.iter().take(MAX_INTERVALS).map(|i| format!("{} to {}", i.start + 1, i.end)).collect();
-        let more = end.intervals.len().saturating_sub(MAX_INTERVALS);
+            intervals.iter().take(MAX_INTERVALS).map(|i| format!("{} to {}", i.start + 1, i.end)).collect();
+        let more = intervals.len().saturating_sub(MAX_INTERVALS);
         let more = if more > 0 { format!(" and {more} more intervals") } else { String::new() };
         odd.push(format!(
             "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). These rows are not fitted. Lower the drive or widen the range to see them",

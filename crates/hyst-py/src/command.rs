@@ -8,11 +8,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::daq::PythonDaq;
-use crate::interrupt::interruptible;
+use crate::interrupt::until_interrupted;
 
 /// Runs one command: its arguments without the program's name, the device for ``--daq host:``, and what is called with each line that the command line prints to stderr.
 ///
-/// Gives the exit code, the error's message, the report in words and as JSON text, what else goes to stdout, and the exception of the device.
+/// Gives the exit code, the error's message, the report in words and as JSON text, what else goes to stdout, the exception of the device, and the exception
+/// that has ended the command (a signal's, or that of ``say``).
 #[pyfunction]
 #[pyo3(signature = (arguments, daq=None, say=None))]
 #[allow(clippy::type_complexity, reason = "a tuple for Python")]
@@ -21,7 +22,7 @@ pub(crate) fn _command<'py>(
     arguments: Vec<String>,
     daq: Option<Py<PyAny>>,
     say: Option<Py<PyAny>>,
-) -> PyResult<(u8, Option<String>, String, Option<String>, Bound<'py, PyBytes>, Option<Py<PyAny>>)> {
+) -> PyResult<(u8, Option<String>, String, Option<String>, Bound<'py, PyBytes>, Option<Py<PyAny>>, Option<Py<PyAny>>)> {
     let device = daq.map(|daq| PythonDaq::new(py, daq)).transpose()?;
     let raised = device.as_ref().map(PythonDaq::raised);
     let arguments = std::iter::once("hystctl".to_owned()).chain(arguments).map(OsString::from);
@@ -37,10 +38,11 @@ pub(crate) fn _command<'py>(
         Some(say) => say.call1(py, (line,)).map(|_| ()),
         None => Ok(()),
     };
-    let Ended { exit, error, text, json, stdout } = interruptible(py, work, tell)?;
+    let (Ended { exit, error, text, json, stdout }, interrupt) = until_interrupted(py, work, tell)?;
     let raised = raised.and_then(|raised| raised.lock().ok()?.take());
-    let raised = raised.map(|error| error.into_value(py).into_any());
-    Ok((exit, error, text, json.map(|json| json.to_string()), PyBytes::new(py, &stdout), raised))
+    let value = |error: PyErr| error.into_value(py).into_any();
+    let (raised, interrupt) = (raised.map(value), interrupt.map(value));
+    Ok((exit, error, text, json.map(|json| json.to_string()), PyBytes::new(py, &stdout), raised, interrupt))
 }
 
 /// The command line: runs it with these arguments, the first of which is the program's name, and gives its exit code.

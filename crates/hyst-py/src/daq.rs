@@ -25,6 +25,8 @@ const PAUSE: Duration = Duration::from_millis(2);
 enum Call {
     Start(f64),
     Exchange(Vec<f64>),
+    /// Where the drive is.
+    Present,
     Stop,
 }
 
@@ -32,6 +34,8 @@ enum Call {
 enum Answer {
     Rate(f64),
     Columns(BTreeMap<&'static str, Vec<f64>>),
+    /// \[V\], where the object says it.
+    Present(Option<f64>),
     Stopped,
 }
 
@@ -56,6 +60,8 @@ pub(crate) struct PythonDaq {
     done: u64,
     /// Whether a call has not returned in time.
     hangs: bool,
+    /// Whether `exchange` has raised: part of its block may have been put out.
+    is_unsure: bool,
 }
 
 impl PythonDaq {
@@ -96,6 +102,7 @@ impl PythonDaq {
             out: VecDeque::new(),
             done: 0,
             hangs: false,
+            is_unsure: false,
         })
     }
 
@@ -117,8 +124,7 @@ impl PythonDaq {
         match answer {
             Ok(Ok(answer)) => Ok(answer),
             Ok(Err(error)) => {
-                let message = Python::attach(|py| error.value(py).to_string());
-                let message = format!("{}: {what} raised: {message}", self.capabilities.device);
+                let message = format!("{}: {what} raised {error}", self.capabilities.device);
                 // The first one says what happened.
                 if let Ok(mut raised) = self.raised.lock() {
                     raised.get_or_insert(error);
@@ -136,16 +142,26 @@ impl PythonDaq {
         }
     }
 
-    /// Hands over drives and gives what has come back, which is checked.
-    fn pass(&mut self, drive_v: &[f64]) -> Result<Vec<Sample>, HostDaqError> {
+    /// Hands over drives; what has come back is not looked at.
+    fn hand_over(&mut self, drive_v: &[f64]) -> Result<BTreeMap<&'static str, Vec<f64>>, HostDaqError> {
         let Some(rate_hz) = self.rate_hz else {
             return Err(lost(format!("{}: the sample clock does not run", self.capabilities.device)));
         };
         let seconds = (drive_v.len() + self.out.len()) as f64 / rate_hz;
-        let answer = self.ask("exchange", Call::Exchange(drive_v.to_vec()), seconds)?;
+        let answer =
+            self.ask("exchange", Call::Exchange(drive_v.to_vec()), seconds).inspect_err(|_| self.is_unsure = true)?;
         self.out.extend(drive_v);
         self.present_v = drive_v.last().copied().unwrap_or(self.present_v);
-        let Answer::Columns(mut columns) = answer else { return Ok(Vec::new()) };
+        Ok(match answer {
+            Answer::Columns(columns) => columns,
+            _ => BTreeMap::new(),
+        })
+    }
+
+    /// Hands over drives and gives what has come back, which is checked.
+    fn pass(&mut self, drive_v: &[f64]) -> Result<Vec<Sample>, HostDaqError> {
+        let mut columns = self.hand_over(drive_v)?;
+        let rate_hz = self.rate_hz.unwrap_or(1.0);
         let device = &self.capabilities.device;
         let wrong = |what: String| lost(format!("{device}: exchange returned {what}"));
         let mut column = |name: &str, needed: bool| match columns.remove(name) {
@@ -200,23 +216,48 @@ impl PythonDaq {
         let ramp = (1..=steps).map(|k| from + (rest_v - from) * k as f64 / steps as f64);
         let still = std::iter::repeat_n(rest_v, (seconds * rate_hz).round() as usize);
         let drives: Vec<f64> = ramp.chain(still).collect();
+        // A device whose measurements make no sense is still brought to rest.
         for block in drives.chunks(self.capabilities.max_block) {
-            self.pass(block)?;
+            let n = self.hand_over(block)?.get("output").map_or(0, Vec::len);
+            self.forget(n);
         }
         let began = Instant::now();
+        let patience = self.deadline + Duration::try_from_secs_f64(self.out.len() as f64 / rate_hz).unwrap_or_default();
         while !self.out.is_empty() {
-            if self.pass(&[])?.is_empty() {
-                if began.elapsed() > self.deadline + Duration::from_secs_f64(self.out.len() as f64 / rate_hz) {
-                    return Err(lost(format!(
-                        "{}: {} samples have not come back",
-                        self.capabilities.device,
-                        self.out.len()
-                    )));
+            let n = self.hand_over(&[])?.get("output").map_or(0, Vec::len);
+            self.forget(n);
+            if n == 0 && !self.out.is_empty() {
+                if began.elapsed() > patience {
+                    let (device, out) = (&self.capabilities.device, self.out.len());
+                    return Err(lost(format!("{device}: {out} samples have not come back")));
                 }
                 thread::sleep(PAUSE);
             }
         }
         Ok(())
+    }
+
+    /// Samples that have come back and are nobody's; without a queue all have.
+    fn forget(&mut self, n: usize) {
+        let n = if self.capabilities.queued { n.min(self.out.len()) } else { self.out.len() };
+        self.out.drain(..n);
+        self.done += n as u64;
+    }
+
+    /// Whether a ramp can begin where the drive is. After an `exchange` that has raised the object is asked; without an answer it is where it was before
+    /// that block, of a device without a queue.
+    fn knows_where_it_is(&mut self) -> bool {
+        if !self.is_unsure {
+            return true;
+        }
+        self.out.clear();
+        match self.ask("capabilities", Call::Present, 0.0) {
+            Ok(Answer::Present(Some(volts))) if self.capabilities.voltage.contains(volts) => {
+                self.present_v = volts;
+                true
+            }
+            _ => !self.capabilities.queued && !self.hangs,
+        }
     }
 
     /// Calls `stop` of an object one of whose methods hangs, from another thread.
@@ -288,8 +329,10 @@ impl Daq for PythonDaq {
         if self.hangs {
             return self.stop_from_outside();
         }
-        // A device that has raised may still take a ramp; where it does not, `stop` has to do.
-        let _ = if self.rate_hz.is_some() { self.go_to_rest(0.0) } else { Ok(()) };
+        if self.rate_hz.is_some() && self.knows_where_it_is() {
+            // A device that has raised may still take a ramp; where it does not, `stop` has to do.
+            let _ = self.go_to_rest(0.0);
+        }
         self.rate_hz = None;
         self.out.clear();
         if self.hangs { self.stop_from_outside() } else { self.ask("stop", Call::Stop, 0.0).map(|_| ()) }
@@ -317,6 +360,7 @@ fn ask(object: &Bound<'_, PyAny>, call: Call) -> PyResult<Answer> {
             let drive = PyArray1::from_vec(object.py(), drive);
             Ok(Answer::Columns(columns(&object.call_method1("exchange", (drive,))?)?))
         }
+        Call::Present => Ok(Answer::Present(object.call_method0("capabilities")?.getattr("present_v")?.extract()?)),
         Call::Stop => object.call_method0("stop").map(|_| Answer::Stopped),
     }
 }

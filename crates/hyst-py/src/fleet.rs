@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::mpsc::Sender;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use hyst_cli::fleet::journal::Journal;
 use hyst_cli::fleet::{self, Entry, Options, Row, entries, one, page, table};
@@ -15,7 +14,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::errors;
-use crate::interrupt::interruptible;
 
 fn of_json<T: DeserializeOwned>(text: &str) -> PyResult<T> {
     serde_json::from_str(text).map_err(|error| PyValueError::new_err(error.to_string()))
@@ -31,21 +29,51 @@ fn all_of(texts: &[String]) -> PyResult<Vec<Entry>> {
 
 /// The actuators of a folder or a list, as JSON.
 #[pyfunction]
-pub(crate) fn _fleet_entries(path: PathBuf) -> PyResult<Vec<String>> {
-    entries::of(&path).map_err(PyValueError::new_err)?.iter().map(json).collect()
+pub(crate) fn _fleet_entries(path: PathBuf, output: PathBuf) -> PyResult<Vec<String>> {
+    entries::of(&path, &output).map_err(PyValueError::new_err)?.iter().map(json).collect()
 }
 
-/// Fits and diagnoses one actuator on one thread: its row as JSON.
+/// Refuses options that no actuator could be done with.
 #[pyfunction]
-pub(crate) fn _fleet_row(py: Python<'_>, entry: &str, options: &str, reports: Option<PathBuf>) -> PyResult<String> {
+pub(crate) fn _fleet_check(options: &str) -> PyResult<()> {
+    of_json::<Options>(options)?.check().map_err(PyValueError::new_err)
+}
+
+/// What ends rows that are being computed.
+#[pyclass(frozen, module = "hyst")]
+pub(crate) struct _Stop(Arc<AtomicBool>);
+
+#[pymethods]
+impl _Stop {
+    #[new]
+    fn new() -> Self {
+        Self(Arc::default())
+    }
+
+    fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Fits and diagnoses one actuator on one thread: its row as JSON; ``None`` where it was stopped.
+#[pyfunction]
+#[pyo3(signature = (entry, options, reports, stop=None))]
+pub(crate) fn _fleet_row(
+    py: Python<'_>,
+    entry: &str,
+    options: &str,
+    reports: Option<PathBuf>,
+    stop: Option<&Bound<'_, _Stop>>,
+) -> PyResult<Option<String>> {
     let entry: Entry = of_json(entry)?;
     let options = Options { reports, ..of_json(options)? };
-    let work = |stop: &Arc<AtomicBool>, _: Sender<()>| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
-        pool.install(|| one::row(&entry, &options, &Stop::from(Arc::clone(stop))))
+    let stop = stop.map_or_else(Stop::default, |stop| Stop::from(Arc::clone(&stop.get().0)));
+    let work = || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        Ok::<_, rayon::ThreadPoolBuildError>(pool.install(|| one::row(&entry, &options, &stop)))
     };
-    let row = interruptible(py, work, |_, ()| Ok(()))?;
-    json(&row.ok_or_else(|| PyOSError::new_err("no thread could be started"))?)
+    let row = py.detach(work).map_err(|error| PyOSError::new_err(error.to_string()))?;
+    row.as_ref().map(json).transpose()
 }
 
 /// The journal of a table of results.
@@ -59,16 +87,24 @@ pub(crate) struct _FleetJournal {
 impl _FleetJournal {
     /// Opens the journal of the table ``output``, or begins it.
     #[new]
-    fn new(output: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (output, *, read_only=false))]
+    fn new(output: PathBuf, read_only: bool) -> PyResult<Self> {
         let place = fleet::journal_of(&output);
         let wrong = |error: std::io::Error| PyOSError::new_err(format!("{}: {error}", place.display()));
-        Ok(Self { journal: Journal::open(&place).map_err(wrong)?, place })
+        let journal = if read_only { Journal::read(&place) } else { Journal::open(&place) };
+        Ok(Self { journal: journal.map_err(wrong)?, place })
     }
 
-    /// Those that are not done yet, or whose files have changed since.
-    fn due(&self, py: Python<'_>, entries: Vec<String>, options: &str) -> PyResult<Vec<String>> {
+    /// Those that are not done yet, or whose files have changed since, or that have no report where ``reports`` are wanted.
+    fn due(&self, py: Python<'_>, entries: Vec<String>, options: &str, reports: bool) -> PyResult<Vec<String>> {
         let (entries, options) = (all_of(&entries)?, of_json::<Options>(options)?);
-        let due = py.detach(|| fleet::due(&entries, &self.journal, &options.fingerprint(), &mut |_| {}));
+        let options = Options { reports: reports.then(PathBuf::new), ..options };
+        // A look at a hundred files at a time, so that Ctrl-C is seen.
+        let mut due = Vec::new();
+        for some in entries.chunks(100) {
+            due.extend(py.detach(|| fleet::due(some, &self.journal, &options, &mut |_| {})));
+            py.check_signals()?;
+        }
         due.iter().map(json).collect()
     }
 
@@ -98,6 +134,6 @@ impl _FleetJournal {
     /// The rows, as JSON.
     fn rows(&self, entries: Vec<String>) -> PyResult<Vec<String>> {
         let entries = all_of(&entries)?;
-        self.journal.rows(&entries)?.map(|row| json(&row?)).collect()
+        self.journal.rows(&entries)?.map(|row| json(&row?.1)).collect()
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
@@ -19,28 +19,49 @@ const STACK: usize = 8 << 20;
 pub(crate) fn interruptible<T: Send, News: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Arc<AtomicBool>, Sender<News>) -> T + Send,
-    mut tell: impl FnMut(Python<'_>, News) -> PyResult<()> + Send,
+    tell: impl FnMut(Python<'_>, News) -> PyResult<()> + Send,
 ) -> PyResult<T> {
+    let (done, raised) = until_interrupted(py, work, tell)?;
+    raised.map_or(Ok(done), Err)
+}
+
+/// As [`interruptible`]; what was done when an exception had ended it, and that exception.
+pub(crate) fn until_interrupted<T: Send, News: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Arc<AtomicBool>, Sender<News>) -> T + Send,
+    mut tell: impl FnMut(Python<'_>, News) -> PyResult<()> + Send,
+) -> PyResult<(T, Option<PyErr>)> {
     let stop = Arc::new(AtomicBool::new(false));
     py.detach(|| {
         thread::scope(|scope| {
             let (reports, reported) = channel();
             let own = Arc::clone(&stop);
             let worker = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, move || work(&own, reports))?;
-            let mut raised = None;
+            let (mut raised, mut looked) = (None, Instant::now());
             loop {
-                let looked = match reported.recv_timeout(LOOK) {
-                    Ok(news) => Python::attach(|py| tell(py, news)),
-                    Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals()),
+                let news = match reported.recv_timeout(LOOK) {
+                    Ok(news) => Some(news),
+                    Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
                 };
-                if let Err(error) = looked {
+                // What reports without a pause is looked after all the same.
+                let is_due = looked.elapsed() >= LOOK;
+                if is_due {
+                    looked = Instant::now();
+                }
+                let seen = Python::attach(|py| {
+                    if is_due {
+                        py.check_signals()?;
+                    }
+                    news.filter(|_| raised.is_none()).map_or(Ok(()), |news| tell(py, news))
+                });
+                if let Err(error) = seen {
                     raised.get_or_insert(error);
                     stop.store(true, Ordering::Relaxed);
                 }
             }
             let done = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
-            raised.map_or(Ok(done), Err)
+            Ok((done, raised))
         })
     })
 }

@@ -42,7 +42,7 @@ mod _hyst {
     #[pymodule_export]
     use crate::control::{ForceObserver, Pid};
     #[pymodule_export]
-    use crate::fleet::{_FleetJournal, _fleet_entries, _fleet_row};
+    use crate::fleet::{_FleetJournal, _Stop, _fleet_check, _fleet_entries, _fleet_row};
     #[pymodule_export]
     use crate::identify::{Diagnosis, diagnose, fit};
     #[pymodule_export]

@@ -1,9 +1,10 @@
 //! `diagnose`: what a model lacks.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose_until};
-use hyst_ident::fit::{FitOptions, fit};
+use hyst_ident::fit::{FitOptions, fit_with};
 use hyst_ident::model::{Kind, Model};
 use hyst_ident::record::{Need, Record};
 use hyst_ident::simulate::Zero;
@@ -116,7 +117,8 @@ pub(crate) fn fitted_and_diagnosed(
     let fitting = FitOptions { zero_per_record: options.zero == Zero::PerRecord, ..FitOptions::default() };
     let of = |kind: Kind| {
         tell(&format!("fitting {kind}"));
-        let model = fit(train, kind, &fitting)?;
+        let mut watch = |_| if stop.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let model = fit_with(train, kind, &fitting, &mut watch)?.model;
         let diagnosis = diagnose_until(train, test, &model, options, tell, stop)?;
         let text = model.to_json();
         Ok::<_, CommandError>((model, text, diagnosis))

@@ -6,12 +6,10 @@ use std::sync::mpsc::channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use hyst_ident::record::ColumnMap;
 use hyst_ident::simulate::Zero;
 use hyst_ident::stop::Stop;
 use serde::Serialize;
 
-use super::diagnose::kind_of;
 use crate::cli::FleetArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::fleet::journal::Journal;
@@ -40,17 +38,12 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// Runs the command.
 pub(super) fn run(args: &FleetArgs) -> CommandResult {
-    ColumnMap::parse(&args.map.map)?;
-    kind_of(&args.model)?;
     let path = args.output.clone();
     let (output, summary) = (Target::File(path.clone()), args.page.clone().map(Target::File));
     let written: Vec<&Target> = std::iter::once(&output).chain(&summary).collect();
     output::check(&[&args.records], &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let all = entries::of(&args.records).map_err(CommandError::bad_input)?;
-    if let Some(folder) = &args.reports {
-        std::fs::create_dir_all(folder)?;
-    }
+    let all = entries::of(&args.records, &args.output).map_err(CommandError::bad_input)?;
     let options = Options {
         model: args.model.clone(),
         zero_per_record: args.zero.get() == Zero::PerRecord,
@@ -59,12 +52,16 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
         rate: args.map.rate,
         reports: args.reports.clone(),
     };
+    options.check().map_err(CommandError::bad_input)?;
+    if let Some(folder) = &args.reports {
+        std::fs::create_dir_all(folder)?;
+    }
     let place = fleet::journal_of(&path);
     let in_journal = |error: io::Error| CommandError::bad_input(format!("{}: {error}", place.display()));
     let mut journal = Journal::open(&place).map_err(in_journal)?;
     let began = Instant::now();
     let bar = Progress::bar("looking at files", all.len());
-    let due = fleet::due(&all, &journal, &options.fingerprint(), &mut |k| bar.at(k));
+    let due = fleet::due(&all, &journal, &options, &mut |k| bar.at(k));
     drop(bar);
     let kept = all.len() - due.len();
     if kept > 0 {
@@ -73,7 +70,7 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
     let jobs = args.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
     let lost = work(&due, &options, jobs, &mut |row| journal.add(row));
     // What is done is shown in any case.
-    output.write_beside_older(|out| table::write(out, &journal, &all))?;
+    output.write(|out| table::write(out, &journal, &all))?;
     if let Some(target) = &summary {
         let html = page::page(&page::title(&args.records), &journal, &all)?;
         target.write(|out| out.write_all(html.as_bytes()))?;
@@ -142,9 +139,10 @@ fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row
 impl Summary {
     fn text(&self) -> String {
         let mut lines = vec![format!(
-            "{} of {} done in {} s, {} without a diagnosis",
+            "{} of {} done ({} in this call, in {} s), {} without a diagnosis",
             self.done,
             text::count(self.actuators, "actuator"),
+            self.done - self.kept.min(self.done),
             text::short(self.seconds),
             self.failed
         )];

@@ -6,20 +6,27 @@ use std::path::Path;
 use super::Entry;
 
 /// Endings of files that are no records: what this program writes, and what lies beside records.
-const NOT_RECORDS: &[&str] = &["json", "toml", "html", "svg", "png", "md", "journal", "pdf", "py", "m"];
+const NOT_RECORDS: &[&str] = &["json", "toml", "html", "svg", "png", "md", "journal", "pdf", "py", "m", "tdms_index"];
 
 /// The files in a folder and the folders in it, in the order of their names, without hidden ones; or the lines of a list.
+///
+/// `output` is where the results go: it, and what lies beside it under its name, is no record.
 ///
 /// A list is text with a path in each line, or a table (`,`) whose header names `file` and, of `test`, `serial` and `date`, what it has. Paths are
 /// relative to the list's folder.
 ///
 /// # Errors
 /// In words, with file and line, where there is nothing or a line is wrong.
-pub fn of(path: &Path) -> Result<Vec<Entry>, String> {
+pub fn of(path: &Path, output: &Path) -> Result<Vec<Entry>, String> {
     let shown = path.display();
     let found = if path.is_dir() {
         let mut found = Vec::new();
         walk(path, &mut found).map_err(|error| format!("{shown}: {error}"))?;
+        let own = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_own = |entry: &Entry| {
+            Path::new(&entry.file).file_name().is_some_and(|name| name.to_string_lossy().starts_with(&own))
+        };
+        found.retain(|entry| !is_own(entry));
         found
     } else {
         let text = fs::read_to_string(path).map_err(|error| {
@@ -27,6 +34,16 @@ pub fn of(path: &Path) -> Result<Vec<Entry>, String> {
         })?;
         listed(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))?
     };
+    if !path.is_dir() && !found.is_empty() && found.iter().all(|entry| !Path::new(&entry.file).exists()) {
+        let first = &found[0].file;
+        return Err(format!(
+            "{shown}: none of the files in this list exists, as {first}; give a path in each line, or a CSV table with the column file"
+        ));
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    if let Some(twice) = found.iter().find(|entry| !seen.insert((&entry.file, &entry.test))) {
+        return Err(format!("{shown}: {} is named twice; an actuator has one line", twice.file));
+    }
     if found.is_empty() {
         return Err(format!("{shown}: no records; give a folder of records or a list of them"));
     }
@@ -43,9 +60,10 @@ fn walk(folder: &Path, found: &mut Vec<Entry>) -> std::io::Result<()> {
         if hidden {
             continue;
         }
-        if path.is_dir() {
+        // A link to a folder may lead to one that is walked already.
+        if each.file_type()?.is_dir() {
             walk(&path, found)?;
-        } else if !NOT_RECORDS.contains(&ending.as_str()) {
+        } else if path.is_file() && !ending.ends_with('~') && !NOT_RECORDS.contains(&ending.as_str()) {
             found.push(Entry { file: path.display().to_string(), test: None, serial: None, date: None });
         }
     }
@@ -92,22 +110,26 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("b")).unwrap();
-        for name in ["c.csv", "b/a.csv", ".hidden", "model.json"] {
+        for name in ["c.csv", "b/a.csv", ".hidden", "model.json", "r.parquet", "r.parquet.journal"] {
             fs::write(at(name), "x").unwrap();
         }
         let own = |names: &[&str]| names.iter().map(|name| at(name).display().to_string()).collect::<Vec<_>>();
         let files = |entries: Vec<Entry>| entries.into_iter().map(|entry| entry.file).collect::<Vec<_>>();
-        assert_eq!(files(of(folder.path()).unwrap()), own(&["b/a.csv", "c.csv"]));
+        assert_eq!(files(of(folder.path(), &at("r.parquet")).unwrap()), own(&["b/a.csv", "c.csv"]));
         let list = at("list.txt");
         fs::write(&list, "c.csv\n\nb/a.csv\n").unwrap();
-        assert_eq!(files(of(&list).unwrap()), own(&["c.csv", "b/a.csv"]));
+        assert_eq!(files(of(&list, &at("r.parquet")).unwrap()), own(&["c.csv", "b/a.csv"]));
         fs::write(&list, "serial, file, test, date\nP-7, c.csv,, 2026-05-02\nP-8, b/a.csv, c.csv\n").unwrap();
-        let entries = of(&list).unwrap();
+        let entries = of(&list, &at("r.parquet")).unwrap();
         assert_eq!(entries[0].serial.as_deref(), Some("P-7"));
         assert_eq!((entries[0].test.as_ref(), entries[0].date.as_deref()), (None, Some("2026-05-02")));
         assert_eq!(entries[1].test, Some(own(&["c.csv"]).remove(0)));
+        for (text, why) in [("c.csv\nc.csv\n", "named twice"), ("no.csv\nnone.csv\n", "none of the files")] {
+            fs::write(&list, text).unwrap();
+            assert!(of(&list, &at("r.parquet")).unwrap_err().contains(why));
+        }
         fs::write(&list, "serial,file\nP-7,\n").unwrap();
-        assert!(of(&list).unwrap_err().contains("list.txt, line 2"));
-        assert!(of(&at("b").join("none")).unwrap_err().contains("give a folder"));
+        assert!(of(&list, &at("r.parquet")).unwrap_err().contains("list.txt, line 2"));
+        assert!(of(&at("b").join("none"), &at("r.parquet")).unwrap_err().contains("give a folder"));
     }
 }

@@ -1,11 +1,14 @@
-//! What is done: a line of JSON for each actuator, written as soon as it is known.
+//! What is done: a line of JSON for each actuator, written and on the disk as soon as it is known.
 //!
-//! A line is written by one call, and a line that was cut off by a kill is no line: it is done again. Of several rows of one file the last counts.
+//! A line is written by one call, and a line that was cut off by a kill is no line: it is done again. Of several rows of one actuator the last counts.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 use super::{Entry, Row};
 
@@ -13,25 +16,71 @@ use super::{Entry, Row};
 pub struct Journal {
     file: File,
     path: PathBuf,
-    /// For each file the byte at which its last row begins, with what the row depends on.
-    done: BTreeMap<String, Done>,
+    /// The end of its whole lines.
+    end: u64,
+    done: BTreeMap<Key, Done>,
+}
+
+/// An actuator: its record and its test record.
+type Key = (String, Option<String>);
+
+fn key(entry: &Entry) -> Key {
+    (entry.file.clone(), entry.test.clone())
 }
 
 /// A row that is in the journal.
 struct Done {
+    /// Where its line begins.
     at: u64,
-    /// Its files and its options.
-    depends_on: (Option<String>, String),
+    /// What it depends on, as a hash; none where a file could not be read.
+    depends_on: Option<[u8; 32]>,
     failed: bool,
+    has_report: bool,
+}
+
+fn depends_on(sha256: Option<&str>, options: &str) -> Option<[u8; 32]> {
+    sha256.map(|sha256| Sha256::digest(format!("{sha256} {options}")).into())
+}
+
+impl Done {
+    fn of(row: &Row, at: u64) -> Self {
+        let has_report =
+            row.outcome.as_ref().is_ok_and(|found| found.report.as_ref().is_some_and(|r| Path::new(r).exists()));
+        let depends_on = depends_on(row.sha256.as_deref(), &row.options);
+        Self { at, depends_on, failed: row.outcome.is_err(), has_report }
+    }
 }
 
 impl Journal {
-    /// Opens the journal at `path`, or begins it.
+    /// Opens the journal at `path`, or begins it, to add to it. Nobody else may meanwhile.
     ///
     /// # Errors
-    /// When it cannot be read or written, or is no journal.
+    /// When it cannot be read or written, is no journal, or somebody else adds to it.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        let file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(io::Error::other("another fleet is being written here; wait for it, or give another name"));
+            }
+            Err(TryLockError::Error(error)) => return Err(error),
+        }
+        let journal = Self::of(file, path)?;
+        if journal.end < journal.file.metadata()?.len() {
+            journal.file.set_len(journal.end)?;
+        }
+        Ok(journal)
+    }
+
+    /// Opens the journal at `path` to look at it.
+    ///
+    /// # Errors
+    /// When it cannot be read or is no journal.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        Self::of(File::open(path)?, path)
+    }
+
+    fn of(file: File, path: &Path) -> io::Result<Self> {
         let mut done = BTreeMap::new();
         let (mut at, mut number) = (0, 0);
         let mut reader = BufReader::new(&file);
@@ -39,75 +88,73 @@ impl Journal {
         loop {
             line.clear();
             let n = reader.read_until(b'\n', &mut line)? as u64;
-            if n == 0 {
+            // A kill can only have cut the last line.
+            if n == 0 || !line.ends_with(b"\n") {
                 break;
             }
             number += 1;
-            let whole = line.ends_with(b"\n");
             match serde_json::from_slice::<Row>(&line) {
-                Ok(row) if whole => {
-                    let failed = row.outcome.is_err();
-                    done.insert(row.entry.file, Done { at, depends_on: (row.sha256, row.options), failed });
+                Ok(row) => {
+                    let own = Done::of(&row, at);
+                    done.insert(key(&row.entry), own);
                 }
-                // A kill can only have cut the last line.
-                _ if !whole => break,
-                Ok(_) => break,
+                // A row of another version, or one that is damaged: its actuator is done again.
+                Err(_) if serde_json::from_slice::<Value>(&line).is_ok_and(|value| value.get("file").is_some()) => {}
                 Err(error) => {
                     let message =
-                        format!("line {number} is no row of a fleet ({error}); give another name, or remove the file");
+                        format!("line {number} is not a row of a fleet's journal ({error}); give another name");
                     return Err(io::Error::new(io::ErrorKind::InvalidData, message));
                 }
             }
             at += n;
         }
         drop(reader);
-        file.set_len(at)?;
-        file.seek(SeekFrom::End(0))?;
-        Ok(Self { file, path: path.to_owned(), done })
+        Ok(Self { file, path: path.to_owned(), end: at, done })
     }
 
-    /// Whether an actuator's row is there, of these files and options.
-    pub fn has(&self, entry: &Entry, sha256: Option<&str>, options: &str) -> bool {
+    /// Whether an actuator's row is there, of these files and options, with a report where reports are wanted.
+    pub fn has(&self, entry: &Entry, sha256: Option<&str>, options: &str, reports: bool) -> bool {
         // A file that could not be read may be readable now.
-        sha256.is_some()
-            && self
-                .done
-                .get(&entry.file)
-                .is_some_and(|done| done.depends_on.0.as_deref() == sha256 && done.depends_on.1 == options)
+        let Some(wanted) = depends_on(sha256, options) else { return false };
+        self.done
+            .get(&key(entry))
+            .is_some_and(|done| done.depends_on == Some(wanted) && (!reports || done.failed || done.has_report))
     }
 
-    /// Adds a row.
+    /// Adds a row; it is on the disk when this returns.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn add(&mut self, row: &Row) -> io::Result<()> {
-        let at = self.file.seek(SeekFrom::End(0))?;
         let mut line = serde_json::to_vec(row)?;
         line.push(b'\n');
         self.file.write_all(&line)?;
-        let (failed, depends_on) = (row.outcome.is_err(), (row.sha256.clone(), row.options.clone()));
-        self.done.insert(row.entry.file.clone(), Done { at, depends_on, failed });
+        self.file.sync_data()?;
+        self.done.insert(key(&row.entry), Done::of(row, self.end));
+        self.end += line.len() as u64;
         Ok(())
     }
 
     /// How many of these actuators are done, and how many of them failed.
     pub fn count(&self, entries: &[Entry]) -> (usize, usize) {
-        let done = || entries.iter().filter_map(|entry| self.done.get(&entry.file));
+        let done = || entries.iter().filter_map(|entry| self.done.get(&key(entry)));
         (done().count(), done().filter(|done| done.failed).count())
     }
 
-    /// The rows of these actuators, in their order, one at a time.
+    /// The rows of these actuators that are done, each with its place in `entries`, in their order, one at a time. Serial numbers and dates are those of
+    /// `entries`.
     ///
     /// # Errors
     /// When the journal cannot be read again.
-    pub fn rows<'a>(&'a self, entries: &'a [Entry]) -> io::Result<impl Iterator<Item = io::Result<Row>> + 'a> {
+    pub fn rows<'a>(&'a self, entries: &'a [Entry]) -> io::Result<impl Iterator<Item = io::Result<(usize, Row)>> + 'a> {
         let mut file = BufReader::new(File::open(&self.path)?);
-        let places = entries.iter().filter_map(|entry| self.done.get(&entry.file).map(|done| done.at));
-        Ok(places.map(move |at| {
-            file.seek(SeekFrom::Start(at))?;
+        let done = entries.iter().enumerate().filter_map(|(k, entry)| Some((k, entry, self.done.get(&key(entry))?)));
+        Ok(done.map(move |(k, entry, done)| {
+            file.seek(SeekFrom::Start(done.at))?;
             let mut line = Vec::new();
             file.by_ref().read_until(b'\n', &mut line)?;
-            Ok(serde_json::from_slice(&line)?)
+            let row: Row = serde_json::from_slice(&line)?;
+            Ok((k, Row { entry: entry.clone(), ..row }))
         }))
     }
 }
@@ -130,21 +177,34 @@ mod tests {
             journal.add(&row(file, sha)).unwrap();
         }
         let (a, b) = (row("a", "2"), row("b", "1"));
-        assert!(journal.has(&a.entry, Some("2"), "o") && !journal.has(&a.entry, Some("1"), "o"));
-        assert!(!journal.has(&b.entry, Some("1"), "other") && !journal.has(&b.entry, None, "o"));
-        let entries = [b.entry.clone(), a.entry.clone()];
-        let rows: Vec<Row> = journal.rows(&entries).unwrap().map(Result::unwrap).collect();
-        assert_eq!(rows, [b.clone(), a.clone()]);
+        assert!(journal.has(&a.entry, Some("2"), "o", false) && !journal.has(&a.entry, Some("1"), "o", false));
+        assert!(!journal.has(&b.entry, Some("1"), "other", false) && !journal.has(&b.entry, None, "o", false));
+        // One is not done; a serial number is that of the list.
+        let numbered = Entry { serial: Some("P-7".into()), ..a.entry.clone() };
+        let entries = [b.entry.clone(), row("c", "1").entry, numbered.clone()];
+        let rows: Vec<(usize, Row)> = journal.rows(&entries).unwrap().map(Result::unwrap).collect();
+        assert_eq!(rows, [(0, b.clone()), (2, Row { entry: numbered, ..a.clone() })]);
+        // Nobody else adds to it, but anybody may look.
+        assert!(Journal::open(&path).is_err());
+        assert_eq!(Journal::read(&path).unwrap().count(&entries), (2, 2));
+        drop(journal);
         let whole = std::fs::read(&path).unwrap();
         // However much of the last row was written.
         let last = serde_json::to_vec(&a).unwrap().len();
         for cut in [1, last / 2, last] {
             std::fs::write(&path, &whole[..whole.len() - cut]).unwrap();
             let mut journal = Journal::open(&path).unwrap();
-            assert!(journal.has(&a.entry, Some("1"), "o") && journal.has(&b.entry, Some("1"), "o"), "{cut}");
+            assert!(
+                journal.has(&a.entry, Some("1"), "o", false) && journal.has(&b.entry, Some("1"), "o", false),
+                "{cut}"
+            );
             journal.add(&a).unwrap();
             assert_eq!(std::fs::read(&path).unwrap(), whole);
         }
+        // A row that is none of this version is done again; the others stay.
+        let strange = [b"{\"file\": \"b\", \"outcome\": 3}\n".as_slice(), &whole].concat();
+        std::fs::write(&path, &strange).unwrap();
+        assert!(Journal::open(&path).unwrap().has(&a.entry, Some("2"), "o", false));
         std::fs::write(&path, "time_s,voltage_v\n0,1\n").unwrap();
         assert!(Journal::open(&path).is_err());
         assert_eq!(std::fs::read(&path).unwrap(), b"time_s,voltage_v\n0,1\n");

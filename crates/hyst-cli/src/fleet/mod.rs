@@ -1,7 +1,7 @@
 //! Diagnoses of many actuators: one row each, whatever their number.
 //!
 //! A row is written to a journal as soon as its actuator is done, so that what is done is never done again ([`journal`]). The table of all
-//! rows is made from the journal ([`table`]), and a page that shows them together ([`page`]). Neither takes more memory for more actuators.
+//! rows is made from the journal ([`table`]), and a page that shows them together ([`page`]). In memory there are some hundred bytes for each actuator.
 
 pub mod entries;
 pub mod journal;
@@ -12,6 +12,7 @@ pub mod table;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use hyst_ident::record::ColumnMap;
 use serde::{Deserialize, Serialize};
 
 /// An actuator of the fleet.
@@ -49,6 +50,15 @@ pub struct Options {
 }
 
 impl Options {
+    /// Refuses what no actuator could be done with.
+    ///
+    /// # Errors
+    /// In words.
+    pub fn check(&self) -> Result<(), String> {
+        crate::commands::diagnose::kind_of(&self.model).map_err(|error| error.text())?;
+        ColumnMap::parse(&self.map).map(|_| ()).map_err(|error| error.to_string())
+    }
+
     /// What a row depends on besides its files. Rows of other options are done anew.
     pub fn fingerprint(&self) -> String {
         // A structure of numbers and texts has JSON.
@@ -105,6 +115,9 @@ pub struct Found {
     pub suspects: BTreeMap<String, f64>,
     /// The report, if one was written.
     pub report: Option<String>,
+    /// Why none was, where one was wanted.
+    #[serde(default)]
+    pub report_error: Option<String>,
 }
 
 /// One actuator's row.
@@ -134,13 +147,13 @@ pub fn journal_of(output: &Path) -> PathBuf {
 pub fn due(
     entries: &[Entry],
     journal: &journal::Journal,
-    fingerprint: &str,
+    options: &Options,
     watch: &mut dyn FnMut(usize),
 ) -> Vec<Entry> {
-    let mut due = Vec::new();
+    let (mut due, fingerprint, reports) = (Vec::new(), options.fingerprint(), options.reports.is_some());
     for (k, entry) in entries.iter().enumerate() {
         watch(k);
-        if !journal.has(entry, one::sum_of(entry).as_deref(), fingerprint) {
+        if !journal.has(entry, one::sum_of(entry).as_deref(), &fingerprint, reports) {
             due.push(entry.clone());
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::time::Instant;
 
 use hyst_ident::atomic_file::write_atomic;
@@ -63,7 +64,12 @@ fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> 
     let diagnosing = DiagnoseOptions { zero, seed: options.seed };
     let kind = kind_of(&options.model)?;
     let (model, text, diagnosis) = fitted_and_diagnosed(&train, test.as_ref(), kind, &diagnosing, &|_| {}, stop)?;
-    let report = written(entry, options, (&train, test.as_ref()), (&model, &text), &diagnosis)?;
+    // A diagnosis without its report is still one.
+    let report = written(entry, options, (&train, test.as_ref()), (&model, &text), &diagnosis);
+    let (report, report_error) = match report {
+        Ok(path) => (path, None),
+        Err(error) => (None, Some(error.text())),
+    };
     let Diagnosis { findings, .. } = diagnosis;
     let effects = findings.effects.iter().map(|finding| NamedEffect {
         name: finding.name.name().to_owned(),
@@ -100,6 +106,7 @@ fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> 
             .collect::<BTreeMap<_, _>>(),
         unit: findings.unit,
         report,
+        report_error,
     })
 }
 
@@ -125,10 +132,12 @@ fn written(
         seed: options.seed,
     };
     let page = report::page(&contents).map_err(CommandError::failed)?;
-    // Files of one name in two folders have two reports.
-    let name: String =
-        entry.file.chars().map(|c| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' }).collect();
-    let path = folder.join(format!("{}.html", name.trim_matches(['_', '.'])));
+    // Files of one name in two folders have two reports, and no name is too long.
+    let stem = Path::new(&entry.file).file_stem().unwrap_or_default().to_string_lossy();
+    let stem: String =
+        stem.chars().map(|c| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' }).take(80).collect();
+    let digits = format!("{:x}", Sha256::digest(format!("{:?}", (&entry.file, &entry.test))));
+    let path = folder.join(format!("{stem}-{}.html", &digits[..8]));
     write_atomic(&path, |out| out.write_all(page.as_bytes()))?;
     Ok(Some(path.display().to_string()))
 }

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use hyst_ident::diagnose::{Axis, Curve, Picture, Role, Style};
 
+use super::Entry;
 use super::journal::Journal;
-use super::{Entry, Row};
 use crate::report::figures;
 use crate::report::html::{Page, Table, escaped};
 use crate::text::{count, percent, short, symbol};
@@ -107,8 +107,9 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
     let mut listed = Table::new("Actuators").words("actuator").words("date").words("verdict").words("effects");
     listed = listed.numbers("RMSE before").numbers("after").words("report");
     let mut done = 0;
-    for (k, row) in journal.rows(&entries)?.enumerate() {
-        let row: Row = row?;
+    let mut shown = 0;
+    for row in journal.rows(&entries)? {
+        let (k, row) = row?;
         done += 1;
         let found = match &row.outcome {
             Ok(found) => found,
@@ -137,7 +138,8 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
         {
             better.push(after / before);
         }
-        if k < MAX_LISTED {
+        if shown < MAX_LISTED {
+            shown += 1;
             let names: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
             let number = |value: Option<f64>| {
                 value.map_or_else(String::new, |value| format!("{} {}", short(value), symbol(&found.unit)))
@@ -168,7 +170,7 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
     }
     page.section("actuators", "Actuators");
     page.table(&listed);
-    more(&mut page, done, done.min(MAX_LISTED));
+    more(&mut page, done - failed, shown);
     let pictures = charts(&series, order);
     page.finish(&figures::data(&pictures)?).map_err(Into::into)
 }
@@ -201,7 +203,7 @@ fn summary(done: usize, failed: usize, all: usize, verdicts: &BTreeMap<String, u
     }
     better.sort_unstable_by(f64::total_cmp);
     if let Some(middle) = better.get(better.len() / 2) {
-        text += &format!(". The extended model leaves {} of the model's error (median)", percent(100.0 * middle));
+        text += &format!(". The residual of the extended model is {} of the model's (median)", percent(100.0 * middle));
     }
     text
 }

@@ -41,6 +41,7 @@ const TEXTS: &[(&str, Text)] = &[
     ("model", |row| found(row).map(|found| found.model.clone())),
     ("unit", |row| found(row).map(|found| found.unit.clone())),
     ("report", |row| found(row).and_then(|found| found.report.clone())),
+    ("report_error", |row| found(row).and_then(|found| found.report_error.clone())),
     ("sha256", |row| row.sha256.clone()),
     ("options", |row| Some(row.options.clone())),
 ];
@@ -75,9 +76,13 @@ fn of_effects(found: &Found) -> impl Iterator<Item = (String, Option<f64>)> + '_
 /// # Errors
 /// When the journal cannot be read or `out` not written.
 pub fn write(out: &mut dyn Write, journal: &Journal, entries: &[Entry]) -> io::Result<()> {
+    in_blocks(out, journal, entries, BLOCK)
+}
+
+fn in_blocks(out: &mut dyn Write, journal: &Journal, entries: &[Entry], block_rows: usize) -> io::Result<()> {
     let mut further = BTreeSet::new();
     for row in journal.rows(entries)? {
-        let row = row?;
+        let (_, row) = row?;
         further.extend(found(&row).into_iter().flat_map(of_effects).map(|(name, _)| name));
     }
     let texts = TEXTS.iter().map(|(name, _)| format!("OPTIONAL BYTE_ARRAY {name} (UTF8);"));
@@ -93,7 +98,7 @@ pub fn write(out: &mut dyn Write, journal: &Journal, entries: &[Entry]) -> io::R
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).map_err(failed)?;
     let mut rows = journal.rows(entries)?;
     loop {
-        let block: Vec<Row> = rows.by_ref().take(BLOCK).collect::<io::Result<_>>()?;
+        let block: Vec<Row> = rows.by_ref().take(block_rows).map(|row| Ok(row?.1)).collect::<io::Result<_>>()?;
         if block.is_empty() {
             break;
         }
@@ -161,4 +166,67 @@ fn write_cells(group: &mut SerializedRowGroupWriter<'_, Vec<u8>>, cells: Cells) 
 /// 1 where there is a value.
 fn levels<T>(cells: &[Option<T>]) -> Vec<i16> {
     cells.iter().map(|cell| i16::from(cell.is_some())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::RowAccessor;
+
+    use super::super::{NamedEffect, Parameter};
+    use super::*;
+
+    #[test]
+    fn a_reader_finds_every_cell_in_every_block() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::open(&folder.path().join("j")).unwrap();
+        let row = |k: usize| {
+            let entry = Entry { file: format!("p{k}"), test: None, serial: Some(format!("S-{k}")), date: None };
+            let parameter = Parameter { value: k as f64, std_error: None, unit: "s".into() };
+            let effect = NamedEffect {
+                name: "rate-dependence".into(),
+                probability: 0.97,
+                parameters: [("seconds".to_owned(), parameter)].into(),
+            };
+            let found = Found {
+                rows: 10 * k,
+                model: "pi".into(),
+                unit: "um".into(),
+                verdict: "explained".into(),
+                noise: 0.1 * k as f64,
+                rmse_before: Some(1.0),
+                rmse_after: None,
+                test_rmse_before: None,
+                test_rmse_after: None,
+                effects: if k == 3 { vec![effect] } else { Vec::new() },
+                suspects: [].into(),
+                report: None,
+                report_error: None,
+            };
+            let outcome = if k == 1 { Err("torn".to_owned()) } else { Ok(found) };
+            Row { entry, sha256: None, options: "o".into(), took_s: 0.5, outcome }
+        };
+        let rows: Vec<Row> = (0..5).map(row).collect();
+        rows.iter().for_each(|row| journal.add(row).unwrap());
+        let entries: Vec<Entry> = rows.iter().map(|row| row.entry.clone()).collect();
+        let mut bytes = Vec::new();
+        in_blocks(&mut bytes, &journal, &entries, 2).unwrap();
+        let reader = SerializedFileReader::new(bytes::Bytes::from(bytes)).unwrap();
+        assert_eq!(reader.num_row_groups(), 3);
+        let schema = reader.metadata().file_metadata().schema_descr();
+        let at = |name: &str| (0..schema.num_columns()).find(|k| schema.column(*k).name() == name).unwrap();
+        let read: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+        assert_eq!(read.len(), 5);
+        for (k, row) in read.iter().enumerate() {
+            assert_eq!(row.get_string(at("serial")).unwrap(), &format!("S-{k}"));
+            if k == 1 {
+                assert_eq!(row.get_string(at("error")).unwrap(), "torn");
+                assert!(row.get_double(at("noise")).is_err());
+            } else {
+                assert_eq!(row.get_double(at("noise")).unwrap(), 0.1 * k as f64);
+                assert_eq!(row.get_long(at("rows")).unwrap(), 10 * k as i64);
+            }
+            assert_eq!(row.get_double(at("rate_dependence_seconds")).ok(), (k == 3).then_some(3.0));
+        }
+    }
 }

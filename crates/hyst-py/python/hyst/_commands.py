@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
 import sys
 import tempfile
 import warnings
@@ -50,6 +52,10 @@ _Records: TypeAlias = _AnyRecord | Sequence[_AnyRecord]
 _PACKAGE = os.path.dirname(__file__)
 #: How folders begin that vanish with a call.
 _PREFIX = "hyst-call-"
+#: Such a folder in a text.
+_VANISHES = re.compile(rf"[^\s\"']*{_PREFIX}[^/\\\s\"']*[/\\]+")
+#: Exit code of a device that is lost, or of data at risk.
+DEVICE_LOST = 3
 
 
 class Report(Mapping[str, Any]):
@@ -95,10 +101,6 @@ class _Files:
     def __init__(self, folder: str) -> None:
         self._folder = Path(folder)
         self._used: set[str] = set()
-
-    def shown(self, text: str) -> str:
-        """A report as it is shown: files that vanish go by their names alone."""
-        return text.replace(str(self._folder) + os.sep, "")
 
     def new(self, name: str) -> Path:
         """A name that is free, like ``name``."""
@@ -170,27 +172,38 @@ def _options(options: Mapping[str, Any]) -> list[str]:
     return arguments
 
 
+def _shown(text: str) -> str:
+    """Text as it is shown: files that vanish with a call go by their names alone."""
+    return _VANISHES.sub("", text)
+
+
 def _say(line: str) -> None:
-    """What the command line prints to stderr; files of one call are gone after it."""
-    if f"{os.sep}{_PREFIX}" in line:
+    """What the command line prints to stderr."""
+    # What is said of a file that vanishes.
+    if _VANISHES.search(line) and ("was there already" in line or "is kept in" in line):
         return
     level, frame = 1, sys._getframe()
     # The caller's own line.
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         level, frame = level + 1, frame.f_back
-    warnings.warn(line.removeprefix("note: "), UserWarning, stacklevel=level)
+    warnings.warn(_shown(line).removeprefix("note: "), UserWarning, stacklevel=level)
 
 
 def _call(arguments: Sequence[str], daq: object = None) -> tuple[str, dict[str, Any], bytes]:
-    code, error, text, content, stdout, raised = _command(list(arguments), daq, _say)
+    code, error, text, content, stdout, raised, interrupt = _command(list(arguments), daq, _say)
+    error = _shown(error or f"ended with {code}")
+    if interrupt is not None:
+        # That a device may still be driven counts for more than what has ended the run.
+        if code == DEVICE_LOST:
+            raise DeviceError(error) from interrupt
+        raise interrupt
     if raised is not None:
-        if hasattr(raised, "add_note") and error:
+        if hasattr(raised, "add_note"):
             raised.add_note(error)
         raise raised
     if code:
-        kind = {2: InputError, 3: DeviceError}.get(code, CommandError)
-        raise kind(error or f"ended with {code}")
-    return text, json.loads(content) if content else {}, stdout
+        raise {2: InputError, DEVICE_LOST: DeviceError}.get(code, CommandError)(error)
+    return _shown(text), json.loads(_shown(content)) if content else {}, stdout
 
 
 def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
@@ -210,7 +223,7 @@ def _reported(command: Sequence[str], options: Mapping[str, Any], files: _Files,
     if writes:
         arguments += ["-o", str(path)]
     text, content, _ = _call(arguments)
-    return Report(files.shown(text), content, _columns(path))
+    return Report(text, content, _columns(path))
 
 
 def info(path: _AnyRecord, **options: Any) -> Report:
@@ -393,4 +406,6 @@ def _without(text: str, path: Path | None) -> str:
 
 def main() -> None:
     """The command line ``hystctl``."""
+    # As any program: Python's own handler waits for the command's end.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(_main(["hystctl", *sys.argv[1:]]))

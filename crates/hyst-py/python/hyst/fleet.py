@@ -21,11 +21,12 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from hashlib import sha256
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from ._hyst import Record, _fleet_entries, _fleet_row, _FleetJournal
+from ._hyst import Record, _fleet_check, _fleet_entries, _fleet_row, _FleetJournal, _Stop
 from ._progress import bar
 
 __all__ = ["Fleet", "diagnose", "summary"]
@@ -51,31 +52,44 @@ class Fleet:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for entry in self._entries:
-            for row in self._journal.rows([entry]):
-                yield json.loads(row)
+            for text in self._journal.rows([entry]):
+                row = json.loads(text)
+                # As the table has it: what was found, or the error.
+                outcome = row.pop("outcome")
+                yield {**row, **outcome.get("Ok", {}), "error": outcome.get("Err")}
 
     @property
     def failed(self) -> dict[str, str]:
         """Why records have no diagnosis, by their files."""
-        return {row["file"]: row["outcome"]["Err"] for row in self if "Err" in row["outcome"]}
+        return {row["file"]: row["error"] for row in self if row["error"] is not None}
 
     def __repr__(self) -> str:
         return f"{self.done - self._failed} of {len(self)} actuators diagnosed, {self._failed} failed: {self.output}"
 
 
+#: What is known of an actuator.
+KEYS = ("file", "test", "serial", "date")
+
+
 def _entries(records: _Records, output: Path) -> list[str]:
     """The actuators, as JSON."""
     if isinstance(records, (str, os.PathLike)):
-        return _fleet_entries(records)
+        return _fleet_entries(records, output)
     entries = []
     for record in records:
         if isinstance(record, Mapping):
-            entries.append(json.dumps({key: os.fspath(value) for key, value in record.items()}))
-        elif isinstance(record, Record):
-            entries.append(json.dumps({"file": str(_kept(record, output))}))
+            if unknown := [key for key in record if key not in KEYS]:
+                raise ValueError(f"{unknown[0]!r} is not known of an actuator; give {', '.join(KEYS)}")
+            entries.append({key: None if value is None else str(value) for key, value in record.items()})
         else:
-            entries.append(json.dumps({"file": os.fspath(record)}))
-    return entries
+            entries.append({"file": str(_kept(record, output)) if isinstance(record, Record) else os.fspath(record)})
+    named = [(entry["file"], entry.get("test")) for entry in entries]
+    seen: set[tuple[str | None, str | None]] = set()
+    for name in named:
+        if name in seen:
+            raise ValueError(f"{name[0]} is named twice; an actuator is named once")
+        seen.add(name)
+    return [json.dumps(entry) for entry in entries]
 
 
 def _kept(record: Record, output: Path) -> Path:
@@ -143,55 +157,97 @@ def diagnose(
             "rate": rate,
         }
     )
+    if zero not in ("none", "per-record"):
+        raise ValueError(f'zero is {zero!r}; it must be "none" or "per-record"')
+    _fleet_check(options)
     if reports is not None:
         Path(reports).mkdir(parents=True, exist_ok=True)
     folder = None if reports is None else os.path.abspath(reports)
     journal = _FleetJournal(path)
-    due = journal.due(entries, options)
-    done = _on_ray(due, options, folder, address) if address else _on_threads(due, options, folder, jobs)
+    due = journal.due(entries, options, folder is not None)
     shown = bar("fleet", len(due), progress)
+    done = 0
+
+    def keep(row: str | None) -> None:
+        nonlocal done
+        if row is None:
+            return
+        journal.add(row)
+        done += 1
+        if shown is not None:
+            shown.say(json.loads(row)["file"])
+            shown.at(done)
+
     try:
-        for k, row in enumerate(done):
-            journal.add(row)
-            if shown is not None:
-                shown.say(json.loads(row)["file"])
-                shown.at(k + 1)
+        if address:
+            _on_ray(due, options, folder, address, keep)
+        else:
+            _on_threads(due, options, folder, jobs, keep)
     finally:
         # What is done is shown in any case.
-        done.close()
         if shown is not None:
             shown.close()
         journal.write(entries, path)
     return Fleet(journal, entries, path)
 
 
-def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | None) -> Any:
-    """Rows as they come, on the cores of this machine."""
+_Keep: TypeAlias = Callable[["str | None"], None]
+
+
+def _on_threads(due: list[str], options: str, reports: str | None, jobs: int | None, keep: _Keep) -> None:
+    """Rows on the cores of this machine; ``keep`` is given each as it comes."""
     workers = jobs or os.cpu_count() or 1
+    stop = _Stop()
+    waiting: set[Future[str | None]] = set()
+    rest = iter(due)
     with ThreadPoolExecutor(workers) as pool:
-        waiting: set[Future[str]] = set()
-        rest = iter(due)
         try:
             while True:
                 while len(waiting) < 2 * workers and (entry := next(rest, None)) is not None:
-                    waiting.add(pool.submit(_fleet_row, entry, options, reports))
+                    waiting.add(pool.submit(_fleet_row, entry, options, reports, stop))
                 if not waiting:
                     return
-                ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                ready = wait(waiting, return_when=FIRST_COMPLETED).done
                 for row in ready:
-                    yield row.result()
-        finally:
+                    waiting.discard(row)
+                    keep(row.result())
+        except BaseException:
+            # Those that are being computed end within moments; what is done already is kept.
+            stop.stop()
             for row in waiting:
                 row.cancel()
+            for row in wait(waiting).done:
+                if not row.cancelled() and row.exception() is None and (text := row.result()) is not None:
+                    with suppress(BaseException):
+                        keep(text)
+            raise
 
 
-def _row(entry: str, options: str, reports: str | None) -> str:
+def _row(entry: str, options: str, reports: str | None) -> str | None:
     """A task: Ray takes no compiled function."""
     return _fleet_row(entry, options, reports)
 
 
-def _on_ray(due: list[str], options: str, reports: str | None, address: str) -> Any:
-    """Rows as they come, on a Ray cluster."""
+def _there(entry: str) -> str:
+    """An actuator whose files are found from another folder."""
+    given = json.loads(entry)
+    return json.dumps({key: os.path.abspath(value) if key in ("file", "test") and value else value for key, value in given.items()})
+
+
+def _without_a_worker(entry: str, options: str, error: BaseException) -> str:
+    """The row of an actuator on which every worker died. Without the hash of its files it is done again next time."""
+    known = {"test": None, "serial": None, "date": None, **json.loads(entry)}
+    why = f"no worker came back with it: {type(error).__name__}"
+    return json.dumps({**known, "sha256": None, "options": options, "took_s": 0.0, "outcome": {"Err": why}})
+
+
+def _named(row: str, entry: str) -> str:
+    """A row with the names that were given."""
+    return json.dumps({**json.loads(row), **json.loads(entry)})
+
+
+def _on_ray(due: list[str], options: str, reports: str | None, address: str, keep: _Keep) -> None:
+    """Rows on a Ray cluster; ``keep`` is given each as it comes."""
     try:
         ray = import_module("ray")
     except ImportError:
@@ -203,17 +259,22 @@ def _on_ray(due: list[str], options: str, reports: str | None, address: str) -> 
     # A worker that dies takes its actuator with it: Ray does it again on another.
     task = ray.remote(num_cpus=1, max_retries=5)(_row)
     most = WAITING * max(1, int(ray.cluster_resources().get("CPU", 1)))
-    waiting: list[Any] = []
+    waiting: dict[Any, str] = {}
     rest = iter(due)
     try:
         while True:
             while len(waiting) < most and (entry := next(rest, None)) is not None:
-                waiting.append(task.remote(entry, options, reports))
+                waiting[task.remote(_there(entry), options, reports)] = entry
             if not waiting:
                 return
-            ready, waiting = ray.wait(waiting, num_returns=1)
-            for row in ready:
-                yield ray.get(row)
+            ready, _ = ray.wait(list(waiting), num_returns=1)
+            for done in ready:
+                entry = waiting.pop(done)
+                try:
+                    row = ray.get(done)
+                except ray.exceptions.RayError as error:
+                    row = _without_a_worker(entry, options, error)
+                keep(None if row is None else _named(row, entry))
     finally:
         for row in waiting:
             ray.cancel(row, force=True)
@@ -239,7 +300,7 @@ def summary(records: _Records, output: _PathLike, page: _PathLike | None = None)
     if not path.with_name(path.name + ".journal").exists():
         raise FileNotFoundError(f"{path}.journal: there is no such fleet; hyst.fleet.diagnose makes it")
     title = f"Fleet {Path(records).name}" if isinstance(records, (str, os.PathLike)) else f"Fleet {path.stem}"
-    html = _FleetJournal(path).page(_entries(records, path), title)
+    html = _FleetJournal(path, read_only=True).page(_entries(records, path), title)
     if page is not None:
         Path(page).write_text(html, encoding="utf-8")
     return html

@@ -47,7 +47,7 @@ Measured: TypeAlias = ArrayLike | Mapping[str, ArrayLike]
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a device can do, asked once before a run.
+    """What a device can do; before a run, and again after an ``exchange`` that has raised.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ class Capabilities:
     rest_v : float
         Voltage at which the device rests [V].
     present_v : float, optional
-        Voltage that it puts out now [V]; the rest voltage if not given.
+        Voltage that it puts out now [V]; the rest voltage if not given. Say it: after an ``exchange`` that has raised, the ramp to rest begins there; without it
+        it begins at the end of the block before, and there is no ramp for a device with a queue.
     max_slew_v_per_s : float
         Steepest slope of the voltage [V/s].
     min_rate_hz, max_rate_hz : float
@@ -97,8 +98,8 @@ class Daq(Protocol):
     """A device: idle, then ``start``, any number of ``exchange``, then ``stop``.
 
     A method that raises ends the run: the drive is ramped to rest as far as ``exchange`` still works, ``stop`` is called, the log is closed,
-    and the exception comes out of ``hyst.run``. All methods are called from one thread, which is not the caller's, one at a time; after a call that missed its
-    deadline ``stop`` is called from another thread.
+    and the exception comes out of ``hyst.run``. ``capabilities`` is called first, on the caller's thread; all further calls come from one other thread, one at a
+    time. After a call that missed its deadline ``stop`` is called from a third.
     """
 
     def capabilities(self) -> Capabilities:
