@@ -111,15 +111,16 @@ def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
 def test_the_wheels_command_line_ends_at_ctrl_c(train, tmp_path):
     train.save(tmp_path / "a.csv")
     line = [sys.executable, "-m", "hyst", "fit", "a.csv", "--model", "bouc-wen", "--optimizer", "de", "--seed", "1"]
-    process = subprocess.Popen([*line, "--evaluations", "10000000", "-o", "b.json"], cwd=tmp_path)
+    process = subprocess.Popen([*line, "--trials", "100000", "-o", "b.json"], cwd=tmp_path)
     time.sleep(2)
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=60) != 0 and not (tmp_path / "b.json").exists()
 
 
 def test_notes_on_records_in_memory_are_warnings_too(train):
-    y = np.minimum(train.outputs, 15.0)
-    clipped = hyst.Record(train.timepts, train.inputs, y)
+    rows = slice(*train.segments[0])
+    y = np.minimum(train.outputs[rows], 15.0)
+    clipped = hyst.Record(train.timepts[rows], train.inputs[rows], y)
     with pytest.warns(UserWarning, match="end of its range"):
         hyst.compare(clipped, models=["pi"])
 

@@ -34,6 +34,8 @@ enum Call {
 enum Answer {
     Rate(f64),
     Columns(BTreeMap<&'static str, Vec<f64>>),
+    /// What is no columns: `exchange` has done its work all the same.
+    Nonsense(PyErr),
     /// \[V\], where the object says it.
     Present(Option<f64>),
     Stopped,
@@ -125,10 +127,7 @@ impl PythonDaq {
             Ok(Ok(answer)) => Ok(answer),
             Ok(Err(error)) => {
                 let message = format!("{}: {what} raised {error}", self.capabilities.device);
-                // The first one says what happened.
-                if let Ok(mut raised) = self.raised.lock() {
-                    raised.get_or_insert(error);
-                }
+                self.keep(error);
                 Err(lost(message))
             }
             Err(_) => {
@@ -142,8 +141,18 @@ impl PythonDaq {
         }
     }
 
-    /// Hands over drives; what has come back is not looked at.
-    fn hand_over(&mut self, drive_v: &[f64]) -> Result<BTreeMap<&'static str, Vec<f64>>, HostDaqError> {
+    /// Keeps an exception for the caller, and says it in words.
+    fn keep(&self, error: PyErr) -> HostDaqError {
+        let message = format!("{}: {error}", self.capabilities.device);
+        // The first one says what happened.
+        if let Ok(mut raised) = self.raised.lock() {
+            raised.get_or_insert(error);
+        }
+        lost(message)
+    }
+
+    /// Hands over drives; what has come back is not looked at, and may be an exception.
+    fn hand_over(&mut self, drive_v: &[f64]) -> Result<PyResult<BTreeMap<&'static str, Vec<f64>>>, HostDaqError> {
         let Some(rate_hz) = self.rate_hz else {
             return Err(lost(format!("{}: the sample clock does not run", self.capabilities.device)));
         };
@@ -153,14 +162,15 @@ impl PythonDaq {
         self.out.extend(drive_v);
         self.present_v = drive_v.last().copied().unwrap_or(self.present_v);
         Ok(match answer {
-            Answer::Columns(columns) => columns,
-            _ => BTreeMap::new(),
+            Answer::Columns(columns) => Ok(columns),
+            Answer::Nonsense(error) => Err(error),
+            _ => Ok(BTreeMap::new()),
         })
     }
 
     /// Hands over drives and gives what has come back, which is checked.
     fn pass(&mut self, drive_v: &[f64]) -> Result<Vec<Sample>, HostDaqError> {
-        let mut columns = self.hand_over(drive_v)?;
+        let mut columns = self.hand_over(drive_v)?.map_err(|error| self.keep(error))?;
         let rate_hz = self.rate_hz.unwrap_or(1.0);
         let device = &self.capabilities.device;
         let wrong = |what: String| lost(format!("{device}: exchange returned {what}"));
@@ -218,13 +228,13 @@ impl PythonDaq {
         let drives: Vec<f64> = ramp.chain(still).collect();
         // A device whose measurements make no sense is still brought to rest.
         for block in drives.chunks(self.capabilities.max_block) {
-            let n = self.hand_over(block)?.get("output").map_or(0, Vec::len);
+            let n = self.hand_over(block)?.map_or(0, |columns| columns.get("output").map_or(0, Vec::len));
             self.forget(n);
         }
         let began = Instant::now();
         let patience = self.deadline + Duration::try_from_secs_f64(self.out.len() as f64 / rate_hz).unwrap_or_default();
         while !self.out.is_empty() {
-            let n = self.hand_over(&[])?.get("output").map_or(0, Vec::len);
+            let n = self.hand_over(&[])?.map_or(0, |columns| columns.get("output").map_or(0, Vec::len));
             self.forget(n);
             if n == 0 && !self.out.is_empty() {
                 if began.elapsed() > patience {
@@ -358,7 +368,8 @@ fn ask(object: &Bound<'_, PyAny>, call: Call) -> PyResult<Answer> {
         }
         Call::Exchange(drive) => {
             let drive = PyArray1::from_vec(object.py(), drive);
-            Ok(Answer::Columns(columns(&object.call_method1("exchange", (drive,))?)?))
+            let told = object.call_method1("exchange", (drive,))?;
+            Ok(columns(&told).map_or_else(Answer::Nonsense, Answer::Columns))
         }
         Call::Present => Ok(Answer::Present(object.call_method0("capabilities")?.getattr("present_v")?.extract()?)),
         Call::Stop => object.call_method0("stop").map(|_| Answer::Stopped),
