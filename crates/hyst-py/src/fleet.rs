@@ -114,6 +114,11 @@ impl _FleetJournal {
         self.journal.add(&row).map_err(|error| PyOSError::new_err(format!("{}: {error}", self.place.display())))
     }
 
+    /// Lets others add to it.
+    fn unlock(&self) -> PyResult<()> {
+        Ok(self.journal.unlock()?)
+    }
+
     /// How many are done, and how many of these failed.
     fn count(&self, entries: Vec<String>) -> PyResult<(usize, usize)> {
         Ok(self.journal.count(&all_of(&entries)?))

@@ -100,7 +100,7 @@ const AUTO: &str = "auto";
 pub(crate) fn kind_of(name: &str) -> CommandResult<Option<Kind>> {
     match name {
         AUTO => Ok(None),
-        name => name.parse().map(Some).map_err(|error| CommandError::bad_input(format!("{error}, or {AUTO}"))),
+        name => name.parse().map(Some).map_err(|error| CommandError::bad_input(format!("{name}: {error}, or {AUTO}"))),
     }
 }
 

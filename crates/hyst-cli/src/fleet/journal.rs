@@ -135,6 +135,14 @@ impl Journal {
         Ok(())
     }
 
+    /// Lets others add to it; this one adds nothing more.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn unlock(&self) -> io::Result<()> {
+        self.file.unlock()
+    }
+
     /// How many of these actuators are done, and how many of them failed.
     pub fn count(&self, entries: &[Entry]) -> (usize, usize) {
         let done = || entries.iter().filter_map(|entry| self.done.get(&key(entry)));

@@ -188,6 +188,7 @@ def diagnose(
         if shown is not None:
             shown.close()
         journal.write(entries, path)
+        journal.unlock()
     return Fleet(journal, entries, path)
 
 
