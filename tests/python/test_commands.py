@@ -92,7 +92,7 @@ def test_force_export_and_loop(train, plant):
 
 @pytest.mark.parametrize("progress", [False, None, lambda line: None])
 def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
-    began = time.monotonic()
+    # Ten million evaluations would not end while anybody waits.
     timer = threading.Timer(0.5, os.kill, [os.getpid(), signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
@@ -103,8 +103,6 @@ def test_ctrl_c_ends_a_search_and_a_diagnosis(train, progress):
     with pytest.raises(KeyboardInterrupt):
         while True:
             hyst.diagnose(train, model, progress=progress)
-    # Ten million evaluations take longer by far on any machine.
-    assert time.monotonic() - began < 300
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")

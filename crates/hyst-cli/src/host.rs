@@ -165,3 +165,26 @@ pub(crate) fn take_report(text: &str, json: &impl Serialize) -> Result<bool, Com
 fn with(use_it: impl FnOnce(&mut Lent)) -> bool {
     LENT.with_borrow_mut(|lent| lent.as_mut().map(use_it)).is_some()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_within_another_leaves_that_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.csv");
+        // What is something else is set aside, which is said.
+        std::fs::write(&path, "nothing of the kind").unwrap();
+        let words = |last: &str| ["hystctl", "excite", "sine", "--high", "100", "-o", last].map(OsString::from);
+        let (said, inner) = std::sync::mpsc::channel();
+        let say: Say = Box::new(move |_| {
+            let _ = said.send(command(words("-"), Host::default()));
+        });
+        let outer = command(words(&path.display().to_string()), Host { say: Some(say), ..Host::default() });
+        assert_eq!((outer.exit, outer.json.is_some(), outer.stdout.len()), (0, true, 0), "{:?}", outer.error);
+        let inner: Vec<Ended> = inner.try_iter().collect();
+        assert!(!inner.is_empty() && inner.iter().all(|ended| ended.exit == 0 && !ended.stdout.is_empty()));
+        assert!(!is_lent());
+    }
+}

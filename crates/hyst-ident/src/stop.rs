@@ -1,7 +1,7 @@
 //! Ending a long computation from another thread.
 //!
 //! A diagnosis fits thousands of times, on all cores, deep in calls whose errors are those of the numerics. What is stopped unwinds from there to
-//! the call that can be stopped, as rust-analyzer's queries do, and becomes an ordinary error there; nothing is printed.
+//! the call that can be stopped, as rust-analyzer's queries do, and becomes an ordinary error there; nothing is printed. A program that aborts where others unwind (`panic = "abort"`) ends with it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;

@@ -68,8 +68,8 @@ use crate::{errors, pickle};
 ///     Plays of ``gpi`` and ``td-pi``, of ``pi`` when it is searched; elements of ``td-em``; most elements of ``maxwell-slip``.
 /// thresholds : int, optional
 ///     Most thresholds of ``pi``, chosen where the record calls for them.
-/// progress : bool, optional
-///     Whether a search shows a bar (tqdm); in a terminal or a notebook if not given. Ctrl-C ends the search.
+/// progress : bool or callable, optional
+///     Whether a search shows a bar (tqdm); in a terminal or a notebook if not given. A function is told how many evaluations are done. Ctrl-C ends the search.
 ///
 /// Raises
 /// ------

@@ -834,7 +834,7 @@ def fit(
     between_samples: Literal["linear", "band-limited"] | None = None,
     elements: int | None = None,
     thresholds: int | None = None,
-    progress: bool | None = None,
+    progress: Callable[[str], object] | bool | None = None,
 ) -> Model: ...
 def diagnose(
     record: _AnyRecord,
