@@ -15,7 +15,7 @@ class _Calls:
     def __init__(self, function: Callable[[str], object]) -> None:
         self._function = function
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, done: int | None = None) -> None:
         self._function(text)
 
     def at(self, done: int) -> None:
@@ -34,8 +34,10 @@ class _Bar:
         self._what = what
         self._tqdm = tqdm(desc=what, total=total, leave=False, bar_format=form)
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, done: int | None = None) -> None:
         self._tqdm.set_description_str(f"{self._what}: {text}")
+        if done is not None:
+            self.at(done)
 
     def at(self, done: int) -> None:
         self._tqdm.update(done - self._tqdm.n)

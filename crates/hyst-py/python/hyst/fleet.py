@@ -139,7 +139,7 @@ def diagnose(
         Of a Ray cluster (``"auto"``, ``"local"``, ``"ray://head:10001"``): its workers do the work instead. Needs ``pip install ray``, and that
         they see the files. A worker that dies is replaced, and its actuator is done again.
     progress : bool or callable, optional
-        Whether a bar is shown; in a terminal or a notebook if not given.
+        Whether a bar is shown; in a terminal or a notebook if not given. A function is given each file that is done.
 
     Returns
     -------
@@ -175,8 +175,7 @@ def diagnose(
         journal.add(row)
         done += 1
         if shown is not None:
-            shown.say(json.loads(row)["file"])
-            shown.at(done)
+            shown.say(json.loads(row)["file"], done)
 
     try:
         if address:
