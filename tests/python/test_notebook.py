@@ -18,7 +18,7 @@ def test_it_runs_from_top_to_bottom():
     shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     pictures = [output for output in shown if "image/png" in output.get("data", {})]
     pages = [output for output in shown if "text/html" in output.get("data", {})]
-    assert len(pictures) == 3 and len(pages) >= 3
+    assert len(pictures) == 4 and len(pages) >= 3
     text = "".join(str(output) for output in shown)
     for part in ["samples per second", "lag", "srcdoc", "3 of 3 actuators diagnosed", "lag_seconds"]:
         assert part in text, part

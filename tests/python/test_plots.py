@@ -52,6 +52,18 @@ def test_results_are_drawn_over_a_record(record):
     plt.close("all")
 
 
+def test_a_diagnosis_is_drawn_as_its_residuals(record):
+    found = hyst.diagnose(record, hyst.fit(record))
+    drawn = lines(found.plot(color="k"))
+    models = [hyst.fit(record), found.extended] if found.effects else [hyst.fit(record)]
+    assert len(drawn) == len(models) and drawn[0][0] == "before"
+    for (_, x, residual), model in zip(drawn, models, strict=True):
+        said = model.simulate(record)
+        counted = np.delete(residual, 1200)[~said.settling]
+        assert np.sqrt(np.mean(counted**2)) == pytest.approx(said.errors["rmse"], rel=1e-9) and np.isnan(x[1200])
+    plt.close("all")
+
+
 def test_notebooks_show_tables_pictures_and_the_report(record, tmp_path):
     page = record._repr_html_()
     for part in ("2000 in 2 segments", "Voltage [V]", "<svg", "bench 4"):

@@ -1,11 +1,15 @@
 """Type checkers pass on the package, and on code that uses it."""
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-pytest.importorskip("mypy")
+NOTEBOOK = Path(__file__).parents[2] / "docs" / "python.ipynb"
+#: python-control has no annotations: pyright takes the type of its default, 0.0, for that of the signal.
+NOT_OURS = 'parameter "inputs" of type "float" in function "input_output_response"'
 
 USE = '''
 import hyst
@@ -28,6 +32,7 @@ WRONG = "import hyst\nhyst.fit(3, model=4)\nhyst.Play(radius='wide')\nhyst.Recor
 
 
 def checked(*arguments, cwd):
+    pytest.importorskip("mypy")
     ran = subprocess.run([sys.executable, "-m", "mypy", "--strict", *arguments], capture_output=True, text=True, cwd=cwd)
     return ran.returncode, ran.stdout + ran.stderr
 
@@ -44,3 +49,31 @@ def test_what_is_wrong_is_found(tmp_path):
     code, said = checked("wrong.py", cwd=tmp_path)
     lines = {line.split(":")[1] for line in said.splitlines() if line.startswith("wrong.py:") and ": error:" in line}
     assert code == 1 and lines == {"2", "3", "4"}, said
+
+
+def pyright(*paths):
+    """Lines that are wrong and what is said of them, of each file."""
+    pytest.importorskip("pyright")
+    call = [sys.executable, "-m", "pyright"]
+    there = subprocess.run([*call, "--version"], capture_output=True, text=True)
+    if there.returncode != 0:
+        pytest.skip(f"pyright cannot be fetched: {there.stderr.strip()[-200:]}")
+    ran = subprocess.run([*call, "--outputjson", "--pythonpath", sys.executable, *map(str, paths)], capture_output=True, text=True)
+    report = json.loads(ran.stdout)
+    assert report["summary"]["filesAnalyzed"] > 0, ran.stdout
+    found = [found for found in report["generalDiagnostics"] if found["severity"] == "error" and NOT_OURS not in found["message"]]
+    return {(Path(one["file"]).name, one["range"]["start"]["line"] + 1, one["message"]) for one in found}
+
+
+def test_pyright_finds_nothing_in_the_package_and_its_use(tmp_path):
+    import hyst
+
+    cells = [cell for cell in json.loads(NOTEBOOK.read_text())["cells"] if cell["cell_type"] == "code"]
+    (tmp_path / "notebook.py").write_text("\n\n".join("".join(cell["source"]) for cell in cells))
+    (tmp_path / "use.py").write_text(USE)
+    assert not pyright(Path(hyst.__file__).parent, tmp_path / "use.py", tmp_path / "notebook.py")
+
+
+def test_pyright_finds_what_is_wrong(tmp_path):
+    (tmp_path / "wrong.py").write_text(WRONG)
+    assert {line for _, line, _ in pyright(tmp_path / "wrong.py")} == {2, 3, 4}

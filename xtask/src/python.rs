@@ -17,6 +17,7 @@ const NEEDED: &[&str] = &[
     "pytest",
     "pytest-xdist",
     "mypy",
+    "pyright[nodejs]",
     "pyarrow",
     "nbformat",
     "nbclient",

@@ -18,9 +18,10 @@ use hyst_ident::optimize::Progress;
 use hyst_ident::record::Record;
 use hyst_ident::simulate::Zero;
 use hyst_ident::stop::Stop;
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -29,7 +30,7 @@ use crate::interrupt::interruptible;
 use crate::model::{Model, parse, zero_of};
 use crate::progress::Bar;
 use crate::record::{any_record, of_arrays};
-use crate::{errors, pickle};
+use crate::{errors, pickle, plot};
 
 /// Fits a model to a record or to arrays; start-up rows are left out.
 ///
@@ -260,6 +261,32 @@ impl Diagnosis {
     #[getter]
     fn effects(&self) -> Vec<&'static str> {
         self.found.findings.effects.iter().map(|f| f.name.name()).collect()
+    }
+
+    /// Draws the residual over time, of the model that was diagnosed and of the extended one: over the test record, or else the training record.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if not given.
+    /// **options
+    ///     Of both lines, as in ``matplotlib.axes.Axes.plot``.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (*, ax=None, **options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, own) = (slf.py(), slf.get());
+        let record = crate::record::Record(own.test.as_ref().unwrap_or(&own.train).clone());
+        let zero = if own.zero == Zero::PerRecord { "per-record" } else { "none" };
+        let models = [Model(own.model.clone()), own.extended()];
+        let said = [models.into_bound_py_any(py)?, record.into_bound_py_any(py)?, zero.into_bound_py_any(py)?];
+        plot::drawn("diagnosis", slf.as_any(), &said, ax, options)
     }
 
     /// Whether both found the same.

@@ -91,7 +91,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     });
     let Some(whole) = h.clone().cholesky() else { return errors };
     let mut covariance = DMatrix::zeros(free.len(), free.len());
-    for gram in &fit.grams {
+    for gram in fit.grams.iter() {
         let full = gram.score(z);
         let score = DVector::from_fn(free.len(), |r, _| full[free[r]] / scale[r]);
         let others = DMatrix::from_fn(free.len(), free.len(), |r, c| {

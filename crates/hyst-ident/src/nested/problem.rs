@@ -1,6 +1,6 @@
 //! One fit: columns, Jacobian, damped Gauss-Newton.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use hyst_core::{CurveSide, Error, HARMONIC_PARTS};
 use nalgebra::{DMatrix, DVector};
@@ -64,8 +64,8 @@ pub(crate) struct Fitted {
     pub(crate) squares: f64,
     pub(crate) rows: usize,
     /// Normal equations of each block at the solution. Columns: the linear unknowns in the order of their
-    /// [`Layout`], change of every nonlinear parameter, and the measured output.
-    pub(crate) grams: Vec<Gram>,
+    /// [`Layout`], change of every nonlinear parameter, and the measured output. Most of the memory of a fit, so its copies share them.
+    pub(crate) grams: Arc<[Gram]>,
     pub(crate) solution: DVector<f64>,
     pub(crate) bounds: Vec<Bounds>,
     /// Penalty of the same unknowns.
@@ -336,7 +336,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The same of each block.
-    fn grams(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Vec<Gram> {
+    fn grams(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Arc<[Gram]> {
         let jacobian: Vec<DMatrix<f64>> = self.in_blocks(jacobian).collect();
         let of = |(x, j): (&DMatrix<f64>, &DMatrix<f64>)| {
             let mut bordered = Bordered::zeros(x.ncols(), j.ncols());

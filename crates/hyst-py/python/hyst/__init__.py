@@ -5,7 +5,7 @@ Every model is a class with keyword parameters and the methods of ``Operator``: 
 one-dimensional array of numbers of; contiguous arrays of float64 are not copied.
 """
 
-from . import _commands, _hyst, daq
+from . import _commands, _hyst, daq, fleet
 from ._commands import *  # noqa: F403
 from ._errors import (
     CommandError,
@@ -40,6 +40,7 @@ __all__ = [
     "ReachError",
     "RecordError",
     "daq",
+    "fleet",
     *_commands.__all__,
     *(name for name in dir(_hyst) if not name.startswith("_")),
 ]

@@ -89,7 +89,7 @@ class Run(Report):
     """What a run reports, with what was measured as ``record``."""
 
     def __init__(
-        self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]], record: Record | None
+        self, text: str, content: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]], record: Record
     ) -> None:
         super().__init__(text, content, columns)
         self.record = record
@@ -370,7 +370,7 @@ def run(
         except BaseException as error:
             # What was measured until then, for who catches it; a log has more.
             with suppress(RecordError):
-                error.record = _measured(path, None) if record is None else None  # type: ignore[attr-defined]
+                error.record = _measured(path, None) if record is None and path.exists() else None  # type: ignore[attr-defined]
             raise
         if record is None:
             content.pop("record", None)
@@ -394,9 +394,9 @@ def close_loop(daq: str, out: _PathLike, **options: Any) -> Report:
     return Report(text, content, {})
 
 
-def _measured(path: Path, kept: _PathLike | None) -> Record | None:
-    """The record of a run, if it came to one."""
-    return read_record(path, name=None if kept is not None else "measured") if path.exists() else None
+def _measured(path: Path, kept: _PathLike | None) -> Record:
+    """The record of a run."""
+    return read_record(path, name=None if kept is not None else "measured")
 
 
 def _without(text: str, path: Path | None) -> str:

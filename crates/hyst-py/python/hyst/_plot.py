@@ -1,12 +1,12 @@
 """What ``plot`` of the objects draws, with matplotlib."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._hyst import Drive, Model, Record, Simulation
+from ._hyst import Diagnosis, Drive, Model, Record, Simulation
 
 _Values = NDArray[np.float64]
 
@@ -91,4 +91,23 @@ def model(model: Model, period: float, temperature: float | None, ax: Any, optio
     y = model.operator(period).simulate(u, time=0.0, load=0.0, **surroundings)
     ax.plot(u, y, **{"linewidth": 0.8, "label": model.kind, **options})
     ax.set(xlabel=_label(model.input_column), ylabel=_label(model.output_column))
+    return ax
+
+
+def diagnosis(
+    diagnosis: Diagnosis, models: Sequence[Model], record: Record, zero: Literal["none", "per-record"], ax: Any, options: dict[str, Any]
+) -> Any:
+    """Residuals of the model that was diagnosed and of the extended one over time; rows of a start-up transient are left out."""
+    ax = _axes(ax)
+    y = record.outputs
+    if y is None:
+        raise ValueError("a residual needs a measured output")
+    names = ["before"] if not diagnosis.effects else ["before", f"with {', '.join(diagnosis.effects)}"]
+    for name, model in zip(names, models, strict=False):
+        predicted = model.simulate(record, zero=zero)
+        residual = np.where(predicted.settling, np.nan, y - predicted.outputs)
+        ax.plot(*_pieces(record.segments, record.timepts, residual), **{"linewidth": 0.8, "label": name, **options})
+    unit = _label(record.output_column or "").rpartition(" ")[2]
+    ax.set(xlabel="Time [s]", ylabel=f"Measured − predicted {unit}")
+    ax.legend()
     return ax

@@ -15,6 +15,9 @@ import hyst
 
 __all__ = ["HysteresisRegressor"]
 
+#: Pyright takes the strings that stand for no array for the types of ``X`` and ``y``.
+_validated: Any = validate_data
+
 
 class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """A model of hysteresis that is fitted to rows of input and output.
@@ -114,7 +117,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self : HysteresisRegressor
         """
         rows: Any
-        rows, measured = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        rows, measured = _validated(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         record = self._record(rows, np.asarray(measured, dtype=np.float64))
         self.model_ = hyst.fit(record, model=self.model, optimizer=self.optimizer, seed=self.seed)
         if self.diagnose:
@@ -135,7 +138,7 @@ class HysteresisRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         y : ndarray of float64, shape (n,)
         """
         check_is_fitted(self)
-        rows = np.asarray(validate_data(self, X, dtype=np.float64, reset=False))
+        rows = np.asarray(_validated(self, X, dtype=np.float64, reset=False))
         if len(rows) == 1:
             # A record has a sample period, which one row has not: the row is repeated.
             return self.predict(np.repeat(rows, 2, axis=0))[:1]
