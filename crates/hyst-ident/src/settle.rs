@@ -335,7 +335,7 @@ mod tests {
             zeros: Vec::new(),
             squares: 100.0 * rmse * rmse,
             rows: 100,
-            grams: [].into(),
+            shares: [].into(),
             solution: DVector::zeros(0),
             bounds: Vec::new(),
             penalty: DMatrix::zeros(0, 0),

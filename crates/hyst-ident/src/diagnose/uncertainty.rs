@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::criteria::{MIN_STD_ERRORS, MINOR_SHARE};
-use crate::lsq::Gram;
+use crate::lsq::Share;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted};
 
@@ -73,8 +73,8 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
 /// alone determines. Parameters at a bound are held there and get none. `start_s` is the clock at the record's first row \[s\].
 pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f64> {
     let mut errors = BTreeMap::new();
-    let Some(columns) = fit.grams.first().map(|g| g.matrix.ncols()) else { return errors };
-    let total = Gram::sum(columns, fit.grams.iter());
+    let Some(columns) = fit.shares.first().map(Share::columns) else { return errors };
+    let total = Share::sum(columns, fit.shares.iter());
     let n = total.unknowns();
     let z = &fit.solution;
     let free: Vec<usize> = (0..n)
@@ -91,8 +91,8 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     });
     let Some(whole) = h.clone().cholesky() else { return errors };
     let mut covariance = DMatrix::zeros(free.len(), free.len());
-    for gram in fit.grams.iter() {
-        let full = gram.score(z);
+    for share in fit.shares.iter() {
+        let (full, gram) = (share.score(z), share.gram());
         let score = DVector::from_fn(free.len(), |r, _| full[free[r]] / scale[r]);
         let others = DMatrix::from_fn(free.len(), free.len(), |r, c| {
             h[(r, c)] - gram.matrix[(free[r], free[c])] / (scale[r] * scale[c])
@@ -101,7 +101,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         let moved = others.cholesky().unwrap_or_else(|| whole.clone()).solve(&score);
         covariance.ger(1.0, &moved, &moved, 1.0);
     }
-    let blocks = fit.grams.len() as f64;
+    let blocks = fit.shares.len() as f64;
     covariance *= (blocks - 1.0) / blocks;
     let covariance_of = |a: usize, b: usize| {
         let place = |unknown: usize| free.iter().position(|i| *i == unknown);

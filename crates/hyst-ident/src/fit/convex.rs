@@ -6,7 +6,7 @@ use super::{
 };
 use crate::base::{Drag, SlidingPlays};
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
-use crate::lsq::{Blocks, Gram};
+use crate::lsq::{Blocks, Gram, Share};
 use crate::model::{Base, Kind, Model, ZERO};
 use crate::nested::Fitted;
 use crate::record::Record;
@@ -97,7 +97,7 @@ fn noise(samples: &Samples, left: &[f64]) -> Noise {
 }
 
 fn total(fitted: &Fitted) -> Gram {
-    Gram::sum(fitted.grams.first().map_or(1, |g| g.matrix.ncols()), fitted.grams.iter())
+    Share::sum(fitted.shares.first().map_or(1, Share::columns), fitted.shares.iter())
 }
 
 #[cfg(test)]

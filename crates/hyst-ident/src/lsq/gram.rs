@@ -4,6 +4,7 @@
 //! fit to any union of blocks and its error on the others cost no further pass over the record: that
 //! is what makes cross-validation and block-wise standard errors cheap.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -95,11 +96,6 @@ impl Gram {
         Self { matrix: own_products(rows), rows: rows.nrows() }
     }
 
-    /// Of each of these blocks of rows.
-    pub(crate) fn of_each(blocks: &[DMatrix<f64>]) -> Vec<Self> {
-        blocks.iter().map(Self::of).collect()
-    }
-
     /// Of all of these blocks of rows, which are `columns` wide.
     pub(crate) fn of_all(blocks: &[DMatrix<f64>], columns: usize) -> Self {
         let mut total = Self::zeros(columns);
@@ -136,6 +132,89 @@ impl Gram {
         let n = self.unknowns();
         self.matrix.view((0, n), (n, 1)).column(0) - self.matrix.view((0, 0), (n, n)) * z
     }
+}
+
+/// What one block adds to the normal equations: its rows, or their products where those are fewer numbers.
+///
+/// A block of 25 rows of a base with 250 columns is a tenth of its products, and a diagnosis holds some dozen fits of a hundred blocks.
+#[derive(Clone, Debug)]
+pub(crate) enum Share {
+    /// The target is the last column.
+    Rows(DMatrix<f64>),
+    Products(Gram),
+}
+
+impl Share {
+    /// Of these rows.
+    pub(crate) fn of(rows: DMatrix<f64>) -> Self {
+        if rows.nrows() < rows.ncols() { Self::Rows(rows) } else { Self::Products(Gram::of(&rows)) }
+    }
+
+    pub(crate) fn columns(&self) -> usize {
+        match self {
+            Self::Rows(rows) => rows.ncols(),
+            Self::Products(gram) => gram.matrix.ncols(),
+        }
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        match self {
+            Self::Rows(rows) => rows.nrows(),
+            Self::Products(gram) => gram.rows,
+        }
+    }
+
+    /// The products `XᵀX`.
+    pub(crate) fn gram(&self) -> Cow<'_, Gram> {
+        match self {
+            Self::Rows(rows) => Cow::Owned(Gram::of(rows)),
+            Self::Products(gram) => Cow::Borrowed(gram),
+        }
+    }
+
+    /// The products of all of these, which are `columns` wide.
+    pub(crate) fn sum<'a>(columns: usize, shares: impl Iterator<Item = &'a Self>) -> Gram {
+        let mut total = Gram::zeros(columns);
+        let mut blocks = Vec::new();
+        for share in shares {
+            match share {
+                Self::Rows(rows) => blocks.push(rows),
+                Self::Products(gram) => total.add(gram),
+            }
+        }
+        // One product of many rows costs less than many of few.
+        let mut rows = DMatrix::zeros(blocks.iter().map(|block| block.nrows()).sum(), columns);
+        let mut next = 0;
+        for block in blocks {
+            rows.rows_mut(next, block.nrows()).copy_from(block);
+            next += block.nrows();
+        }
+        if next > 0 {
+            total.add(&Gram::of(&rows));
+        }
+        total
+    }
+
+    /// Σ (y − X z)² over the rows.
+    pub(crate) fn error(&self, z: &DVector<f64>) -> f64 {
+        match self {
+            Self::Rows(rows) => residual(rows, z).norm_squared(),
+            Self::Products(gram) => gram.error(z),
+        }
+    }
+
+    /// Xᵀ(y − X z): the gradient that these rows contribute.
+    pub(crate) fn score(&self, z: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Rows(rows) => rows.columns(0, z.len()).tr_mul(&residual(rows, z)),
+            Self::Products(gram) => gram.score(z),
+        }
+    }
+}
+
+/// y − X z, y being the last column.
+fn residual(rows: &DMatrix<f64>, z: &DVector<f64>) -> DVector<f64> {
+    rows.column(z.len()) - rows.columns(0, z.len()) * z
 }
 
 /// What further columns add to the normal equations of others: their products with those, and with each other.
@@ -185,6 +264,18 @@ mod tests {
     fn products_by_strips_are_those_of_the_whole() {
         let x = DMatrix::from_fn(70, 2 * STRIP + 5, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
         assert!((own_products(&x) - x.transpose() * &x).amax() < 1e-12);
+    }
+
+    #[test]
+    fn rows_and_their_products_say_the_same() {
+        let x = DMatrix::from_fn(9, 12, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
+        let z = DVector::from_fn(11, |i, _| (i as f64).sin());
+        let (rows, products) = (Share::of(x.clone()), Share::Products(Gram::of(&x)));
+        assert!(matches!(rows, Share::Rows(_)) && matches!(Share::of(x.rows(0, 9).transpose()), Share::Products(_)));
+        assert_eq!((rows.columns(), rows.rows()), (products.columns(), products.rows()));
+        assert_eq!(rows.gram().matrix, products.gram().matrix);
+        assert!((rows.error(&z) - products.error(&z)).abs() < 1e-12 * products.error(&z));
+        assert!((rows.score(&z) - products.score(&z)).amax() < 1e-12);
     }
 
     #[test]

@@ -4,6 +4,6 @@ mod gram;
 mod ordered;
 mod quadratic;
 
-pub(crate) use gram::{Blocks, Bordered, Gram};
+pub(crate) use gram::{Blocks, Bordered, Gram, Share};
 pub(crate) use ordered::{Order, nearest_ordered};
 pub(crate) use quadratic::{Bounds, held, solve, solve_near};

@@ -13,7 +13,7 @@ use super::cross_validation::{cross_validate, folds_by_experiment, folds_interle
 use super::{Cause, Hypothesis, Layout, Projector, SignalPath, owed};
 use crate::Samples;
 use crate::base::{Basis, Drag};
-use crate::lsq::{Blocks, Bordered, Bounds, Gram, held, solve_near};
+use crate::lsq::{Blocks, Bordered, Bounds, Gram, Share, held, solve_near};
 use crate::memory;
 use crate::model::Effect;
 use crate::repetition::only_loop;
@@ -63,9 +63,9 @@ pub(crate) struct Fitted {
     /// Σ residual² over the rows that count.
     pub(crate) squares: f64,
     pub(crate) rows: usize,
-    /// Normal equations of each block at the solution. Columns: the linear unknowns in the order of their
+    /// What each block adds to the normal equations at the solution. Columns: the linear unknowns in the order of their
     /// [`Layout`], change of every nonlinear parameter, and the measured output. Most of the memory of a fit, so its copies share them.
-    pub(crate) grams: Arc<[Gram]>,
+    pub(crate) shares: Arc<[Share]>,
     pub(crate) solution: DVector<f64>,
     pub(crate) bounds: Vec<Bounds>,
     /// Penalty of the same unknowns.
@@ -157,11 +157,9 @@ impl<'a> Problem<'a> {
         base.map_or_else(
             || vec![false; self.blocks.rows.len()],
             |base| {
-                unpredictable(
-                    &Gram::of_each(&base.blocks),
-                    &self.penalty(&Hypothesis::default(), &base.total, base.solution.len()),
-                    folds,
-                )
+                let penalty = self.penalty(&Hypothesis::default(), &base.total, base.solution.len());
+                let shares: Vec<Share> = base.blocks.into_iter().map(Share::of).collect();
+                unpredictable(&shares, &penalty, folds)
             },
         )
     }
@@ -336,14 +334,16 @@ impl<'a> Problem<'a> {
     }
 
     /// The same of each block.
-    fn grams(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Arc<[Gram]> {
+    fn shares(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Arc<[Share]> {
         let jacobian: Vec<DMatrix<f64>> = self.in_blocks(jacobian).collect();
         let of = |(x, j): (&DMatrix<f64>, &DMatrix<f64>)| {
-            let mut bordered = Bordered::zeros(x.ncols(), j.ncols());
-            bordered.add(x, j);
-            bordered.around(&Gram::of(x))
+            // The target stays the last column.
+            let (linear, further) = (x.ncols() - 1, j.ncols());
+            let mut rows = x.clone().insert_columns(linear, further, 0.0);
+            rows.columns_mut(linear, further).copy_from(j);
+            Share::of(rows)
         };
-        assembly.blocks.par_iter().zip(&jacobian).map(of).collect()
+        assembly.blocks.par_iter().zip(&jacobian).map(of).collect::<Vec<_>>().into()
     }
 
     /// Columns over the rows that count, cut into blocks.
@@ -471,7 +471,7 @@ impl<'a> Problem<'a> {
             squares: at.total.error(&at.solution),
             rows: at.total.rows,
             solution: at.solution.clone().resize_vertically(unknowns, 0.0),
-            grams: self.grams(at, jacobian),
+            shares: self.shares(at, jacobian),
             bounds,
             penalty,
         }
