@@ -58,7 +58,7 @@ class Narx:
 
     @staticmethod
     def inputs(u):
-        # The present input is that of the row before for a model without feedthrough.
+        # Row k holds the input of row k + 1: with a lag of one row that is the present input.
         now = np.append(u[1:], u[-1])
         return np.column_stack([now, np.sign(np.diff(now, prepend=now[0]))])
 
@@ -67,7 +67,7 @@ class Narx:
         self.model.fit(X=self.inputs(u), y=y.reshape(-1, 1))
 
     def simulate(self, period, u):
-        start = np.full((max(self.lags, 1), 1), self.first)
+        start = np.full((self.lags, 1), self.first)
         return self.model.predict(X=self.inputs(u), y=np.vstack([start, np.zeros((len(u) - len(start), 1))])).ravel()
 
 
@@ -166,7 +166,7 @@ CONTENDERS = {
 
 
 def rmse(measured, predicted):
-    """Root mean square of the residual without its mean; infinite if the simulation diverges."""
+    """Root mean square of the residual without its mean [its unit]; infinite if the simulation diverges."""
     residual = measured - predicted
     return float(np.std(residual)) if np.isfinite(residual).all() else float("inf")
 
