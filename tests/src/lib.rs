@@ -10,6 +10,7 @@ pub mod force_ranking;
 pub mod force_study;
 pub mod fuzz;
 pub mod logs;
+pub mod other_bench;
 pub mod other_physics;
 pub mod served;
 

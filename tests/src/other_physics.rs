@@ -34,35 +34,24 @@ impl Law {
 
     /// The memory's output for a drive between −1 and 1, passed from −1 on.
     fn follow(self, x: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let mut memory = self.memory(rng);
+        x.iter().map(|x| memory(*x)).collect()
+    }
+
+    /// The memory, which takes the drive between −1 and 1 value by value, from −1 on, and gives its output.
+    pub fn memory(self, rng: &mut ChaCha8Rng) -> Box<dyn FnMut(f64) -> f64 + Send> {
         let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
-        let small_steps = |mut rate: Box<dyn FnMut(f64, f64, f64) -> f64>, start: f64| -> Vec<f64> {
-            // As many as a stair needs, too: a law is stiff where its loop is narrow.
-            const FEWEST: f64 = 12.0;
-            const LARGEST: f64 = 0.002;
-            let (mut z, mut from) = (start, -1.0);
-            let follow = |to: &f64| {
-                let steps = ((to - from).abs() / LARGEST).ceil().max(FEWEST);
-                let step = (to - from) / steps;
-                for i in 0..steps as u32 {
-                    z += rate(from + step * (f64::from(i) + 0.5), z, step);
-                }
-                from = *to;
-                z
-            };
-            x.iter().map(follow).collect()
-        };
         match self {
             Self::Plays => {
                 let elements: Vec<(f64, f64)> = (0..14).map(|_| (draw(0.01, 0.8), draw(0.0, 1.0) / 7.0)).collect();
                 let mut at = vec![-1.0_f64; elements.len()];
-                let pass = |x: &f64| {
+                Box::new(move |x| {
                     let moved = at.iter_mut().zip(&elements).map(|(p, (r, w))| {
                         *p = f64::clamp(*p, x - r, x + r);
                         w * *p
                     });
                     moved.sum()
-                };
-                x.iter().map(pass).collect()
+                })
             }
             Self::Relays | Self::Ramps => {
                 let width = if self == Self::Ramps { draw(0.1, 0.3) } else { 0.0 };
@@ -74,22 +63,21 @@ impl Law {
                     })
                     .collect();
                 let mut at = vec![-1.0; relays.len()];
-                let ramp = |x: f64| match width > 0.0 {
+                let ramp = move |x: f64| match width > 0.0 {
                     true => (2.0 * x / width).clamp(-1.0, 1.0),
                     false => 1f64.copysign(x),
                 };
-                let pass = |x: &f64| {
+                Box::new(move |x| {
                     let moved = at.iter_mut().zip(&relays).map(|(s, (down, up))| {
                         *s = f64::max(*s, ramp(x - up)).min(f64::max(ramp(x - up), ramp(x - down)));
                         *s
                     });
                     moved.sum::<f64>() / count as f64
-                };
-                x.iter().map(pass).collect()
+                })
             }
             Self::ColemanHodgdon => {
                 let (a, b, c) = (draw(1.0, 4.0), draw(0.8, 1.2), draw(0.2, 0.5));
-                small_steps(Box::new(move |x, z, dx| a * dx.abs() * (b * x - z) + c * dx), -b)
+                small_steps(move |x, z, dx| a * dx.abs() * (b * x - z) + c * dx, -b)
             }
             Self::BoucWen => {
                 let (n, closing, scale) = (draw(1.0, 2.0), draw(0.1, 0.6), draw(0.15, 0.5));
@@ -98,8 +86,8 @@ impl Law {
                     let share = if dx * z > 0.0 { 1.0 } else { closing };
                     dx * (1.0 - share * (z.abs() / scale).powf(n))
                 };
-                let z = small_steps(Box::new(law), 0.0);
-                x.iter().zip(z).map(|(x, z)| x - z).collect()
+                let mut force = small_steps(law, 0.0);
+                Box::new(move |x| x - force(x))
             }
             Self::JilesAtherton => {
                 let (k, a, c) = (draw(0.1, 0.3), draw(0.2, 0.5), draw(0.05, 0.3));
@@ -112,25 +100,47 @@ impl Law {
                     let reversible = c * (flat(x + 1e-5) - flat(x - 1e-5)) / 2e-5;
                     ((1.0 - c) * slope + reversible) * dx
                 };
-                small_steps(Box::new(law), -0.5)
+                small_steps(law, -0.5)
             }
             Self::Dahl => {
                 // Subtracted, too, from a line that is nowhere less steep.
-                let (mut total, mut steepest) = (vec![0.0; x.len()], 0.0);
+                let (mut elements, mut steepest) = (Vec::new(), 0.0);
                 for _ in 0..3 {
                     let (reach, n, weight) = (draw(0.2, 0.9), draw(0.6, 1.4), draw(0.1, 0.4));
                     let law = move |_: f64, f: f64, dx: f64| {
                         let left = 1.0 - f * dx.signum();
                         dx / reach * left.abs().powf(n).copysign(left)
                     };
-                    let part = small_steps(Box::new(law), -1.0);
-                    total.iter_mut().zip(part).for_each(|(sum, f)| *sum += weight * f.clamp(-1.5, 1.5));
+                    elements.push((weight, small_steps(law, -1.0)));
                     steepest += weight * 2_f64.powf(n) / reach;
                 }
-                x.iter().zip(total).map(|(x, f)| x - f / steepest).collect()
+                Box::new(move |x| {
+                    let total = elements.iter_mut().fold(0.0, |sum, (weight, f)| sum + *weight * f(x).clamp(-1.5, 1.5));
+                    x - total / steepest
+                })
             }
         }
     }
+}
+
+/// A law dz = rate(x, z, dx), integrated from x = −1 and z = `start` on in steps that are as small as a stair needs, too: a law is stiff where its
+/// loop is narrow.
+fn small_steps(
+    rate: impl Fn(f64, f64, f64) -> f64 + Send + 'static,
+    start: f64,
+) -> Box<dyn FnMut(f64) -> f64 + Send> {
+    const FEWEST: f64 = 12.0;
+    const LARGEST: f64 = 0.002;
+    let (mut z, mut from) = (start, -1.0_f64);
+    Box::new(move |to| {
+        let steps = ((to - from).abs() / LARGEST).ceil().max(FEWEST);
+        let step = (to - from) / steps;
+        for i in 0..steps as u32 {
+            z += rate(from + step * (f64::from(i) + 0.5), z, step);
+        }
+        from = to;
+        z
+    })
 }
 
 /// An actuator with its effects, and what it is fitted with.

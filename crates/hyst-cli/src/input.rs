@@ -172,7 +172,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     if let Some(longest) = frozen.iter().max_by_key(|run| run.rows) {
         let rows = frozen.iter().map(|run| run.rows).sum();
         odd.push(format!(
-            "the sensor repeats one value: {}, the most from row {} at {} s ({} of {} {unit}). These rows are not fitted. Look for dropouts or a stopped data stream",
+            "the sensor repeats one value: {}, the most from row {} at {} s ({} of {} {unit}). A fit leaves these rows out. Look for dropouts or a stopped data stream",
             text::count(rows, "row"),
             longest.first + 1,
             text::short(record.time()[longest.first]),
@@ -193,7 +193,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
         let more = intervals.len().saturating_sub(MAX_INTERVALS);
         let more = if more > 0 { format!(" and {more} more intervals") } else { String::new() };
         odd.push(format!(
-            "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). These rows are not fitted. Lower the drive or widen the range to see them",
+            "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). A fit leaves these rows out. Lower the drive or widen the range to see them",
             text::short(end.at),
             text::count(rows, "row"),
             shown.join(", ")

@@ -124,6 +124,8 @@ pub enum CompensateError {
     Inverse(#[from] hyst_core::Error),
 }
 
+/// How far beyond the range of the drive an unlimited one may go, over that range.
+const FAR: f64 = 100.0;
 /// Margin on the reach, as a share of the stroke: noise and drift moved the record's own ends.
 const MARGIN: f64 = 0.01;
 
@@ -152,18 +154,8 @@ pub fn compensate(model: &Model, reference: &Record, options: &CompensateOptions
 
 /// The model driven as it would drive the actuator.
 fn missed(model: &Model, follower: &mut Follower, drive: &[f64]) -> Result<Missed, CompensateError> {
-    let period = follower.samples.period;
-    let chain = Box::new(model.without_sensor().build(period)?);
-    let mut state = Box::new(chain.state());
-    let mut residual = Vec::with_capacity(drive.len());
-    for segment in follower.samples.segments.clone() {
-        for row in segment.clone() {
-            let (env, u) = (follower.env(row, None), drive[row]);
-            let y =
-                if row == segment.start { chain.reset(&mut state, &env, u) } else { chain.step(&mut state, &env, u) };
-            residual.push(follower.samples.output[row] - y);
-        }
-    }
+    let predicted = follower.predicted(model, drive)?;
+    let residual: Vec<f64> = follower.samples.output.iter().zip(predicted).map(|(wanted, y)| wanted - y).collect();
     // A reference has no input of its own: start-ups are looked for along the drive.
     follower.samples.input = drive.to_vec();
     let settling = start_up_rows(&follower.samples, &residual);
@@ -251,6 +243,34 @@ impl Follower {
         self.fade = slew * self.samples.period;
         self.held = held;
         self
+    }
+
+    /// The drive of all rows for other values than the reference's, which may lie beyond its reach, without limits but those of the inverse
+    /// hysteresis.
+    pub(crate) fn along(mut self, values: &[f64]) -> Result<Vec<f64>, hyst_core::Error> {
+        let span = self.range.1 - self.range.0;
+        let (low, high) = (self.range.0 - FAR * span, self.range.1 + FAR * span);
+        self.limits = Limits::new(low, high, f64::INFINITY, &Sampling { period: self.samples.period })?;
+        self.samples.output = values.to_vec();
+        Ok(values.iter().map(|_| self.next(None).drive).collect())
+    }
+
+    /// What the model does with a drive, sensor effects left out.
+    pub(crate) fn predicted(&self, model: &Model, drive: &[f64]) -> Result<Vec<f64>, hyst_core::Error> {
+        let chain = Box::new(model.without_sensor().build(self.samples.period)?);
+        let mut state = Box::new(chain.state());
+        let mut outputs = Vec::with_capacity(drive.len());
+        for segment in &self.samples.segments {
+            for row in segment.clone() {
+                let (env, u) = (self.env(row, None), drive[row]);
+                outputs.push(if row == segment.start {
+                    chain.reset(&mut state, &env, u)
+                } else {
+                    chain.step(&mut state, &env, u)
+                });
+            }
+        }
+        Ok(outputs)
     }
 
     /// Segments of the reference.

@@ -3,7 +3,7 @@
 //! The way of a record: [`record::Record`] (read and checked) → [`fit::fit`] (a base model) →
 //! [`diagnose::diagnose`] (what the model lacks, named and added) → [`compensate::compensate`] (the
 //! drive that makes the actuator follow a reference). [`simulate::simulate`] says what a model
-//! predicts, [`excite`] designs the drive of an identification experiment.
+//! predicts, [`excite`] designs the drive of an identification experiment, [`learn`] improves the drive of a reference that repeats.
 //!
 //! Knows nothing of devices and terminals: progress is told to closures, results are returned.
 
@@ -26,6 +26,7 @@ pub mod force;
 pub mod frozen;
 pub mod full_memory;
 pub mod identify;
+pub mod learn;
 pub mod linear;
 mod loop_gains;
 mod lsq;

@@ -45,6 +45,8 @@ struct RecordSummary {
     sample_rate_hz: f64,
     seconds: f64,
     segments: usize,
+    /// Whether the times were uneven, and the values are interpolated at even ones; a note has the size of the jitter.
+    resampled: bool,
     /// Where the times come from.
     times: Option<String>,
     input: Option<String>,
@@ -160,6 +162,7 @@ fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
         sample_rate_hz: 1.0 / record.sample_period(),
         seconds: time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0),
         segments: record.segments().len(),
+        resampled: record.notes().iter().any(|note| note.contains("resampled to even steps")),
         times,
         input: (!record.input().is_empty()).then(|| record.input_column().to_owned()),
         output: record.output_unit().map(|unit| unit.column()),
@@ -232,6 +235,11 @@ fn picture(record: &Record) -> String {
     )
 }
 
+/// A resolution; of doubles it is often so small that zeros would have to be counted.
+fn resolution(step: f64) -> String {
+    if step > 0.0 && step < 1e-4 { format!("{step:.1e}") } else { text::short(step) }
+}
+
 impl Summary {
     fn text(&self) -> String {
         let mut lines = vec![format!("{}: {}", self.file, self.format), String::new()];
@@ -254,7 +262,7 @@ impl Summary {
                 c.role.unwrap_or("-"),
                 number(c.min),
                 number(c.max),
-                text::short(c.resolution),
+                resolution(c.resolution),
                 c.rows,
                 c.missing
             ));
@@ -268,11 +276,12 @@ impl Summary {
         lines.push(String::new());
         if let Some(record) = &self.record {
             lines.push(format!(
-                "record: {} over {} s in {}, {} samples per second",
+                "record: {} over {} s in {}, {} samples per second, times {}",
                 text::count(record.rows, "row"),
                 text::short(record.seconds),
                 text::count(record.segments, "segment"),
-                text::short(record.sample_rate_hz)
+                text::short(record.sample_rate_hz),
+                if record.resampled { "uneven (note below)" } else { "even to within their rounding" }
             ));
             let uses = [
                 ("times from", record.times.as_deref()),
@@ -294,7 +303,8 @@ impl Summary {
         }
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         match (self.warnings.as_slice(), &self.record) {
-            ([], Some(_)) => lines.push("warnings: none".to_owned()),
+            ([], Some(_)) if self.notes.is_empty() => lines.push("warnings: none".to_owned()),
+            ([], Some(_)) => lines.push("warnings: none besides the notes".to_owned()),
             (warnings, _) => lines.extend(warnings.iter().map(|what| format!("warning: {what}"))),
         }
         if !self.picture.is_empty() {

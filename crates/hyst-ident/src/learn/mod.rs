@@ -1,0 +1,438 @@
+//! Iterative learning control: the drive of a reference that repeats, improved by what was measured while it was played.
+//!
+//! What is learned is not the drive but the *learned reference* v, which the model's inverse turns into the drive (Moore 1993; Leang and
+//! Devasia 2006 for piezo actuators, where the inverse is a linear one). With a true model the output is v. So a pass that leaves the error
+//! e = r − y changes v by L e, where the filter L follows from what was measured:
+//!
+//! - D, the response of the output to a change of v, is 1 where the model is true. It is estimated from the first pass as a gain and a delay, and from
+//!   the changes of v and y between passes in narrow bands of frequency, with its variance s². Then L = D* / (|D|² + s²): the change with the least expected square
+//!   of the error that is left. A missing delay, a gain that is off or a mode that the model lacks is in D.
+//! - Each pass plays the reference several times. What differs between these plays does not repeat (noise, creep, drift); its power N in each
+//!   band limits what is learned of an error E: L (1 − 3 N / |E|²) E, and nothing where that is negative.
+//!
+//! The change starts from the best pass so far; after a pass that was worse it is half as large. It ends at the repeatability: the error
+//! that the same drive would have in another play.
+
+mod bands;
+mod inverse;
+mod rational;
+mod response;
+mod spectrum;
+
+use std::ops::Range;
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use crate::compensate::{CompensateError, CompensateOptions, Follower, compensate};
+use crate::model::Model;
+use crate::record::{Columns, Record};
+use bands::{Bands, Width};
+pub use inverse::LearnedDrive;
+use inverse::Inverse;
+use response::{Pair, Response};
+use spectrum::Spectrum;
+
+/// How long to learn.
+#[derive(Clone, Copy, Debug)]
+pub struct LearnOptions {
+    /// Limits of the drive.
+    pub compensate: CompensateOptions,
+    /// Passes after which it ends in any case, the one without anything learned included.
+    pub passes: usize,
+    /// Error at which it ends, over the repeatability.
+    pub floor: f64,
+}
+
+impl Default for LearnOptions {
+    fn default() -> Self {
+        Self { compensate: CompensateOptions::default(), passes: 8, floor: 1.1 }
+    }
+}
+
+/// What a pass left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Pass {
+    /// Root mean square of reference less output, over all plays \[output unit\].
+    pub rmse: f64,
+    /// The largest \[output unit\].
+    pub max_abs: f64,
+    /// Root mean square of the error's mean over the plays, noise taken away: what repeats, and can be learned \[output unit\].
+    pub repeating: f64,
+    /// Repeatability as known after this pass: root mean square of what differs from play to play \[output unit\].
+    pub repeatability: f64,
+    /// Rows at which a limit acted on the drive.
+    pub limited_rows: usize,
+}
+
+/// Why learning ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// The error is that of playing the same drive again.
+    AtFloor,
+    /// Two passes brought less than a twentieth.
+    NoGain,
+    /// Three passes in a row were worse than the best.
+    Worse,
+    /// As many passes as were asked for.
+    Passes,
+}
+
+/// Why a pass teaches nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    /// Plays have other lengths than the reference, or there are fewer than two.
+    #[error("a pass is at least two plays of {rows} rows each; there are {plays}, one of {other} rows")]
+    Plays {
+        /// Rows of the reference.
+        rows: usize,
+        /// Plays that were given.
+        plays: usize,
+        /// Rows of the first that is too short or too long, or of any.
+        other: usize,
+    },
+    /// A value is no number.
+    #[error("play {play}, row {row}: the output is no number; look at the sensor")]
+    NotFinite {
+        /// From 1.
+        play: usize,
+        /// From 1.
+        row: usize,
+    },
+    /// The output hardly follows, or moves the other way.
+    #[error(
+        "the output does not follow the reference (correlation {correlation:.2}, gain {gain:.2}): {advice}"
+    )]
+    NotFollowing {
+        /// Between learned reference and output.
+        correlation: f64,
+        /// Slope of the output over it.
+        gain: f64,
+        /// What to do.
+        advice: &'static str,
+    },
+}
+
+/// A correlation below which nothing can be learned: the change would have the wrong sign in too many frequencies.
+const LEAST_CORRELATION: f64 = 0.5;
+/// Error that is taken for noise, over N: of white noise one frequency in twenty has more.
+const NOISE: f64 = 3.0;
+/// A pass that brings less than this share twice ends it.
+const GAIN: f64 = 0.05;
+/// A pass is worse from this ratio to the best on; below that it is scatter.
+const WORSE: f64 = 1.05;
+/// How long the first and the last value are held at least \[s\].
+const HOLD_S: f64 = 0.05;
+/// How far the learned reference may leave the output's range, as a share of that.
+const BEYOND: f64 = 0.5;
+
+/// A pass as it is kept.
+struct Taken {
+    pass: Pass,
+    plays: f64,
+    drive: LearnedDrive,
+    /// v, its spectrum, and that of the mean output.
+    predicted: Vec<f64>,
+    input: Vec<Complex<f64>>,
+    output: Vec<Complex<f64>>,
+}
+
+/// Learns the drive of one reference.
+pub struct Learner<'a> {
+    model: &'a Model,
+    /// With the holds before and behind it.
+    reference: Record,
+    /// Rows of the reference that was given.
+    rows: Range<usize>,
+    options: LearnOptions,
+    inverse: Inverse,
+    spectrum: Spectrum,
+    bands: Bands,
+    wanted: Vec<Complex<f64>>,
+    /// Sum over passes of |difference between plays|², scaled to the power of one play, and of the number of differences.
+    scatter: Vec<f64>,
+    differences: f64,
+    /// Sum of squares of what differs, and its degrees of freedom.
+    squares: (f64, f64),
+    taken: Vec<Taken>,
+    best: usize,
+    /// Passes in a row that were worse than the best.
+    worse: u32,
+    predicted: Vec<f64>,
+    drive: LearnedDrive,
+}
+
+impl<'a> Learner<'a> {
+    /// Begins with the drive of the model's inverse.
+    ///
+    /// # Errors
+    /// As [`compensate`], and if the reference has more than one segment or fewer than 16 rows.
+    pub fn new(model: &'a Model, reference: &Record, options: LearnOptions) -> Result<Self, CompensateError> {
+        let plan = compensate(model, reference, &options.compensate)?;
+        let hold = (2 * plan.lead).max((HOLD_S / reference.sample_period()).round() as usize);
+        let given = reference.rows();
+        let reference = held(reference, hold)?;
+        let follower = Follower::new(model, &reference, &options.compensate)?;
+        let plan = compensate(model, &reference, &options.compensate)?;
+        let predicted = follower.predicted(model, &plan.voltage)?;
+        let spectrum = Spectrum::new(predicted.len());
+        let bands = Bands::new(spectrum.bins());
+        let limited = [plan.voltage_limited, plan.slew_limited].concat();
+        Ok(Self {
+            model,
+            rows: hold..hold + given,
+            options,
+            inverse: Inverse::new(model, &reference, options.compensate, &spectrum)?,
+            wanted: spectrum.of(reference.output().unwrap_or_default()),
+            reference,
+            scatter: vec![0.0; spectrum.bins()],
+            differences: 0.0,
+            squares: (0.0, 0.0),
+            spectrum,
+            bands,
+            taken: Vec::new(),
+            best: 0,
+            worse: 0,
+            predicted,
+            drive: LearnedDrive { voltage: plan.voltage, limited },
+        })
+    }
+
+    /// Rows of the drive at which the reference runs: before them its first value is held, so that a drive can begin before the output has to move, and
+    /// behind them its last one.
+    pub fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    /// The reference with these holds.
+    pub fn reference(&self) -> &Record {
+        &self.reference
+    }
+
+    /// The drive of the next pass.
+    pub fn drive(&self) -> &LearnedDrive {
+        &self.drive
+    }
+
+    /// The best pass so far, counted from 0: what it left, and its drive. None before the first one.
+    pub fn best(&self) -> Option<(usize, Pass, &LearnedDrive)> {
+        self.taken.get(self.best).map(|taken| (self.best, taken.pass, &taken.drive))
+    }
+
+    /// What the passes left, in order.
+    pub fn passes(&self) -> impl Iterator<Item = Pass> {
+        self.taken.iter().map(|taken| taken.pass)
+    }
+
+    /// The learned correction of the best pass, v − r at each row \[output unit\]: what the model had wrong.
+    pub fn correction(&self) -> Vec<f64> {
+        let wanted = self.reference.output().unwrap_or_default();
+        self.taken.get(self.best).map_or_else(Vec::new, |taken| {
+            taken.predicted.iter().zip(wanted).map(|(v, r)| v - r).collect()
+        })
+    }
+
+    /// Takes the outputs that were measured while [`drive`](Self::drive) was played, each at the rows of the reference, and makes the next drive.
+    /// Gives why it ended, if it did.
+    ///
+    /// # Errors
+    /// If the plays are not those of the reference, or the output does not follow it. Then nothing is learned, and the drive stays.
+    pub fn take(&mut self, plays: &[Vec<f64>]) -> Result<Option<Ended>, LearnError> {
+        self.check(plays)?;
+        let rows = self.predicted.len();
+        let mean: Vec<f64> = (0..rows).map(|k| plays.iter().map(|y| y[k]).sum::<f64>() / plays.len() as f64).collect();
+        if self.taken.is_empty() {
+            follows(&self.predicted, &mean)?;
+        }
+        self.compare(plays, &mean);
+        let output = self.spectrum.of(&mean);
+        let pass = self.judge(plays);
+        let input = self.spectrum.of(&self.predicted);
+        let plays = plays.len() as f64;
+        self.taken.push(Taken { pass, plays, drive: self.drive.clone(), predicted: self.predicted.clone(), input, output });
+        let last = self.taken.len() - 1;
+        let best = self.taken[self.best].pass.rmse;
+        self.worse = if pass.rmse > WORSE * best { self.worse + 1 } else { 0 };
+        if pass.rmse < best {
+            self.best = last;
+        }
+        let ended = self.ended(pass);
+        if ended.is_none() {
+            self.step();
+        }
+        Ok(ended)
+    }
+
+    fn check(&self, plays: &[Vec<f64>]) -> Result<(), LearnError> {
+        let rows = self.predicted.len();
+        let other = plays.iter().map(Vec::len).find(|len| *len != rows);
+        if plays.len() < 2 || other.is_some() {
+            return Err(LearnError::Plays { rows, plays: plays.len(), other: other.unwrap_or(rows) });
+        }
+        let bad = |y: &Vec<f64>| y.iter().position(|y| !y.is_finite());
+        match plays.iter().enumerate().find_map(|(play, y)| Some((play + 1, bad(y)? + 1))) {
+            Some((play, row)) => Err(LearnError::NotFinite { play, row }),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds what differs between the plays to what is known of it.
+    fn compare(&mut self, plays: &[Vec<f64>], mean: &[f64]) {
+        let freedom = plays.len() as f64 - 1.0;
+        for play in plays {
+            let off: Vec<f64> = play.iter().zip(mean).map(|(y, mean)| y - mean).collect();
+            self.squares.0 += off[self.rows.clone()].iter().map(|d| d * d).sum::<f64>();
+            let spectrum = self.spectrum.of(&off);
+            self.scatter.iter_mut().zip(spectrum).for_each(|(sum, d)| *sum += d.norm_sqr());
+        }
+        self.squares.1 += freedom * self.rows.len() as f64;
+        self.differences += freedom;
+    }
+
+    /// Power of one play's scatter at each frequency, smoothed over its band.
+    fn noise(&self) -> Vec<f64> {
+        let sums = self.bands.real_sums(Width::Medium, |bin| self.scatter[bin]);
+        let counts = self.bands.real_sums(Width::Medium, |_| self.differences);
+        let of = |bin: usize| {
+            let band = self.bands.of(bin);
+            // The mean is known from few plays: no less than the slowest frequencies say.
+            (sums[band] / counts[band].max(f64::MIN_POSITIVE)).max(if bin == 0 { self.scatter[0] / self.differences } else { 0.0 })
+        };
+        (0..self.scatter.len()).map(of).collect()
+    }
+
+    fn judge(&self, plays: &[Vec<f64>]) -> Pass {
+        let wanted = self.reference.output().unwrap_or_default();
+        let rows = self.rows.clone();
+        let errors = || plays.iter().flat_map(|y| y[rows.clone()].iter().zip(&wanted[rows.clone()]).map(|(y, r)| r - y));
+        let per_play = plays.len() as f64;
+        let mean = rows.clone().map(|k| plays.iter().map(|y| y[k]).sum::<f64>() / per_play - wanted[k]);
+        let repeating = mean.map(|e| e * e).sum::<f64>() / rows.len() as f64;
+        let scatter = self.squares.0 / self.squares.1;
+        Pass {
+            rmse: (errors().map(|e| e * e).sum::<f64>() / (per_play * rows.len() as f64)).sqrt(),
+            max_abs: errors().fold(0.0, |most, e| most.max(e.abs())),
+            repeating: (repeating - scatter / per_play).max(0.0).sqrt(),
+            repeatability: scatter.sqrt(),
+            limited_rows: self.drive.limited.len(),
+        }
+    }
+
+    fn ended(&self, pass: Pass) -> Option<Ended> {
+        let rmse = |back: usize| self.taken.len().checked_sub(back + 1).map(|k| self.taken[k].pass.rmse);
+        let best_of = |passes: Range<usize>| self.taken[passes].iter().map(|t| t.pass.rmse).fold(f64::INFINITY, f64::min);
+        let now = self.taken.len();
+        if pass.rmse <= self.options.floor * pass.repeatability {
+            Some(Ended::AtFloor)
+        } else if self.worse >= 3 {
+            Some(Ended::Worse)
+        } else if now > 3 && self.worse == 0 && rmse(2).is_some() && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 2) {
+            Some(Ended::NoGain)
+        } else if now >= self.options.passes {
+            Some(Ended::Passes)
+        } else {
+            None
+        }
+    }
+
+    /// The response, from the first pass and from the changes since.
+    fn response(&self, noise: &[f64]) -> Response {
+        let scaled = |factor: f64| noise.iter().map(|n| n * factor).collect::<Vec<f64>>();
+        let difference = |a: &[Complex<f64>], b: &[Complex<f64>]| -> Vec<Complex<f64>> {
+            a.iter().zip(b).map(|(a, b)| a - b).collect()
+        };
+        let changes: Vec<_> = self
+            .taken
+            .windows(2)
+            .map(|two| (difference(&two[1].input, &two[0].input), difference(&two[1].output, &two[0].output), 1.0 / two[0].plays + 1.0 / two[1].plays))
+            .collect();
+        let begun = &self.taken[0];
+        let first = (Pair { from: &begun.input, to: &begun.output }, scaled(1.0 / begun.plays));
+        let since = changes.iter().map(|(from, to, share)| (Pair { from, to }, scaled(*share)));
+        let pairs: Vec<_> = std::iter::once(first).chain(since).collect();
+        Response::of(&self.bands, &pairs, self.spectrum.length())
+    }
+
+    /// Makes the next learned reference and its drive.
+    fn step(&mut self) {
+        let noise = self.noise();
+        let response = self.response(&noise);
+        let best = &self.taken[self.best];
+        let trust = 0.5_f64.powi(self.worse as i32);
+        let change: Vec<Complex<f64>> = (0..noise.len())
+            .map(|bin| {
+                let error = self.wanted[bin] - best.output[bin];
+                let noise = noise[bin] / best.plays;
+                let sure = (1.0 - NOISE * noise / error.norm_sqr().max(f64::MIN_POSITIVE)).max(0.0);
+                error * response.step(bin, self.bands.of(bin)) * sure * trust
+            })
+            .collect();
+        let (low, high) = (self.model.output.low, self.model.output.high);
+        let beyond = BEYOND * (high - low);
+        let to: Vec<f64> = best
+            .predicted
+            .iter()
+            .zip(self.spectrum.back(change))
+            .map(|(v, change)| (v + change).clamp(low - beyond, high + beyond))
+            .collect();
+        // The inverse exists: the first drive was made with it.
+        let drive = self.inverse.changed(&self.reference, &best.drive.voltage, [&best.predicted, &to], &self.spectrum);
+        if let Ok(drive) = drive
+            && let Ok(predicted) = self.predict(&drive.voltage)
+        {
+            (self.predicted, self.drive) = (predicted, drive);
+        }
+    }
+
+    /// What the model says that a drive does.
+    fn predict(&self, drive: &[f64]) -> Result<Vec<f64>, CompensateError> {
+        let follower = Follower::new(self.model, &self.reference, &self.options.compensate)?;
+        Ok(follower.predicted(self.model, drive)?)
+    }
+}
+
+/// The reference with its first value held for `rows` rows before it, and its last one as long behind it.
+fn held(reference: &Record, rows: usize) -> Result<Record, CompensateError> {
+    let hold = |values: &[f64]| -> Vec<f64> {
+        let (first, last) = (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(0.0));
+        [&vec![first; rows], values, &vec![last; rows]].concat()
+    };
+    let period = reference.sample_period();
+    let start = reference.time().first().copied().unwrap_or(0.0) - rows as f64 * period;
+    let unit = reference.output_unit();
+    Ok(Record::from_samples(Columns {
+        name: reference.name(),
+        time: (0..reference.rows() + 2 * rows).map(|k| start + k as f64 * period).collect(),
+        output: unit.zip(reference.output().map(hold)),
+        temperature: reference.temperature().map(hold),
+        load: reference.load().map(hold),
+        ..Columns::default()
+    })?)
+}
+
+/// Whether the output moves as the learned reference asks.
+fn follows(wanted: &[f64], output: &[f64]) -> Result<(), LearnError> {
+    let n = wanted.len() as f64;
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (mean_v, mean_y) = (mean(wanted), mean(output));
+    let (mut own, mut cross, mut all) = (0.0, 0.0, 0.0);
+    for (v, y) in wanted.iter().zip(output) {
+        let (v, y) = (v - mean_v, y - mean_y);
+        own += v * v;
+        cross += v * y;
+        all += y * y;
+    }
+    let correlation = cross / (own * all).sqrt().max(f64::MIN_POSITIVE);
+    let gain = cross / own.max(f64::MIN_POSITIVE);
+    if correlation >= LEAST_CORRELATION {
+        return Ok(());
+    }
+    let advice = if correlation < -LEAST_CORRELATION {
+        "the model has the wrong sign for this actuator; fit one to a record of it"
+    } else {
+        "look at sensor and amplifier, and whether the model is of this actuator"
+    };
+    Err(LearnError::NotFollowing { correlation, gain, advice })
+}

@@ -1,0 +1,143 @@
+//! A rational response with a delay: what a mode, a lag or an amplifier that the model lacks makes of the learned reference.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Highest order that is tried: two modes.
+const MOST: usize = 4;
+/// Iterations of the weights (Sanathanan and Koerner 1963).
+const ITERATIONS: usize = 12;
+
+/// Equations of one pair of spectra: output, input, and the power of what the output has besides, at each frequency.
+pub(super) struct Equations<'a> {
+    pub(super) from: &'a [Complex<f64>],
+    pub(super) to: &'a [Complex<f64>],
+    pub(super) noise: &'a [f64],
+}
+
+/// D(z) = B(z) / A(z) · z^{−delay} with z = e^{jω}.
+#[derive(Clone, Debug)]
+pub(super) struct Rational {
+    numerator: Vec<f64>,
+    /// Behind the leading 1.
+    denominator: Vec<f64>,
+    /// \[samples\]
+    delay: f64,
+}
+
+impl Rational {
+    /// A gain and a delay.
+    pub(super) fn plain(gain: f64, delay: f64) -> Self {
+        Self { numerator: vec![gain], denominator: Vec::new(), delay }
+    }
+
+    /// The response at a frequency \[rad/sample\].
+    pub(super) fn at(&self, omega: f64) -> Complex<f64> {
+        let turned = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
+        let numerator: Complex<f64> = self.numerator.iter().enumerate().map(|(k, b)| turned(k) * *b).sum();
+        let denominator: Complex<f64> =
+            Complex::new(1.0, 0.0) + (1..).zip(&self.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
+        numerator / denominator * Complex::from_polar(1.0, -omega * self.delay)
+    }
+
+    /// The order whose parameters pay for themselves (Schwarz 1978), among a gain with the given delay and rational responses behind that delay.
+    pub(super) fn fit(all: &[Equations<'_>], length: usize, plain: &Self) -> Self {
+        let weighed = |r: &Self| -> f64 {
+            all.iter().map(|e| misfit(e, length, r).iter().zip(e.noise).map(|(m, n)| m / n).sum::<f64>()).sum()
+        };
+        let rows: usize = all.iter().map(|e| 2 * e.from.len()).sum();
+        // What is left is no white noise of a known power: its scale is that of the best.
+        let criterion = |left: f64, count: usize| rows as f64 * left.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln();
+        let (mut best, mut least) = (plain.clone(), criterion(weighed(plain), 2));
+        for order in [1, 2, MOST] {
+            if let Some(found) = Self::of_order(all, length, order, plain.delay) {
+                let found_criterion = criterion(weighed(&found), 2 * order + 2);
+                if found_criterion < least {
+                    (best, least) = (found, found_criterion);
+                }
+            }
+        }
+        best
+    }
+
+    /// Least squares of A Y − B V, weighted with the A of the iteration before.
+    fn of_order(all: &[Equations<'_>], length: usize, order: usize, delay: f64) -> Option<Self> {
+        let unknowns = 2 * order + 1;
+        let mut now = Self { numerator: vec![1.0], denominator: Vec::new(), delay };
+        for _ in 0..ITERATIONS {
+            let (mut normal, mut right) = (DMatrix::<f64>::zeros(unknowns, unknowns), DVector::<f64>::zeros(unknowns));
+            for e in all {
+                for bin in 1..e.from.len() {
+                    let omega = TAU * bin as f64 / length as f64;
+                    let turned = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
+                    let a: Complex<f64> = Complex::new(1.0, 0.0)
+                        + (1..).zip(&now.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
+                    let weight = 1.0 / (a.norm_sqr() * e.noise[bin]).max(f64::MIN_POSITIVE);
+                    let late = e.from[bin] * Complex::from_polar(1.0, -omega * delay);
+                    let row: Vec<Complex<f64>> =
+                        (0..=order).map(|k| late * turned(k)).chain((1..=order).map(|k| -e.to[bin] * turned(k))).collect();
+                    for (i, x) in row.iter().enumerate() {
+                        right[i] += weight * (x.conj() * e.to[bin]).re;
+                        for (j, z) in row.iter().enumerate().take(i + 1) {
+                            normal[(i, j)] += weight * (x.conj() * z).re;
+                        }
+                    }
+                }
+            }
+            normal.fill_upper_triangle_with_lower_triangle();
+            // Of very different sizes otherwise.
+            let scale = DVector::from_iterator(unknowns, (0..unknowns).map(|k| 1.0 / normal[(k, k)].max(f64::MIN_POSITIVE).sqrt()));
+            let scaled = DMatrix::from_fn(unknowns, unknowns, |i, j| {
+                normal[(i, j)] * scale[i] * scale[j] + if i == j { 1e-10 } else { 0.0 }
+            });
+            let solved = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+            if solved.iter().any(|x| !x.is_finite()) {
+                return None;
+            }
+            now.numerator = solved.rows(0, order + 1).iter().copied().collect();
+            now.denominator = solved.rows(order + 1, order).iter().copied().collect();
+        }
+        Some(now)
+    }
+}
+
+/// |Y − D V|² at each frequency.
+pub(super) fn misfit(e: &Equations<'_>, length: usize, response: &Rational) -> Vec<f64> {
+    (0..e.from.len())
+        .map(|bin| {
+            let omega = TAU * bin as f64 / length as f64;
+            if bin == 0 { 0.0 } else { (e.to[bin] - response.at(omega) * e.from[bin]).norm_sqr() }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mode_and_a_delay_are_found_in_noise() {
+        let length = 2000;
+        let truth = Rational { numerator: vec![0.03, 0.02, 0.0], denominator: vec![-1.90, 0.97], delay: 3.3 };
+        let omega = |bin: usize| TAU * bin as f64 / length as f64;
+        let mut seed = 1u64;
+        let mut noise = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        };
+        let from: Vec<Complex<f64>> =
+            (0..=1000).map(|bin| Complex::new(1.0 + noise(), noise()) * (100.0 / (1.0 + bin as f64))).collect();
+        let to: Vec<Complex<f64>> = (0..=1000)
+            .map(|bin| truth.at(omega(bin)) * from[bin] + Complex::new(noise(), noise()) * 0.01)
+            .collect();
+        let power = vec![1e-4 / 6.0; 1001];
+        let equations = [Equations { from: &from, to: &to, noise: &power }];
+        let found = Rational::fit(&equations, length, &Rational::plain(1.0, 3.3));
+        assert_eq!(found.denominator.len(), 2);
+        for bin in [5, 50, 80, 100, 150] {
+            let (a, b) = (truth.at(omega(bin)), found.at(omega(bin)));
+            assert!((a - b).norm() < 0.03 * a.norm(), "{bin}: {a} {b}");
+        }
+    }
+}
