@@ -95,14 +95,9 @@ impl OtherDevice {
         }
     }
 
-    /// Its sample rate \[Hz\].
-    pub fn rate(&self) -> f64 {
-        self.bench.rate_hz
-    }
-
-    /// Another play of the same noise-free actuator has other noise.
-    pub fn reseed(&mut self, seed: u64) {
-        self.rng = ChaCha8Rng::seed_from_u64(seed);
+    /// What it is.
+    pub fn bench(&self) -> Bench {
+        self.bench
     }
 
     fn sample(&mut self, volts: f64) -> Sample {
@@ -129,7 +124,8 @@ impl OtherDevice {
         for i in 1..=STEPS {
             let x = from + (to - from) * f64::from(i) / f64::from(STEPS);
             self.lagged = if lag_s > 0.0 { self.lagged + (x - self.lagged) * (h / lag_s) } else { x };
-            let moved = stroke_um * (self.shares.0 * self.lagged + self.shares.1 * (self.memory)(self.lagged)) - self.at_rest_um;
+            let moved = stroke_um * (self.shares.0 * self.lagged + self.shares.1 * (self.memory)(self.lagged))
+                - self.at_rest_um;
             let mut slow = 0.0;
             for (tau, state) in &mut self.creep {
                 *state += (moved - *state) * (h / *tau);

@@ -125,10 +125,7 @@ impl Law {
 
 /// A law dz = rate(x, z, dx), integrated from x = −1 and z = `start` on in steps that are as small as a stair needs, too: a law is stiff where its
 /// loop is narrow.
-fn small_steps(
-    rate: impl Fn(f64, f64, f64) -> f64 + Send + 'static,
-    start: f64,
-) -> Box<dyn FnMut(f64) -> f64 + Send> {
+fn small_steps(rate: impl Fn(f64, f64, f64) -> f64 + Send + 'static, start: f64) -> Box<dyn FnMut(f64) -> f64 + Send> {
     const FEWEST: f64 = 12.0;
     const LARGEST: f64 = 0.002;
     let (mut z, mut from) = (start, -1.0_f64);

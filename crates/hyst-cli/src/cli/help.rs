@@ -23,6 +23,12 @@ pub(super) const CLOSE_LOOP: &str = "\
 Example:
   hystctl close-loop --daq sim:plant.toml --out loop";
 
+pub(super) const LEARN: &str = "\
+Examples:
+  hystctl learn --daq sim:plant.toml --model extended.json --reference triangle:2,12,10,1 -o learned.csv
+  hystctl learn --daq serial:/dev/ttyACM0 --model extended.json --reference line.csv --max-error 2 --logs passes -o learned.csv
+  hystctl run --daq sim:plant.toml --drive learned.csv --record measured.csv";
+
 pub(super) const COMPARE: &str = "\
 Examples:
   hystctl compare train.csv --test test.csv

@@ -4,6 +4,7 @@ mod close_loop;
 mod compare;
 mod excite;
 mod help;
+mod learn;
 mod linear;
 mod search;
 mod values;
@@ -24,6 +25,7 @@ pub(crate) use close_loop::CloseLoopArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use excite::{Common, ExciteArgs, ExciteKind, PeakForm, SeparateArgs};
 use help::{COMPENSATE, DIAGNOSE, EXAMPLES, FIT, FLEET, PLANT, RECORDS, RUN, RUN_USAGE, SIMULATE};
+pub(crate) use learn::LearnArgs;
 pub(crate) use linear::{GainArgs, LoopArgs, ResponseArgs};
 pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, PidGains, VoltageLimits};
@@ -45,6 +47,7 @@ pub(crate) enum Command {
     Diagnose(DiagnoseArgs),
     Fleet(FleetArgs),
     CloseLoop(CloseLoopArgs),
+    Learn(LearnArgs),
     Compensate(CompensateArgs),
     Excite(ExciteArgs),
     Response(ResponseArgs),
@@ -553,7 +556,7 @@ impl Control {
 }
 
 /// What keeps a drive in bounds.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct LimitArgs {
     /// Lowest and highest voltage; if not given, those of the record that the model was fitted to
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
@@ -573,7 +576,7 @@ pub(crate) struct TemperatureArg {
     pub(crate) degc: Option<f64>,
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct MapArg {
     /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; a column without a name goes by its number, as time_s=1; may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
@@ -647,7 +650,7 @@ pub(crate) struct DevicesArgs {
     pub(crate) json: JsonArg,
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct JsonArg {
     /// Print the report as JSON to stdout
     #[arg(long)]

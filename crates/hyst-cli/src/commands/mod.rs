@@ -14,6 +14,7 @@ mod force;
 mod gain;
 mod hysteresis_loop;
 mod info;
+mod learn;
 mod log;
 mod plot;
 mod record;
@@ -40,6 +41,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Fleet(args) => fleet::run(&args),
         Command::CloseLoop(args) => close_loop::run(&args),
+        Command::Learn(args) => learn::run(&args),
         Command::Compensate(args) => compensate::run(&args),
         Command::Excite(args) => excite::run(&args),
         Command::Response(args) => response::run(&args),

@@ -4,6 +4,7 @@ mod beside;
 mod control;
 pub(super) mod gaps;
 mod guard;
+pub(super) mod interrupt;
 pub(super) mod job;
 mod live;
 mod lookout;

@@ -13,7 +13,7 @@ use crate::record::Record;
 
 /// Response below which the inverse does not grow any more: impulses at the corners of a reference that is much faster than a mode would take the
 /// hysteresis elsewhere.
-const LEAST_RESPONSE: f64 = 0.3;
+const LEAST_RESPONSE: f64 = 0.1;
 
 /// A drive, and the rows at which a limit acted.
 #[derive(Clone, Debug, Default, PartialEq)]

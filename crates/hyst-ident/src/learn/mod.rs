@@ -1,17 +1,17 @@
 //! Iterative learning control: the drive of a reference that repeats, improved by what was measured while it was played.
 //!
-//! What is learned is not the drive but the *learned reference* v, which the model's inverse turns into the drive (Moore 1993; Leang and
-//! Devasia 2006 for piezo actuators, where the inverse is a linear one). With a true model the output is v. So a pass that leaves the error
-//! e = r − y changes v by L e, where the filter L follows from what was measured:
+//! A pass plays a drive u; the model predicts the output v, and y is measured. The error e = r − y is to vanish, so the predicted output has to change by L e,
+//! and the model's inverse turns that change into one of the drive (Moore 1993; Leang and Devasia 2006 for piezo actuators, with a linear inverse).
+//! The filter L follows from what was measured:
 //!
-//! - D, the response of the output to a change of v, is 1 where the model is true. It is estimated from the first pass as a gain and a delay, and from
-//!   the changes of v and y between passes in narrow bands of frequency, with its variance s². Then L = D* / (|D|² + s²): the change with the least expected square
-//!   of the error that is left. A missing delay, a gain that is off or a mode that the model lacks is in D.
-//! - Each pass plays the reference several times. What differs between these plays does not repeat (noise, creep, drift); its power N in each
+//! - D, the response of the measured output to a change of the predicted one, is 1 where the model is true. A gain or a delay that is off and a mode that the
+//!   model lacks are in D: it is estimated from the first pass and from the changes between passes as a rational response with a delay, and in
+//!   narrow bands of frequency, with its variance s². Then L = D* / (|D|² + s²), the change with the least expected square of the remaining error.
+//! - Each pass plays the drive several times. What differs between these plays does not repeat (noise, creep, drift); its power N in each
 //!   band limits what is learned of an error E: L (1 − 3 N / |E|²) E, and nothing where that is negative.
 //!
-//! The change starts from the best pass so far; after a pass that was worse it is half as large. It ends at the repeatability: the error
-//! that the same drive would have in another play.
+//! A change starts from the best pass so far; after a pass that was worse it is half as large. Learning ends at the repeatability: the error
+//! that the same drive has in another play.
 
 mod bands;
 mod inverse;
@@ -28,8 +28,8 @@ use crate::compensate::{CompensateError, CompensateOptions, Follower, compensate
 use crate::model::Model;
 use crate::record::{Columns, Record};
 use bands::{Bands, Width};
-pub use inverse::LearnedDrive;
 use inverse::Inverse;
+pub use inverse::LearnedDrive;
 use response::{Pair, Response};
 use spectrum::Spectrum;
 
@@ -71,7 +71,7 @@ pub struct Pass {
 pub enum Ended {
     /// The error is that of playing the same drive again.
     AtFloor,
-    /// Two passes brought less than a twentieth.
+    /// Two passes brought less than a twentieth, or three of which some were worse.
     NoGain,
     /// Three passes in a row were worse than the best.
     Worse,
@@ -102,9 +102,7 @@ pub enum LearnError {
         row: usize,
     },
     /// The output hardly follows, or moves the other way.
-    #[error(
-        "the output does not follow the reference (correlation {correlation:.2}, gain {gain:.2}): {advice}"
-    )]
+    #[error("the output does not follow the reference (correlation {correlation:.2}, gain {gain:.2}): {advice}")]
     NotFollowing {
         /// Between learned reference and output.
         correlation: f64,
@@ -226,12 +224,13 @@ impl<'a> Learner<'a> {
         self.taken.iter().map(|taken| taken.pass)
     }
 
-    /// The learned correction of the best pass, v − r at each row \[output unit\]: what the model had wrong.
+    /// The learned correction of the best pass, r − v at the rows of the drive \[output unit\]: reference less what the model says that the drive does, which is
+    /// what the model had wrong.
     pub fn correction(&self) -> Vec<f64> {
         let wanted = self.reference.output().unwrap_or_default();
-        self.taken.get(self.best).map_or_else(Vec::new, |taken| {
-            taken.predicted.iter().zip(wanted).map(|(v, r)| v - r).collect()
-        })
+        self.taken
+            .get(self.best)
+            .map_or_else(Vec::new, |taken| taken.predicted.iter().zip(wanted).map(|(v, r)| r - v).collect())
     }
 
     /// Takes the outputs that were measured while [`drive`](Self::drive) was played, each at the rows of the reference, and makes the next drive.
@@ -251,7 +250,14 @@ impl<'a> Learner<'a> {
         let pass = self.judge(plays);
         let input = self.spectrum.of(&self.predicted);
         let plays = plays.len() as f64;
-        self.taken.push(Taken { pass, plays, drive: self.drive.clone(), predicted: self.predicted.clone(), input, output });
+        self.taken.push(Taken {
+            pass,
+            plays,
+            drive: self.drive.clone(),
+            predicted: self.predicted.clone(),
+            input,
+            output,
+        });
         let last = self.taken.len() - 1;
         let best = self.taken[self.best].pass.rmse;
         self.worse = if pass.rmse > WORSE * best { self.worse + 1 } else { 0 };
@@ -298,7 +304,11 @@ impl<'a> Learner<'a> {
         let of = |bin: usize| {
             let band = self.bands.of(bin);
             // The mean is known from few plays: no less than the slowest frequencies say.
-            (sums[band] / counts[band].max(f64::MIN_POSITIVE)).max(if bin == 0 { self.scatter[0] / self.differences } else { 0.0 })
+            (sums[band] / counts[band].max(f64::MIN_POSITIVE)).max(if bin == 0 {
+                self.scatter[0] / self.differences
+            } else {
+                0.0
+            })
         };
         (0..self.scatter.len()).map(of).collect()
     }
@@ -306,7 +316,8 @@ impl<'a> Learner<'a> {
     fn judge(&self, plays: &[Vec<f64>]) -> Pass {
         let wanted = self.reference.output().unwrap_or_default();
         let rows = self.rows.clone();
-        let errors = || plays.iter().flat_map(|y| y[rows.clone()].iter().zip(&wanted[rows.clone()]).map(|(y, r)| r - y));
+        let errors =
+            || plays.iter().flat_map(|y| y[rows.clone()].iter().zip(&wanted[rows.clone()]).map(|(y, r)| r - y));
         let per_play = plays.len() as f64;
         let mean = rows.clone().map(|k| plays.iter().map(|y| y[k]).sum::<f64>() / per_play - wanted[k]);
         let repeating = mean.map(|e| e * e).sum::<f64>() / rows.len() as f64;
@@ -321,14 +332,16 @@ impl<'a> Learner<'a> {
     }
 
     fn ended(&self, pass: Pass) -> Option<Ended> {
-        let rmse = |back: usize| self.taken.len().checked_sub(back + 1).map(|k| self.taken[k].pass.rmse);
-        let best_of = |passes: Range<usize>| self.taken[passes].iter().map(|t| t.pass.rmse).fold(f64::INFINITY, f64::min);
+        let best_of =
+            |passes: Range<usize>| self.taken[passes].iter().map(|t| t.pass.rmse).fold(f64::INFINITY, f64::min);
         let now = self.taken.len();
         if pass.rmse <= self.options.floor * pass.repeatability {
             Some(Ended::AtFloor)
         } else if self.worse >= 3 {
             Some(Ended::Worse)
-        } else if now > 3 && self.worse == 0 && rmse(2).is_some() && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 2) {
+        } else if now > 3 && self.worse == 0 && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 2)
+            || now > 4 && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 3)
+        {
             Some(Ended::NoGain)
         } else if now >= self.options.passes {
             Some(Ended::Passes)
@@ -346,7 +359,13 @@ impl<'a> Learner<'a> {
         let changes: Vec<_> = self
             .taken
             .windows(2)
-            .map(|two| (difference(&two[1].input, &two[0].input), difference(&two[1].output, &two[0].output), 1.0 / two[0].plays + 1.0 / two[1].plays))
+            .map(|two| {
+                (
+                    difference(&two[1].input, &two[0].input),
+                    difference(&two[1].output, &two[0].output),
+                    1.0 / two[0].plays + 1.0 / two[1].plays,
+                )
+            })
             .collect();
         let begun = &self.taken[0];
         let first = (Pair { from: &begun.input, to: &begun.output }, scaled(1.0 / begun.plays));

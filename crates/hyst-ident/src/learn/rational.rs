@@ -48,7 +48,9 @@ impl Rational {
         };
         let rows: usize = all.iter().map(|e| 2 * e.from.len()).sum();
         // What is left is no white noise of a known power: its scale is that of the best.
-        let criterion = |left: f64, count: usize| rows as f64 * left.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln();
+        let criterion = |left: f64, count: usize| {
+            rows as f64 * left.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln()
+        };
         let (mut best, mut least) = (plain.clone(), criterion(weighed(plain), 2));
         for order in [1, 2, MOST] {
             if let Some(found) = Self::of_order(all, length, order, plain.delay) {
@@ -75,8 +77,10 @@ impl Rational {
                         + (1..).zip(&now.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
                     let weight = 1.0 / (a.norm_sqr() * e.noise[bin]).max(f64::MIN_POSITIVE);
                     let late = e.from[bin] * Complex::from_polar(1.0, -omega * delay);
-                    let row: Vec<Complex<f64>> =
-                        (0..=order).map(|k| late * turned(k)).chain((1..=order).map(|k| -e.to[bin] * turned(k))).collect();
+                    let row: Vec<Complex<f64>> = (0..=order)
+                        .map(|k| late * turned(k))
+                        .chain((1..=order).map(|k| -e.to[bin] * turned(k)))
+                        .collect();
                     for (i, x) in row.iter().enumerate() {
                         right[i] += weight * (x.conj() * e.to[bin]).re;
                         for (j, z) in row.iter().enumerate().take(i + 1) {
@@ -87,7 +91,10 @@ impl Rational {
             }
             normal.fill_upper_triangle_with_lower_triangle();
             // Of very different sizes otherwise.
-            let scale = DVector::from_iterator(unknowns, (0..unknowns).map(|k| 1.0 / normal[(k, k)].max(f64::MIN_POSITIVE).sqrt()));
+            let scale = DVector::from_iterator(
+                unknowns,
+                (0..unknowns).map(|k| 1.0 / normal[(k, k)].max(f64::MIN_POSITIVE).sqrt()),
+            );
             let scaled = DMatrix::from_fn(unknowns, unknowns, |i, j| {
                 normal[(i, j)] * scale[i] * scale[j] + if i == j { 1e-10 } else { 0.0 }
             });
@@ -128,9 +135,8 @@ mod tests {
         };
         let from: Vec<Complex<f64>> =
             (0..=1000).map(|bin| Complex::new(1.0 + noise(), noise()) * (100.0 / (1.0 + bin as f64))).collect();
-        let to: Vec<Complex<f64>> = (0..=1000)
-            .map(|bin| truth.at(omega(bin)) * from[bin] + Complex::new(noise(), noise()) * 0.01)
-            .collect();
+        let to: Vec<Complex<f64>> =
+            (0..=1000).map(|bin| truth.at(omega(bin)) * from[bin] + Complex::new(noise(), noise()) * 0.01).collect();
         let power = vec![1e-4 / 6.0; 1001];
         let equations = [Equations { from: &from, to: &to, noise: &power }];
         let found = Rational::fit(&equations, length, &Rational::plain(1.0, 3.3));

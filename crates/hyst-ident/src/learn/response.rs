@@ -38,7 +38,9 @@ impl Response {
     /// that what each band says itself. `noise` is the power of what does not repeat in each pair, `length` the number of rows of which the spectra
     /// are.
     pub(super) fn of(bands: &Bands, pairs: &[(Pair<'_>, Vec<f64>)], length: usize) -> Self {
-        let Some((first, noise)) = pairs.first() else { return Self { gain: Vec::new(), variance: Vec::new(), mean: 1.0 } };
+        let Some((first, noise)) = pairs.first() else {
+            return Self { gain: Vec::new(), variance: Vec::new(), mean: 1.0 };
+        };
         let plain = gain_and_delay(bands, first, noise, length);
         let mut response = plain.clone();
         let powers = |response: &Rational| -> Vec<Vec<f64>> {
@@ -80,11 +82,12 @@ impl Response {
             least = least.min(*variance / size);
             *variance = least * size;
         }
-        if std::env::var("ONLY").is_ok() {
-            eprintln!("rational {response:?}");
-        }
         let known = Self { gain, variance, mean: 1.0 }.with(bands, first, &powers[0]);
-        let mut all = pairs.iter().zip(&powers).skip(1).fold(known, |known, ((change, _), power)| known.with(bands, change, power));
+        let mut all = pairs
+            .iter()
+            .zip(&powers)
+            .skip(1)
+            .fold(known, |known, ((change, _), power)| known.with(bands, change, power));
         // A mean is a hysteresis at rest: what is right over the whole travel is right for it.
         all.mean = plain.at(0.0).re;
         all

@@ -37,6 +37,7 @@ __all__ = [
     "force",
     "gain",
     "info",
+    "learn",
     "loop",
     "record",
     "response",
@@ -376,6 +377,52 @@ def run(
             content.pop("record", None)
         measured = _measured(path, record)
         return Run(_without(text, path if record is None else None), content, _columns(path), measured)
+
+
+def learn(
+    daq: Daq | str,
+    model: Model | _PathLike,
+    reference: ArrayLike | _AnyRecord,
+    *,
+    rate: float | None = None,
+    output: _PathLike | None = None,
+    output_column: str | None = None,
+    **options: Any,
+) -> Report:
+    """Improves the drive of a reference that repeats, pass by pass, by what is measured while it plays (``hystctl learn``).
+
+    ``columns`` of the report has the best drive (``voltage_v``) and the reference, which is held for a while before and behind; its rows ``passes`` have
+    RMSE and repeatability of each pass.
+
+    Parameters
+    ----------
+    daq : hyst.daq.Daq or str
+        As :func:`run` takes it.
+    model : Model or path
+        What makes the first drive.
+    reference : array, Record or path
+        Wanted output, one segment. An array needs ``rate`` [Hz] and, if it is not in the model's unit, ``output_column``.
+    output : path, optional
+        Where to write the drive.
+    **options
+        What ``hystctl learn --help`` lists: ``passes``, ``plays``, ``max_error``, ``limit=(low, high)``, ``slew``, ``logs``, ``extended``, …
+
+    Raises
+    ------
+    InputError
+        If something was refused; nothing has moved.
+    CommandError
+        If the output does not follow the reference, or a limit was broken. The best drive so far is in ``output``.
+    """
+    with _files() as files:
+        device, own = _device(daq)
+        path = Path(output) if output is not None else files.new("learned.csv")
+        column = output_column or (model.output_column if isinstance(model, Model) else "displacement_um")
+        options |= {"model": files.model(model), "reference": files.signal(reference, rate, column), "output": path}
+        text, content, _ = _call(["learn", *device, *_options(options)], own)
+        if output is None:
+            content.pop("output", None)
+        return Report(_without(text, path if output is None else None), content, _columns(path))
 
 
 def record(daq: Daq | str, seconds: float, *, output: _PathLike | None = None, **options: Any) -> Run:

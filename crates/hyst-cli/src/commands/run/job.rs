@@ -26,13 +26,13 @@ use crate::{input, recording, text};
 #[derive(Debug)]
 pub(in crate::commands) struct Job {
     /// Voltages of each segment \[V\].
-    pub(super) segments: Vec<Vec<f64>>,
+    pub(in crate::commands) segments: Vec<Vec<f64>>,
     /// How they are played.
-    pub(super) options: RecordOptions,
+    pub(in crate::commands) options: RecordOptions,
     /// What is followed, unless a drive is played as it stands.
-    pub(super) followed: Option<Followed>,
+    pub(in crate::commands) followed: Option<Followed>,
     /// Wanted output at each of the voltages, where there is one.
-    pub(super) wanted: Vec<Option<f64>>,
+    pub(in crate::commands) wanted: Vec<Option<f64>>,
     /// What the device is to follow references with: then the voltages above are references.
     pub(super) handed_over: Option<HandedOver>,
     /// Symbol of the output's unit.
@@ -91,17 +91,17 @@ impl HandedOver {
 
 /// A reference, and the model that computes its drive.
 #[derive(Debug)]
-pub(super) struct Followed {
-    pub(super) model: Model,
+pub(in crate::commands) struct Followed {
+    pub(in crate::commands) model: Model,
     /// The text of the model's file.
-    pub(super) json: String,
-    pub(super) reference: Record,
+    pub(in crate::commands) json: String,
+    pub(in crate::commands) reference: Record,
     /// What makes the drive.
     pub(super) control: Control,
     /// The drive as planned by the model's inverse, where that takes part.
     pub(super) drive: Option<Drive>,
     /// The drive as it is corrected on the way, where the model needs a temperature that the device measures.
-    pub(super) live: Option<Live>,
+    pub(in crate::commands) live: Option<Live>,
     /// The PID, where one takes part.
     pub(super) closed: Option<Closed>,
     /// How long the device is held at the first value of a segment \[s\].
@@ -135,7 +135,7 @@ impl Job {
     }
 
     /// How steep the device has to go \[V/s\].
-    pub(super) fn steepest(&self) -> f64 {
+    pub(in crate::commands) fn steepest(&self) -> f64 {
         if let Some(HandedOver { slew_v_per_s, .. }) = self.handed_over {
             return slew_v_per_s;
         }
@@ -145,7 +145,7 @@ impl Job {
     }
 
     /// What the model foresees to go wrong, if that is much.
-    pub(super) fn foreseen(&self) -> Option<String> {
+    pub(in crate::commands) fn foreseen(&self) -> Option<String> {
         let followed = self.followed.as_ref()?;
         let plan = self.handed_over.as_ref().and_then(|handed| handed.plan.as_ref());
         followed.foreseen(followed.drive.as_ref().or(plan)?)
@@ -247,7 +247,7 @@ const LIVE_BLOCK_S: f64 = 0.05;
 
 impl Job {
     /// Reads the files that `args` names and computes the drive for a device that can do `device`.
-    pub(super) fn read(args: &RunArgs, device: &Capabilities) -> CommandResult<Self> {
+    pub(in crate::commands) fn read(args: &RunArgs, device: &Capabilities) -> CommandResult<Self> {
         let limits = limits(args, device)?;
         thermometer(args.hottest, device)?;
         match (&args.model, &args.reference, &args.drive) {

@@ -7,7 +7,7 @@ use hyst_ident::record::Record;
 
 /// The drive of a model whose gain depends on a temperature that is only known while the device runs.
 #[derive(Debug)]
-pub(super) struct Live {
+pub(in crate::commands) struct Live {
     follower: Follower,
     drive: Drive,
 }

@@ -10,6 +10,7 @@ use hyst_hw::{Cause, Daq, Failure, Recording, Revision, record_with};
 use super::beside::Watched;
 use super::gaps::{GapFinder, Gaps};
 use super::guard::Guard;
+use super::interrupt::Interrupt;
 use super::job::Job;
 use super::lookout::Lookout;
 use super::view::View;
@@ -37,42 +38,12 @@ where
     D::Error: Classified,
 {
     let lent = host::stop();
-    let (stop, over) = (lent.clone().unwrap_or_default(), Arc::new(AtomicBool::new(false)));
-    let (asked, ended, warned) = (Arc::clone(&stop), Arc::clone(&over), AtomicBool::new(false));
-    let logged = Arc::new(AtomicBool::new(false));
-    let kept = {
-        let (path, logged, recorded) =
-            (log.as_ref().map(|log| log.path().to_owned()), Arc::clone(&logged), job.recorded);
-        move || match path.as_ref().filter(|_| logged.load(Ordering::Relaxed)) {
-            Some(path) => {
-                format!("; what was measured, but for the last half second, can be read in {}", path.display())
-            }
-            None if recorded => "; what was measured is lost: give --log, too, which is written as it comes".to_owned(),
-            None => String::new(),
-        }
-    };
-    let again = move || {
-        if ended.load(Ordering::Relaxed) {
-            // What was measured is being written: an impatient stop of the run is no wish to lose it.
-            if warned.swap(true, Ordering::Relaxed) {
-                say("error: left before all that was measured was written");
-                std::process::exit(i32::from(Exit::DeviceLost as u8));
-            }
-            say("note: what was measured is being written; once more, and it is left as it is");
-        } else if asked.swap(true, Ordering::Relaxed) {
-            // Who asks twice does not want to wait for a device that does not answer.
-            say(&format!(
-                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status){}",
-                kept()
-            ));
-            std::process::exit(i32::from(Exit::DeviceLost as u8));
-        }
-    };
+    let path = log.as_ref().map(|log| log.path().to_owned());
+    let interrupt = Interrupt::new(lent.clone().unwrap_or_default(), path, job.recorded);
+    let stop = Arc::clone(&interrupt.stop);
     // A host looks after Ctrl-C itself.
-    if lent.is_none()
-        && let Err(error) = ctrlc::set_handler(again)
-    {
-        say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
+    if lent.is_none() {
+        interrupt.watch();
     }
     let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
     let stream = job.live.map(|address| RunStream::at(address, job.symbol)).transpose();
@@ -112,14 +83,15 @@ where
     };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
         let on = lookout.take(news);
-        logged.store(lookout.log.as_ref().is_some_and(|log| log.samples() > 0), Ordering::Relaxed);
+        let has_logged = lookout.log.as_ref().is_some_and(|log| log.samples() > 0);
+        interrupt.logged.store(has_logged, Ordering::Relaxed);
         if saturated.load(Ordering::Relaxed) {
             lookout.end(Fault::Saturation);
         }
         let ended = lookout.fault.is_some() || lookout.view.interrupted() || stop.load(Ordering::Relaxed);
         if ended { ControlFlow::Break(()) } else { on }
     });
-    over.store(true, Ordering::Relaxed);
+    interrupt.over.store(true, Ordering::Relaxed);
     match &played {
         Err(Failure { not_stopped: Some(error), driven, .. }) => {
             let what = if *driven { "the device may still be driven" } else { "the device did not take the stop" };

@@ -1,0 +1,364 @@
+//! `learn`: the drive of a reference that repeats, improved pass by pass.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hyst_hw::{Daq, Recording};
+use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose_until};
+use hyst_ident::learn::{Ended, LearnOptions, Learner, Pass};
+use hyst_ident::model::Model;
+use hyst_ident::record::{Extra, OutputUnit, Record};
+use hyst_ident::simulate::Zero;
+use serde::Serialize;
+
+use super::compensate::options;
+use super::run::interrupt;
+use super::run::job::{Followed, Job};
+use super::run::play::{self, Played};
+use crate::cli::LearnArgs;
+use crate::device::{AnyDevice, Wishes};
+use crate::exit::{CommandError, CommandResult, Exit};
+use crate::log::{LoggedModel, RunInfo, RunLog};
+use crate::output::{self, Report, Target, say};
+use crate::progress::Progress;
+use crate::{host, input, recording, text};
+
+/// An effect that the passes show.
+#[derive(Debug, Serialize)]
+struct Found {
+    effect: &'static str,
+    probability: f64,
+}
+
+/// What is said about learning.
+#[derive(Debug, Serialize)]
+struct Summary {
+    device: String,
+    rate_hz: f64,
+    unit: &'static str,
+    plays: u32,
+    passes: Vec<Pass>,
+    /// The best pass, from 1.
+    best: usize,
+    ended: Ended,
+    /// Root mean square of what differs from play to play, as known after the first pass and after the last one \[output unit\].
+    repeatability_estimate: f64,
+    repeatability: f64,
+    /// By how much the error of the best pass is smaller than that of the first one.
+    improvement: f64,
+    /// Root mean square and largest value of the correction: what the model had wrong \[output unit\].
+    correction_rms: f64,
+    correction_max_abs: f64,
+    /// Effects that explain it; none where it was not looked for.
+    found: Option<Vec<Found>>,
+    output: String,
+    logs: Option<String>,
+    extended: Option<String>,
+    #[serde(skip)]
+    symbol: &'static str,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &LearnArgs) -> CommandResult {
+    let written: Vec<&Target> = std::iter::once(&args.output).chain(&args.extended).collect();
+    let read: Vec<&Path> =
+        args.daq.file().into_iter().chain([args.model.as_path(), args.reference.as_path()]).collect();
+    output::check(&read, &written)?;
+    if let Some(folder) = &args.logs
+        && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some())
+    {
+        let message = format!("{}: the folder is not empty; give another one with --logs", folder.display());
+        return Err(CommandError::bad_input(message));
+    }
+    let report = Report::new(args.json.json, &written)?;
+    let wishes = Wishes {
+        noise: args.seed,
+        voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
+        slew_v_per_s: args.limits.slew,
+        force: false,
+        silence_s: args.silence,
+        hottest_degc: args.hottest,
+        error: args.max_error,
+    };
+    let mut device = AnyDevice::open(&args.daq, &wishes)?;
+    let mut job = Job::read(&args.to_run(), device.capabilities())?;
+    let Some(followed) = job.followed.as_mut() else {
+        return Err(CommandError::bad_input("give --model and --reference"));
+    };
+    // The same drive in each play of a pass: a temperature that moves is one of the things that do not repeat.
+    followed.live = None;
+    let Followed { model, json, reference, .. } = &*followed;
+    let (model, json, reference) = (model.clone(), json.clone(), reference.clone());
+    let learner = learner(args, &model, &reference, device.capabilities())?;
+    if let Some(foreseen) = job.foreseen() {
+        say(&format!("note: {foreseen}"));
+    }
+    if let Some(folder) = &args.logs {
+        fs::create_dir_all(folder).map_err(|e| {
+            CommandError::failed(format!("{}: {e}; choose another folder with --logs", folder.display()))
+        })?;
+    }
+    if args.clear {
+        device.clear()?;
+    }
+    let mut passes = Passes { device, job, args, json: &json, model: &model, records: Vec::new(), rate_hz: 0.0 };
+    let (learner, ended) = passes.all(learner)?;
+    let Passes { device, records, rate_hz, .. } = passes;
+    let summary = finish(args, &model, &learner, ended, &records, (device.capabilities(), rate_hz))?;
+    report.print(&summary.text(), &summary)
+}
+
+fn learner<'a>(
+    args: &LearnArgs,
+    model: &'a Model,
+    reference: &Record,
+    device: &hyst_hw::Capabilities,
+) -> CommandResult<Learner<'a>> {
+    if reference.segments().len() > 1 {
+        return Err(CommandError::bad_input(format!(
+            "{}: the reference has {} segments; learn one after the other, each from a file of its own",
+            reference.name(),
+            reference.segments().len()
+        )));
+    }
+    let mut compensate = options(&args.limits);
+    let range = args.limits.limit.map_or((model.input.low, model.input.high), |limit| (limit.low, limit.high));
+    compensate.voltage = Some((range.0.max(device.voltage.min_v), range.1.min(device.voltage.max_v)));
+    compensate.slew = compensate.slew.min(device.max_slew_v_per_s);
+    compensate.temperature = input::temperature(args.temperature, model, reference).or(model
+        .effects
+        .temperature
+        .filter(|_| device.temperature)
+        .map(|gain| gain.reference_degc));
+    let options = LearnOptions { compensate, passes: args.passes as usize, ..LearnOptions::default() };
+    Ok(Learner::new(model, reference, options)?)
+}
+
+/// Passes on a device.
+struct Passes<'a> {
+    device: AnyDevice,
+    job: Job,
+    args: &'a LearnArgs,
+    model: &'a Model,
+    json: &'a str,
+    /// What the passes measured.
+    records: Vec<Record>,
+    rate_hz: f64,
+}
+
+impl<'a> Passes<'a> {
+    /// All passes. Whatever ends them, the best drive so far is kept.
+    fn all(&mut self, mut learner: Learner<'a>) -> CommandResult<(Learner<'a>, Ended)> {
+        let symbol = recording::unit(self.device.capabilities().output).symbol();
+        let mut number = 0;
+        loop {
+            number += 1;
+            let taken =
+                self.plays(&learner, number).and_then(|plays| learner.take(&plays).map_err(CommandError::failed));
+            let ended = match taken {
+                Ok(ended) => ended,
+                Err(error) => return Err(self.kept(&learner, error)),
+            };
+            if let Some(pass) = learner.passes().last() {
+                let times = text::short(pass.rmse / pass.repeatability.max(f64::MIN_POSITIVE));
+                let held = if pass.limited_rows == 0 {
+                    String::new()
+                } else {
+                    format!("; a limit held the drive in {}", text::count(pass.limited_rows, "row"))
+                };
+                say(&format!(
+                    "pass {number}: RMSE {} {symbol}, {times} times the repeatability of {} {symbol}{held}",
+                    text::short(pass.rmse),
+                    text::short(pass.repeatability)
+                ));
+            }
+            if let Some(ended) = ended {
+                return Ok((learner, ended));
+            }
+            if interrupt::asked() || host::stopping().is_stopped() {
+                let error = CommandError::failed("stopped on request; the device was brought to rest");
+                return Err(self.kept(&learner, error));
+            }
+        }
+    }
+
+    /// The error that ended it, once the best drive so far is written.
+    fn kept(&self, learner: &Learner<'_>, error: CommandError) -> CommandError {
+        let Some((best, pass, drive)) = learner.best() else { return error };
+        let extra = [Extra::numbers(&self.model.input.column, &drive.voltage)];
+        let written =
+            self.args.output.write(|out| learner.reference().write_with(out, &extra).map_err(output::io_error));
+        if written.is_ok() {
+            say(&format!(
+                "note: the best drive so far, of pass {}, RMSE {}, is kept in {}",
+                best + 1,
+                text::short(pass.rmse),
+                self.args.output
+            ));
+        }
+        error
+    }
+
+    /// One pass: the outputs of each play at the rows of the drive.
+    fn plays(&mut self, learner: &Learner<'_>, number: usize) -> CommandResult<Vec<Vec<f64>>> {
+        let plays = self.args.plays as usize;
+        let unit = recording::unit(self.device.capabilities().output);
+        self.job.segments = vec![learner.drive().voltage.clone(); plays];
+        let wanted: Vec<Option<f64>> =
+            learner.reference().output().unwrap_or_default().iter().copied().map(Some).collect();
+        self.job.wanted = wanted.repeat(plays);
+        let name = self.device.capabilities().device.clone();
+        let info = RunInfo {
+            device: &name,
+            output: unit,
+            sample_rate_hz: self.job.options.rate_hz,
+            model: Some(LoggedModel { model: self.model, json: self.json }),
+        };
+        let path = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}.mcap")));
+        let mut log = path
+            .map(|path| RunLog::create(&path, &info).map_err(|error| CommandError::new(Exit::Failed, error)))
+            .transpose()?;
+        self.device.gentle(self.job.steepest());
+        let played = play::play(&mut self.device, &mut self.job, log.as_mut());
+        let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
+        let Played { recording, error, .. } = played?;
+        if let Some(error) = error {
+            return Err(error);
+        }
+        closed?;
+        self.rate_hz = recording.rate_hz;
+        let outputs = recording.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect();
+        self.keep(recording, number, unit)?;
+        Ok(outputs)
+    }
+
+    fn keep(&mut self, recording: Recording, number: usize, unit: OutputUnit) -> CommandResult {
+        let record = recording::to_record(&recording::split(recording), &format!("pass {number}"), unit)?;
+        self.records.push(record);
+        Ok(())
+    }
+}
+
+/// Writes the drive, looks for what the model lacks, and sums up.
+fn finish(
+    args: &LearnArgs,
+    model: &Model,
+    learner: &Learner<'_>,
+    ended: Ended,
+    records: &[Record],
+    (device, rate_hz): (&hyst_hw::Capabilities, f64),
+) -> CommandResult<Summary> {
+    let passes: Vec<Pass> = learner.passes().collect();
+    let (Some((best, pass, drive)), Some(first), Some(last)) = (learner.best(), passes.first(), passes.last()) else {
+        return Err(CommandError::failed("no pass was played"));
+    };
+    let extra = [Extra::numbers(&model.input.column, &drive.voltage)];
+    args.output.write(|out| learner.reference().write_with(out, &extra).map_err(output::io_error))?;
+    let correction = learner.correction();
+    let found = diagnosed(args, model, records)?;
+    if let (Some(target), Some(found)) = (&args.extended, &found) {
+        target.write(|out| out.write_all(found.extended.to_json().as_bytes()))?;
+    }
+    let unit = recording::unit(device.output);
+    let named = |found: Diagnosis| -> Vec<Found> {
+        let effects = found.findings.effects.iter();
+        effects.map(|e| Found { effect: e.name.name(), probability: e.probability }).collect()
+    };
+    Ok(Summary {
+        device: device.device.clone(),
+        rate_hz,
+        unit: unit.suffix(),
+        plays: args.plays,
+        best: best + 1,
+        ended,
+        repeatability_estimate: first.repeatability,
+        repeatability: last.repeatability,
+        improvement: first.rmse / pass.rmse.max(f64::MIN_POSITIVE),
+        correction_rms: (correction.iter().map(|c| c * c).sum::<f64>() / correction.len().max(1) as f64).sqrt(),
+        correction_max_abs: correction.iter().fold(0.0, |most, c| most.max(c.abs())),
+        found: found.map(named),
+        output: args.output.to_string(),
+        logs: args.logs.as_ref().map(|folder: &PathBuf| folder.display().to_string()),
+        extended: args.extended.as_ref().map(ToString::to_string),
+        symbol: unit.symbol(),
+        passes,
+    })
+}
+
+/// What the model lacks on all passes together; none where a diagnosis cannot say.
+fn diagnosed(args: &LearnArgs, model: &Model, records: &[Record]) -> CommandResult<Option<Diagnosis>> {
+    if records.is_empty() {
+        return Ok(None);
+    }
+    let progress = Progress::spinner("what the model had wrong");
+    let joined = Record::join(records.to_vec())?;
+    let options = DiagnoseOptions { zero: Zero::PerRecord, seed: args.seed.unwrap_or(1) };
+    let told = |what: &str| progress.say(&format!("what the model had wrong: {what}"));
+    match diagnose_until(&joined, None, model, &options, &told, &host::stopping()) {
+        Ok(found) => Ok(Some(found)),
+        Err(error) => {
+            drop(progress);
+            say(&format!("note: what the model had wrong cannot be diagnosed on these passes: {error}"));
+            Ok(None)
+        }
+    }
+}
+
+impl Summary {
+    fn text(&self) -> String {
+        let (short, unit) = (text::short, self.symbol);
+        let mut rows = vec![
+            ["pass", &format!("RMSE [{unit}]"), "largest", "that repeats", "over repeatability"]
+                .map(str::to_owned)
+                .to_vec(),
+        ];
+        rows.extend(self.passes.iter().zip(1..).map(|(pass, number)| {
+            let mark = if number == self.best { " best" } else { "" };
+            vec![
+                format!("{number}{mark}"),
+                short(pass.rmse),
+                short(pass.max_abs),
+                short(pass.repeating),
+                short(pass.rmse / pass.repeatability.max(f64::MIN_POSITIVE)),
+            ]
+        }));
+        let why = match self.ended {
+            Ended::AtFloor => "the error is that of playing the same drive again",
+            Ended::NoGain => "the last passes brought less than 5 %",
+            Ended::Worse => {
+                "three passes in a row were worse than the best: the model is too far from this actuator; fit it anew, or add what diagnose finds"
+            }
+            Ended::Passes => "all passes are done; give more with --passes",
+        };
+        let mut lines = vec![
+            text::table(&rows),
+            format!("ended: {why}"),
+            format!(
+                "repeatability: {} {unit} (estimated at {} {unit} after the first pass); error {} times smaller than that of the model's inverse",
+                short(self.repeatability),
+                short(self.repeatability_estimate),
+                short(self.improvement)
+            ),
+            format!(
+                "correction: {} {unit} RMS, {} {unit} at most",
+                short(self.correction_rms),
+                short(self.correction_max_abs)
+            ),
+        ];
+        if let Some(found) = &self.found {
+            let names: Vec<String> =
+                found.iter().map(|f| format!("{} (probability {})", f.effect, short(f.probability))).collect();
+            lines.push(match (names.is_empty(), &self.extended) {
+                (true, _) => "no effect that the model lacks explains it".to_owned(),
+                (false, Some(path)) => format!("the model lacks {}; with that: {path}", text::listed(&names)),
+                (false, None) => {
+                    format!("the model lacks {}; --extended MODEL writes one with that", text::listed(&names))
+                }
+            });
+        }
+        lines.extend(self.logs.iter().map(|folder| format!("logs: {folder}")));
+        lines.push(format!("drive: {}", self.output));
+        lines.push(format!("next: hystctl run --daq DEVICE --drive {} --record measured.csv", self.output));
+        lines.join("\n")
+    }
+}
