@@ -276,3 +276,22 @@ def test_ctrl_c_ramps_to_rest(tmp_path):
 
 def test_the_skeleton_satisfies_the_protocol():
     assert isinstance(Bench(), hyst.daq.Daq)
+
+
+def test_learning_on_a_device_of_ones_own():
+    bench = Bench()
+    steps = 50.0 - 50.0 * np.cos(2 * np.pi * 2.0 * np.arange(3000) / RATE)
+    train = hyst.run(bench, drive=steps * np.linspace(1.0, 0.3, len(steps)), rate=RATE).record
+    model = hyst.fit(train, model="pi")
+    wanted = 2.0 + 4.0 * np.abs((np.arange(600) / 150.0) % 2.0 - 1.0)
+    learned = hyst.learn(bench, model, wanted, rate=RATE, passes=4, max_error=3.0)
+    passes = [one["rmse"] for one in learned["passes"]]
+    assert min(passes) == passes[learned["best"] - 1] <= passes[0] and bench.is_at_rest()
+    # The best drive, with the reference held before and behind it.
+    drive, reference = learned.columns["voltage_v"], learned.columns["displacement_um"]
+    assert len(drive) == len(reference) > len(wanted) and "output" not in learned
+    assert np.all(reference[:50] == wanted[0]) and np.all(reference[50:650] == wanted)
+    again = hyst.run(bench, drive=drive, rate=RATE).record
+    assert np.sqrt(np.mean((again.outputs[50:650] - wanted) ** 2)) <= 1.5 * min(passes) + 1e-3
+    with pytest.raises(hyst.InputError, match="does not move"):
+        hyst.learn(bench, model, np.full(100, 3.0), rate=RATE)

@@ -79,15 +79,15 @@ pub fn identify(device: &mut OtherDevice, diagnosed: bool) -> Model {
     diagnose(&record, None, &base, &DiagnoseOptions::default(), &|_| {}).map_or(base, |found| found.extended)
 }
 
-/// The outputs of some plays of a drive, each from rest.
+/// The outputs of some plays of a drive, each from rest; one before them, which the memory of other drives shows in, is left out.
 ///
 /// # Panics
 /// Never: the device takes all.
 pub fn play(device: &mut OtherDevice, drive: &[f64], plays: usize) -> Vec<Vec<f64>> {
     let options = RecordOptions { settle_s: 2.0, ..RecordOptions::at(device.bench().rate_hz) };
-    let segments = vec![drive; plays];
+    let segments = vec![drive; plays + 1];
     let measured = record(device, &segments, &options, |_| ControlFlow::Continue(())).expect("a recording");
-    measured.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect()
+    measured.segments.iter().skip(1).map(|s| s.samples.iter().map(|s| s.output).collect()).collect()
 }
 
 /// Gain and weights times a factor: a model of another actuator.

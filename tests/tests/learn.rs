@@ -82,7 +82,7 @@ fn what_does_not_follow_teaches_nothing() {
     assert!(matches!(frozen, LearnError::NotFollowing { .. }), "{frozen}");
     let mut lost = all(&|y| y);
     lost[1][7] = f64::NAN;
-    assert_eq!(refused(&mut learner, &lost), LearnError::NotFinite { play: 2, row: 8 });
+    assert!(matches!(refused(&mut learner, &lost), LearnError::NotFinite { play: 2, row: 8 }));
     assert!(matches!(refused(&mut learner, &plays[..1]), LearnError::Plays { plays: 1, .. }));
     // The drive is still that of the model's inverse, and the same plays are taken afterwards.
     assert_eq!(learner.drive().voltage, drive);

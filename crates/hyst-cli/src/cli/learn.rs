@@ -33,7 +33,7 @@ pub(crate) struct LearnArgs {
     /// Most passes
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=50))]
     pub(crate) passes: u32,
-    /// Plays of the same drive in a pass
+    /// Plays of the same drive in a pass, besides a first one that is not looked at: the actuator still remembers other drives in it
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=20))]
     pub(crate) plays: u32,
     /// Folder for a log of each pass (MCAP), empty or new

@@ -11,7 +11,6 @@ use hyst_ident::record::{Extra, OutputUnit, Record};
 use hyst_ident::simulate::Zero;
 use serde::Serialize;
 
-use super::compensate::options;
 use super::run::interrupt;
 use super::run::job::{Followed, Job};
 use super::run::play::{self, Played};
@@ -21,7 +20,7 @@ use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
-use crate::{host, input, recording, text};
+use crate::{host, recording, text};
 
 /// An effect that the passes show.
 #[derive(Debug, Serialize)]
@@ -87,9 +86,10 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
     };
     // The same drive in each play of a pass: a temperature that moves is one of the things that do not repeat.
     followed.live = None;
-    let Followed { model, json, reference, .. } = &*followed;
-    let (model, json, reference) = (model.clone(), json.clone(), reference.clone());
-    let learner = learner(args, &model, &reference, device.capabilities())?;
+    let Followed { model, json, reference, options, .. } = &*followed;
+    let (model, json) = (model.clone(), json.clone());
+    let options = LearnOptions { compensate: *options, passes: args.passes as usize, ..LearnOptions::default() };
+    let learner = Learner::new(&model, reference, options).map_err(CommandError::bad_input)?;
     if let Some(foreseen) = job.foreseen() {
         say(&format!("note: {foreseen}"));
     }
@@ -99,39 +99,13 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
         })?;
     }
     if args.clear {
-        device.clear()?;
+        super::run::clear(&mut device)?;
     }
     let mut passes = Passes { device, job, args, json: &json, model: &model, records: Vec::new(), rate_hz: 0.0 };
     let (learner, ended) = passes.all(learner)?;
     let Passes { device, records, rate_hz, .. } = passes;
     let summary = finish(args, &model, &learner, ended, &records, (device.capabilities(), rate_hz))?;
     report.print(&summary.text(), &summary)
-}
-
-fn learner<'a>(
-    args: &LearnArgs,
-    model: &'a Model,
-    reference: &Record,
-    device: &hyst_hw::Capabilities,
-) -> CommandResult<Learner<'a>> {
-    if reference.segments().len() > 1 {
-        return Err(CommandError::bad_input(format!(
-            "{}: the reference has {} segments; learn one after the other, each from a file of its own",
-            reference.name(),
-            reference.segments().len()
-        )));
-    }
-    let mut compensate = options(&args.limits);
-    let range = args.limits.limit.map_or((model.input.low, model.input.high), |limit| (limit.low, limit.high));
-    compensate.voltage = Some((range.0.max(device.voltage.min_v), range.1.min(device.voltage.max_v)));
-    compensate.slew = compensate.slew.min(device.max_slew_v_per_s);
-    compensate.temperature = input::temperature(args.temperature, model, reference).or(model
-        .effects
-        .temperature
-        .filter(|_| device.temperature)
-        .map(|gain| gain.reference_degc));
-    let options = LearnOptions { compensate, passes: args.passes as usize, ..LearnOptions::default() };
-    Ok(Learner::new(model, reference, options)?)
 }
 
 /// Passes on a device.
@@ -160,17 +134,20 @@ impl<'a> Passes<'a> {
                 Err(error) => return Err(self.kept(&learner, error)),
             };
             if let Some(pass) = learner.passes().last() {
-                let times = text::short(pass.rmse / pass.repeatability.max(f64::MIN_POSITIVE));
+                let repeats = match pass.over_repeatability() {
+                    Some(times) => format!(
+                        "{} times the repeatability of {} {symbol}",
+                        text::short(times),
+                        text::short(pass.repeatability)
+                    ),
+                    None => "and each play gives the same".to_owned(),
+                };
                 let held = if pass.limited_rows == 0 {
                     String::new()
                 } else {
                     format!("; a limit held the drive in {}", text::count(pass.limited_rows, "row"))
                 };
-                say(&format!(
-                    "pass {number}: RMSE {} {symbol}, {times} times the repeatability of {} {symbol}{held}",
-                    text::short(pass.rmse),
-                    text::short(pass.repeatability)
-                ));
+                say(&format!("pass {number}: RMSE {} {symbol}, {repeats}{held}", text::short(pass.rmse)));
             }
             if let Some(ended) = ended {
                 return Ok((learner, ended));
@@ -203,10 +180,11 @@ impl<'a> Passes<'a> {
     fn plays(&mut self, learner: &Learner<'_>, number: usize) -> CommandResult<Vec<Vec<f64>>> {
         let plays = self.args.plays as usize;
         let unit = recording::unit(self.device.capabilities().output);
-        self.job.segments = vec![learner.drive().voltage.clone(); plays];
+        // The first play is left out: the actuator remembers other drives in it.
+        self.job.segments = vec![learner.drive().voltage.clone(); plays + 1];
         let wanted: Vec<Option<f64>> =
             learner.reference().output().unwrap_or_default().iter().copied().map(Some).collect();
-        self.job.wanted = wanted.repeat(plays);
+        self.job.wanted = wanted.repeat(plays + 1);
         let name = self.device.capabilities().device.clone();
         let info = RunInfo {
             device: &name,
@@ -221,12 +199,13 @@ impl<'a> Passes<'a> {
         self.device.gentle(self.job.steepest());
         let played = play::play(&mut self.device, &mut self.job, log.as_mut());
         let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-        let Played { recording, error, .. } = played?;
+        let Played { mut recording, error, .. } = played?;
         if let Some(error) = error {
             return Err(error);
         }
         closed?;
         self.rate_hz = recording.rate_hz;
+        recording.segments.drain(..recording.segments.len().min(1));
         let outputs = recording.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect();
         self.keep(recording, number, unit)?;
         Ok(outputs)
@@ -308,7 +287,7 @@ impl Summary {
     fn text(&self) -> String {
         let (short, unit) = (text::short, self.symbol);
         let mut rows = vec![
-            ["pass", &format!("RMSE [{unit}]"), "largest", "that repeats", "over repeatability"]
+            ["pass", &format!("RMSE [{unit}]"), "largest", "repeating part", "over repeatability"]
                 .map(str::to_owned)
                 .to_vec(),
         ];
@@ -319,7 +298,7 @@ impl Summary {
                 short(pass.rmse),
                 short(pass.max_abs),
                 short(pass.repeating),
-                short(pass.rmse / pass.repeatability.max(f64::MIN_POSITIVE)),
+                pass.over_repeatability().map_or_else(|| "-".to_owned(), short),
             ]
         }));
         let why = match self.ended {

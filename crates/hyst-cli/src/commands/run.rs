@@ -209,11 +209,10 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         log.note("asked", asked(args)).map_err(|error| CommandError::new(Exit::Failed, error))?;
     }
     // All that can be refused has been, but by the device itself.
-    if let Some(Stated { code, text }) = if args.clear { daq.clear()?.map(Stated::of) } else { None } {
-        output::say(&format!("note: cleared fault {code} of an earlier run: {text}"));
-        if let Some(log) = &mut log {
-            log.note("cleared", BTreeMap::from([("fault".to_owned(), format!("{code}: {text}"))]))?;
-        }
+    if let Some(fault) = if args.clear { clear(daq)? } else { None }
+        && let Some(log) = &mut log
+    {
+        log.note("cleared", BTreeMap::from([("fault".to_owned(), fault)]))?;
     }
     if let Some(HandedOver { recipe, range, .. }) = &job.handed_over {
         daq.follow(recipe, *range)?;
@@ -277,6 +276,13 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         symbol: unit.symbol(),
     };
     report.print(&summary.text(), &summary)
+}
+
+/// Clears the fault of an earlier run, and says which it was.
+pub(super) fn clear(daq: &mut AnyDevice) -> CommandResult<Option<String>> {
+    let fault = daq.clear()?.map(Stated::of).map(|Stated { code, text }| format!("{code}: {text}"));
+    fault.iter().for_each(|fault| output::say(&format!("note: cleared fault {fault}, of an earlier run")));
+    Ok(fault)
 }
 
 /// What was asked for, as a log has it.

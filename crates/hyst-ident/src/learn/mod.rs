@@ -7,8 +7,9 @@
 //! - D, the response of the measured output to a change of the predicted one, is 1 where the model is true. A gain or a delay that is off and a mode that the
 //!   model lacks are in D: it is estimated from the first pass and from the changes between passes as a rational response with a delay, and in
 //!   narrow bands of frequency, with its variance s². Then L = D* / (|D|² + s²), the change with the least expected square of the remaining error.
-//! - Each pass plays the drive several times. What differs between these plays does not repeat (noise, creep, drift); its power N in each
-//!   band limits what is learned of an error E: L (1 − 3 N / |E|²) E, and nothing where that is negative.
+//! - Each pass plays the drive several times, after one more play that is left out, so that the actuator remembers this drive and no other. What differs
+//!   between these plays does not repeat (noise, creep, drift); its power N in each band limits what is learned of an error E: L (1 − 3 N / |E|²) E, and
+//!   nothing where that is negative.
 //!
 //! A change starts from the best pass so far; after a pass that was worse it is half as large. Learning ends at the repeatability: the error
 //! that the same drive has in another play.
@@ -26,11 +27,13 @@ use serde::Serialize;
 
 use crate::compensate::{CompensateError, CompensateOptions, Follower, compensate};
 use crate::model::Model;
+use crate::range;
 use crate::record::{Columns, Record};
 use bands::{Bands, Width};
 use inverse::Inverse;
 pub use inverse::LearnedDrive;
-use response::{Pair, Response};
+use rational::Pair;
+use response::Response;
 use spectrum::Spectrum;
 
 /// How long to learn.
@@ -65,6 +68,13 @@ pub struct Pass {
     pub limited_rows: usize,
 }
 
+impl Pass {
+    /// The error over the repeatability; none where each play gave the same, or only one was played.
+    pub fn over_repeatability(&self) -> Option<f64> {
+        (self.repeatability > 0.0).then(|| self.rmse / self.repeatability)
+    }
+}
+
 /// Why learning ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -79,10 +89,29 @@ pub enum Ended {
     Passes,
 }
 
-/// Why a pass teaches nothing.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+/// Why nothing is learned.
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
+    /// The first drive cannot be made.
+    #[error(transparent)]
+    Compensate(#[from] CompensateError),
+    /// More than one segment.
+    #[error("{record}: the reference has {segments} segments; learn one after the other, each from a file of its own")]
+    Segments {
+        /// The reference.
+        record: String,
+        /// Its segments.
+        segments: usize,
+    },
+    /// Nothing to follow.
+    #[error("{record}: the reference does not move: it is {value} throughout; give one that does")]
+    Still {
+        /// The reference.
+        record: String,
+        /// Its value \[output unit\].
+        value: f64,
+    },
     /// Plays have other lengths than the reference, or there are fewer than two.
     #[error("a pass is at least two plays of {rows} rows each; there are {plays}, one of {other} rows")]
     Plays {
@@ -104,7 +133,7 @@ pub enum LearnError {
     /// The output hardly follows, or moves the other way.
     #[error("the output does not follow the reference (correlation {correlation:.2}, gain {gain:.2}): {advice}")]
     NotFollowing {
-        /// Between learned reference and output.
+        /// Between predicted and measured output.
         correlation: f64,
         /// Slope of the output over it.
         gain: f64,
@@ -121,9 +150,11 @@ const NOISE: f64 = 3.0;
 const GAIN: f64 = 0.05;
 /// A pass is worse from this ratio to the best on; below that it is scatter.
 const WORSE: f64 = 1.05;
+/// Power of what rounding makes of a play, over the largest of the reference at one frequency.
+const ROUNDING: f64 = 1e-18;
 /// How long the first and the last value are held at least \[s\].
 const HOLD_S: f64 = 0.05;
-/// How far the learned reference may leave the output's range, as a share of that.
+/// How far the predicted output may leave the range of the model's output, as a share of that.
 const BEYOND: f64 = 0.5;
 
 /// A pass as it is kept.
@@ -166,15 +197,23 @@ impl<'a> Learner<'a> {
     /// Begins with the drive of the model's inverse.
     ///
     /// # Errors
-    /// As [`compensate`], and if the reference has more than one segment or fewer than 16 rows.
-    pub fn new(model: &'a Model, reference: &Record, options: LearnOptions) -> Result<Self, CompensateError> {
-        let plan = compensate(model, reference, &options.compensate)?;
-        let hold = (2 * plan.lead).max((HOLD_S / reference.sample_period()).round() as usize);
+    /// As [`compensate`], and if the reference has more than one segment or does not move.
+    pub fn new(model: &'a Model, reference: &Record, options: LearnOptions) -> Result<Self, LearnError> {
+        let segments = reference.segments().len();
+        if segments > 1 {
+            return Err(LearnError::Segments { record: reference.name(), segments });
+        }
+        let lead = Follower::new(model, reference, &options.compensate)?.stated().lead;
+        let (low, high) = range(reference.output().unwrap_or_default().iter().copied());
+        if low == high {
+            return Err(LearnError::Still { record: reference.name(), value: low });
+        }
+        let hold = (2 * lead).max((HOLD_S / reference.sample_period()).round() as usize);
         let given = reference.rows();
         let reference = held(reference, hold)?;
         let follower = Follower::new(model, &reference, &options.compensate)?;
         let plan = compensate(model, &reference, &options.compensate)?;
-        let predicted = follower.predicted(model, &plan.voltage)?;
+        let predicted = follower.predicted(model, &plan.voltage).map_err(CompensateError::from)?;
         let spectrum = Spectrum::new(predicted.len());
         let bands = Bands::new(spectrum.bins());
         let limited = [plan.voltage_limited, plan.slew_limited].concat();
@@ -233,7 +272,8 @@ impl<'a> Learner<'a> {
             .map_or_else(Vec::new, |taken| taken.predicted.iter().zip(wanted).map(|(v, r)| r - v).collect())
     }
 
-    /// Takes the outputs that were measured while [`drive`](Self::drive) was played, each at the rows of the reference, and makes the next drive.
+    /// Takes the outputs that were measured while [`drive`](Self::drive) was played, a value for each of its rows, and makes the next drive. The play that
+    /// comes first after another drive should not be among them: what the actuator remembers of that one does not repeat.
     /// Gives why it ended, if it did.
     ///
     /// # Errors
@@ -301,14 +341,15 @@ impl<'a> Learner<'a> {
     fn noise(&self) -> Vec<f64> {
         let sums = self.bands.real_sums(Width::Medium, |bin| self.scatter[bin]);
         let counts = self.bands.real_sums(Width::Medium, |_| self.differences);
+        // A device without noise repeats to the rounding of its numbers.
+        let wanted = self.wanted.iter().skip(1).map(|r| r.norm_sqr()).fold(0.0, f64::max);
+        let rounding = (ROUNDING * wanted).max(f64::MIN_POSITIVE.sqrt());
         let of = |bin: usize| {
             let band = self.bands.of(bin);
-            // The mean is known from few plays: no less than the slowest frequencies say.
-            (sums[band] / counts[band].max(f64::MIN_POSITIVE)).max(if bin == 0 {
-                self.scatter[0] / self.differences
-            } else {
-                0.0
-            })
+            let power = sums[band] / counts[band].max(f64::MIN_POSITIVE);
+            // The mean of a play differs at least as much as its slowest frequencies do.
+            let power = if bin == 0 { power.max(self.scatter[0] / self.differences) } else { power };
+            power.max(rounding)
         };
         (0..self.scatter.len()).map(of).collect()
     }
@@ -371,10 +412,10 @@ impl<'a> Learner<'a> {
         let first = (Pair { from: &begun.input, to: &begun.output }, scaled(1.0 / begun.plays));
         let since = changes.iter().map(|(from, to, share)| (Pair { from, to }, scaled(*share)));
         let pairs: Vec<_> = std::iter::once(first).chain(since).collect();
-        Response::of(&self.bands, &pairs, self.spectrum.length())
+        Response::of(&self.bands, &pairs, &self.spectrum)
     }
 
-    /// Makes the next learned reference and its drive.
+    /// Makes the next drive, and what the model predicts of it.
     fn step(&mut self) {
         let noise = self.noise();
         let response = self.response(&noise);
@@ -385,7 +426,8 @@ impl<'a> Learner<'a> {
                 let error = self.wanted[bin] - best.output[bin];
                 let noise = noise[bin] / best.plays;
                 let sure = (1.0 - NOISE * noise / error.norm_sqr().max(f64::MIN_POSITIVE)).max(0.0);
-                error * response.step(bin, self.bands.of(bin)) * sure * trust
+                let change = error * response.step(bin, self.bands.of(bin)) * sure * trust;
+                if change.re.is_finite() && change.im.is_finite() { change } else { Complex::new(0.0, 0.0) }
             })
             .collect();
         let (low, high) = (self.model.output.low, self.model.output.high);
@@ -394,7 +436,7 @@ impl<'a> Learner<'a> {
             .predicted
             .iter()
             .zip(self.spectrum.back(change))
-            .map(|(v, change)| (v + change).clamp(low - beyond, high + beyond))
+            .map(|(v, change)| (v + change).max(low - beyond).min(high + beyond))
             .collect();
         // The inverse exists: the first drive was made with it.
         let drive = self.inverse.changed(&self.reference, &best.drive.voltage, [&best.predicted, &to], &self.spectrum);
@@ -431,7 +473,7 @@ fn held(reference: &Record, rows: usize) -> Result<Record, CompensateError> {
     })?)
 }
 
-/// Whether the output moves as the learned reference asks.
+/// Whether the output moves as predicted.
 fn follows(wanted: &[f64], output: &[f64]) -> Result<(), LearnError> {
     let n = wanted.len() as f64;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;

@@ -9,11 +9,22 @@ const MOST: usize = 4;
 /// Iterations of the weights (Sanathanan and Koerner 1963).
 const ITERATIONS: usize = 12;
 
-/// Equations of one pair of spectra: output, input, and the power of what the output has besides, at each frequency.
-pub(super) struct Equations<'a> {
+/// A pair of spectra, of the predicted and the measured output, or of their changes.
+#[derive(Clone, Copy)]
+pub(super) struct Pair<'a> {
     pub(super) from: &'a [Complex<f64>],
     pub(super) to: &'a [Complex<f64>],
-    pub(super) noise: &'a [f64],
+}
+
+impl Pair<'_> {
+    /// |Y − D V|² at each frequency but 0.
+    pub(super) fn misfit(&self, length: usize, response: &Rational) -> Vec<f64> {
+        let at = |bin: usize| {
+            let omega = TAU * bin as f64 / length as f64;
+            if bin == 0 { 0.0 } else { (self.to[bin] - response.at(omega) * self.from[bin]).norm_sqr() }
+        };
+        (0..self.from.len()).map(at).collect()
+    }
 }
 
 /// D(z) = B(z) / A(z) · z^{−delay} with z = e^{jω}.
@@ -42,11 +53,14 @@ impl Rational {
     }
 
     /// The order whose parameters pay for themselves (Schwarz 1978), among a gain with the given delay and rational responses behind that delay.
-    pub(super) fn fit(all: &[Equations<'_>], length: usize, plain: &Self) -> Self {
+    /// Each pair comes with the power of what its output has besides.
+    pub(super) fn fit(all: &[(Pair<'_>, Vec<f64>)], length: usize, plain: &Self) -> Self {
         let weighed = |r: &Self| -> f64 {
-            all.iter().map(|e| misfit(e, length, r).iter().zip(e.noise).map(|(m, n)| m / n).sum::<f64>()).sum()
+            all.iter()
+                .map(|(pair, noise)| pair.misfit(length, r).iter().zip(noise).map(|(m, n)| m / n).sum::<f64>())
+                .sum()
         };
-        let rows: usize = all.iter().map(|e| 2 * e.from.len()).sum();
+        let rows: usize = all.iter().map(|(pair, _)| 2 * pair.from.len()).sum();
         // What is left is no white noise of a known power: its scale is that of the best.
         let criterion = |left: f64, count: usize| {
             rows as f64 * left.max(f64::MIN_POSITIVE).ln() + count as f64 * (rows as f64).ln()
@@ -64,18 +78,18 @@ impl Rational {
     }
 
     /// Least squares of A Y − B V, weighted with the A of the iteration before.
-    fn of_order(all: &[Equations<'_>], length: usize, order: usize, delay: f64) -> Option<Self> {
+    fn of_order(all: &[(Pair<'_>, Vec<f64>)], length: usize, order: usize, delay: f64) -> Option<Self> {
         let unknowns = 2 * order + 1;
         let mut now = Self { numerator: vec![1.0], denominator: Vec::new(), delay };
         for _ in 0..ITERATIONS {
             let (mut normal, mut right) = (DMatrix::<f64>::zeros(unknowns, unknowns), DVector::<f64>::zeros(unknowns));
-            for e in all {
-                for bin in 1..e.from.len() {
+            for (e, noise) in all {
+                for (bin, noise) in noise.iter().enumerate().skip(1) {
                     let omega = TAU * bin as f64 / length as f64;
                     let turned = |k: usize| Complex::from_polar(1.0, -omega * k as f64);
                     let a: Complex<f64> = Complex::new(1.0, 0.0)
                         + (1..).zip(&now.denominator).map(|(k, a)| turned(k) * *a).sum::<Complex<f64>>();
-                    let weight = 1.0 / (a.norm_sqr() * e.noise[bin]).max(f64::MIN_POSITIVE);
+                    let weight = 1.0 / (a.norm_sqr() * noise).max(f64::MIN_POSITIVE);
                     let late = e.from[bin] * Complex::from_polar(1.0, -omega * delay);
                     let row: Vec<Complex<f64>> = (0..=order)
                         .map(|k| late * turned(k))
@@ -109,16 +123,6 @@ impl Rational {
     }
 }
 
-/// |Y − D V|² at each frequency.
-pub(super) fn misfit(e: &Equations<'_>, length: usize, response: &Rational) -> Vec<f64> {
-    (0..e.from.len())
-        .map(|bin| {
-            let omega = TAU * bin as f64 / length as f64;
-            if bin == 0 { 0.0 } else { (e.to[bin] - response.at(omega) * e.from[bin]).norm_sqr() }
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,7 +142,7 @@ mod tests {
         let to: Vec<Complex<f64>> =
             (0..=1000).map(|bin| truth.at(omega(bin)) * from[bin] + Complex::new(noise(), noise()) * 0.01).collect();
         let power = vec![1e-4 / 6.0; 1001];
-        let equations = [Equations { from: &from, to: &to, noise: &power }];
+        let equations = [(Pair { from: &from, to: &to }, power)];
         let found = Rational::fit(&equations, length, &Rational::plain(1.0, 3.3));
         assert_eq!(found.denominator.len(), 2);
         for bin in [5, 50, 80, 100, 150] {

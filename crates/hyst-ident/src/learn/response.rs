@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::bands::{Bands, Width};
-use super::rational::{Equations, Rational, misfit};
+use super::rational::{Pair, Rational};
+use super::spectrum::Spectrum;
 
 /// The response in each band, and the variance of that.
 #[derive(Clone, Debug)]
@@ -22,45 +23,32 @@ pub(super) struct Response {
 const SPREAD: f64 = 0.05;
 /// The slope of a hysteresis is not one number: share of a change by which its answer differs from place to place.
 const SLOPE: f64 = 0.15;
-/// Delays that are tried \[samples\], and their step.
+/// Delays that are tried \[samples\], and the step of their parts.
 const DELAYS: (i32, i32) = (-20, 200);
 const DELAY_STEP: f64 = 0.25;
 
-/// A pair of spectra, of a learned reference (or its change) and the output (or its change).
-#[derive(Clone, Copy)]
-pub(super) struct Pair<'a> {
-    pub(super) from: &'a [Complex<f64>],
-    pub(super) to: &'a [Complex<f64>],
-}
-
 impl Response {
-    /// From the first pass and the changes since: a rational response with a delay, by weighted least squares over all frequencies, and of
-    /// that what each band says itself. `noise` is the power of what does not repeat in each pair, `length` the number of rows of which the spectra
-    /// are.
-    pub(super) fn of(bands: &Bands, pairs: &[(Pair<'_>, Vec<f64>)], length: usize) -> Self {
+    /// From the first pass and the changes since, each with the power of what does not repeat in it: a rational response with a delay, by weighted
+    /// least squares over all frequencies, and of that what each band says itself.
+    pub(super) fn of(bands: &Bands, pairs: &[(Pair<'_>, Vec<f64>)], spectrum: &Spectrum) -> Self {
         let Some((first, noise)) = pairs.first() else {
             return Self { gain: Vec::new(), variance: Vec::new(), mean: 1.0 };
         };
-        let plain = gain_and_delay(bands, first, noise, length);
-        let mut response = plain.clone();
-        let powers = |response: &Rational| -> Vec<Vec<f64>> {
-            pairs.iter().map(|(pair, noise)| misfits(bands, pair, response, noise, length)).collect()
+        let length = spectrum.length();
+        let plain = gain_and_delay(bands, first, noise, spectrum);
+        let weighed = |response: &Rational| -> Vec<(Pair<'_>, Vec<f64>)> {
+            pairs.iter().map(|(pair, noise)| (*pair, misfits(bands, pair, response, noise, length))).collect()
         };
+        let mut response = plain.clone();
         for _ in 0..2 {
-            let powers = powers(&response);
-            let equations: Vec<Equations<'_>> = pairs
-                .iter()
-                .zip(&powers)
-                .map(|((pair, _), power)| Equations { from: pair.from, to: pair.to, noise: power })
-                .collect();
-            response = Rational::fit(&equations, length, &plain);
+            response = Rational::fit(&weighed(&response), length, &plain);
         }
         let middle = bands.real_sums(Width::Narrow, |bin| bin as f64);
         let counts = bands.real_sums(Width::Narrow, |_| 1.0);
-        let powers = powers(&response);
+        let weighed = weighed(&response);
         let (mut left, mut input) = (vec![0.0; counts.len()], vec![0.0; counts.len()]);
-        for ((pair, noise), power) in pairs.iter().zip(&powers) {
-            let known = misfit(&Equations { from: pair.from, to: pair.to, noise: power }, length, &response);
+        for (pair, noise) in pairs {
+            let known = pair.misfit(length, &response);
             let weight = |bin: usize| 1.0 / noise[bin].max(f64::MIN_POSITIVE);
             let (l, i) = (
                 bands.real_sums(Width::Wide, |bin| known[bin] * weight(bin)),
@@ -82,15 +70,9 @@ impl Response {
             least = least.min(*variance / size);
             *variance = least * size;
         }
-        let known = Self { gain, variance, mean: 1.0 }.with(bands, first, &powers[0]);
-        let mut all = pairs
-            .iter()
-            .zip(&powers)
-            .skip(1)
-            .fold(known, |known, ((change, _), power)| known.with(bands, change, power));
         // A mean is a hysteresis at rest: what is right over the whole travel is right for it.
-        all.mean = plain.at(0.0).re;
-        all
+        let begun = Self { gain, variance, mean: plain.at(0.0).re };
+        weighed.iter().fold(begun, |known, (pair, power)| known.with(bands, pair, power))
     }
 
     /// With what each band says of D by least squares, Y = D V, where Y has the power `noise` besides.
@@ -117,15 +99,21 @@ impl Response {
 }
 
 /// D = g e^{−jωτ} with gain and delay by least squares over all frequencies, each with the power of what is left there.
-fn gain_and_delay(bands: &Bands, pair: &Pair<'_>, noise: &[f64], length: usize) -> Rational {
-    let bins = pair.from.len();
+fn gain_and_delay(bands: &Bands, pair: &Pair<'_>, noise: &[f64], spectrum: &Spectrum) -> Rational {
+    let (bins, length) = (pair.from.len(), spectrum.length());
     let turned = |bin: usize, delay: f64| Complex::from_polar(1.0, -TAU * bin as f64 / length as f64 * delay);
     let (mut gain, mut delay) = (1.0, 0.0);
     for _ in 0..3 {
         let power = misfits(bands, pair, &Rational::plain(gain, delay), noise, length);
-        let cross: Vec<Complex<f64>> = (1..bins).map(|bin| pair.to[bin] * pair.from[bin].conj() / power[bin]).collect();
-        let along = |delay: f64| cross.iter().zip(1..).map(|(c, bin)| (c * turned(bin, delay).conj()).re).sum::<f64>();
-        let tried = (DELAYS.0 * 4..=DELAYS.1 * 4).map(|k| DELAY_STEP * f64::from(k));
+        let mut cross: Vec<Complex<f64>> =
+            (0..bins).map(|bin| pair.to[bin] * pair.from[bin].conj() / power[bin]).collect();
+        cross[0] = Complex::new(0.0, 0.0);
+        let along = |delay: f64| cross.iter().zip(0..).map(|(c, bin)| (c * turned(bin, delay).conj()).re).sum::<f64>();
+        // Whole samples from the correlation in time, parts of them about the best.
+        let lags = spectrum.whole_back(cross.clone());
+        let of = |lag: i32| lags[lag.rem_euclid(length as i32) as usize];
+        let whole = (DELAYS.0..=DELAYS.1).fold(0, |best, lag| if of(lag) > of(best) { lag } else { best });
+        let tried = (-4..=4).map(|k| f64::from(whole) + DELAY_STEP * f64::from(k));
         let best = tried.map(|d| (along(d), d)).fold((f64::MIN, 0.0), |best, d| if d.0 > best.0 { d } else { best });
         // The parabola through it and its neighbours.
         let (left, right) = (along(best.1 - DELAY_STEP), along(best.1 + DELAY_STEP));
@@ -140,7 +128,7 @@ fn gain_and_delay(bands: &Bands, pair: &Pair<'_>, noise: &[f64], length: usize) 
 /// Power of what a response leaves of the output, where the input has its power, and of the noise.
 fn misfits(bands: &Bands, pair: &Pair<'_>, response: &Rational, noise: &[f64], length: usize) -> Vec<f64> {
     let input = |bin: usize| pair.from[bin].norm_sqr();
-    let left = misfit(&Equations { from: pair.from, to: pair.to, noise }, length, response);
+    let left = pair.misfit(length, response);
     let weighted = bands.real_sums(Width::Wide, |bin| left[bin] * input(bin));
     let weights = bands.real_sums(Width::Wide, input);
     (0..pair.from.len())

@@ -56,7 +56,14 @@ impl Spectrum {
     }
 
     /// From frequency to time; the bridge is dropped.
-    pub(super) fn back(&self, mut spectrum: Vec<Complex<f64>>) -> Vec<f64> {
+    pub(super) fn back(&self, spectrum: Vec<Complex<f64>>) -> Vec<f64> {
+        let mut values = self.whole_back(spectrum);
+        values.truncate(self.rows);
+        values
+    }
+
+    /// From frequency to time, over the whole length.
+    pub(super) fn whole_back(&self, mut spectrum: Vec<Complex<f64>>) -> Vec<f64> {
         let mut values = self.inverse.make_output_vec();
         // Those of a real signal.
         if let Some(first) = spectrum.first_mut() {
@@ -67,8 +74,8 @@ impl Spectrum {
         {
             last.im = 0.0;
         }
+        // The lengths are those of the plan.
         let _ = self.inverse.process(&mut spectrum, &mut values);
-        values.truncate(self.rows);
         values.iter_mut().for_each(|value| *value /= self.length as f64);
         values
     }

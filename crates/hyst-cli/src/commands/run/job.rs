@@ -6,7 +6,7 @@ use std::path::Path;
 use hyst_core::{ForceParams, PidParams};
 use hyst_hw::wire::{SATURATION_TOLERANCE, lateness, recipe_head};
 use hyst_hw::{Capabilities, RecordOptions, Recording};
-use hyst_ident::compensate::{Drive, compensate};
+use hyst_ident::compensate::{CompensateOptions, Drive, compensate};
 use hyst_ident::export::block;
 use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
@@ -96,6 +96,8 @@ pub(in crate::commands) struct Followed {
     /// The text of the model's file.
     pub(in crate::commands) json: String,
     pub(in crate::commands) reference: Record,
+    /// Limits and surroundings of its drive.
+    pub(in crate::commands) options: CompensateOptions,
     /// What makes the drive.
     pub(super) control: Control,
     /// The drive as planned by the model's inverse, where that takes part.
@@ -320,7 +322,7 @@ impl Job {
             let degc = options.temperature;
             // Where the inverse alone would be refused, the loop may find its way or end with a fault that says why.
             let plan = compensate(&model, &reference, &options).ok();
-            let job = Self::hand_over(args, device, model, json, reference, ((low, high), plan), play)?;
+            let job = Self::hand_over(args, device, model, json, reference, (options, (low, high), plan), play)?;
             return Ok(Self { degc, ..job });
         }
         let drive = args.control.inverts().then(|| compensate(&model, &reference, &options)).transpose()?;
@@ -341,8 +343,17 @@ impl Job {
             None
         };
         let wanted = reference.output().unwrap_or_default().iter().copied().map(Some).collect();
-        let followed =
-            Followed { model, json, reference, control: args.control, drive, live, closed, held_s: play.settle_s };
+        let followed = Followed {
+            model,
+            json,
+            reference,
+            options,
+            control: args.control,
+            drive,
+            live,
+            closed,
+            held_s: play.settle_s,
+        };
         Ok(Self { degc: options.temperature, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
@@ -353,7 +364,7 @@ impl Job {
         model: Model,
         json: String,
         reference: Record,
-        (limits, plan): ((f64, f64), Option<Drive>),
+        (options, limits, plan): (CompensateOptions, (f64, f64), Option<Drive>),
         mut play: RecordOptions,
     ) -> CommandResult<Self> {
         if args.control != Control::PidFeedforward {
@@ -393,6 +404,7 @@ impl Job {
             model,
             json,
             reference,
+            options,
             control: args.control,
             drive: None,
             live: None,
