@@ -27,7 +27,7 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
 fn the_loop_closes_on_an_amplifier_that_is_slow() {
     let lab = Lab::new();
     lab.write("plant.toml", format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT));
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 3 --out loop --json");
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 2 --out loop --json");
     let summary = ran.json();
     let turns = summary["turns"].as_array().unwrap();
     let limit = turns[0]["slew_limit"].as_f64().unwrap();

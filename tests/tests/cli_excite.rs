@@ -2,7 +2,7 @@
 
 use hyst_tests::{Lab, column};
 
-const KINDS: [&str; 11] = [
+const KINDS: [&str; 13] = [
     "identification",
     "sine",
     "decaying-sine",
@@ -14,6 +14,8 @@ const KINDS: [&str; 11] = [
     "am-sine",
     "tones",
     "minor-loops",
+    "raster",
+    "spiral",
 ];
 
 #[test]

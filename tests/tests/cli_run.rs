@@ -120,6 +120,13 @@ fn a_reference_is_followed_and_logged() {
     let half = wanted.len() / 2;
     let squares: f64 = measured[half..].iter().zip(&wanted[half..]).map(|(y, r)| (y - r).powi(2)).sum();
     assert!((late / (squares / (wanted.len() - half) as f64).sqrt() - 1.0).abs() < 1e-9, "{report}");
+    // The model without the lag is late by it: that is an error, or, where a delay is allowed, a figure of its own.
+    let allowed = lab.ok(&format!("{follow} --model model.json --allow-delay --json")).json();
+    let of = |report: &Value, key: &str| report["tracking"][key].as_f64();
+    assert_eq!(of(&plain, "delay_s"), None);
+    assert!(of(&allowed, "delay_s").unwrap() > 1e-3 && of(&allowed, "rmse") < of(&plain, "rmse"), "{allowed}");
+    let said = lab.ok(&format!("{follow} --model model.json --allow-delay")).stdout;
+    assert!(said.contains("ms later, which was allowed") && said.contains("turning point"), "{said}");
     // Ramps to the first voltage and back to rest are in the log and not in the record.
     assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
     assert_eq!(samples.last().unwrap()["phase"], "retreat");

@@ -44,6 +44,7 @@ pub mod simulate;
 pub mod spikes;
 pub mod stop;
 mod tone_phase;
+pub mod tracking;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};

@@ -45,7 +45,7 @@ pub(crate) fn only_loop(samples: &Samples) -> Option<f64> {
 }
 
 /// Rows at which a drive turns by at least `least`, and whether from a top.
-fn turns(u: &[f64], least: f64) -> Vec<(usize, bool)> {
+pub(crate) fn turns(u: &[f64], least: f64) -> Vec<(usize, bool)> {
     let mut turns = Vec::new();
     let (mut top, mut bottom) = (0, 0);
     let mut rising = None;

@@ -180,6 +180,26 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
+    /// Lines of a raster scan: constant speed there and back, with rounded turnings
+    Raster {
+        /// Share of the time that the turnings take; 0 = a triangle
+        #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+        turning: f64,
+        #[command(flatten)]
+        periodic: Periodic,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// One axis of a spiral scan: a sine around mid-span whose amplitude grows to the whole span
+    Spiral {
+        /// Angle at which it begins [degrees]; the other axis has 90 more
+        #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+        phase: f64,
+        #[command(flatten)]
+        periodic: Periodic,
+        #[command(flatten)]
+        common: Common,
+    },
     /// Sine around mid-span whose amplitude swings: every amplitude at one frequency
     AmSine {
         /// Frequency

@@ -24,7 +24,7 @@ pub(crate) struct LearnArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record of the wanted output, one segment, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle or steps
+    /// Record of the wanted output, one segment, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle, steps, raster, spiral, spiral-y or lissajous
     #[arg(long)]
     pub(crate) reference: PathBuf,
     /// Drive to write (CSV): the best one, with the reference held for a while before and behind it
@@ -94,6 +94,7 @@ impl LearnArgs {
             clear: self.clear,
             hottest: self.hottest,
             max_error: self.max_error,
+            allow_delay: false,
             kout: None,
             live: None,
             plain: self.plain,

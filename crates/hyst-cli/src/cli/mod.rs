@@ -312,7 +312,7 @@ pub(crate) struct CompensateArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS with sine, triangle or steps, at the rate of the model's record
+    /// Record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS with sine, triangle, steps, raster, spiral, spiral-y or lissajous, at the rate of the model's record
     pub(crate) reference: PathBuf,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
@@ -343,7 +343,7 @@ pub(crate) struct RunArgs {
     /// Model file
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) model: Option<PathBuf>,
-    /// Record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle or steps
+    /// Record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle, steps, raster, spiral, spiral-y or lissajous
     #[arg(long, requires = "model", required_unless_present = "drive", conflicts_with = "drive")]
     pub(crate) reference: Option<PathBuf>,
     /// Record of the voltages to play, as excite or compensate writes it; - for stdin
@@ -377,6 +377,9 @@ pub(crate) struct RunArgs {
     /// End the run and come to rest when the output is further than this from the reference for half a second, of which breaks of a tenth of a second are no end [output unit]
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
+    /// Compare the output with the reference as late as it is: one delay, the one with the least error, does not count as an error. It is printed
+    #[arg(long, requires = "reference", conflicts_with = "drive")]
+    pub(crate) allow_delay: bool,
     /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,

@@ -1,8 +1,8 @@
 //! `excite`: drives with which to identify or test an actuator.
 
 use hyst_ident::excite::{
-    AmSine, DecayingSine, Drive, ExciteError, Forc, Identification, Limits, MinorLoops, Multisine, Peak, Phases, Shape,
-    Sine, Stairs, Sweep, Tone, Triangle,
+    AmSine, DecayingSine, Drive, ExciteError, Forc, Identification, Limits, MinorLoops, Multisine, Peak, Phases,
+    Raster, Shape, Sine, Spiral, Stairs, Sweep, Tone, Triangle,
 };
 use serde::Serialize;
 
@@ -137,6 +137,14 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
                 |frequency_hz: f64, amplitude: f64| Shape::Tone(Tone { frequency_hz, amplitude, cycles: *cycles });
             let of = |hz: &f64| amplitudes.iter().map(|a| tone(*hz, *a)).collect::<Vec<_>>();
             (common, frequencies.iter().flat_map(of).collect())
+        }
+        ExciteKind::Raster { turning, periodic, common } => {
+            let (frequency_hz, cycles) = (periodic.frequency, periodic.cycles);
+            (common, vec![Shape::Raster(Raster { frequency_hz, cycles, turning: *turning })])
+        }
+        ExciteKind::Spiral { phase, periodic, common } => {
+            let (frequency_hz, cycles) = (periodic.frequency, periodic.cycles);
+            (common, vec![Shape::Spiral(Spiral { frequency_hz, cycles, phase_deg: *phase })])
         }
         ExciteKind::MinorLoops { levels, share, periodic, common } => {
             let (frequency_hz, cycles) = (periodic.frequency, periodic.cycles);

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use hyst_core::PidParams;
 use hyst_hw::{ClockFit, Daq};
-use hyst_ident::metrics::Errors;
 use hyst_ident::range;
+use hyst_ident::tracking::{Harmonic, Tracking, Turning};
 use serde::Serialize;
 
 use super::compensate::Compensation;
@@ -76,21 +76,6 @@ struct Summary {
 
 /// An offset is told where less than this share of the error is left without it.
 const MOSTLY_OFFSET: f64 = 0.5;
-
-/// Measured output against the reference.
-#[derive(Clone, Copy, Debug, Serialize)]
-struct Tracking {
-    rmse: f64,
-    /// In percent of the reference's span.
-    nrmse_percent: f64,
-    max_abs: f64,
-    /// RMSE over the last half, in which the start tells less.
-    rmse_last_half: f64,
-    /// Mean of measured less reference: a zero, or what the actuator remembers of earlier runs.
-    mean: f64,
-    /// RMSE about that mean.
-    rmse_about_mean: f64,
-}
 
 /// Whether the model still explains the device.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -252,6 +237,11 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let (low, high) = range(measured.iter().copied());
+    let follows = |followed: &Followed| {
+        let segments = followed.reference.segments();
+        Tracking::of(followed.wanted(), &measured, segments, recording.rate_hz, args.allow_delay)
+            .map_err(CommandError::failed)
+    };
     let summary = Summary {
         device,
         rate_hz: recording.rate_hz,
@@ -260,7 +250,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         unit: unit.suffix(),
         lowest_output: low,
         highest_output: high,
-        tracking: job.followed.as_ref().map(|followed| Tracking::of(followed.wanted(), &measured)).transpose()?,
+        tracking: job.followed.as_ref().map(follows).transpose()?,
         compensation: job.followed.as_ref().and_then(Followed::compensation),
         control: job.followed.as_ref().map(|followed| followed.control),
         pid: job.pid(&recording).map(Gains::of),
@@ -308,6 +298,7 @@ fn asked(args: &RunArgs) -> BTreeMap<String, String> {
         ("temperature_degc", number(args.temperature.degc)),
         ("hottest_degc", number(args.hottest)),
         ("max_error", number(args.max_error)),
+        ("allow_delay", args.allow_delay.then(|| "true".to_owned())),
         ("silence_s", number(args.silence)),
         ("rate_hz", number(args.map.rate)),
         ("settle_s", number(args.settle)),
@@ -316,24 +307,6 @@ fn asked(args: &RunArgs) -> BTreeMap<String, String> {
         ("seed", args.seed.map(|seed| seed.to_string())),
     ];
     entries.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect()
-}
-
-impl Tracking {
-    fn of(wanted: &[f64], measured: &[f64]) -> CommandResult<Self> {
-        let errors = Errors::of(wanted, measured, &vec![false; wanted.len()]).map_err(CommandError::failed)?;
-        let half = wanted.len() / 2;
-        let squares: f64 = wanted[half..].iter().zip(&measured[half..]).map(|(w, y)| (w - y) * (w - y)).sum();
-        let rmse_last_half = (squares / (wanted.len() - half).max(1) as f64).sqrt();
-        let mean = wanted.iter().zip(measured).map(|(w, y)| y - w).sum::<f64>() / wanted.len().max(1) as f64;
-        Ok(Self {
-            rmse: errors.rmse,
-            nrmse_percent: errors.nrmse_percent,
-            max_abs: errors.max_abs,
-            rmse_last_half,
-            mean,
-            rmse_about_mean: (errors.rmse * errors.rmse - mean * mean).max(0.0).sqrt(),
-        })
-    }
 }
 
 impl Gains {
@@ -358,6 +331,32 @@ impl Gains {
     }
 }
 
+/// What is said of delay, turning points and harmonics, each in a line of its own.
+fn tracking_details(tracking: &Tracking, unit: &str) -> String {
+    let short = text::short;
+    let mut lines = Vec::new();
+    if let Some(delay) = tracking.delay_s {
+        let how = if delay < 0.0 { "earlier" } else { "later" };
+        lines.push(format!("against the reference {} ms {how}, which was allowed", short(1e3 * delay.abs())));
+    }
+    if let Some(Turning { points, near_percent, rmse, max_abs, rmse_between }) = tracking.turning {
+        lines.push(format!(
+            "near {} ({} of the way to the next one): RMSE {} {unit}, largest {} {unit}; between them RMSE {} {unit}",
+            text::count(points, "turning point"),
+            text::percent(near_percent),
+            short(rmse),
+            short(max_abs),
+            short(rmse_between)
+        ));
+    }
+    if !tracking.harmonics.is_empty() {
+        let said = |h: &Harmonic| format!("{} Hz {} at {:.2}°", short(h.frequency_hz), short(h.gain), h.phase_deg);
+        let said: Vec<String> = tracking.harmonics.iter().map(said).collect();
+        lines.push(format!("gain and phase of the harmonics: {}", said.join(", ")));
+    }
+    lines.iter().map(|line| format!("\n          {line}")).collect()
+}
+
 impl Summary {
     fn text(&self) -> String {
         let (short, unit) = (text::short, self.symbol);
@@ -370,7 +369,7 @@ impl Summary {
             short(self.lowest_output),
             short(self.highest_output)
         )];
-        lines.extend(self.tracking.map(|t| {
+        lines.extend(self.tracking.as_ref().map(|t| {
             let (rmse, share, most) = (short(t.rmse), text::percent(t.nrmse_percent), short(t.max_abs));
             let late = short(t.rmse_last_half);
             let mut line = format!(
@@ -385,7 +384,7 @@ impl Summary {
                     short(t.rmse_about_mean)
                 );
             }
-            line
+            line + &tracking_details(t, unit)
         }));
         lines.extend(self.pid.as_ref().map(|pid| pid.text(self.symbol)));
         lines.extend(self.compensation.as_ref().map(Compensation::text));

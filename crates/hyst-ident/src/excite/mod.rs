@@ -6,6 +6,7 @@
 
 mod crest;
 mod identification;
+mod scan;
 mod separate;
 mod shapes;
 #[cfg(test)]
@@ -16,6 +17,7 @@ use std::io::Write;
 use std::ops::Range;
 
 pub use identification::Identification;
+pub use scan::{Raster, Spiral};
 pub use separate::{SeparateOptions, Separation, Tried, Verdict, separate};
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
 pub use waves::{AmSine, MinorLoops, Tone};

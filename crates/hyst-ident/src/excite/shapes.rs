@@ -8,6 +8,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::crest;
+use super::scan::{Raster, Spiral};
 use super::waves::{AmSine, MinorLoops, Tone};
 use super::{ExciteError, Limits, MOST_ROWS, positive, require};
 
@@ -141,6 +142,10 @@ pub enum Shape {
     Tone(Tone),
     /// See [`MinorLoops`].
     MinorLoops(MinorLoops),
+    /// See [`Raster`].
+    Raster(Raster),
+    /// See [`Spiral`].
+    Spiral(Spiral),
 }
 
 impl Shape {
@@ -157,6 +162,8 @@ impl Shape {
             Self::AmSine(_) => "am-sine",
             Self::Tone(_) => "tone",
             Self::MinorLoops(_) => "minor-loops",
+            Self::Raster(_) => "raster",
+            Self::Spiral(_) => "spiral",
         }
     }
 
@@ -168,7 +175,9 @@ impl Shape {
             | Self::Triangle(_)
             | Self::AmSine(_)
             | Self::Tone(_)
-            | Self::MinorLoops(_) => "lower frequency_hz",
+            | Self::MinorLoops(_)
+            | Self::Raster(_)
+            | Self::Spiral(_) => "lower frequency_hz",
             Self::Stairs(_) => "lengthen ramp_s",
             Self::Multisine(_) => "lower high_hz or lengthen fade_s",
             Self::Sweep(_) => "lower high_hz",
@@ -190,6 +199,8 @@ impl Shape {
             Self::AmSine(sine) => sine.samples(rate),
             Self::Tone(tone) => tone.samples(rate),
             Self::MinorLoops(loops) => loops.samples(rate),
+            Self::Raster(raster) => raster.samples(rate),
+            Self::Spiral(spiral) => spiral.samples(rate),
         }
     }
 }

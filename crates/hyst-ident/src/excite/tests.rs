@@ -27,6 +27,8 @@ fn shapes() -> Vec<Shape> {
         Shape::AmSine(AmSine { frequency_hz: 7.0, modulation_hz: 0.5, depth: 0.8, cycles: 2 }),
         Shape::Tone(Tone { frequency_hz: 9.0, amplitude: 0.8, cycles: 6 }),
         Shape::MinorLoops(MinorLoops { levels: 4, share: 0.3, frequency_hz: 5.0, cycles: 3 }),
+        Shape::Raster(Raster { frequency_hz: 4.0, cycles: 3, turning: 0.2 }),
+        Shape::Spiral(Spiral { frequency_hz: 5.0, cycles: 8, phase_deg: 90.0 }),
         Shape::Sweep(Sweep { low_hz: 1.0, high_hz: 50.0, duration_s: 2.0 }),
         Shape::Forc(Forc { curves: 5, peak_s: 0.2, rest_s: 0.1, peak: Peak::HalfSine }),
         Shape::Forc(Forc { curves: 5, peak_s: 0.2, rest_s: 0.1, peak: Peak::Triangle }),

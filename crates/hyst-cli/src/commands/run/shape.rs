@@ -1,9 +1,10 @@
-//! References without a file: sines, triangles and steps between two outputs.
+//! References without a file: sines, triangles, steps and what scanners ask for, between two outputs.
 
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::str::FromStr;
 
+use hyst_ident::excite::{Raster, Spiral};
 use hyst_ident::record::{Columns, OutputUnit, Record};
 
 use crate::exit::{CommandError, CommandResult};
@@ -11,7 +12,7 @@ use crate::exit::{CommandError, CommandResult};
 /// Longest reference \[rows\].
 const MOST_ROWS: f64 = 1e8;
 
-/// A reference as its arguments say it. It begins at its lower end.
+/// A reference as its arguments say it. It begins at its lower end, but for spirals and the sines of Lissajous patterns, which begin in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::commands) struct Shape {
     form: Form,
@@ -27,7 +28,33 @@ enum Form {
     Sine,
     Triangle,
     Steps,
+    /// Lines with rounded turnings.
+    Raster,
+    /// One axis of a spiral, from the middle to the rim, and the other one.
+    Spiral,
+    SpiralY,
+    /// One axis of a Lissajous pattern.
+    Lissajous,
 }
+
+impl Form {
+    const ALL: [(&'static str, Self); 7] = [
+        ("sine", Self::Sine),
+        ("triangle", Self::Triangle),
+        ("steps", Self::Steps),
+        ("raster", Self::Raster),
+        ("spiral", Self::Spiral),
+        ("spiral-y", Self::SpiralY),
+        ("lissajous", Self::Lissajous),
+    ];
+
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(known, _)| *known == name).map(|(_, form)| *form)
+    }
+}
+
+/// Share of a raster's time that its turnings take.
+const TURNING: f64 = 0.2;
 
 /// Highest frequency, as a share of the rate: with fewer samples in a period a shape is another one.
 const FASTEST: f64 = 0.1;
@@ -41,12 +68,7 @@ impl FromStr for Shape {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (form, numbers) = text.split_once(':').ok_or("there is no colon")?;
-        let form = match form {
-            "sine" => Form::Sine,
-            "triangle" => Form::Triangle,
-            "steps" => Form::Steps,
-            _ => return Err(format!("there is no form \"{form}\"")),
-        };
+        let form = Form::named(form).ok_or_else(|| format!("there is no form \"{form}\""))?;
         let cells: Vec<&str> = numbers.split(',').map(str::trim).collect();
         let &[low, high, hz, seconds] = &cells[..] else {
             let many = if numbers.is_empty() { 0 } else { cells.len() };
@@ -73,11 +95,13 @@ impl Shape {
     pub(in crate::commands) fn named(path: &Path) -> CommandResult<Option<Self>> {
         let Some(text) = path.to_str().filter(|_| !path.exists()) else { return Ok(None) };
         let Some((form, _)) = text.split_once(':') else { return Ok(None) };
-        if !["sine", "triangle", "steps"].contains(&form) {
+        if Form::named(form).is_none() {
             // Windows has drives of one letter.
-            let word = form.len() > 1 && form.chars().all(|c| c.is_ascii_alphabetic());
+            let word = form.len() > 1 && form.chars().all(|c| c.is_ascii_alphabetic() || c == '-');
+            let names: Vec<&str> = Form::ALL.iter().map(|(name, _)| *name).collect();
             let message = format!(
-                "{text}: there is no such file, and no form \"{form}\": give sine, triangle or steps, as sine:2,12,5,10"
+                "{text}: there is no such file, and no form \"{form}\": give one of {}, as sine:2,12,5,10",
+                names.join(", ")
             );
             return if word { Err(CommandError::bad_input(message)) } else { Ok(None) };
         }
@@ -94,6 +118,10 @@ impl Shape {
             Form::Sine => 0.5 - 0.5 * (TAU * phase).cos(),
             Form::Triangle => up,
             Form::Steps => (STEPS * up).round() / STEPS,
+            Form::Raster => Raster::position(phase, TURNING),
+            Form::Spiral => Spiral::position(t / self.seconds, t * self.hz, 0.0),
+            Form::SpiralY => Spiral::position(t / self.seconds, t * self.hz, 90.0),
+            Form::Lissajous => 0.5 + 0.5 * (TAU * phase).sin(),
         };
         self.low + (self.high - self.low) * share
     }
@@ -128,7 +156,7 @@ mod tests {
 
     #[test]
     fn shapes_begin_at_their_lower_end_and_reach_the_upper_one() {
-        for form in ["sine", "triangle", "steps"] {
+        for form in ["sine", "triangle", "steps", "raster"] {
             let path = format!("{form}:2,12,5,1");
             let shape = Shape::named(Path::new(&path)).unwrap().unwrap();
             let record = shape.record(Path::new(&path), OutputUnit::Micrometre, 1000.0).unwrap();
@@ -137,6 +165,27 @@ mod tests {
             assert!(y.iter().all(|y| (2.0..=12.0).contains(y)));
             assert_eq!(y[0].to_bits(), y[200].to_bits());
         }
+    }
+
+    #[test]
+    fn what_scanners_ask_for_has_its_speed_and_its_radius() {
+        let of = |form: &str| {
+            let path = format!("{form}:2,12,5,1");
+            let shape = Shape::named(Path::new(&path)).unwrap().unwrap();
+            shape.record(Path::new(&path), OutputUnit::Micrometre, 1000.0).unwrap().output().unwrap().to_vec()
+        };
+        // 10 % of each line's time is a turning at either end; constant speed is 100 µm/s over 0.9 then.
+        let raster = of("raster");
+        let slopes: Vec<f64> = raster.windows(2).map(|w| 1e3 * (w[1] - w[0])).collect();
+        assert!(slopes[10..90].iter().all(|v| (v - 100.0 / 0.9).abs() < 1e-6), "{slopes:?}");
+        assert!(slopes[99].abs() < 10.0 && slopes.windows(2).all(|w| (w[1] - w[0]).abs() < 12.0), "{slopes:?}");
+        let (x, y) = (of("spiral"), of("spiral-y"));
+        for k in (0..1000).step_by(37) {
+            let radius = (x[k] - 7.0).hypot(y[k] - 7.0);
+            assert!((radius - 5.0 * k as f64 / 1000.0).abs() < 1e-9, "row {k}: {radius}");
+        }
+        let sine = of("lissajous");
+        assert!((sine[0] - 7.0).abs() < 1e-12 && (sine[50] - 12.0).abs() < 1e-12 && (sine[150] - 2.0).abs() < 1e-12);
     }
 
     #[test]
