@@ -99,7 +99,7 @@ fn run(seed: u64, number: u64, wrong: Option<Wrong>, keep: Option<&str>) -> Vec<
             wanted.iter().map(|y| ((y - model.output.low) / gain).clamp(0.0, bench.volts)).collect();
         let by_gain = play(&mut device, &straight, 1);
         let by_gain = rms(by_gain[0].iter().zip(&wanted).map(|(y, r)| y - r));
-        let options = LearnOptions { passes: 6, floor: 1.0, ..LearnOptions::default() };
+        let options = LearnOptions { passes: 6, ..LearnOptions::default() };
         let mut learner = match Learner::new(&model, &reference, options) {
             Ok(learner) => learner,
             Err(error) => {
@@ -180,13 +180,15 @@ fn main() {
         })
         .collect();
     let all: Vec<&Outcome> = outcomes.iter().flatten().collect();
+    let before = all.iter().filter(|o| o.over_floor.first().is_some_and(|r| *r <= 1.3)).count();
     let within = all.iter().filter(|o| o.over_floor.iter().take(6).any(|r| *r <= 1.3)).count();
     let mut gains: Vec<f64> = all.iter().map(|o| o.against_gain).collect();
     gains.sort_by(f64::total_cmp);
     println!(
-        "{} of {} within 1.3 of the repeatability after 5 learned passes; no pass more than 2 % worse than the first in {}; {:.1} times below the DC gain (median); ended by themselves {}",
-        within,
+        "{} of {} within 1.3 of the repeatability with the model's inverse, {} after at most 5 learned passes; no pass more than 2 % worse than the first in {}; {:.1} times below the DC gain (median); ended by themselves {}",
+        before,
         all.len(),
+        within,
         all.iter().filter(|o| o.never_worse).count(),
         gains[gains.len() / 2],
         all.iter().filter(|o| o.ended.is_some_and(|e| e != Ended::Passes)).count()

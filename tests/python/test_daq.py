@@ -293,5 +293,19 @@ def test_learning_on_a_device_of_ones_own():
     assert np.all(reference[:50] == wanted[0]) and np.all(reference[50:650] == wanted)
     again = hyst.run(bench, drive=drive, rate=RATE).record
     assert np.sqrt(np.mean((again.outputs[50:650] - wanted) ** 2)) <= 1.5 * min(passes) + 1e-3
-    with pytest.raises(hyst.InputError, match="does not move"):
+    with pytest.raises(hyst.InputError, match="does not move") as refused:
         hyst.learn(bench, model, np.full(100, 3.0), rate=RATE)
+    assert refused.value.columns is None
+
+    # A sensor that freezes after the first pass ends it, and the drive of that pass is kept.
+    one = Bench()
+    first = hyst.learn(one, model, wanted, rate=RATE, passes=1)
+
+    class Freezing(Bench):
+        def exchange(self, drive):
+            outputs = super().exchange(drive)
+            return np.full(len(outputs), 3.0) if len(self.put_out) > len(one.put_out) + 100 else outputs
+
+    with pytest.raises(hyst.CommandError, match="does not follow") as ended:
+        hyst.learn(Freezing(), model, wanted, rate=RATE, passes=4)
+    assert np.array_equal(ended.value.columns["voltage_v"], first.columns["voltage_v"])

@@ -49,9 +49,15 @@ fn the_error_falls_and_the_learned_drive_is_played() {
 fn too_great_an_error_ends_it_at_rest_and_nothing_is_written() {
     let lab = lab();
     let ran = lab.run(
-        "learn --daq sim:plant.toml --model model.json --reference triangle:3,9,0.5,4 --max-error 0.001 -o learned.csv",
+        "learn --daq sim:plant.toml --model model.json --reference triangle:3,9,0.5,4 --max-error 0.001 --logs logs -o learned.csv",
     );
     assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert_eq!(crate::cli_run::log(&lab, "logs/pass-1.mcap").last().unwrap()["drive_v"], 0.0);
+    // In a reference of a third of a second it could not last half a second.
+    let short = lab.run(
+        "learn --daq sim:plant.toml --model model.json --reference triangle:3,9,30,0.3 --max-error 0.001 -o learned.csv",
+    );
+    assert!(short.code == 3 && short.stderr.contains("further from the reference"), "{}", short.stderr);
     assert!(ran.stderr.contains("further from the reference") && !lab.path("learned.csv").exists(), "{}", ran.stderr);
 }
 

@@ -6,7 +6,7 @@ use hyst_tests::{Lab, WARM, column};
 use serde_json::Value;
 
 /// All messages of a log, after a look at what stands around them.
-fn log(lab: &Lab, name: &str) -> Vec<Value> {
+pub(crate) fn log(lab: &Lab, name: &str) -> Vec<Value> {
     let bytes = fs::read(lab.path(name)).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().expect("the log has a summary");
     let channel = summary.channels.values().find(|channel| channel.topic == "/actuator/sample").unwrap();
@@ -120,13 +120,13 @@ fn a_reference_is_followed_and_logged() {
     let half = wanted.len() / 2;
     let squares: f64 = measured[half..].iter().zip(&wanted[half..]).map(|(y, r)| (y - r).powi(2)).sum();
     assert!((late / (squares / (wanted.len() - half) as f64).sqrt() - 1.0).abs() < 1e-9, "{report}");
-    // The model without the lag is late by it: that is an error, or, where a delay is allowed, a figure of its own.
+    // The model without the lag takes it for a wider loop and is too early at 1 Hz: that is an error, or, where a shift is allowed, a figure of its own.
     let allowed = lab.ok(&format!("{follow} --model model.json --allow-delay --json")).json();
     let of = |report: &Value, key: &str| report["tracking"][key].as_f64();
     assert_eq!(of(&plain, "delay_s"), None);
-    assert!(of(&allowed, "delay_s").unwrap() > 1e-3 && of(&allowed, "rmse") < of(&plain, "rmse"), "{allowed}");
+    assert!(of(&allowed, "delay_s").unwrap() < -1e-3 && of(&allowed, "rmse") < of(&plain, "rmse"), "{allowed}");
     let said = lab.ok(&format!("{follow} --model model.json --allow-delay")).stdout;
-    assert!(said.contains("ms later, which was allowed") && said.contains("turning point"), "{said}");
+    assert!(said.contains("ms earlier, which was allowed") && said.contains("turning point"), "{said}");
     // Ramps to the first voltage and back to rest are in the log and not in the record.
     assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
     assert_eq!(samples.last().unwrap()["phase"], "retreat");

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::Complex;
+use realfft::RealFftPlanner;
 use serde::Serialize;
 
 use crate::metrics::{Errors, MetricsError};
@@ -74,6 +75,10 @@ const MOST_HARMONICS: usize = 8;
 const HIGHEST: usize = 40;
 /// Distances of turns are this regular where a reference repeats, as a share of its period.
 const REGULAR: f64 = 0.01;
+/// Tops, and bottoms, are this much alike, as a share of the reference's span.
+const ALIKE: f64 = 0.02;
+/// Smallest difference of two sums of squares, over such a sum.
+const ROUNDING: f64 = 1e-12;
 
 impl Tracking {
     /// Of all rows. `segments` are their parts between which the drive was at rest; with `allow_delay` the reference is shifted by the one delay, or lead,
@@ -174,7 +179,8 @@ fn shifted(wanted: &[f64], segments: &[Range<usize>], rows: f64) -> Vec<f64> {
     late
 }
 
-/// The delay with the least error about its mean \[rows\]: Gauss-Newton on r(t − d) − y, each step as far as it helps.
+/// The delay with the least error about its mean \[rows\]: whole rows from the correlation, parts of them by Gauss-Newton on r(t − d) − y, each step as
+/// far as it helps.
 fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
     let about_mean = |late: &[f64]| -> (Vec<f64>, f64) {
         let mut error: Vec<f64> = late.iter().zip(measured).map(|(r, y)| r - y).collect();
@@ -184,9 +190,10 @@ fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
         (error, squares)
     };
     // No row of a segment is taken from beyond its first half.
-    let most = segments.iter().map(Range::len).min().unwrap_or(0) as f64 / 2.0;
-    let mut delay = 0.0;
-    let (mut error, mut squares) = about_mean(wanted);
+    let most = segments.iter().map(Range::len).min().unwrap_or(0) / 2;
+    let mut delay = whole_delay(wanted, measured, segments, most) as f64;
+    let most = most as f64;
+    let (mut error, mut squares) = about_mean(&shifted(wanted, segments, delay));
     for _ in 0..50 {
         let half = 0.5;
         let (before, after) = (shifted(wanted, segments, delay - half), shifted(wanted, segments, delay + half));
@@ -216,6 +223,83 @@ fn delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>]) -> f64 {
     delay
 }
 
+/// The whole number of rows, `most` at most either way, by which the reference has to be later so that the error about its mean is smallest: for all of them
+/// at once, by a Fourier transform.
+fn whole_delay(wanted: &[f64], measured: &[f64], segments: &[Range<usize>], most: usize) -> i64 {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let (mean_r, mean_y) = (mean(wanted), mean(measured));
+    // Sums over r(t − d), over its square, and over its product with y, for each delay from −most to most.
+    let lags = 2 * most + 1;
+    let (mut sums, mut squares, mut products) = (vec![0.0; lags], vec![0.0; lags], vec![0.0; lags]);
+    for segment in segments {
+        let r: Vec<f64> = wanted[segment.clone()].iter().map(|x| x - mean_r).collect();
+        let y: Vec<f64> = measured[segment.clone()].iter().map(|x| x - mean_y).collect();
+        let (Some(first), Some(last)) = (r.first().copied(), r.last().copied()) else { continue };
+        let n = r.len();
+        let correlation = correlation(&r, &y);
+        let running = |x: &mut dyn Iterator<Item = f64>| -> Vec<f64> {
+            std::iter::once(0.0)
+                .chain(x.scan(0.0, |sum, x| {
+                    *sum += x;
+                    Some(*sum)
+                }))
+                .collect()
+        };
+        let (of_r, of_y) = (running(&mut r.iter().copied()), running(&mut y.iter().copied()));
+        let of_squares = running(&mut r.iter().map(|r| r * r));
+        for lag in 0..lags {
+            // The reference stands still at its first value before it begins, and at its last one after its end.
+            let (held, rows, from, y_held) = if lag >= most {
+                let late = lag - most;
+                (first, late, 0..n - late, of_y[late])
+            } else {
+                let early = most - lag;
+                (last, early, early..n, of_y[n] - of_y[n - early])
+            };
+            sums[lag] += of_r[from.end] - of_r[from.start] + rows as f64 * held;
+            squares[lag] += of_squares[from.end] - of_squares[from.start] + rows as f64 * held * held;
+            products[lag] += correlation[(lag + correlation.len() - most) % correlation.len()] + held * y_held;
+        }
+    }
+    let n = wanted.len().max(1) as f64;
+    let error = |lag: usize| squares[lag] - 2.0 * products[lag] - sums[lag] * sums[lag] / n;
+    // Of equal ones the shortest; rounding makes none better.
+    let scale = squares.iter().copied().fold(0.0, f64::max);
+    let mut best = most;
+    for off in 1..=most {
+        for lag in [most + off, most - off] {
+            if error(lag) < error(best) - ROUNDING * scale {
+                best = lag;
+            }
+        }
+    }
+    best as i64 - most as i64
+}
+
+/// Σ r(k) y(k + d), at d for d ≥ 0 and at length + d for d < 0.
+fn correlation(r: &[f64], y: &[f64]) -> Vec<f64> {
+    let length = (2 * r.len()).next_power_of_two();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let spectrum = |x: &[f64]| {
+        let mut padded = x.to_vec();
+        padded.resize(length, 0.0);
+        let mut spectrum = forward.make_output_vec();
+        // The lengths are those of the plan.
+        let _ = forward.process(&mut padded, &mut spectrum);
+        spectrum
+    };
+    let mut product: Vec<_> =
+        spectrum(r).into_iter().zip(spectrum(y)).map(|(r, y)| r.conj() * y / length as f64).collect();
+    // Real ones, as of any real signal: rounding leaves a trace.
+    for at in [0, length / 2] {
+        product[at].im = 0.0;
+    }
+    let mut correlation = back.make_output_vec();
+    let _ = back.process(&mut product, &mut correlation);
+    correlation
+}
+
 /// Gain and phase over whole periods, from the first top or bottom to the last of its kind; empty where the reference repeats nothing.
 fn harmonics(wanted: &[f64], measured: &[f64], turns: &[usize], rate_hz: f64) -> Vec<Harmonic> {
     // From every second turn to the next but one is a period: at least two of them.
@@ -224,10 +308,15 @@ fn harmonics(wanted: &[f64], measured: &[f64], turns: &[usize], rate_hz: f64) ->
     let periods = kind.len() - 1;
     let period = (last - first) as f64 / periods.max(1) as f64;
     let regular = |w: &[usize]| ((w[1] - w[0]) as f64 - period).abs() <= REGULAR * period + 1.0;
-    if periods < 2 || !kind.windows(2).all(regular) {
+    let (low, high) = range(wanted.iter().copied());
+    let alike = |from: usize| {
+        let (low_turn, high_turn) = range(turns.iter().skip(from).step_by(2).map(|row| wanted[*row]));
+        high_turn - low_turn <= ALIKE * (high - low)
+    };
+    if periods < 2 || !kind.windows(2).all(regular) || !alike(0) || !alike(1) {
         return Vec::new();
     }
-    let highest = HIGHEST.min((period / 2.0) as usize).saturating_sub(1);
+    let highest = HIGHEST.min(((period / 2.0) as usize).saturating_sub(1));
     let of: Vec<(usize, Complex<f64>, Complex<f64>)> = (1..=highest)
         .map(|number| {
             let turn = TAU * number as f64 / period;
@@ -271,7 +360,7 @@ mod tests {
 
     #[test]
     fn a_delay_is_found_and_taken_away() {
-        let (wanted, measured) = (rows(triangle), rows(|t| if t < 0.0123 { 0.0 } else { triangle(t - 0.0123) + 0.3 }));
+        let (wanted, measured) = (rows(triangle), rows(|t| triangle((t - 0.0123).max(0.0)) + 0.3));
         let of = |allow| Tracking::of(&wanted, &measured, &whole(), 1000.0, allow).unwrap();
         let (plain, late) = (of(false), of(true));
         assert!(plain.delay_s.is_none() && (late.delay_s.unwrap() - 0.0123).abs() < 1e-5, "{late:?}");
@@ -288,15 +377,34 @@ mod tests {
     }
 
     #[test]
+    fn a_delay_beyond_a_step_and_beyond_half_a_period_is_found() {
+        let stairs = |t: f64| 2.0 * (10.0 * triangle(0.2 * t)).floor() / 10.0;
+        // 30 Hz, and a delay of more than half its period.
+        let fast = |t: f64| triangle(30.0 * t) * (1.0 + 0.1 * t);
+        for (reference, delay) in [(&stairs as &dyn Fn(f64) -> f64, 0.25), (&fast, 0.021), (&fast, -0.021)] {
+            let (wanted, measured) = (rows(reference), rows(|t| reference((t - delay).clamp(0.0, 4.999)) + 0.1));
+            let found = Tracking::of(&wanted, &measured, &whole(), 1000.0, true).unwrap();
+            assert!(
+                (found.delay_s.unwrap() - delay).abs() < 1e-4 && found.rmse_about_mean < 0.02,
+                "{delay}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_grows_or_decays_has_no_harmonics() {
+        let wanted = rows(|t| (-0.3 * t).exp() * (TAU * 5.0 * t).sin());
+        let found = Tracking::of(&wanted, &wanted, &whole(), 1000.0, false).unwrap();
+        assert!(found.turning.is_some() && found.harmonics.is_empty(), "{found:?}");
+    }
+
+    #[test]
     fn rounded_corners_are_an_error_at_the_turning_points() {
-        let wanted = rows(triangle);
-        let measured: Vec<f64> = (0..5000usize)
-            .map(|k| (k.saturating_sub(30)..(k + 31).min(5000)).map(|j| wanted[j]).sum::<f64>())
-            .zip((0..5000usize).map(|k| ((k + 31).min(5000) - k.saturating_sub(30)) as f64))
-            .map(|(sum, n)| sum / n)
-            .collect();
+        // It begins and ends between two corners.
+        let wanted = rows(|t| triangle(t + 0.25));
+        let measured = rows(|t| (-30..=30).map(|k| triangle(t + 0.25 + 1e-3 * f64::from(k))).sum::<f64>() / 61.0);
         let turning = Tracking::of(&wanted, &measured, &whole(), 1000.0, false).unwrap().turning.unwrap();
-        assert_eq!(turning.points, 9);
+        assert_eq!(turning.points, 10);
         assert!(turning.rmse > 10.0 * turning.rmse_between && turning.max_abs > 0.25, "{turning:?}");
     }
 

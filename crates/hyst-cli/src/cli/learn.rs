@@ -46,7 +46,7 @@ pub(crate) struct LearnArgs {
     pub(crate) temperature: TemperatureArg,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
-    /// End it and come to rest when the output is further than this from the reference for half a second [output unit]
+    /// End it and come to rest when the output is further than this from the reference for half a second, or a quarter of a reference that is shorter than two [output unit]
     #[arg(long, value_name = "Y", value_parser = positive)]
     pub(crate) max_error: Option<f64>,
     /// End it and come to rest above this temperature

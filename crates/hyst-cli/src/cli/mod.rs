@@ -374,7 +374,7 @@ pub(crate) struct RunArgs {
     /// End the run and come to rest above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// End the run and come to rest when the output is further than this from the reference for half a second, of which breaks of a tenth of a second are no end [output unit]
+    /// End the run and come to rest when the output is further than this from the reference for half a second, or a quarter of a segment that is shorter than two; breaks of a tenth of a second are no end [output unit]
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
     /// Compare the output with the reference as late as it is: one delay, the one with the least error, does not count as an error. It is printed
@@ -389,8 +389,8 @@ pub(crate) struct RunArgs {
     /// Show a bar on a terminal instead of a picture of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Hold at the first value of a reference before it begins; 2 if not given. A model takes the actuator as settled there, and
-    /// creep takes its time
+    /// Hold at the first value before a segment begins; 2 for a reference and 0 for a drive if not given. A model takes the actuator as
+    /// settled there, and creep takes its time
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) settle: Option<f64>,
     /// Seed of a simulated plant's noise, so that a second record has another one; that of its file if not given

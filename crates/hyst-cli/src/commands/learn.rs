@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use hyst_hw::{Daq, Recording};
 use hyst_ident::diagnose::{DiagnoseOptions, Diagnosis, diagnose_until};
-use hyst_ident::learn::{Ended, LearnOptions, Learner, Pass};
+use hyst_ident::learn::{Ended, LearnOptions, LearnedDrive, Learner, Pass};
 use hyst_ident::model::Model;
-use hyst_ident::record::{Extra, OutputUnit, Record};
+use hyst_ident::record::{Extra, Record};
 use hyst_ident::simulate::Zero;
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
-use crate::{host, recording, text};
+use crate::{recording, text};
 
 /// An effect that the passes show.
 #[derive(Debug, Serialize)]
@@ -45,14 +45,17 @@ struct Summary {
     repeatability: f64,
     /// By how much the error of the best pass is smaller than that of the first one.
     improvement: f64,
-    /// Root mean square and largest value of the correction: what the model had wrong \[output unit\].
+    /// Root mean square and largest value of the correction, reference less what the model predicts for the drive \[output unit\].
     correction_rms: f64,
     correction_max_abs: f64,
     /// Effects that explain it; none where it was not looked for.
     found: Option<Vec<Found>>,
     output: String,
     logs: Option<String>,
+    /// The model with these effects, if it was written.
     extended: Option<String>,
+    /// How long the first value was held before each play \[s\].
+    settle_s: f64,
     #[serde(skip)]
     symbol: &'static str,
 }
@@ -85,8 +88,18 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
         return Err(CommandError::bad_input("give --model and --reference"));
     };
     // The same drive in each play of a pass: a temperature that moves is one of the things that do not repeat.
-    followed.live = None;
-    let Followed { model, json, reference, options, .. } = &*followed;
+    if followed.live.take().is_some()
+        && let (None, Some(degc)) = (args.temperature.degc, followed.options.temperature)
+    {
+        say(&format!(
+            "note: the first drive is planned for {} °C, where the model's gain is stated; --temperature gives that of today",
+            text::short(degc)
+        ));
+    }
+    job.log_option = "--logs";
+    let Some(Followed { model, json, reference, options, .. }) = &job.followed else {
+        return Err(CommandError::bad_input("give --model and --reference"));
+    };
     let (model, json) = (model.clone(), json.clone());
     let options = LearnOptions { compensate: *options, passes: args.passes as usize, ..LearnOptions::default() };
     let learner = Learner::new(&model, reference, options).map_err(CommandError::bad_input)?;
@@ -103,8 +116,8 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
     }
     let mut passes = Passes { device, job, args, json: &json, model: &model, records: Vec::new(), rate_hz: 0.0 };
     let (learner, ended) = passes.all(learner)?;
-    let Passes { device, records, rate_hz, .. } = passes;
-    let summary = finish(args, &model, &learner, ended, &records, (device.capabilities(), rate_hz))?;
+    let Passes { device, records, rate_hz, job, .. } = passes;
+    let summary = finish(args, &model, &learner, ended, &records, (device.capabilities(), rate_hz), &job)?;
     report.print(&summary.text(), &summary)
 }
 
@@ -152,7 +165,7 @@ impl<'a> Passes<'a> {
             if let Some(ended) = ended {
                 return Ok((learner, ended));
             }
-            if interrupt::asked() || host::stopping().is_stopped() {
+            if interrupt::stopping().is_stopped() {
                 let error = CommandError::failed("stopped on request; the device was brought to rest");
                 return Err(self.kept(&learner, error));
             }
@@ -162,25 +175,45 @@ impl<'a> Passes<'a> {
     /// The error that ended it, once the best drive so far is written.
     fn kept(&self, learner: &Learner<'_>, error: CommandError) -> CommandError {
         let Some((best, pass, drive)) = learner.best() else { return error };
-        let extra = [Extra::numbers(&self.model.input.column, &drive.voltage)];
-        let written =
-            self.args.output.write(|out| learner.reference().write_with(out, &extra).map_err(output::io_error));
-        if written.is_ok() {
-            say(&format!(
-                "note: the best drive so far, of pass {}, RMSE {}, is kept in {}",
-                best + 1,
-                text::short(pass.rmse),
-                self.args.output
-            ));
-        }
+        let symbol = recording::unit(self.device.capabilities().output).symbol();
+        let what = format!("the best drive so far, of pass {}, RMSE {} {symbol},", best + 1, text::short(pass.rmse));
+        say(&match write_drive(&self.args.output, self.model, learner, drive) {
+            Ok(()) => format!("note: {what} is kept in {}", self.args.output),
+            Err(error) => format!("warning: {what} cannot be kept there: {}", error.text()),
+        });
         error
     }
 
-    /// One pass: the outputs of each play at the rows of the drive.
+    /// One pass: the outputs of each play at the rows of the drive. A pass in which the device had to wait for its drive is played again, once.
     fn plays(&mut self, learner: &Learner<'_>, number: usize) -> CommandResult<Vec<Vec<f64>>> {
+        let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}.mcap")));
+        let (mut recording, mut gaps) = self.played(learner, name.as_deref())?;
+        if gaps > 0 {
+            let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}-again.mcap")));
+            say(&format!(
+                "note: pass {number} is played again: the device had no next value in time, so its drive was another one"
+            ));
+            (recording, gaps) = self.played(learner, name.as_deref())?;
+        }
+        if gaps > 0 {
+            return Err(CommandError::failed(
+                "the line is too slow for this rate: the device held old values on the way; use a faster line, or a reference with fewer samples a second",
+            ));
+        }
+        self.rate_hz = recording.rate_hz;
+        // The first play is left out: the actuator remembers other drives in it.
+        recording.segments.drain(..recording.segments.len().min(1));
+        let outputs = recording.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect();
+        let unit = recording::unit(self.device.capabilities().output);
+        let record = recording::to_record(&recording::split(recording), &format!("pass {number}"), unit)?;
+        self.records.push(record);
+        Ok(outputs)
+    }
+
+    /// All plays of a pass, the first one included, and how often the device had to wait.
+    fn played(&mut self, learner: &Learner<'_>, log: Option<&Path>) -> CommandResult<(Recording, usize)> {
         let plays = self.args.plays as usize;
         let unit = recording::unit(self.device.capabilities().output);
-        // The first play is left out: the actuator remembers other drives in it.
         self.job.segments = vec![learner.drive().voltage.clone(); plays + 1];
         let wanted: Vec<Option<f64>> =
             learner.reference().output().unwrap_or_default().iter().copied().map(Some).collect();
@@ -192,30 +225,25 @@ impl<'a> Passes<'a> {
             sample_rate_hz: self.job.options.rate_hz,
             model: Some(LoggedModel { model: self.model, json: self.json }),
         };
-        let path = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}.mcap")));
-        let mut log = path
-            .map(|path| RunLog::create(&path, &info).map_err(|error| CommandError::new(Exit::Failed, error)))
+        let mut log = log
+            .map(|path| RunLog::create(path, &info).map_err(|error| CommandError::new(Exit::Failed, error)))
             .transpose()?;
         self.device.gentle(self.job.steepest());
         let played = play::play(&mut self.device, &mut self.job, log.as_mut());
         let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
-        let Played { mut recording, error, .. } = played?;
+        let Played { recording, gaps, error, .. } = played?;
         if let Some(error) = error {
             return Err(error);
         }
         closed?;
-        self.rate_hz = recording.rate_hz;
-        recording.segments.drain(..recording.segments.len().min(1));
-        let outputs = recording.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect();
-        self.keep(recording, number, unit)?;
-        Ok(outputs)
+        Ok((recording, gaps.times))
     }
+}
 
-    fn keep(&mut self, recording: Recording, number: usize, unit: OutputUnit) -> CommandResult {
-        let record = recording::to_record(&recording::split(recording), &format!("pass {number}"), unit)?;
-        self.records.push(record);
-        Ok(())
-    }
+/// Writes a drive with its reference; an older file keeps its content under another name.
+fn write_drive(to: &Target, model: &Model, learner: &Learner<'_>, drive: &LearnedDrive) -> CommandResult {
+    let extra = [Extra::numbers(&model.input.column, &drive.voltage)];
+    to.write_measured(|out| learner.reference().write_with(out, &extra).map_err(output::io_error))
 }
 
 /// Writes the drive, looks for what the model lacks, and sums up.
@@ -226,18 +254,28 @@ fn finish(
     ended: Ended,
     records: &[Record],
     (device, rate_hz): (&hyst_hw::Capabilities, f64),
+    job: &Job,
 ) -> CommandResult<Summary> {
     let passes: Vec<Pass> = learner.passes().collect();
     let (Some((best, pass, drive)), Some(first), Some(last)) = (learner.best(), passes.first(), passes.last()) else {
         return Err(CommandError::failed("no pass was played"));
     };
-    let extra = [Extra::numbers(&model.input.column, &drive.voltage)];
-    args.output.write(|out| learner.reference().write_with(out, &extra).map_err(output::io_error))?;
+    write_drive(&args.output, model, learner, drive)?;
     let correction = learner.correction();
     let found = diagnosed(args, model, records)?;
-    if let (Some(target), Some(found)) = (&args.extended, &found) {
-        target.write(|out| out.write_all(found.extended.to_json().as_bytes()))?;
-    }
+    let names_any = found.as_ref().is_some_and(|found| !found.findings.effects.is_empty());
+    let extended = match (&args.extended, &found) {
+        (Some(target), Some(found)) if names_any => {
+            target.write(|out| out.write_all(found.extended.to_json().as_bytes()))?;
+            Some(target.to_string())
+        }
+        (Some(target), found) => {
+            let why = if found.is_some() { ": the passes show no effect to add to the model" } else { "" };
+            say(&format!("note: {target} is not written{why}"));
+            None
+        }
+        _ => None,
+    };
     let unit = recording::unit(device.output);
     let named = |found: Diagnosis| -> Vec<Found> {
         let effects = found.findings.effects.iter();
@@ -258,7 +296,8 @@ fn finish(
         found: found.map(named),
         output: args.output.to_string(),
         logs: args.logs.as_ref().map(|folder: &PathBuf| folder.display().to_string()),
-        extended: args.extended.as_ref().map(ToString::to_string),
+        extended,
+        settle_s: job.options.settle_s,
         symbol: unit.symbol(),
         passes,
     })
@@ -273,7 +312,7 @@ fn diagnosed(args: &LearnArgs, model: &Model, records: &[Record]) -> CommandResu
     let joined = Record::join(records.to_vec())?;
     let options = DiagnoseOptions { zero: Zero::PerRecord, seed: args.seed.unwrap_or(1) };
     let told = |what: &str| progress.say(&format!("what the model had wrong: {what}"));
-    match diagnose_until(&joined, None, model, &options, &told, &host::stopping()) {
+    match diagnose_until(&joined, None, model, &options, &told, &interrupt::stopping()) {
         Ok(found) => Ok(Some(found)),
         Err(error) => {
             drop(progress);
@@ -337,7 +376,11 @@ impl Summary {
         }
         lines.extend(self.logs.iter().map(|folder| format!("logs: {folder}")));
         lines.push(format!("drive: {}", self.output));
-        lines.push(format!("next: hystctl run --daq DEVICE --drive {} --record measured.csv", self.output));
+        lines.push(format!(
+            "next: hystctl run --daq DEVICE --drive {} --settle {} --record measured.csv",
+            self.output,
+            short(self.settle_s)
+        ));
         lines.join("\n")
     }
 }

@@ -25,9 +25,11 @@ impl Raster {
         let from_low = from_low.min(1.0 - from_low);
         // Either turning begins and ends this far from its middle.
         let half = 0.25 * turning;
-        let way = |d: f64| if d < half { 0.5 * (d * d / half + half) } else { d };
-        let gone = if from_low <= 0.25 { way(from_low) } else { 0.5 - way(0.5 - from_low) };
-        (gone - 0.5 * half) / (0.5 - half)
+        let way = |d: f64| {
+            let gone = if d < half { 0.5 * (d * d / half + half) } else { d };
+            (gone - 0.5 * half) / (0.5 - half)
+        };
+        if from_low <= 0.25 { way(from_low) } else { 1.0 - way(0.5 - from_low) }
     }
 
     pub(super) fn samples(&self, rate: f64) -> Result<Vec<f64>, ExciteError> {

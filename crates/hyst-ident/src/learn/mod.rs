@@ -6,7 +6,9 @@
 //!
 //! - D, the response of the measured output to a change of the predicted one, is 1 where the model is true. A gain or a delay that is off and a mode that the
 //!   model lacks are in D: it is estimated from the first pass and from the changes between passes as a rational response with a delay, and in
-//!   narrow bands of frequency, with its variance s². Then L = D* / (|D|² + s²), the change with the least expected square of the remaining error.
+//!   narrow bands of frequency, with a variance s², to which a share of |D|² is added because the slope of a hysteresis is not one number. Then
+//!   L = D* / (|D|² + s²), the change with the least expected square of the remaining error. The variance is no exact one: the rational
+//!   response and the bands are estimated from the same passes.
 //! - Each pass plays the drive several times, after one more play that is left out, so that the actuator remembers this drive and no other. What differs
 //!   between these plays does not repeat (noise, creep, drift); its power N in each band limits what is learned of an error E: L (1 − 3 N / |E|²) E, and
 //!   nothing where that is negative.
@@ -53,7 +55,7 @@ impl Default for LearnOptions {
     }
 }
 
-/// What a pass left.
+/// The errors of one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Pass {
     /// Root mean square of reference less output, over all plays \[output unit\].
@@ -113,7 +115,9 @@ pub enum LearnError {
         value: f64,
     },
     /// Plays have other lengths than the reference, or there are fewer than two.
-    #[error("a pass is at least two plays of {rows} rows each; there are {plays}, one of {other} rows")]
+    #[error(
+        "a pass is at least two plays of {rows} rows each; there are {plays}, one of {other} rows: play the drive again, whole"
+    )]
     Plays {
         /// Rows of the reference.
         rows: usize,
@@ -145,17 +149,17 @@ pub enum LearnError {
 /// A correlation below which nothing can be learned: the change would have the wrong sign in too many frequencies.
 const LEAST_CORRELATION: f64 = 0.5;
 /// Error that is taken for noise, over N: of white noise one frequency in twenty has more.
-const NOISE: f64 = 3.0;
+const NOISE_MULTIPLE: f64 = 3.0;
 /// A pass that brings less than this share twice ends it.
-const GAIN: f64 = 0.05;
+const LEAST_IMPROVEMENT: f64 = 0.05;
 /// A pass is worse from this ratio to the best on; below that it is scatter.
-const WORSE: f64 = 1.05;
+const WORSE_RATIO: f64 = 1.05;
 /// Power of what rounding makes of a play, over the largest of the reference at one frequency.
-const ROUNDING: f64 = 1e-18;
+const ROUNDING_POWER: f64 = 1e-18;
 /// How long the first and the last value are held at least \[s\].
 const HOLD_S: f64 = 0.05;
 /// How far the predicted output may leave the range of the model's output, as a share of that.
-const BEYOND: f64 = 0.5;
+const BEYOND_RANGE: f64 = 0.5;
 
 /// A pass as it is kept.
 struct Taken {
@@ -216,7 +220,9 @@ impl<'a> Learner<'a> {
         let predicted = follower.predicted(model, &plan.voltage).map_err(CompensateError::from)?;
         let spectrum = Spectrum::new(predicted.len());
         let bands = Bands::new(spectrum.bins());
-        let limited = [plan.voltage_limited, plan.slew_limited].concat();
+        let mut limited = [plan.voltage_limited, plan.slew_limited].concat();
+        limited.sort_unstable();
+        limited.dedup();
         Ok(Self {
             model,
             rows: hold..hold + given,
@@ -263,8 +269,8 @@ impl<'a> Learner<'a> {
         self.taken.iter().map(|taken| taken.pass)
     }
 
-    /// The learned correction of the best pass, r − v at the rows of the drive \[output unit\]: reference less what the model says that the drive does, which is
-    /// what the model had wrong.
+    /// The learned correction of the best pass, r − v at the rows of the drive \[output unit\]: reference less what the model predicts for the drive. It is
+    /// what the model had wrong, and, where limits held the drive or the inverse has a band, what these keep from the reference.
     pub fn correction(&self) -> Vec<f64> {
         let wanted = self.reference.output().unwrap_or_default();
         self.taken
@@ -282,9 +288,8 @@ impl<'a> Learner<'a> {
         self.check(plays)?;
         let rows = self.predicted.len();
         let mean: Vec<f64> = (0..rows).map(|k| plays.iter().map(|y| y[k]).sum::<f64>() / plays.len() as f64).collect();
-        if self.taken.is_empty() {
-            follows(&self.predicted, &mean)?;
-        }
+        // In each pass: a sensor may fail on the way.
+        follows(&self.predicted, &mean)?;
         self.compare(plays, &mean);
         let output = self.spectrum.of(&mean);
         let pass = self.judge(plays);
@@ -300,7 +305,7 @@ impl<'a> Learner<'a> {
         });
         let last = self.taken.len() - 1;
         let best = self.taken[self.best].pass.rmse;
-        self.worse = if pass.rmse > WORSE * best { self.worse + 1 } else { 0 };
+        self.worse = if pass.rmse > WORSE_RATIO * best { self.worse + 1 } else { 0 };
         if pass.rmse < best {
             self.best = last;
         }
@@ -343,7 +348,7 @@ impl<'a> Learner<'a> {
         let counts = self.bands.real_sums(Width::Medium, |_| self.differences);
         // A device without noise repeats to the rounding of its numbers.
         let wanted = self.wanted.iter().skip(1).map(|r| r.norm_sqr()).fold(0.0, f64::max);
-        let rounding = (ROUNDING * wanted).max(f64::MIN_POSITIVE.sqrt());
+        let rounding = (ROUNDING_POWER * wanted).max(f64::MIN_POSITIVE.sqrt());
         let of = |bin: usize| {
             let band = self.bands.of(bin);
             let power = sums[band] / counts[band].max(f64::MIN_POSITIVE);
@@ -380,8 +385,8 @@ impl<'a> Learner<'a> {
             Some(Ended::AtFloor)
         } else if self.worse >= 3 {
             Some(Ended::Worse)
-        } else if now > 3 && self.worse == 0 && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 2)
-            || now > 4 && best_of(0..now) > (1.0 - GAIN) * best_of(0..now - 3)
+        } else if now > 3 && self.worse == 0 && best_of(0..now) > (1.0 - LEAST_IMPROVEMENT) * best_of(0..now - 2)
+            || now > 4 && best_of(0..now) > (1.0 - LEAST_IMPROVEMENT) * best_of(0..now - 3)
         {
             Some(Ended::NoGain)
         } else if now >= self.options.passes {
@@ -425,13 +430,13 @@ impl<'a> Learner<'a> {
             .map(|bin| {
                 let error = self.wanted[bin] - best.output[bin];
                 let noise = noise[bin] / best.plays;
-                let sure = (1.0 - NOISE * noise / error.norm_sqr().max(f64::MIN_POSITIVE)).max(0.0);
+                let sure = (1.0 - NOISE_MULTIPLE * noise / error.norm_sqr().max(f64::MIN_POSITIVE)).max(0.0);
                 let change = error * response.step(bin, self.bands.of(bin)) * sure * trust;
                 if change.re.is_finite() && change.im.is_finite() { change } else { Complex::new(0.0, 0.0) }
             })
             .collect();
         let (low, high) = (self.model.output.low, self.model.output.high);
-        let beyond = BEYOND * (high - low);
+        let beyond = BEYOND_RANGE * (high - low);
         let to: Vec<f64> = best
             .predicted
             .iter()

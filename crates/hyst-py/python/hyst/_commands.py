@@ -412,14 +412,25 @@ def learn(
     InputError
         If something was refused; nothing has moved.
     CommandError
-        If the output does not follow the reference, or a limit was broken. The best drive so far is in ``output``.
+        If the output does not follow the reference, or learning was stopped.
+    DeviceError
+        If the device was lost, or a limit was broken.
+
+    Both have the best drive so far as ``columns``, as the report has them; ``None`` before the first pass has ended. It is in ``output``, too.
     """
     with _files() as files:
         device, own = _device(daq)
         path = Path(output) if output is not None else files.new("learned.csv")
         column = output_column or (model.output_column if isinstance(model, Model) else "displacement_um")
         options |= {"model": files.model(model), "reference": files.signal(reference, rate, column), "output": path}
-        text, content, _ = _call(["learn", *device, *_options(options)], own)
+        before = path.stat().st_mtime_ns if path.exists() else None
+        try:
+            text, content, _ = _call(["learn", *device, *_options(options)], own)
+        except BaseException as error:
+            # An older file of this name is not of this run.
+            fresh = path.exists() and path.stat().st_mtime_ns != before
+            error.columns = _columns(path) if fresh else None  # type: ignore[attr-defined]
+            raise
         if output is None:
             content.pop("output", None)
         return Report(_without(text, path if output is None else None), content, _columns(path))

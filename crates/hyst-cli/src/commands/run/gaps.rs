@@ -9,7 +9,7 @@ use crate::recording::missing;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(in crate::commands) struct Gaps {
     /// How often.
-    pub(super) times: usize,
+    pub(in crate::commands) times: usize,
     /// Periods altogether.
     periods: usize,
 }

@@ -3,6 +3,9 @@
 use hyst_hw::Sample;
 use hyst_hw::wire::{Fault, Lasting, PATIENCE_S};
 
+/// How long an error lasts before it ends a run, as a share of a segment: in a short one it could never last half a second.
+const SHARE_OF_SEGMENT: f32 = 0.25;
+
 /// What ends a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guard {
@@ -13,12 +16,13 @@ pub(super) struct Guard {
 }
 
 impl Guard {
-    /// Highest temperature \[°C\] and greatest tracking error \[output unit\], where there are such limits.
-    pub(super) fn new(hottest_degc: Option<f64>, error: Option<f64>, rate_hz: f64) -> Self {
+    /// Highest temperature \[°C\] and greatest tracking error \[output unit\], where there are such limits. Of segments of `shortest_s` an error ends the run
+    /// after a quarter of that, or half a second.
+    pub(super) fn new(hottest_degc: Option<f64>, error: Option<f64>, rate_hz: f64, shortest_s: f64) -> Self {
         Self {
             hottest_degc: hottest_degc.unwrap_or(f64::INFINITY),
             error: error.unwrap_or(f64::INFINITY),
-            patience: PATIENCE_S * rate_hz as f32,
+            patience: PATIENCE_S.min(SHARE_OF_SEGMENT * shortest_s as f32) * rate_hz as f32,
             astray: Lasting::default(),
         }
     }
@@ -47,7 +51,7 @@ mod tests {
 
     #[test]
     fn heat_and_dead_sensors_end_a_run_at_once_and_an_error_after_a_while() {
-        let mut guard = Guard::new(Some(60.0), Some(0.5), 100.0);
+        let mut guard = Guard::new(Some(60.0), Some(0.5), 100.0, 10.0);
         assert_eq!(guard.look(&sample(1.0, 20.0), None), None);
         assert_eq!(guard.look(&sample(1.0, 60.1), None), Some(Fault::Temperature));
         assert_eq!(guard.look(&sample(f64::NAN, 20.0), None), Some(Fault::Sensor));
@@ -56,7 +60,10 @@ mod tests {
         assert!((0..11).all(|_| away(1.4).is_none()));
         assert!((0..50).all(|_| away(1.6).is_none()));
         assert_eq!(away(1.6), Some(Fault::TrackingError));
-        let mut none = Guard::new(None, None, 100.0);
+        let mut short = Guard::new(None, Some(0.5), 100.0, 0.4);
+        assert!((0..10).all(|_| short.look(&sample(1.0, 20.0), Some(1.6)).is_none()));
+        assert_eq!(short.look(&sample(1.0, 20.0), Some(1.6)), Some(Fault::TrackingError));
+        let mut none = Guard::new(None, None, 100.0, 10.0);
         assert!((0..1000).all(|_| none.look(&sample(1e9, 1e9), Some(0.0)).is_none()));
     }
 }

@@ -4,9 +4,12 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, Once, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, Once, PoisonError};
+
+use hyst_ident::stop::Stop;
 
 use crate::exit::Exit;
+use crate::host;
 use crate::output::say;
 
 /// A run, as the handler knows it.
@@ -26,12 +29,17 @@ pub(super) struct Interrupt {
 
 static CURRENT: Mutex<Option<Arc<Interrupt>>> = Mutex::new(None);
 static HANDLER: Once = Once::new();
-/// Whether Ctrl-C was pressed since the program began.
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Set once Ctrl-C was pressed.
+static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// Whether Ctrl-C was pressed.
+/// Whether Ctrl-C was pressed since the program began.
 pub(in crate::commands) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
+}
+
+/// What ends a computation after a run: the host, or Ctrl-C.
+pub(in crate::commands) fn stopping() -> Stop {
+    Stop::from(host::stop().unwrap_or_else(|| Arc::clone(&ASKED)))
 }
 
 impl Interrupt {
@@ -60,10 +68,10 @@ impl Interrupt {
         if self.over.load(Ordering::Relaxed) {
             // What was measured is being written: an impatient stop of the run is no wish to lose it.
             if self.warned.swap(true, Ordering::Relaxed) {
-                say("error: left before all that was measured was written");
+                say("error: left at once; what had not been written yet is lost");
                 std::process::exit(i32::from(Exit::DeviceLost as u8));
             }
-            say("note: what was measured is being written; once more, and it is left as it is");
+            say("note: stopping; what was measured is kept. Press Ctrl-C again to leave at once");
         } else if self.stop.swap(true, Ordering::Relaxed) {
             // Who asks twice does not want to wait for a device that does not answer.
             say(&format!(

@@ -39,6 +39,8 @@ pub(in crate::commands) struct Job {
     pub(super) symbol: &'static str,
     /// Whether a record of it is written.
     pub(super) recorded: bool,
+    /// The option that keeps what is measured as it comes.
+    pub(in crate::commands) log_option: &'static str,
     /// Where viewers are served, if they are.
     pub(super) live: Option<SocketAddr>,
     /// Whether a bar is to be shown instead of a picture.
@@ -439,6 +441,7 @@ impl Job {
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
             recorded: args.record.is_some(),
+            log_option: "--log",
             live: args.live,
             plain: args.plain,
             hottest_degc: args.hottest,
@@ -458,6 +461,7 @@ impl Job {
             handed_over: None,
             symbol: recording::unit(device.output).symbol(),
             recorded: args.output.is_some(),
+            log_option: "--log",
             live: args.live,
             plain: args.plain,
             hottest_degc: args.hottest,
@@ -476,11 +480,6 @@ impl Job {
         if args.temperature.degc.is_some() {
             return Err(CommandError::bad_input(
                 "--temperature needs --model and --reference: a drive is played as it stands",
-            ));
-        }
-        if args.settle.is_some() {
-            return Err(CommandError::bad_input(
-                "--settle needs --model and --reference: a drive is played as it stands",
             ));
         }
         if args.map.rate.is_some() {
@@ -512,7 +511,8 @@ impl Job {
             return Err(CommandError::bad_input(message));
         }
         let wanted = vec![None; volts.len()];
-        let options = play_options(args, device, &drive);
+        let mut options = play_options(args, device, &drive);
+        options.settle_s = args.settle.unwrap_or(options.settle_s);
         Ok(Self::new(args, device, split(&drive, volts), options, wanted, None))
     }
 }

@@ -10,7 +10,7 @@ use hyst_hw::{Cause, Daq, Failure, Recording, Revision, record_with};
 use super::beside::Watched;
 use super::gaps::{GapFinder, Gaps};
 use super::guard::Guard;
-use super::interrupt::Interrupt;
+use super::interrupt::{self, Interrupt};
 use super::job::Job;
 use super::lookout::Lookout;
 use super::view::View;
@@ -39,13 +39,14 @@ where
 {
     let lent = host::stop();
     let path = log.as_ref().map(|log| log.path().to_owned());
-    let interrupt = Interrupt::new(lent.clone().unwrap_or_default(), path, job.recorded);
-    let stop = Arc::clone(&interrupt.stop);
+    let current = Interrupt::new(lent.clone().unwrap_or_default(), path, job.recorded);
+    let stop = Arc::clone(&current.stop);
     // A host looks after Ctrl-C itself.
     if lent.is_none() {
-        interrupt.watch();
+        current.watch();
     }
-    let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz);
+    let shortest = job.segments.iter().map(Vec::len).min().unwrap_or(0) as f64 / job.options.rate_hz;
+    let guard = Guard::new(job.hottest_degc, job.greatest_error, job.options.rate_hz, shortest);
     let stream = job.live.map(|address| RunStream::at(address, job.symbol)).transpose();
     let stream = stream.map_err(|error| CommandError::new(Exit::Failed, error))?;
     if let Some(stream) = &stream {
@@ -66,7 +67,8 @@ where
         forces: Vec::new(),
         now_s: 0.0,
     };
-    if lookout.view.interrupted() || stop.load(Ordering::Relaxed) {
+    // Of a command that plays more than once, Ctrl-C may have come in between.
+    if lookout.view.interrupted() || stop.load(Ordering::Relaxed) || (lent.is_none() && interrupt::asked()) {
         return Err(CommandError::failed("stopped on request before anything moved"));
     }
     let (mut live, mut closed) = match &mut job.followed {
@@ -84,14 +86,14 @@ where
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
         let on = lookout.take(news);
         let has_logged = lookout.log.as_ref().is_some_and(|log| log.samples() > 0);
-        interrupt.logged.store(has_logged, Ordering::Relaxed);
+        current.logged.store(has_logged, Ordering::Relaxed);
         if saturated.load(Ordering::Relaxed) {
             lookout.end(Fault::Saturation);
         }
         let ended = lookout.fault.is_some() || lookout.view.interrupted() || stop.load(Ordering::Relaxed);
         if ended { ControlFlow::Break(()) } else { on }
     });
-    interrupt.over.store(true, Ordering::Relaxed);
+    current.over.store(true, Ordering::Relaxed);
     match &played {
         Err(Failure { not_stopped: Some(error), driven, .. }) => {
             let what = if *driven { "the device may still be driven" } else { "the device did not take the stop" };
@@ -120,7 +122,7 @@ where
                 &recording,
                 log_error,
                 fault.map(|fault| (fault, detail)),
-                (log.map(|log| &*log), job.recorded),
+                (log.map(|log| &*log), job.recorded, job.log_option),
             ));
             Ok(Played { recording, forces, watched, gaps, error })
         }
@@ -133,7 +135,7 @@ fn failed<E: Classified>(
     partial: &Recording,
     log_error: Option<LogError>,
     fault: Option<(Fault, String)>,
-    (log, recorded): (Option<&RunLog>, bool),
+    (log, recorded, keeps): (Option<&RunLog>, bool, &str),
 ) -> CommandError {
     let measured: usize = partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
     let many = text::count(measured, "sample");
@@ -149,7 +151,7 @@ fn failed<E: Classified>(
             say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()));
         }
         (None, _) if recorded => {}
-        (None, _) => say(&format!("note: {many} that had been measured are lost; give --log to keep them next time")),
+        (None, _) => say(&format!("note: {many} that had been measured are lost; give {keeps} to keep them next time")),
     }
     match fault {
         Some((fault, detail)) if cancelled => CommandError::new(
