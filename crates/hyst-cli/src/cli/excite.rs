@@ -192,7 +192,7 @@ pub(crate) enum ExciteKind {
     },
     /// One axis of a spiral scan: a sine around mid-span whose amplitude grows to the whole span
     Spiral {
-        /// Angle at which it begins [degrees]; the other axis has 90 more
+        /// Angle at which it begins, in degrees; the other axis has 90 more
         #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
         phase: f64,
         #[command(flatten)]
