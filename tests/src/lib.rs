@@ -1,6 +1,7 @@
 //! Helpers that the cross-crate tests share: the built `hystctl`, a folder to work in, small records.
 
 pub mod activation_study;
+pub mod ageing;
 pub mod calibration;
 pub mod control_study;
 pub mod controller;

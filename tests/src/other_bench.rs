@@ -56,6 +56,19 @@ pub struct OtherDevice {
     creep: Vec<(f64, f64)>,
     mode: (f64, f64),
     at_rest_um: f64,
+    ageing: Option<Ageing>,
+}
+
+/// A slow change, evenly from when it begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Ageing {
+    /// How long it takes \[s\].
+    pub seconds: f64,
+    /// By how much the gain falls, as a share of it.
+    pub gain: f64,
+    /// By how much the loop becomes wider, as a share of its width.
+    pub loop_width: f64,
+    began: u64,
 }
 
 impl OtherDevice {
@@ -92,7 +105,24 @@ impl OtherDevice {
             creep,
             mode: (0.0, 0.0),
             at_rest_um,
+            ageing: None,
         }
+    }
+
+    /// From now on it changes: within `seconds` its gain falls by the share `gain` and its loop becomes wider by the share `loop_width`.
+    pub fn age(&mut self, seconds: f64, gain: f64, loop_width: f64) {
+        self.ageing = Some(Ageing { seconds, gain, loop_width, began: self.now });
+    }
+
+    /// Shares of linear part and memory by now.
+    fn shares_now(&self) -> (f64, f64) {
+        let (straight, memory) = self.shares;
+        self.ageing.map_or(self.shares, |ageing| {
+            let done = ((self.now - ageing.began) as f64 / self.bench.rate_hz / ageing.seconds).min(1.0);
+            let wider = memory * ageing.loop_width * done;
+            let gain = 1.0 - ageing.gain * done;
+            (gain * (straight - wider), gain * (memory + wider))
+        })
     }
 
     /// What it is.
@@ -120,12 +150,12 @@ impl OtherDevice {
             self.late[low] * (1.0 - part) + self.late[(low + 1).min(self.late.len() - 1)] * part
         };
         let (from, to) = (delayed(late + 1.0), delayed(late));
+        let shares = self.shares_now();
         let mut y = 0.0;
         for i in 1..=STEPS {
             let x = from + (to - from) * f64::from(i) / f64::from(STEPS);
             self.lagged = if lag_s > 0.0 { self.lagged + (x - self.lagged) * (h / lag_s) } else { x };
-            let moved = stroke_um * (self.shares.0 * self.lagged + self.shares.1 * (self.memory)(self.lagged))
-                - self.at_rest_um;
+            let moved = stroke_um * (shares.0 * self.lagged + shares.1 * (self.memory)(self.lagged)) - self.at_rest_um;
             let mut slow = 0.0;
             for (tau, state) in &mut self.creep {
                 *state += (moved - *state) * (h / *tau);

@@ -6,7 +6,7 @@ use hyst_tests::Lab;
 fn the_loop_closes_on_an_actuator_with_a_lag() {
     let lab = Lab::new();
     lab.write("plant.toml", hyst_tests::PLANT);
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 3 --out loop --json");
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --turns 3 --out loop --json");
     let summary = ran.json();
     let turns = summary["turns"].as_array().unwrap();
     assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
@@ -27,7 +27,7 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
 fn the_loop_closes_on_an_amplifier_that_is_slow() {
     let lab = Lab::new();
     lab.write("plant.toml", format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT));
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 500 --turns 2 --out loop --json");
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --turns 2 --out loop --json");
     let summary = ran.json();
     let turns = summary["turns"].as_array().unwrap();
     let limit = turns[0]["slew_limit"].as_f64().unwrap();
@@ -38,7 +38,7 @@ fn the_loop_closes_on_an_amplifier_that_is_slow() {
     assert!(error(turns.last().unwrap()) < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(), "{summary:#}");
     let drive = lab.read("loop/train-2.csv");
     let volts: Vec<f64> = drive.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
-    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 500.0 < 0.81 * limit), "segments begin where they end");
+    assert!(volts.windows(2).all(|w| (w[1] - w[0]).abs() * 250.0 < 0.81 * limit), "segments begin where they end");
 }
 
 #[test]

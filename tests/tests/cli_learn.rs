@@ -33,7 +33,7 @@ fn the_error_falls_and_the_learned_drive_is_played() {
     assert_eq!(std::fs::read_dir(lab.path("logs")).unwrap().count(), passes.len());
     assert_eq!(ran.stderr.matches("times the repeatability").count(), passes.len(), "{}", ran.stderr);
     // What is played is what was learned.
-    lab.ok("run --daq sim:plant.toml --drive learned.csv --record measured.csv");
+    lab.ok("run --daq sim:plant.toml --drive learned.csv --settle 2 --record measured.csv");
     let column = |file: &str, name: &str| -> Vec<f64> {
         let text = lab.read(file);
         let at = text.lines().next().unwrap().split(',').position(|column| column == name).unwrap();

@@ -254,7 +254,6 @@ fn arguments_have_to_make_sense_together() {
         ("--model model.json --record out.csv", "--reference"),
         ("--model model.json --reference reference.csv --drive u.csv --record out.csv", "--drive"),
         ("--drive u.csv --record out.csv --bandwidth 10", "--bandwidth"),
-        ("--drive u.csv --record out.csv --settle 1", "--settle"),
         ("--drive u.csv --record u.csv", "read by the same command"),
         ("--drive u.csv --log plant.toml", "read by the same command"),
         ("--drive u.csv --record out.csv --log out.csv", "two outputs"),

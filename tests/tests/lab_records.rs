@@ -77,9 +77,7 @@ fn shows_the_lag(record: &Record) -> Diagnosis {
 
 #[test]
 fn slow_and_fast_sample_rates() {
-    for (rate_hz, seconds) in [(200.0, 36.0), (5000.0, 10.5)] {
-        shows_the_lag(&record_at(&lagging(), rate_hz, seconds, OutputUnit::Micrometre));
-    }
+    shows_the_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
     // Two seconds at 50 kHz: decaying loops, fast ones, stairs.
     let mut plant = Plant::new(lagging()).unwrap();
     let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;

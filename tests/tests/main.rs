@@ -3,6 +3,7 @@
 
 mod block_format;
 mod bouc_wen_benchmark;
+mod cli_adapt;
 mod cli_close_loop;
 mod cli_compare;
 mod cli_compensate;

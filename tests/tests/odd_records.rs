@@ -214,7 +214,7 @@ fn findings_do_not_depend_on_the_unit() {
         let in_um = whole_way(&creeping(1.0), kind).unwrap();
         assert_eq!(in_um, ["creep"]);
         // The weights of a triangle take longer to fit, and have the same unit.
-        let scales: &[f64] = if kind == Kind::Pi { &[1e-3, 1e3, 1e6] } else { &[1e6] };
+        let scales: &[f64] = if kind == Kind::Pi { &[1e-3, 1e6] } else { &[1e6] };
         for &scale in scales {
             assert_eq!(whole_way(&creeping(scale), kind).unwrap(), in_um, "{kind} at {scale}");
         }

@@ -304,26 +304,33 @@ impl Follower {
     /// The drive of the next row \[V\], within the limits. `temperature` \[°C\] is the newest that was
     /// measured, if any; it changes little over the preview. After the last row the last drive is held.
     pub fn next(&mut self, temperature: Option<f64>) -> Limited<f64> {
+        self.next_aimed(temperature, |_, reference| reference)
+    }
+
+    /// The same, where the inverse aims at what `aim` makes of each value of the reference: it is called for one row after the other, a preview ahead of
+    /// the drive, and told whether a segment begins with it.
+    pub fn next_aimed(&mut self, temperature: Option<f64>, mut aim: impl FnMut(bool, f64) -> f64) -> Limited<f64> {
         let Some(segment) = self.samples.segments.get(self.segment).cloned() else {
             return Limited { drive: self.before, voltage: false, slew: false };
         };
         let last = segment.end - 1;
         let lead = self.compensator.lead();
-        let feed = |this: &mut Self, row: usize| {
+        let starts = self.row == segment.start;
+        let mut feed = |this: &mut Self, row: usize, first: bool| {
             let row = row.min(last);
             let env = this.env(row, temperature);
-            this.compensator.step(&mut this.state, &env, this.samples.output[row])
-        };
-        let starts = self.row == segment.start;
-        let wanted = if starts {
-            let env = self.env(self.row, temperature);
-            let mut wanted = self.compensator.reset(&mut self.state, &env, self.samples.output[self.row]);
-            for ahead in 1..=lead {
-                wanted = feed(self, segment.start + ahead);
+            let aimed = aim(first, this.samples.output[row]);
+            if first {
+                this.compensator.reset(&mut this.state, &env, aimed)
+            } else {
+                this.compensator.step(&mut this.state, &env, aimed)
             }
-            wanted
+        };
+        let wanted = if starts {
+            let first = feed(self, segment.start, true);
+            (1..=lead).fold(first, |_, ahead| feed(self, segment.start + ahead, false))
         } else {
-            feed(self, self.row + lead)
+            feed(self, self.row + lead, false)
         };
         let wanted = if wanted.is_finite() { wanted } else { self.before };
         let inside = self.limits.apply(wanted, wanted);

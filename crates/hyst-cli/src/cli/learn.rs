@@ -95,6 +95,7 @@ impl LearnArgs {
             hottest: self.hottest,
             max_error: self.max_error,
             allow_delay: false,
+            adapt: None,
             kout: None,
             live: None,
             plain: self.plain,

@@ -380,6 +380,10 @@ pub(crate) struct RunArgs {
     /// Compare the output with the reference as late as it is: one delay, the one with the least error, does not count as an error. It is printed
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) allow_delay: bool,
+    /// Keep up with the actuator: correct what the inverse aims at by what is measured while it moves, within bounds. With FILE, continue from what an
+    /// earlier run has left there and leave it there again; the model stays as it is
+    #[arg(long, value_name = "FILE", num_args = 0..=1, requires = "reference", conflicts_with_all = ["drive", "kout"])]
+    pub(crate) adapt: Option<Option<PathBuf>>,
     /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,

@@ -1,5 +1,6 @@
 //! `run`: plays a drive, or a reference through a model, on a device.
 
+mod adapt;
 mod beside;
 mod control;
 pub(super) mod gaps;
@@ -32,6 +33,7 @@ use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::recording::Beside;
 use crate::{recording, text};
+use adapt::{Adapting, Change};
 use beside::Watched;
 use gaps::Gaps;
 use job::{Followed, HandedOver, Job, Told};
@@ -66,6 +68,8 @@ struct Summary {
     clock: Option<ClockSummary>,
     /// Whether the drive was corrected by the measured temperature on the way.
     temperature_followed: bool,
+    /// How the actuator differs from its model, as learned by the end; none where that was not asked for.
+    adapted: Option<Change>,
     log: Option<String>,
     record: Option<String>,
     #[serde(skip)]
@@ -160,7 +164,8 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     }
     let mut read: Vec<&Path> = args.daq.file().into_iter().collect();
     read.extend([&args.model, &args.reference, &args.drive].into_iter().filter_map(|path| path.as_deref()));
-    output::check(&read, &written)?;
+    let kept = args.adapt.clone().flatten().map(Target::File);
+    output::check(&read, &[&written[..], &kept.iter().collect::<Vec<_>>()].concat())?;
     let report = Report::new(args.json.json, &written)?;
     let wishes = Wishes {
         noise: args.seed,
@@ -212,6 +217,12 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         (Some(log), Some(clock)) => log.note("clock", ClockSummary::new(clock).entries()),
         _ => Ok(()),
     };
+    let adapting = job.followed.as_ref().and_then(|followed| followed.adapting.as_ref());
+    let adapted = adapting.map(Adapting::change);
+    let noted = match (log.as_mut().filter(|log| log.samples() > 0), &adapted) {
+        (Some(log), Some(change)) => noted.and(log.note("adapted", change.entries())),
+        _ => noted,
+    };
     let closed = noted.and(log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish));
     let Played { mut recording, mut forces, watched, gaps, error } = played?;
     job.align(&mut recording, &mut forces);
@@ -235,6 +246,11 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     }
     // The record may lie on another disk than a log that could not be closed.
     closed?;
+    if let (Some(Some(file)), Some(adapting)) =
+        (&args.adapt, job.followed.as_ref().and_then(|followed| followed.adapting.as_ref()))
+    {
+        adapting.keep(file)?;
+    }
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let (low, high) = range(measured.iter().copied());
     let follows = |followed: &Followed| {
@@ -259,7 +275,8 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         force_n,
         gaps,
         clock: daq.clock().map(ClockSummary::new),
-        temperature_followed: job.followed.as_ref().is_some_and(|followed| followed.live.is_some()),
+        temperature_followed: job.followed.as_ref().is_some_and(Followed::follows_temperature),
+        adapted,
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.record.as_ref().map(ToString::to_string),
         model: args.model.as_ref().map(|path| path.display().to_string()),
@@ -298,6 +315,7 @@ fn asked(args: &RunArgs) -> BTreeMap<String, String> {
         ("temperature_degc", number(args.temperature.degc)),
         ("hottest_degc", number(args.hottest)),
         ("max_error", number(args.max_error)),
+        ("adapt", args.adapt.as_ref().map(|file| path(file).unwrap_or_else(|| "true".to_owned()))),
         ("allow_delay", args.allow_delay.then(|| "true".to_owned())),
         ("silence_s", number(args.silence)),
         ("rate_hz", number(args.map.rate)),
@@ -393,6 +411,12 @@ impl Summary {
         }
         if self.temperature_followed {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
+        }
+        if let Some(change) = &self.adapted {
+            lines.push(match change.lessons {
+                0 => "adapted: nothing was learned; the drive has to go over its range both ways first".to_owned(),
+                _ => format!("adapted: {}", change.text(unit)),
+            });
         }
         lines.extend(self.force_n.map(|(low, high)| {
             format!(

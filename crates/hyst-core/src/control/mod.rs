@@ -1,11 +1,13 @@
 //! What stands between a model and the actuator: feedback, the force observer, limits of the drive.
 
+mod adapt;
 mod force;
 mod limits;
 mod pid;
 mod tracking;
 mod watch;
 
+pub use adapt::{Adaptation, AdaptationOptions, Adapted};
 pub use force::{AffineFit, ForceObservation, ForceObserver, ForceParams};
 pub use limits::{Limited, Limits};
 pub use pid::{Pid, PidParams, PidState};

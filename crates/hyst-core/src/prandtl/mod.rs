@@ -1,13 +1,11 @@
 //! The Prandtl-Ishlinskii family: weighted plays.
 
-mod adapt;
 mod envelope;
 mod gpi;
 mod pi;
 mod td_pi;
 mod viscous;
 
-pub use adapt::{Adaptation, Adapted};
 pub use envelope::{Curve, Envelope, EnvelopeInverse, EnvelopeState};
 pub use gpi::{Gpi, GpiInverse, GpiInverseState, GpiParams, GpiState};
 

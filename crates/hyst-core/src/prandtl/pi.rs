@@ -108,17 +108,6 @@ impl<T: Real, const N: usize> Pi<T, N> {
         self.gain
     }
 
-    /// Weights of all slots; zero behind the last play.
-    pub(super) fn all_weights(&self) -> &[T; N] {
-        &self.weights
-    }
-
-    /// Another gain and other weights.
-    pub(super) fn set(&mut self, gain: T, weights: &[T]) {
-        self.gain = gain;
-        self.weights.iter_mut().zip(weights).take(self.len).for_each(|(to, from)| *to = *from);
-    }
-
     #[inline]
     fn advance(&self, s: &mut PiState<T, N>, u: T) -> T {
         let u = if u.is_finite() { u } else { s.u };
@@ -157,14 +146,6 @@ impl<T: Real, const N: usize> PiState<T, N> {
     /// Virgin memory: every play at 0.
     pub fn virgin() -> Self {
         Self { plays: [T::ZERO; N], u: T::ZERO }
-    }
-
-    pub(super) fn plays(&self) -> &[T; N] {
-        &self.plays
-    }
-
-    pub(super) fn input(&self) -> T {
-        self.u
     }
 }
 

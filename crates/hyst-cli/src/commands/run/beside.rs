@@ -5,6 +5,7 @@ use hyst_hw::{Phase, Sample};
 use hyst_ident::BetweenSamples;
 use hyst_ident::model::{Effect, HostChain, Model};
 
+use super::adapt::{Adapting, Change};
 use super::sweep::Sweep;
 use crate::exit::{CommandError, CommandResult};
 
@@ -25,6 +26,8 @@ pub(super) struct Beside {
     /// When the run began, by the device's clock \[s\].
     began_s: Option<f64>,
     segment: Option<usize>,
+    /// Whether nothing of this segment's record has come yet.
+    fresh: bool,
     /// What was put out last \[V\].
     last_v: f64,
     /// What the sensor shows beyond the model before the reference begins: its zero of today.
@@ -44,6 +47,8 @@ pub(super) struct Beside {
     trained_to: Option<f64>,
     lost_at: Option<f64>,
     now_lost: bool,
+    /// Of a model that is adapted.
+    adapting: Option<Adapting>,
 }
 
 /// What the model says of one sample.
@@ -102,6 +107,7 @@ impl Beside {
         rate_hz: f64,
         degc: Option<f64>,
         force: Option<Force>,
+        adapting: Option<Adapting>,
     ) -> CommandResult<Option<Self>> {
         if model.between_samples != BetweenSamples::Linear {
             return Ok(None);
@@ -126,6 +132,7 @@ impl Beside {
             degc: degc.or(model.effects.temperature.map(|t| t.reference_degc)).unwrap_or_default(),
             began_s: None,
             segment: None,
+            fresh: true,
             last_v: 0.0,
             zero: Mean::default(),
             sweep: Sweep::new(),
@@ -142,6 +149,7 @@ impl Beside {
             trained_to: model.rmse,
             lost_at: None,
             now_lost: false,
+            adapting,
         }))
     }
 
@@ -161,6 +169,8 @@ impl Beside {
         } else {
             self.segment = Some(segment);
             (self.zero, self.anew, self.sweep, self.before) = (Mean::default(), Mean::default(), Sweep::new(), 0);
+            self.fresh = true;
+            self.adapting.iter().for_each(Adapting::begin_segment);
             self.chain.reset(&mut self.state, &env, sample.drive_v)
         };
         self.last_v = sample.drive_v;
@@ -168,7 +178,14 @@ impl Beside {
             self.zero.add(sample.output - free);
         }
         let known = phase == Phase::Record && self.known(sample.drive_v, sample.output - free);
-        let output = free + self.zero.value();
+        if phase == Phase::Record && self.fresh {
+            self.fresh = false;
+            self.adapting.iter().for_each(|adapting| adapting.zero(self.zero.value()));
+        }
+        let output = match &self.adapting {
+            Some(adapting) => adapting.take(free, sample.output, known),
+            None => free + self.zero.value(),
+        };
         let mut explains = None;
         if let (Some(watch), true) = (&self.watch, known) {
             self.looked = true;
@@ -203,6 +220,11 @@ impl Beside {
             return false;
         }
         true
+    }
+
+    /// What was learned, if it has changed.
+    pub(super) fn adapted(&self) -> Option<Change> {
+        self.adapting.as_ref()?.news()
     }
 
     /// How the watch has ended; `None` where nothing was watched.

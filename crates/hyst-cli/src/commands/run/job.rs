@@ -12,6 +12,7 @@ use hyst_ident::loop_gains;
 use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
 
+use super::adapt::Adapting;
 use super::beside::{Beside, Force};
 use super::control::ClosedLoop;
 use super::live::Live;
@@ -104,8 +105,10 @@ pub(in crate::commands) struct Followed {
     pub(super) control: Control,
     /// The drive as planned by the model's inverse, where that takes part.
     pub(super) drive: Option<Drive>,
-    /// The drive as it is corrected on the way, where the model needs a temperature that the device measures.
+    /// The drive as it is corrected on the way, where the model needs a temperature that the device measures, or is adapted.
     pub(in crate::commands) live: Option<Live>,
+    /// What keeps up with the actuator, where that was asked for.
+    pub(super) adapting: Option<Adapting>,
     /// The PID, where one takes part.
     pub(super) closed: Option<Closed>,
     /// How long the device is held at the first value of a segment \[s\].
@@ -129,7 +132,7 @@ impl Job {
         let Some(followed) = &self.followed else { return Ok(None) };
         let on_device = self.handed_over.is_some();
         let force = self.stiffness.map(|stiffness| if on_device { Force::OnDevice } else { Force::Here(stiffness) });
-        let beside = Beside::new(&followed.model, self.options.rate_hz, self.degc, force)?;
+        let beside = Beside::new(&followed.model, self.options.rate_hz, self.degc, force, followed.adapting.clone())?;
         if beside.is_none() && self.stiffness.is_some() && !on_device {
             return Err(CommandError::bad_input(
                 "--kout needs a model that can be run as the drive comes; this one has to know all of it (band-limited): estimate the force afterwards, with hystctl force",
@@ -228,6 +231,11 @@ impl Followed {
         rows.flat_map(|(rows, segment)| wanted[rows.clone()].iter().take(segment.samples.len())).copied().collect()
     }
 
+    /// Whether the drive was corrected by a measured temperature.
+    pub(super) fn follows_temperature(&self) -> bool {
+        self.live.is_some() && self.model.effects.temperature.is_some()
+    }
+
     /// What there is to say about the drive that was played.
     pub(super) fn compensation(&self) -> Option<Compensation> {
         let drive = self.live.as_ref().map(Live::drive).or(self.drive.as_ref())?;
@@ -246,7 +254,7 @@ const USUAL_SETTLE_S: f64 = 2.0;
 const STEEPER: f64 = 1.5;
 /// As [`STEEPER`], where a loop on the device corrects it.
 const LOOP_STEEPER: f64 = 4.0;
-/// How much of a drive is sent at once where it is corrected by a measured temperature \[s\].
+/// How much of a drive is sent at once where it is corrected by what is measured \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
 impl Job {
@@ -317,6 +325,17 @@ impl Job {
         let measured = model.effects.temperature.filter(|_| device.temperature && args.control.inverts());
         if let Some(gain) = measured {
             options.temperature = options.temperature.or(Some(gain.reference_degc));
+        }
+        let adapting = match &args.adapt {
+            Some(file) if args.control == Control::Feedforward => Some(Adapting::new(&model, &json, file.as_deref())?),
+            Some(_) => {
+                return Err(CommandError::bad_input(
+                    "--adapt corrects what the inverse aims at, and a PID would take its part: give --control feedforward",
+                ));
+            }
+            None => None,
+        };
+        if measured.is_some() || adapting.is_some() {
             play.block = (LIVE_BLOCK_S * play.rate_hz).clamp(1.0, play.block as f64) as usize;
         }
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
@@ -332,8 +351,10 @@ impl Job {
             Some(drive) => drive.voltage.clone(),
             None => straight(&model, &reference, low, high)?,
         };
-        let live = match (&drive, measured) {
-            (Some(drive), Some(_)) => Some(Live::new(&model, &reference, &options, drive, play.slew_v_per_s)?),
+        let live = match &drive {
+            Some(drive) if measured.is_some() || adapting.is_some() => {
+                Some(Live::new(&model, &reference, &options, drive, play.slew_v_per_s, adapting.clone())?)
+            }
             _ => None,
         };
         let segments = split(&reference, &planned);
@@ -353,6 +374,7 @@ impl Job {
             control: args.control,
             drive,
             live,
+            adapting,
             closed,
             held_s: play.settle_s,
         };
@@ -410,6 +432,7 @@ impl Job {
             control: args.control,
             drive: None,
             live: None,
+            adapting: None,
             closed: None,
             held_s: play.settle_s,
         };

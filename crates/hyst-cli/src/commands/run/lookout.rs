@@ -79,6 +79,9 @@ impl Lookout<'_> {
             self.stream.iter_mut().for_each(|stream| stream.sample(&logged));
         }
         self.view.add(Seen { sample: *sample, wanted, predicted: expected.map(|e| e.output), force });
+        if let Some(change) = self.beside.as_ref().and_then(Beside::adapted) {
+            self.note("adapted", change.text(self.unit));
+        }
         if let Some(explains) = expected.and_then(|e| e.explains) {
             let (kind, text) = self.told(explains);
             self.event(kind, text);

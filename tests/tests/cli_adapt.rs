@@ -1,0 +1,97 @@
+//! `run --adapt`: a model that keeps up with an actuator that has changed.
+
+use hyst_tests::Lab;
+use hyst_tests::ageing::aged;
+use hyst_tests::other_bench::Bench;
+use hyst_tests::other_physics::Law;
+use serde_json::Value;
+
+fn plant(gain: f64, loop_share: f64) -> String {
+    format!(
+        "seed = 3\n[actuator]\nmax_v = 100\ngain_um_per_v = {gain}\nloop_share = {loop_share}\nrelays = 2000\n[sensor]\nrange_um = [-10, 40]\nnoise_um = 0.005\n"
+    )
+}
+
+/// A model of an actuator, and one whose gain has fallen by 5 % and whose loop is a fifth wider since.
+fn lab() -> Lab {
+    let lab = Lab::new();
+    lab.write("new.toml", plant(0.2, 0.12));
+    lab.write("aged.toml", plant(0.19, 0.144));
+    lab.ok("excite identification --high 100 --rate 500 -o u.csv");
+    lab.ok("run --daq sim:new.toml --drive u.csv --record train.csv");
+    lab.ok("fit train.csv --model pi -o model.json");
+    lab
+}
+
+fn number(report: &Value, path: &str) -> f64 {
+    report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {report:#}"))
+}
+
+const FOLLOW: &str = "run --daq sim:aged.toml --model model.json --reference sine:3,15,1,20 --json";
+
+#[test]
+fn an_actuator_that_has_aged_is_followed_and_what_was_learned_is_kept() {
+    let lab = lab();
+    let plain = lab.ok(FOLLOW).json();
+    let adapted = lab.ok(&format!("{FOLLOW} --adapt kept.json --log run.mcap")).json();
+    let (before, after) = (number(&plain, "/tracking/rmse_last_half"), number(&adapted, "/tracking/rmse_last_half"));
+    assert!(after < 0.3 * before, "{before} → {after}: {adapted:#}");
+    assert!((number(&adapted, "/adapted/gain_percent") + 5.0).abs() < 1.5, "{adapted:#}");
+    assert!(number(&adapted, "/adapted/loop_width") > 0.0, "{adapted:#}");
+    assert!(plain["adapted"].is_null() && !plain["watch"]["explains"].as_bool().unwrap(), "{plain:#}");
+    // Another run starts from there.
+    let again = lab.ok(&format!("{FOLLOW} --adapt kept.json")).json();
+    let whole = number(&again, "/tracking/rmse");
+    assert!(whole < 0.7 * number(&adapted, "/tracking/rmse"), "{whole}: {adapted:#}");
+    let said = lab.ok(&format!("{} --adapt", FOLLOW.trim_end_matches(" --json"))).stdout;
+    assert!(said.contains("adapted: gain -") && said.contains("%, loop wider by"), "{said}");
+}
+
+#[test]
+fn a_model_that_is_true_stays_so() {
+    let lab = lab();
+    let follow = FOLLOW.replace("aged", "new");
+    let (plain, adapted) = (lab.ok(&follow).json(), lab.ok(&format!("{follow} --adapt")).json());
+    let (plain, adapted_rmse) = (number(&plain, "/tracking/rmse"), number(&adapted, "/tracking/rmse"));
+    assert!(adapted_rmse < 1.1 * plain, "{plain} → {adapted_rmse}");
+    assert!(number(&adapted, "/adapted/gain_percent").abs() < 1.0, "{adapted:#}");
+}
+
+#[test]
+fn what_does_not_fit_is_refused_before_anything_moves() {
+    let lab = lab();
+    lab.ok(&format!("{FOLLOW} --adapt kept.json"));
+    lab.ok("fit train.csv --model preisach -o other.json");
+    let kept = lab.read("kept.json");
+    lab.write("broken.json", "{\"numbers\": 3}");
+    for (line, named) in [
+        (FOLLOW.replace("model.json", "other.json") + " --adapt kept.json", "another model"),
+        (format!("{FOLLOW} --adapt broken.json"), "broken.json"),
+        (format!("{FOLLOW} --adapt --control pid+feedforward"), "--control feedforward"),
+        ("run --daq sim:aged.toml --drive u.csv --record x.csv --adapt".to_owned(), "--adapt"),
+        (format!("{FOLLOW} --adapt model.json"), "model.json"),
+    ] {
+        let ran = lab.run(&line);
+        assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
+        assert!(ran.stderr.contains(named), "{line}: {}", ran.stderr);
+    }
+    assert_eq!(lab.read("kept.json"), kept);
+}
+
+#[test]
+fn other_physics_that_age_are_followed_as_with_a_model_fitted_anew() {
+    let bench = Bench {
+        seed: 4,
+        law: Law::ColemanHodgdon,
+        rate_hz: 200.0,
+        volts: 100.0,
+        stroke_um: 12.0,
+        noise_um: 0.005,
+        delay_s: 0.0,
+        lag_s: 0.0,
+        creep: 0.0,
+        mode: None,
+    };
+    let found = aged(bench, 60.0);
+    assert!(found.adapted < 1.5 * found.anew && found.adapted < 0.7 * found.kept, "{found:?}");
+}
