@@ -36,8 +36,11 @@ fn an_actuator_that_has_aged_is_followed_and_what_was_learned_is_kept() {
     let adapted = lab.ok(&format!("{FOLLOW} --adapt kept.json --log run.mcap")).json();
     let (before, after) = (number(&plain, "/tracking/rmse_last_half"), number(&adapted, "/tracking/rmse_last_half"));
     assert!(after < 0.3 * before, "{before} → {after}: {adapted:#}");
-    assert!((number(&adapted, "/adapted/gain_percent") + 5.0).abs() < 1.5, "{adapted:#}");
-    assert!(number(&adapted, "/adapted/loop_width") > 0.0, "{adapted:#}");
+    // What the model had wrong of the new one is learned as well.
+    let new = lab.ok(&format!("{} --adapt", FOLLOW.replace("aged", "new"))).json();
+    let change = |path: &str| number(&adapted, path) - number(&new, path);
+    assert!((change("/adapted/gain_percent") + 5.0).abs() < 1.0, "{new:#} {adapted:#}");
+    assert!(change("/adapted/loop_width") > 0.2, "{new:#} {adapted:#}");
     assert!(plain["adapted"].is_null() && !plain["watch"]["explains"].as_bool().unwrap(), "{plain:#}");
     // Another run starts from there.
     let again = lab.ok(&format!("{FOLLOW} --adapt kept.json")).json();
@@ -48,13 +51,13 @@ fn an_actuator_that_has_aged_is_followed_and_what_was_learned_is_kept() {
 }
 
 #[test]
-fn a_model_that_is_true_stays_so() {
+fn an_actuator_that_is_as_it_was_is_followed_no_worse() {
     let lab = lab();
     let follow = FOLLOW.replace("aged", "new");
     let (plain, adapted) = (lab.ok(&follow).json(), lab.ok(&format!("{follow} --adapt")).json());
-    let (plain, adapted_rmse) = (number(&plain, "/tracking/rmse"), number(&adapted, "/tracking/rmse"));
-    assert!(adapted_rmse < 1.1 * plain, "{plain} → {adapted_rmse}");
-    assert!(number(&adapted, "/adapted/gain_percent").abs() < 1.0, "{adapted:#}");
+    let late = |report: &Value| number(report, "/tracking/rmse_last_half");
+    assert!(late(&adapted) < late(&plain), "{plain:#} {adapted:#}");
+    assert!(number(&adapted, "/adapted/gain_percent").abs() < 2.0, "{adapted:#}");
 }
 
 #[test]
