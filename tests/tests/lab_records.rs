@@ -78,11 +78,11 @@ fn shows_the_lag(record: &Record) -> Diagnosis {
 #[test]
 fn slow_and_fast_sample_rates() {
     shows_the_lag(&record_at(&lagging(), 200.0, 36.0, OutputUnit::Micrometre));
-    // Two seconds at 20 kHz: decaying loops, fast ones, stairs.
+    // Two seconds at 50 kHz: decaying loops, fast ones, stairs.
     let mut plant = Plant::new(lagging()).unwrap();
     let high = hyst_hw::Daq::capabilities(&plant).voltage.max_v;
     let row = |seconds: f64, f: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        (0..(seconds * 2e4) as usize).map(|k| high * f(k as f64 / 2e4)).collect()
+        (0..(seconds * 5e4) as usize).map(|k| high * f(k as f64 / 5e4)).collect()
     };
     let wave = |hz: f64, t: f64| 0.5 - 0.5 * (std::f64::consts::TAU * hz * t).cos();
     let decaying = row(1.0, &|t| wave(6.0, t) * (1.0 - 0.8 * t));
@@ -90,7 +90,7 @@ fn slow_and_fast_sample_rates() {
     let stairs =
         row(0.5, &|t| 0.2 + 0.6 * ((7.3 * (8.0 * t).floor()).sin() * 0.5 + 0.5) * (8.0 * t).fract().min(0.2) / 0.2);
     let segments = [decaying.as_slice(), &fast, &stairs];
-    shows_the_lag(&measured(&mut plant, &segments, 20_000.0, OutputUnit::Micrometre, "lab"));
+    shows_the_lag(&measured(&mut plant, &segments, 50_000.0, OutputUnit::Micrometre, "lab"));
 }
 
 #[test]

@@ -27,7 +27,6 @@ The number in a name is that of plays, cells along an edge, elements, states or 
 move at every sample. `pi_10_viscous` drags in proportion to the rate, `pi_10_root_viscous` with its root; `td_em_10` computes a
 matrix exponential whenever the temperature moves, `td_em_10_steady` has it constant. `chain` is delay, lag, 10 plays, temperature,
 4 creep elements, a resonance, drift and a tone, `compensator` its inverse with 129 taps.
-`adaptation` has 4 plays: an aim at every sample and, at most, one step of least squares.
 
 No function of any model can reach a panic, at opt-level 3 and s: they link with a panic handler that does not.
 ";

@@ -155,32 +155,6 @@ impl<T: Real> Stage<T> for Observer<T> {
     }
 }
 
-/// A model that is adapted, as a stage: the aim for a reference, of an actuator whose output falls 5 % short of what is aimed at and trails by a play.
-#[derive(Clone, Debug)]
-pub struct Keeper<T>(Adaptation<T, 4, 6>);
-
-pub(crate) fn keeper<T: Real>() -> Result<Keeper<T>, Error> {
-    Ok(Keeper(Adaptation::new(given((0.0, 20.0)), &given(AdaptationOptions::default()))?))
-}
-
-impl<T: Real> Stage<T> for Keeper<T> {
-    type State = (Adapted<T, 4, 6>, T);
-    fn state(&self) -> Self::State {
-        (self.0.begin(), T::ZERO)
-    }
-    fn reset(&self, s: &mut Self::State, e: &Env<T>, u0: T) -> T {
-        *s = self.state();
-        self.step(s, e, u0)
-    }
-    fn step(&self, s: &mut Self::State, _: &Env<T>, u: T) -> T {
-        let aimed = self.0.aim(&mut s.0, u);
-        s.1 = play(s.1, aimed, T::from_f64(0.5));
-        let measured = T::from_f64(0.85) * aimed + T::from_f64(0.1) * s.1;
-        self.0.learn(&mut s.0, aimed, measured, true);
-        aimed
-    }
-}
-
 /// Limits as a stage: the drive that may follow the last one.
 #[derive(Clone, Debug)]
 pub struct Limiter<T>(Limits<T>);
