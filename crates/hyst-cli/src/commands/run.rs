@@ -275,7 +275,8 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
         force_n,
         gaps,
         clock: daq.clock().map(ClockSummary::new),
-        temperature_followed: job.followed.as_ref().is_some_and(Followed::follows_temperature),
+        temperature_followed: daq.capabilities().temperature
+            && job.followed.as_ref().is_some_and(Followed::needs_temperature),
         adapted,
         log: args.log.as_ref().map(|path| path.display().to_string()),
         record: args.record.as_ref().map(ToString::to_string),
@@ -413,7 +414,7 @@ impl Summary {
             lines.push("the drive was corrected by the measured temperature on the way".to_owned());
         }
         if let Some(change) = &self.adapted {
-            lines.push(match change.lessons {
+            lines.push(match change.updates {
                 0 => "adapted: nothing was learned; the drive has to go over its range both ways first".to_owned(),
                 _ => format!("adapted: {}", change.text(unit)),
             });

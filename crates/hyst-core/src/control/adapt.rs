@@ -5,8 +5,8 @@
 //! model's inverse aims at P⁻¹(r). This needs no parameter of the model, so it serves every kind that predicts an output.
 //!
 //! Output and weights are estimated by recursive least squares (Ljung 1999, ch. 11) with three changes. The drive has to move: what is measured within one
-//! `travel` is averaged into one lesson, so that an actuator at rest teaches nothing, and the past is forgotten by travel, not by time. No variance grows
-//! beyond its first value. After each lesson the numbers are projected onto bounds around the identity and onto what keeps P rising, so that its
+//! `travel` is averaged into one update, so that an actuator at rest teaches nothing, and the past is forgotten by travel, not by time. No variance grows
+//! beyond its first value. After each update the numbers are projected onto bounds around the identity and onto what keeps P rising, so that its
 //! inverse exists (Kuhnen and Krejčí 2009). The correction r − P⁻¹(r) is bounded as well, whatever was learned.
 
 use crate::error::within;
@@ -15,7 +15,7 @@ use crate::{Error, Real};
 /// What adaptation may do, in shares of the output's span where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptationOptions {
-    /// What the model left of its own record: a lesson counts by that.
+    /// What the model left of its own record: an update is weighed by that.
     pub sigma: f64,
     /// How far the gain may leave 1, and the weight of each play 0.
     pub gain: f64,
@@ -23,7 +23,7 @@ pub struct AdaptationOptions {
     pub zero: f64,
     /// The largest correction.
     pub correction: f64,
-    /// Travel after which a lesson counts 1/e, in spans.
+    /// Travel after which an update counts 1/e, in spans.
     pub memory: f64,
 }
 
@@ -33,11 +33,11 @@ impl Default for AdaptationOptions {
     }
 }
 
-/// Travel of one lesson, as a share of the span.
+/// Travel of one update, as a share of the span.
 const TRAVEL: f64 = 0.01;
 /// Least slope of P: its inverse exists, and asks for at most this much more.
 const LEAST_SLOPE: f64 = 0.4;
-/// Most samples of one lesson.
+/// Most samples of one update.
 const MOST_SAMPLES: u32 = 1 << 20;
 
 /// How a model is adapted. P has `N` plays and `M = N + 2` numbers: gain, weights, zero.
@@ -121,7 +121,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
             outputs: T::ZERO,
             samples: 0,
             from: T::ZERO,
-            lessons: 0,
+            updates: 0,
         }
     }
 
@@ -146,7 +146,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
     /// Forgets the history of what was seen, as where a device comes from rest, and keeps what was learned.
     pub fn see_anew(&self, s: &mut Adapted<T, N, M>) {
         s.seen = None;
-        s.drop_lesson(T::ZERO);
+        s.drop_samples(T::ZERO);
     }
 
     /// Forgets the history of what was aimed at: the next aim continues from what was seen.
@@ -177,7 +177,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
     }
 
     /// Takes the output that the model predicted for what was applied, and the one that was measured \[y\]. `trusted` is whether the measurement tells the
-    /// position: not while a limit of the sensor or of the actuator holds it. Gives whether a lesson was learned.
+    /// position: not while a limit of the sensor or of the actuator holds it. Gives whether the estimate was updated.
     pub fn learn(&self, s: &mut Adapted<T, N, M>, predicted: T, measured: T, trusted: bool) -> bool {
         if !predicted.is_finite() {
             return false;
@@ -188,7 +188,7 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         self.move_plays(&mut plays, v);
         s.seen = Some(plays);
         if starts || !(trusted && measured.is_finite()) || s.samples >= MOST_SAMPLES {
-            s.drop_lesson(v);
+            s.drop_samples(v);
             return false;
         }
         let of = [v].into_iter().chain(plays).chain([T::ONE]);
@@ -200,9 +200,9 @@ impl<T: Real, const N: usize, const M: usize> Adaptation<T, N, M> {
         }
         let per = T::ONE / T::from_f64(f64::from(s.samples));
         let (x, y) = (s.sums.map(|sum| sum * per), s.outputs * per);
-        s.drop_lesson(v);
+        s.drop_samples(v);
         s.update(self, &x, y);
-        s.lessons = s.lessons.saturating_add(1);
+        s.updates = s.updates.saturating_add(1);
         true
     }
 
@@ -250,12 +250,12 @@ pub struct Adapted<T, const N: usize, const M: usize> {
     /// Plays behind the predicted output, and behind what was aimed at.
     seen: Option<[T; N]>,
     aimed: Option<[T; N]>,
-    /// The lesson under way: sums of its rows, and where it began.
+    /// The update under way: sums of its rows, and where it began.
     sums: [T; M],
     outputs: T,
     samples: u32,
     from: T,
-    lessons: u32,
+    updates: u32,
 }
 
 impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
@@ -292,12 +292,12 @@ impl<T: Real, const N: usize, const M: usize> Adapted<T, N, M> {
         self.weights().iter().zip(&how.thresholds).fold(T::ZERO, |sum, (w, r)| sum + two * *w * *r)
     }
 
-    /// Lessons so far.
-    pub fn lessons(&self) -> u32 {
-        self.lessons
+    /// Updates so far.
+    pub fn updates(&self) -> u32 {
+        self.updates
     }
 
-    fn drop_lesson(&mut self, v: T) {
+    fn drop_samples(&mut self, v: T) {
         (self.sums, self.outputs, self.samples, self.from) = ([T::ZERO; M], T::ZERO, 0, v);
     }
 
@@ -424,7 +424,7 @@ mod tests {
             assert!(!how.learn(&mut s, motion(k), 1.2 * motion(k), false));
             assert!(!how.learn(&mut s, motion(k), f64::NAN, true));
         }
-        assert_eq!((s.gain(), s.weights(), s.zero(), s.lessons()), (1.0, &[0.0; N][..], 0.0, 0));
+        assert_eq!((s.gain(), s.weights(), s.zero(), s.updates()), (1.0, &[0.0; N][..], 0.0, 0));
         assert_eq!(how.aim(&mut s, 9.25), 9.25);
     }
 
@@ -477,7 +477,7 @@ mod tests {
         let how = how();
         let (_, learned) = error(true);
         let again = how.begin_at(*learned.numbers());
-        assert_eq!((again.numbers(), again.lessons()), (learned.numbers(), 0));
+        assert_eq!((again.numbers(), again.updates()), (learned.numbers(), 0));
         assert_eq!(how.begin_at([f64::NAN; M]), how.begin());
         // Beyond a bound is at the bound.
         let mut far = how.begin_at([9.0; M]);

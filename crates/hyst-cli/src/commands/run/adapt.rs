@@ -21,7 +21,7 @@ use crate::text;
 const PLAYS: usize = 4;
 const NUMBERS: usize = PLAYS + 2;
 
-/// Least and greatest residual of a model that a lesson counts by, as a share of its output's range: a fit to a record of its own knows less than it says.
+/// Least and greatest residual of a model that an update is weighed by, as a share of its output's range: a fit to a record of its own knows less than it says.
 const SIGMA: (f64, f64) = (1e-3, 0.05);
 /// A change is logged from this share on, of the gain or of the output's range.
 const LOGGED: f64 = 0.005;
@@ -36,6 +36,8 @@ struct Inner {
     how: Adaptation<f64, PLAYS, NUMBERS>,
     state: Adapted<f64, PLAYS, NUMBERS>,
     span: f64,
+    /// Whether the estimate was updated since the change was looked at.
+    updated: bool,
     logged: Change,
     /// What an earlier run knew.
     kept: Option<Kept>,
@@ -51,8 +53,8 @@ pub(super) struct Change {
     pub(super) loop_width: f64,
     /// \[output unit\]
     pub(super) zero: f64,
-    /// Steps of the estimate.
-    pub(super) lessons: u32,
+    /// Updates of the estimate.
+    pub(super) updates: u32,
     /// Since the first run of the kept adaptation \[s\]; none of a run on its own.
     pub(super) over_s: Option<f64>,
 }
@@ -92,7 +94,15 @@ impl Adapting {
         if let Some(numbers) = kept.as_ref().and_then(|kept| <[f64; NUMBERS]>::try_from(&kept.numbers[..]).ok()) {
             state = how.begin_at(numbers);
         }
-        Ok(Self(Rc::new(RefCell::new(Inner { how, state, span, logged: Change::default(), kept, model_sha256 }))))
+        Ok(Self(Rc::new(RefCell::new(Inner {
+            how,
+            state,
+            span,
+            updated: false,
+            logged: Change::default(),
+            kept,
+            model_sha256,
+        }))))
     }
 
     /// Where the inverse has to aim to reach `reference`; whether a segment begins with it.
@@ -118,8 +128,8 @@ impl Adapting {
 
     /// Takes a sample, and gives the output that was expected.
     pub(super) fn take(&self, predicted: f64, measured: f64, trusted: bool) -> f64 {
-        let Inner { how, state, .. } = &mut *self.0.borrow_mut();
-        how.learn(state, predicted, measured, trusted);
+        let Inner { how, state, updated, .. } = &mut *self.0.borrow_mut();
+        *updated |= how.learn(state, predicted, measured, trusted);
         how.expected(state, predicted).unwrap_or(predicted)
     }
 
@@ -130,13 +140,16 @@ impl Adapting {
             gain_percent: 100.0 * (state.stroke_gain(how) - 1.0),
             loop_width: span * state.loop_width(how),
             zero: span * state.zero(),
-            lessons: state.lessons(),
+            updates: state.updates(),
             over_s: kept.as_ref().map(|kept| (now_unix_s() - kept.since_unix_s).max(0.0)),
         }
     }
 
     /// The same, if it is another one than was given last.
     pub(super) fn news(&self) -> Option<Change> {
+        if !std::mem::take(&mut self.0.borrow_mut().updated) {
+            return None;
+        }
         let now = self.change();
         let Inner { logged, span, .. } = &mut *self.0.borrow_mut();
         let moved = (now.gain_percent - logged.gain_percent).abs() > 100.0 * LOGGED
@@ -203,7 +216,7 @@ impl Change {
             ("gain_percent".to_owned(), self.gain_percent.to_string()),
             ("loop_width".to_owned(), self.loop_width.to_string()),
             ("zero".to_owned(), self.zero.to_string()),
-            ("lessons".to_owned(), self.lessons.to_string()),
+            ("updates".to_owned(), self.updates.to_string()),
         ])
     }
 }

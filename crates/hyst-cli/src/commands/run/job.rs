@@ -231,8 +231,8 @@ impl Followed {
         rows.flat_map(|(rows, segment)| wanted[rows.clone()].iter().take(segment.samples.len())).copied().collect()
     }
 
-    /// Whether the drive was corrected by a measured temperature.
-    pub(super) fn follows_temperature(&self) -> bool {
+    /// Whether the drive was corrected on the way and depends on a temperature.
+    pub(super) fn needs_temperature(&self) -> bool {
         self.live.is_some() && self.model.effects.temperature.is_some()
     }
 
