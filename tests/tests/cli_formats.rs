@@ -34,7 +34,7 @@ fn info_names_channels_units_and_the_next_command() {
     lab.write("asks.csv", "t,V,x,w\n0,1,2,5\n1,2,3,7\n2,3,4,1\n");
     let told = lab.ok("info asks.csv").stdout;
     assert!(told.contains("not a record yet") && told.contains("--map time_s=t"), "{told}");
-    // A unit that the map states is marked as such; a factor makes another unit, which the file's values do not have.
+    // A unit that the map states is marked as such; with a factor, one of the file's numbers is so much of it.
     let told = lab.ok("info asks.csv --map time_ms=t --map voltage_v=V --map displacement_um=2*x").stdout;
     let line = |name: &str| {
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -43,11 +43,22 @@ fn info_names_channels_units_and_the_next_command() {
     };
     assert_eq!(line("t")[1..3], ["time", "ms*"], "{told}");
     assert_eq!(line("V")[1..3], ["input", "V*"], "{told}");
-    assert_eq!(line("x")[1..3], ["output", "?"], "{told}");
+    assert_eq!(line("x")[1..4], ["output", "2", "µm*"], "{told}");
     assert_eq!(line("w")[1..3], ["-", "?"], "{told}");
     assert!(told.contains("times from the column \"t\"") && told.contains("the file states no unit"), "{told}");
     lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
     assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
+    // A map is shown though columns are missing still, and a single column is said to be too few.
+    lab.write("one.csv", "a\n1\n2\n4\n");
+    let told = lab.ok("info one.csv").stdout;
+    assert!(told.contains("the file has one column, but needs further ones: time, input, output"), "{told}");
+    assert!(!told.contains("COLUMN") && told.contains("--map displacement_um=a --rate HZ"), "{told}");
+    let told = lab.ok("info one.csv --map displacement_um=a").stdout;
+    assert!(told.contains("output") && told.contains("µm*"), "{told}");
+    // Nothing is proposed for a record that a fit refuses.
+    lab.write("still.csv", "time_s,voltage_v,displacement_um\n0,1,2\n1,2,2\n2,3,2\n");
+    let told = lab.ok("info still.csv").stdout;
+    assert!(told.contains("never moves") && !told.contains("next:"), "{told}");
 }
 
 #[test]

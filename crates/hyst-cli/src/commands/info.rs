@@ -29,7 +29,10 @@ struct ChannelSummary {
     /// The unit that the file states.
     unit: Option<&'static str>,
     /// The unit that `--map` states instead.
-    mapped_unit: Option<&'static str>,
+    mapped_unit: Option<String>,
+    /// Whether the unit is stated elsewhere in the file than in the channel's name.
+    #[serde(skip)]
+    unit_beside_name: bool,
     rows: usize,
     missing: usize,
     min: Option<f64>,
@@ -117,12 +120,18 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     let told = |note: &&String| !note.contains(" is read as ") || note.contains("converted");
     let notes = record.iter().flat_map(|record| record.notes().iter().filter(told).cloned()).collect();
     let options = further(&input::columns(&args.map));
-    let next = record.as_ref().and_then(|record| next(&file, record, &options)).or(advice);
+    let next = match &record {
+        // A fit refuses a record that never moves.
+        Some(record) if still(record) => None,
+        Some(record) => next(&file, record, &options),
+        None => advice,
+    };
     let channel = |c: &Channel| ChannelSummary {
         name: c.name.clone(),
         role: c.role,
         unit: c.unit,
-        mapped_unit: c.mapped_unit,
+        mapped_unit: c.mapped_unit.clone(),
+        unit_beside_name: c.unit_beside_name,
         rows: c.rows,
         missing: c.missing,
         min: c.range.map(|r| r.0),
@@ -142,9 +151,21 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     }
 }
 
+/// Whether the input or the output has one value throughout.
+fn still(record: &Record) -> bool {
+    let constant = |values: &[f64]| values.windows(2).all(|pair| pair[0] == pair[1]);
+    !record.input().is_empty() && constant(record.input()) || record.output().is_some_and(constant)
+}
+
 fn never_moves(channel: &Channel) -> Option<String> {
     let (low, high) = channel.range?;
-    (low == high).then(|| format!("\"{}\" never moves: it is {} throughout", channel.name, text::short(low)))
+    (low == high).then(|| {
+        format!(
+            "\"{}\" never moves: it is {} throughout; as an input or output it cannot be fitted",
+            channel.name,
+            text::short(low)
+        )
+    })
 }
 
 fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
@@ -162,7 +183,7 @@ fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
         sample_rate_hz: 1.0 / record.sample_period(),
         seconds: time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0),
         segments: record.segments().len(),
-        resampled: record.notes().iter().any(|note| note.contains("resampled to even steps")),
+        resampled: record.resampled(),
         times,
         input: (!record.input().is_empty()).then(|| record.input_column().to_owned()),
         output: record.output_unit().map(|unit| unit.column()),
@@ -180,8 +201,12 @@ fn next(file: &str, record: &Record, options: &str) -> Option<String> {
     let file = quoted(file);
     match (record.input().is_empty(), record.output().is_some()) {
         (false, true) => Some(format!("hystctl fit {file}{options} --model pi -o {model}")),
-        (false, false) => Some(format!("hystctl simulate --model model.json {file}{options} -o predicted.csv")),
-        (true, true) => Some(format!("hystctl compensate --model model.json {file}{options} -o drive.csv")),
+        (false, false) => Some(format!(
+            "hystctl simulate --model MODEL.json {file}{options} -o predicted.csv (MODEL.json: from hystctl fit)"
+        )),
+        (true, true) => Some(format!(
+            "hystctl compensate --model MODEL.json {file}{options} -o drive.csv (MODEL.json: from hystctl fit)"
+        )),
         (true, false) => None,
     }
 }
@@ -245,20 +270,20 @@ impl Summary {
         let mut lines = vec![format!("{}: {}", self.file, self.format), String::new()];
         let wide = self.channels.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).clamp(7, 40);
         lines.push(format!(
-            "  {:wide$}  {:11}  {:>5}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
+            "  {:wide$}  {:11}  {:>8}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
             "channel", "read as", "unit", "min", "max", "resolution", "rows", "missing"
         ));
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
             let name: String = c.name.chars().take(40).collect();
-            let unit = match (c.unit, c.mapped_unit) {
+            let unit = match (c.unit, &c.mapped_unit) {
                 (Some(unit), _) => unit.to_owned(),
                 (None, Some(unit)) => format!("{unit}*"),
                 (None, None) if matches!(c.role, Some("segment")) || c.name == "segment" => "-".to_owned(),
                 (None, None) => "?".to_owned(),
             };
             lines.push(format!(
-                "  {name:wide$}  {:11}  {unit:>5}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
+                "  {name:wide$}  {:11}  {unit:>8}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
                 c.role.unwrap_or("-"),
                 number(c.min),
                 number(c.max),
@@ -269,6 +294,9 @@ impl Summary {
         }
         if self.channels.iter().any(|c| c.unit.is_none() && c.mapped_unit.is_some()) {
             lines.push("  * as --map says; the file states no unit".to_owned());
+        }
+        if self.channels.iter().any(|c| c.unit_beside_name) {
+            lines.push("  units that a name does not state are from elsewhere in the file".to_owned());
         }
         if self.channels.len() == MAX_CHANNELS {
             lines.push(format!("  (the first {MAX_CHANNELS})"));
@@ -303,14 +331,21 @@ impl Summary {
         }
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         match (self.warnings.as_slice(), &self.record) {
-            ([], Some(_)) if self.notes.is_empty() => lines.push("warnings: none".to_owned()),
-            ([], Some(_)) => lines.push("warnings: none besides the notes".to_owned()),
+            ([], Some(_)) => {
+                let notes = if self.notes.is_empty() { "" } else { " besides the notes" };
+                let mapped = self.channels.iter().any(|c| c.unit.is_none() && c.mapped_unit.is_some());
+                let units = if mapped { "; the units with * are yours" } else { "" };
+                lines.push(format!("warnings: none{notes}{units}"));
+            }
             (warnings, _) => lines.extend(warnings.iter().map(|what| format!("warning: {what}"))),
         }
         if !self.picture.is_empty() {
             lines.extend([String::new(), self.picture.clone()]);
         }
         lines.extend(self.missing.iter().flat_map(|why| [String::new(), format!("not a record yet: {why}")]));
+        if self.missing.is_some() && self.next.is_some() {
+            lines.push("rates, noise and further warnings follow once columns and units are known".to_owned());
+        }
         lines.extend(self.next.iter().flat_map(|next| [String::new(), format!("next: {next}")]));
         lines.join("\n")
     }

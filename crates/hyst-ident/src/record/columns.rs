@@ -169,6 +169,11 @@ impl Role {
         }
     }
 
+    /// The role in one word.
+    pub(crate) fn word(self) -> &'static str {
+        self.words().trim_start_matches("the ")
+    }
+
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Segment => "the segment",

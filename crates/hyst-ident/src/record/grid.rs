@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 /// How finely times are printed, in decimals of a second.
 ///
 /// Both figures are needed: fixed decimals (`10.920000`) are limited by `decimals`, a fixed number of digits
@@ -143,7 +145,7 @@ pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> 
     let mut groups: Vec<(Fits, Vec<usize>)> = Vec::new();
     for segment in by_length {
         let t = &time[segments[segment].clone()];
-        let own = Tolerance::of(t, printed).fits(t);
+        let [own] = fits(t, printed, [slack(t)]);
         match groups.iter_mut().find(|(fits, _)| !fits.and(own).is_empty()) {
             Some((fits, group)) => {
                 *fits = fits.and(own);
@@ -164,31 +166,36 @@ pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> 
     periods.into_iter().map(|period| period.ok_or(Fault::TooShort)).collect()
 }
 
-/// How far a row may be off its grid.
-struct Tolerance {
-    printed: Printed,
-    /// Beyond the printed digits \[s\].
-    slack: f64,
+/// Rows of a segment that one thread looks at.
+const PART_ROWS: usize = 1 << 16;
+
+/// How far rows may be off their grid beyond the printed digits \[s\]: times summed up step by step drift off it by more than a rounding, and a
+/// millionth of a period is no matter.
+fn slack(t: &[f64]) -> f64 {
+    rounding(t) + 1e-6 * if t.len() < 2 { 0.0 } else { mean_step(t) }
 }
 
-impl Tolerance {
-    /// Times summed up step by step drift off the grid by more than a rounding: a millionth of a period is no matter.
-    fn of(t: &[f64], printed: Printed) -> Self {
-        let guess = if t.len() < 2 { 0.0 } else { mean_step(t) };
-        Self { printed, slack: rounding(t) + 1e-6 * guess }
-    }
-
-    /// The periods that fit a segment's times.
-    fn fits(&self, t: &[f64]) -> Fits {
-        let mut own = Fits::ALL;
-        let resolution = self.printed.resolution();
-        let first = t.first().map_or(0.0, |t| resolution.at(*t));
-        for (k, tk) in t.iter().enumerate().skip(1) {
+/// The periods that fit a segment's times, for each of some slacks \[s\].
+fn fits<const N: usize>(t: &[f64], printed: Printed, slacks: [f64; N]) -> [Fits; N] {
+    let Some(start) = t.first() else { return [Fits::ALL; N] };
+    let resolution = printed.resolution();
+    let first = resolution.at(*start);
+    let part = |(part, times): (usize, &[f64])| {
+        let mut own = [Fits::ALL; N];
+        for (k, tk) in (part * PART_ROWS..).zip(times).skip(usize::from(part == 0)) {
             let r = resolution.at(*tk).max(first);
-            own.narrow(tk - t[0], r + self.slack, k as f64);
+            for (own, slack) in own.iter_mut().zip(slacks) {
+                own.narrow(tk - start, r + slack, k as f64);
+            }
         }
         own
+    };
+    if t.len() <= PART_ROWS {
+        return part((0, t));
     }
+    // The interval is the same in whatever order the rows narrow it.
+    let both = |a: [Fits; N], b: [Fits; N]| std::array::from_fn(|n| a[n].and(b[n]));
+    t.par_chunks(PART_ROWS).enumerate().map(part).reduce(|| [Fits::ALL; N], both)
 }
 
 fn rounding(time: &[f64]) -> f64 {
@@ -202,24 +209,26 @@ fn shared(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<O
     };
     let guess = mean_step(&time[longest.clone()]);
     let rounding = rounding(time);
-    let loose = Tolerance { printed, slack: rounding + 1e-6 * guess };
-    let exact = Tolerance { printed, slack: rounding };
+    let slack = rounding + 1e-6 * guess;
     let (mut strict, mut all) = (Fits::ALL, Fits::ALL);
+    let mut odd = None;
     for rows in segments {
-        all = all.and(loose.fits(&time[rows.clone()]));
-        strict = strict.and(exact.fits(&time[rows.clone()]));
+        let [own, exact] = fits(&time[rows.clone()], printed, [slack, rounding]);
+        (all, strict) = (all.and(own), strict.and(exact));
+        if own.is_empty() && odd.is_none() {
+            odd = Some(rows);
+        }
     }
     // Segments that have each a period but none in common differ in it, unless the rows of one are uneven by themselves.
-    let odd = |rows: &&Range<usize>| loose.fits(&time[rows.start..rows.end]).is_empty();
-    if all.is_empty() && !segments.iter().any(|rows| odd(&rows)) {
+    if all.is_empty() && odd.is_none() {
         return Ok(None);
     }
     if let Some(fault) = gap(time, segments, printed, guess) {
         return Err(fault);
     }
     // Where all have a period in common, none is uneven.
-    if let Some(rows) = all.is_empty().then(|| segments.iter().find(odd)).flatten() {
-        return Err(uneven(&time[rows.clone()], printed, loose.slack, rows.start));
+    if let Some(rows) = odd {
+        return Err(uneven(&time[rows.clone()], printed, slack, rows.start));
     }
     let grid = Grid { time, segments, printed, rounding, strict };
     let value = grid.simplest(guess).clamp(all.low, all.high);
@@ -288,10 +297,16 @@ fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) ->
     let resolution = printed.resolution();
     let is_coarse = |row: &usize| guess <= 3.0 * resolution.at(time[*row]);
     let steps = || segments.iter().flat_map(|rows| rows.clone().skip(1)).filter(is_coarse);
-    let mut lengths: Vec<f64> = steps().map(|row| time[row] - time[row - 1]).collect();
-    if lengths.is_empty() {
+    // Steps that differ by less than any tolerance are none of them odd; most records end here.
+    let (mut low, mut high, mut finest) = (f64::INFINITY, 0.0_f64, f64::INFINITY);
+    for row in steps() {
+        let step = time[row] - time[row - 1];
+        (low, high, finest) = (low.min(step), high.max(step), finest.min(resolution.at(time[row])));
+    }
+    if high - low <= 0.5 * finest || high < low {
         return None;
     }
+    let mut lengths: Vec<f64> = steps().map(|row| time[row] - time[row - 1]).collect();
     let count = lengths.len();
     let usual = *lengths.select_nth_unstable_by((count - 1) / 2, f64::total_cmp).1;
     let is_odd = |row: &usize| (time[*row] - time[*row - 1] - usual).abs() > 0.5 * resolution.at(time[*row]);

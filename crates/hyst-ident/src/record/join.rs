@@ -58,6 +58,7 @@ impl Record {
         self.sources.extend(next.sources);
         self.labelled |= next.labelled;
         self.lost = self.lost.and(next.lost);
+        self.resampled |= next.resampled;
         self.labels.extend(next.labels);
         self.periods.extend(next.periods);
         self.segments.extend(next.segments.into_iter().map(|s| s.start + rows..s.end + rows));

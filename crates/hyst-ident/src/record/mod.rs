@@ -107,6 +107,9 @@ pub struct Record {
     lost: Losses,
     /// Rows whose output is missing; empty where none is.
     missing: Vec<bool>,
+    /// Whether values were interpolated at even times.
+    #[serde(default)]
+    resampled: bool,
     /// What was done to read the file.
     notes: Vec<String>,
     /// The file's text without a byte-order mark, for writing its columns again as they stand.
@@ -163,7 +166,7 @@ impl Record {
             });
         }
         let origin = Origin { time_column: "time_s", segment_column: "segment", place: &Place::Row };
-        Self::assemble(samples, Printed::EXACT, &origin)
+        Self::assemble(samples, Printed::EXACT, None, &origin)
     }
 
     /// The same with another input, as long as its own.
@@ -171,8 +174,13 @@ impl Record {
         Self { input: Some(input), ..self.clone() }
     }
 
-    /// Puts together finite columns of equal length.
-    fn assemble(samples: Columns, printed: Printed, origin: &Origin<'_>) -> Result<Self, RecordError> {
+    /// Puts together finite columns of equal length. `periods` are those of the segments, where they are known.
+    fn assemble(
+        samples: Columns,
+        printed: Printed,
+        periods: Option<Vec<grid::Period>>,
+        origin: &Origin<'_>,
+    ) -> Result<Self, RecordError> {
         let Columns { name, segment, mut time, mut input_column, input, output, temperature, load } = samples;
         if time.is_empty() {
             return Err(RecordError::NoRows { file: name });
@@ -200,7 +208,8 @@ impl Record {
                 found: seconds(time[row]),
             });
         }
-        let periods = grid::fit(&time, &segments, printed).map_err(|fault| match fault {
+        let periods = periods.map_or_else(|| grid::fit(&time, &segments, printed), Ok);
+        let periods = periods.map_err(|fault| match fault {
             Fault::Uneven { row, expected } => RecordError::UnevenTime {
                 file: file(),
                 place: place(row),
@@ -234,6 +243,7 @@ impl Record {
             load,
             lost: Losses::default(),
             missing: Vec::new(),
+            resampled: false,
             notes: Vec::new(),
             text: None,
         })
@@ -285,6 +295,11 @@ impl Record {
     /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
     pub fn sources(&self) -> &[Source] {
         &self.sources
+    }
+
+    /// Whether the times of a file were uneven, and the values are interpolated at even ones; a note has the size of the jitter.
+    pub fn resampled(&self) -> bool {
+        self.resampled
     }
 
     /// What the logs that it was read from, if any, lost of their runs.

@@ -146,7 +146,11 @@ pub(super) fn with_layout(
         (Some(Values { numbers, mut printed }), Clock::Column { per_second, .. }) => {
             printed.decimals += per_second.log10().round() as i32;
             let exact = *per_second >= 1.0 && per_second.log10().fract() == 0.0;
-            (numbers.iter().map(|t| t / per_second).collect(), if exact { printed } else { Printed::EXACT })
+            let mut seconds = numbers;
+            if *per_second != 1.0 {
+                seconds.iter_mut().for_each(|t| *t /= per_second);
+            }
+            (seconds, if exact { printed } else { Printed::EXACT })
         }
         (_, Clock::Even { start, step }) => {
             // A mean of some rows is half of them late.
@@ -199,8 +203,10 @@ pub(super) fn with_layout(
     let done = repair(&mut samples, &mut printed, need == Need::Output, &origin)?;
     let place = place_of(&done, &place);
     finite(&samples, &place)?;
-    let mut record = Record::assemble(samples, printed, &Origin { place: &place, ..origin })?;
+    let mut record = Record::assemble(samples, printed, done.periods.clone(), &Origin { place: &place, ..origin })?;
     record.missing.clone_from(&done.missing);
+    record.resampled = done.resampled;
+    record.lost.cut_off = contents.cut_off();
     record.notes = contents
         .notes()
         .iter()

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::error::{Place, RecordError};
-use super::grid::{self, Fault, Printed};
+use super::grid::{self, Fault, Period, Printed};
 use super::{Columns, Origin};
 
 /// Longest run of missing inputs, temperatures or loads that is bridged by a straight line \[rows\].
@@ -37,6 +37,10 @@ pub(super) struct Repaired {
     rows: Option<Vec<usize>>,
     /// Whether anything differs from the file's rows.
     pub(super) changed: bool,
+    /// Whether values were interpolated at even times.
+    pub(super) resampled: bool,
+    /// The period of each segment, where the times are even.
+    pub(super) periods: Option<Vec<Period>>,
     pub(super) notes: Vec<String>,
 }
 
@@ -63,15 +67,17 @@ pub(super) fn repair(
     leave_out_without(samples, &mut done, wanted, origin)?;
     continue_clock(samples, &mut done);
     join_repeated(samples, &mut done);
-    let mut uneven = is_uneven(samples, *printed);
-    if let Some(segments) = &uneven
+    let mut times = Times::of(samples, *printed);
+    if let Times::Uneven(segments) = &times
         && insert_lost(samples, &mut done, segments)
     {
-        uneven = is_uneven(samples, *printed);
+        times = Times::of(samples, *printed);
     }
     bridge(samples);
-    if let Some(segments) = uneven {
-        even_out(samples, printed, &mut done, segments);
+    match times {
+        Times::Even(periods) => done.periods = Some(periods),
+        Times::Uneven(segments) => even_out(samples, printed, &mut done, segments),
+        Times::Unsorted => {}
     }
     Ok(done)
 }
@@ -356,15 +362,35 @@ fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     done.note(format!("{} with the time of the row before ({how}; the first is row {at}): joined", rows_word(count)));
 }
 
-/// Whether times increase, but not by even steps.
-fn is_uneven(samples: &Columns, printed: Printed) -> Option<Vec<Range<usize>>> {
-    let rows = samples.time.len();
-    if rows < 2 || samples.time.windows(2).any(|t| t[1] <= t[0]) {
-        return None;
+/// How times go on.
+enum Times {
+    /// By even steps in each segment.
+    Even(Vec<Period>),
+    /// They increase in these segments, but not by even steps.
+    Uneven(Vec<Range<usize>>),
+    /// In some other way, which the checks that come later refuse.
+    Unsorted,
+}
+
+impl Times {
+    fn of(samples: &Columns, printed: Printed) -> Self {
+        let time = samples.time.as_slice();
+        if time.len() < 2 || time.windows(2).any(|t| t[1] <= t[0]) {
+            return Self::Unsorted;
+        }
+        let segments = match &samples.segment {
+            None => std::iter::once(0..time.len()).collect(),
+            Some(labels) => match super::split(labels) {
+                Ok((_, segments)) => segments,
+                Err(_) => return Self::Unsorted,
+            },
+        };
+        match grid::fit(time, &segments, printed) {
+            Ok(periods) => Self::Even(periods),
+            Err(Fault::Uneven { .. }) => Self::Uneven(segments),
+            Err(Fault::TooShort) => Self::Unsorted,
+        }
     }
-    let labels = samples.segment.clone().unwrap_or_else(|| vec![0; rows]);
-    let (_, segments) = super::split(&labels).ok()?;
-    matches!(grid::fit(&samples.time, &segments, printed), Err(Fault::Uneven { .. })).then_some(segments)
 }
 
 /// Puts back rows that are lost where only a few in sequence are, without values; says whether there were any.
@@ -445,7 +471,7 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
             relabel(samples, &segments);
         }
     }
-    if let Some(segments) = is_uneven(samples, *printed) {
+    if let Times::Uneven(segments) = Times::of(samples, *printed) {
         // Times that follow no grid at all are refused by the checks that come later.
         if segments.iter().any(|rows| wild(&samples.time[rows.clone()])) {
             return;
@@ -546,6 +572,7 @@ fn resample(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>
         }
     }
     done.changed = true;
+    done.resampled = true;
     ((squares / old.len() as f64).sqrt(), most)
 }
 

@@ -125,6 +125,15 @@ impl Layout {
     }
 }
 
+/// The columns that a map names, with the roles that it gives them.
+///
+/// # Errors
+/// When one is not there, or has another unit.
+pub(crate) fn mapped(file: &File<'_>, map: &ColumnMap) -> Result<Vec<(Role, Choice)>, RecordError> {
+    let headings = file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect();
+    Search { wants_input: true, file, headings }.mapped(map)
+}
+
 fn per_second(canonical: &str) -> f64 {
     TimeUnit::of_column(canonical).unwrap_or(TimeUnit::Second).per_second()
 }
@@ -508,6 +517,15 @@ impl Search<'_> {
         });
         let own = map.entries.iter().map(|e| format!("--map {}", argument(&e.canonical, e.factor, &e.column)));
         let line = own.chain(arguments).collect::<Vec<_>>().join(" ");
+        if let Some(short) = self.too_few(&open, taken) {
+            return RecordError::Columns {
+                file: self.place(),
+                problems: format!("{}; {short}", problems.list.join("; ")),
+                advice: format!("columns found: {}; put all columns side by side into one file", self.listed()),
+                options: String::new(),
+                columns: self.file.heads.len() + self.file.texts.len(),
+            };
+        }
         let no_time = open.iter().any(|(role, guess)| *role == Role::Time && guess.is_none());
         let rate = if no_time { "; for a file without times give the rate with --rate" } else { "" };
         RecordError::Columns {
@@ -517,6 +535,29 @@ impl Search<'_> {
             options: line,
             columns: self.file.heads.len() + self.file.texts.len(),
         }
+    }
+}
+
+impl Search<'_> {
+    /// What is missing where the file has fewer columns than the roles that are open.
+    fn too_few(&self, open: &[(Role, Option<usize>)], taken: &[usize]) -> Option<String> {
+        let count = self.file.heads.len();
+        let free = count.saturating_sub(taken.len());
+        // A rate stands for a column of time.
+        let needed = open.iter().filter(|(role, _)| *role != Role::Time).count();
+        if free >= needed {
+            return None;
+        }
+        let columns = if count == 1 { "one column".to_owned() } else { format!("{count} columns") };
+        let words: Vec<&str> = open.iter().map(|(role, _)| role.word()).collect();
+        let time = if words.contains(&Role::Time.word()) { " (--rate HZ replaces a column of time)" } else { "" };
+        let alone = if free == 1 && taken.is_empty() {
+            let example = argument(Role::Output.example(), None, self.name(0));
+            format!("; for a reference, which is an output alone: --map {example} --rate HZ")
+        } else {
+            String::new()
+        };
+        Some(format!("the file has {columns}, but needs further ones: {}{time}{alone}", words.join(", ")))
     }
 }
 

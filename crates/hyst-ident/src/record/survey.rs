@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use super::columns::Need;
+use super::columns::{ColumnMap, Need};
 use super::error::RecordError;
 use super::heading::{Heading, Unit};
 use super::log::is_run_log;
 use super::read::{Reading, with_layout};
-use super::roles::{Clock, Layout};
+use super::roles::{Clock, File, Layout, mapped};
 use super::source::{self, Contents};
 use super::unit::TimeUnit;
 use super::{Record, RunLog};
@@ -31,8 +31,10 @@ pub struct Channel {
     pub step: f64,
     /// What the record takes it for: `segment`, `time`, `input`, `output`, `temperature` or `load`.
     pub role: Option<&'static str>,
-    /// The unit that `--map` gives it, where the file states none.
-    pub mapped_unit: Option<&'static str>,
+    /// The unit that `--map` gives it, where the file states none; `0.001 V` where it scales the values.
+    pub mapped_unit: Option<String>,
+    /// Whether its unit is stated elsewhere in the file than in its name.
+    pub unit_beside_name: bool,
 }
 
 /// What a file holds.
@@ -95,7 +97,10 @@ impl Survey {
                 mark(&mut channels, contents, &layout);
                 (Ok(record), Some(times(contents, how, &layout)))
             }
-            Err(error) => (Err(error), None),
+            Err(error) => {
+                mark_mapped(&mut channels, name, contents, &how.map);
+                (Err(error), None)
+            }
         };
         Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), times, record })
     }
@@ -103,19 +108,14 @@ impl Survey {
 
 /// Notes which channels a record is read from.
 fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
-    let mut note = |column: usize, role: &'static str, canonical: &str| {
-        let stated = contents.heads().get(column).is_some_and(|head| !has_unit(head));
-        if let Some(channel) = channels.get_mut(column) {
-            channel.role = Some(role);
-            channel.mapped_unit = Unit::of_canonical(canonical).filter(|_| stated).map(|unit| unit.symbol);
-        }
-    };
+    let mut note =
+        |column, role, canonical: &str, factor| mark_one(channels, contents, (column, role), canonical, factor);
     if let Some(column) = layout.segment {
-        note(column, "segment", "");
+        note(column, "segment", "", None);
     }
     if let Clock::Column { column, per_second } = layout.time {
         let unit = TimeUnit::ALL.into_iter().find(|unit| unit.per_second() == per_second);
-        note(column, "time", unit.map_or("", TimeUnit::column));
+        note(column, "time", unit.map_or("", TimeUnit::column), None);
     }
     let choices = [
         ("input", &layout.input),
@@ -125,10 +125,32 @@ fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
     ];
     for (role, choice) in choices {
         if let Some(choice) = choice {
-            // Values in the table are those of the file: a factor makes another unit of them.
-            let same = choice.factor.is_none_or(|factor| factor == -1.0);
-            note(choice.column, role, if same { &choice.canonical } else { "" });
+            note(choice.column, role, &choice.canonical, choice.factor);
         }
+    }
+}
+
+/// The same for what a map says of columns that are no record yet. A map that is wrong is said so by the error.
+fn mark_mapped(channels: &mut [Channel], name: &str, contents: &dyn Contents, map: &ColumnMap) {
+    let file = File { name, header: contents.header(), heads: contents.heads(), texts: contents.texts() };
+    for (role, choice) in mapped(&file, map).unwrap_or_default() {
+        mark_one(channels, contents, (choice.column, role.word()), &choice.canonical, choice.factor);
+    }
+}
+
+/// Notes the role of a channel, and the unit of its values that a map states.
+fn mark_one(
+    channels: &mut [Channel],
+    contents: &dyn Contents,
+    (column, role): (usize, &'static str),
+    canonical: &str,
+    factor: Option<f64>,
+) {
+    let Some(channel) = channels.get_mut(column) else { return };
+    channel.role = Some(role);
+    if contents.heads().get(column).is_some_and(|head| !has_unit(head)) {
+        let scale = factor.filter(|factor| *factor != -1.0).map_or(String::new(), |factor| format!("{factor} "));
+        channel.mapped_unit = Unit::of_canonical(canonical).map(|unit| format!("{scale}{}", unit.symbol));
     }
 }
 
@@ -199,6 +221,7 @@ fn channels(contents: &dyn Contents) -> Result<Vec<Channel>, RecordError> {
             step: quantisation(&there) * 12f64.sqrt(),
             role: None,
             mapped_unit: None,
+            unit_beside_name: Heading::parse(&head.name, None).unit.is_none() && has_unit(head),
         }
     };
     Ok(heads.iter().zip(values).map(channel).collect())

@@ -37,7 +37,7 @@ impl Fault {
     }
 
     /// What only a damaged file has.
-    fn damaged(what: &str) -> Self {
+    fn damaged(what: impl std::fmt::Display) -> Self {
         Self(format!("{what}; the file is damaged: copy it again, or write it again with the program that made it"))
     }
 }
@@ -104,7 +104,11 @@ impl<'a> Message<'a> {
 
     /// The message at `at`; `None` at the end mark.
     fn read(bytes: &'a [u8], at: usize) -> Result<Option<Self>, Fault> {
-        let cut = || Fault::damaged("the file ends in the middle of a message");
+        let cut = || Fault::damaged(format!("the file ends in the middle of the message at byte {at}"));
+        let too_long = |length: i64| {
+            let left = bytes.len().saturating_sub(at);
+            Fault::damaged(format!("the message at byte {at} states {length} bytes, where the file has {left} more"))
+        };
         let mut start = at;
         let mut word = || {
             let word = u32_at(bytes, start);
@@ -120,12 +124,13 @@ impl<'a> Message<'a> {
             return Ok(None);
         }
         let part = |start: usize, length: usize| bytes.get(start..start.checked_add(length)?);
-        let metadata = part(start, length as usize).ok_or_else(cut)?;
+        let metadata = part(start, length as usize).ok_or_else(|| too_long(length.into()))?;
         let start = start + metadata.len();
         let table = flatbuffer::Table::root(metadata).ok_or_else(cut)?;
-        let length = usize::try_from(table.i64(3, 0)).map_err(|_| cut())?;
-        let body = part(start, length).ok_or_else(cut)?;
-        Ok(Some(Self { kind: table.u8(1, 0), header: table.table(2), body, next: start + length }))
+        let stated = table.i64(3, 0);
+        let body =
+            usize::try_from(stated).ok().and_then(|length| part(start, length)).ok_or_else(|| too_long(stated))?;
+        Ok(Some(Self { kind: table.u8(1, 0), header: table.table(2), body, next: start + body.len() }))
     }
 }
 

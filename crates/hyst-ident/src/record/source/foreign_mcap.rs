@@ -49,7 +49,7 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let log = Log::read(bytes).map_err(damaged)?;
     let (mut topics, mut notes, mut left_out) = (Vec::new(), log.notes(), log.left_out.clone());
     let encodings = log.encodings();
-    let is_empty = log.is_empty();
+    let (is_empty, cut_off) = (log.is_empty(), !log.is_closed());
     for topic in log.topics {
         let decoder = topic.decoder;
         let mut series = topic.series;
@@ -67,6 +67,9 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     }
     topics.retain(|(series, _)| !series.columns.is_empty());
     if topics.is_empty() {
+        if cut_off {
+            notes.insert(0, "the log was cut off: its end is missing".to_owned());
+        }
         return Err(damaged(why_nothing(is_empty, &left_out, &notes)));
     }
     notes.extend(align::align(&mut topics));
@@ -76,7 +79,7 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let more = notes.len().saturating_sub(MOST_NOTES);
     notes.truncate(MOST_NOTES);
     notes.extend((more > 0).then(|| format!("and {more} more notes")));
-    Ok(Table { notes, ..table(topics, &encodings) })
+    Ok(Table { notes, cut_off, ..table(topics, &encodings) })
 }
 
 /// Why there is no column, and what to do.

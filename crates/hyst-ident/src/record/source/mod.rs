@@ -147,6 +147,11 @@ pub(crate) trait Contents {
     fn notes(&self) -> &[String] {
         &[]
     }
+
+    /// Whether the end of the file is missing, and no note says so.
+    fn cut_off(&self) -> bool {
+        false
+    }
 }
 
 /// A format of bytes: how its files are told apart, and how they are read as a whole.

@@ -70,21 +70,24 @@ pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
         _ => (false, 0),
     };
     let digits = &bytes[signs..];
-    let (mut mantissa, mut count, mut after) = (0_u64, 0_i32, 0_i32);
-    let mut pointed = false;
-    let mut at = 0;
-    while let Some(byte) = digits.get(at) {
-        match byte {
-            b'0'..=b'9' => {
-                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
-                count += i32::from(count > 0 || *byte != b'0');
-                after += i32::from(pointed);
-            }
-            _ if *byte == decimal && !pointed => pointed = true,
-            _ => break,
+    let mut mantissa = 0_u64;
+    let mut run = |from: usize| {
+        let mut at = from;
+        while let Some(digit) = digits.get(at).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10) {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+            at += 1;
         }
-        at += 1;
-    }
+        at
+    };
+    let before = run(0);
+    let pointed = digits.get(before) == Some(&decimal);
+    let at_point = before + usize::from(pointed);
+    let mut at = if pointed { run(at_point) } else { before };
+    // Cells are shorter than any `i32`.
+    let after = i32::try_from(at - at_point).ok()?;
+    let zeros = digits[..at].iter().take_while(|byte| matches!(byte, b'0') || **byte == decimal);
+    let zeros = zeros.filter(|byte| **byte == b'0').count();
+    let count = i32::try_from(at - usize::from(pointed) - zeros).ok()?;
     // At least one digit.
     if at == usize::from(pointed) {
         return None;

@@ -15,6 +15,8 @@ pub(crate) struct Table {
     pub(crate) values: Vec<Vec<f64>>,
     /// What was done to read the file that its owner may want to know.
     pub(crate) notes: Vec<String>,
+    /// Whether the end of the file is missing, and no note says so.
+    pub(crate) cut_off: bool,
 }
 
 impl Table {
@@ -54,5 +56,9 @@ impl Contents for Table {
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    fn cut_off(&self) -> bool {
+        self.cut_off
     }
 }

@@ -106,7 +106,7 @@ impl<'a> Batch<'a> {
                 "a buffer expands to more than 200 times its size; write the columns of the record alone, as CSV",
             ));
         }
-        let failed = |error: std::io::Error| Fault::damaged(&format!("a compressed buffer is damaged ({error})"));
+        let failed = |error: std::io::Error| Fault::damaged(format!("a compressed buffer is damaged ({error})"));
         let mut bytes = match codec {
             Codec::Lz4 => {
                 let mut bytes = Vec::new();

@@ -199,12 +199,14 @@ impl Log {
         words.join(" and ")
     }
 
-    /// What the file lost.
+    /// Whether its end is there.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// What of the file is damaged.
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        if !self.is_closed {
-            notes.push("the log was cut off: its end is missing".to_owned());
-        }
         if let Some((problem, count)) = &self.damaged {
             let pieces = if *count == 1 { "1 damaged piece" } else { &format!("{count} damaged pieces") };
             notes.push(format!("{pieces} of the log left out: {}", super::shortened(problem)));
