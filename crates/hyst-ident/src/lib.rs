@@ -20,6 +20,7 @@ pub mod digits;
 mod drive;
 pub mod everett;
 pub mod excite;
+pub mod experiment;
 pub mod export;
 pub mod fit;
 pub mod force;

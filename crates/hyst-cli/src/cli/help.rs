@@ -20,8 +20,9 @@ Examples:
   hystctl fit train.csv --model bouc-wen --optimizer gwo --seed 1 --trials 12 --trace t.csv --picture t.svg -o model.json";
 
 pub(super) const CLOSE_LOOP: &str = "\
-Example:
-  hystctl close-loop --daq sim:plant.toml --out loop";
+Examples:
+  hystctl close-loop --daq sim:plant.toml --out loop
+  hystctl close-loop --daq sim:plant.toml --out loop --until 0.95 --within 60s";
 
 pub(super) const LEARN: &str = "\
 Examples:

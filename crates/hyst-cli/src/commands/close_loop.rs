@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hyst_hw::{Daq, RecordOptions};
+use hyst_hw::Daq;
 use hyst_ident::atomic_file::write_atomic;
 use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, RemainderKind, diagnose_until};
-use hyst_ident::excite::{Drive, Identification, Limits};
+use hyst_ident::experiment::Question;
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
 use hyst_ident::model::{Kind, Model};
@@ -16,17 +16,22 @@ use serde::Serialize;
 
 use crate::cli::CloseLoopArgs;
 use crate::device::{AnyDevice, Wishes};
-use crate::exit::{CommandError, CommandResult, Exit};
+use crate::exit::{CommandError, CommandResult};
 use crate::host;
 use crate::output::{self, Report};
 use crate::progress::Progress;
+use crate::text;
 use crate::tracking::{Files, Run, Task};
-use crate::{recording, text};
+use plan::{Experiment, Plan};
+
+mod plan;
 
 /// One turn.
 #[derive(Debug, Serialize)]
 struct Turn {
     turn: u32,
+    /// What was played, and what for.
+    experiment: Experiment,
     /// Kind of the base.
     base: Kind,
     /// Errors of the model of the turn before on this turn's record, which it has not seen.
@@ -38,6 +43,17 @@ struct Turn {
     slew_limit: Option<f64>,
     /// What is left, in words.
     left: String,
+    /// What is open where experiments are chosen.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    open: Vec<Question>,
+    /// How a reference was followed; chosen experiments follow it in the end.
+    #[serde(flatten)]
+    tracking: Option<Tracking>,
+}
+
+/// How a reference was followed.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Tracking {
     /// Error of the followed reference \[output unit\].
     tracking_rmse: f64,
     tracking_max_abs: f64,
@@ -54,6 +70,8 @@ struct Summary {
     /// By the inverse of the base model alone.
     base_inverse_rmse: f64,
     turns: Vec<Turn>,
+    /// Time of all experiments \[s\].
+    seconds: f64,
     /// Why it ended.
     ended: String,
     folder: PathBuf,
@@ -85,15 +103,17 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
 fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> CommandResult<Summary> {
     let out = &args.out;
     let file = |name: &str, turn: u32, ending: &str| out.join(format!("{name}-{turn}.{ending}"));
+    let most = args.turns.unwrap_or(if args.until.is_some() { 12 } else { 4 });
     let (mut records, mut model): (Vec<Record>, Option<Model>) = (Vec::new(), None);
     let mut list: Vec<Turn> = Vec::new();
     let mut kind = args.model;
-    let (mut slew, mut unit) = (None, None);
+    let mut unit = None;
+    let mut plan = Plan::new(args, daq);
     let (mut plain, mut base_alone) = (f64::NAN, f64::NAN);
-    let mut ended = format!("all {} turns are done; give more with --turns", args.turns);
-    for turn in 1..=args.turns {
+    let mut ended = format!("all {most} turns are done; give more with --turns");
+    for turn in 1..=most {
         progress.say(&format!("turn {turn}: experiment"));
-        let record = experiment(daq, args, turn, slew)?;
+        let (experiment, record) = plan.play(daq, turn)?;
         let mut csv = Vec::new();
         record.write_csv(&mut csv).map_err(output::io_error)?;
         write_atomic(file("train", turn, "csv"), |f| f.write_all(&csv))?;
@@ -104,76 +124,81 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let train = Record::join(records.clone())?;
         progress.say(&format!("turn {turn}: fit"));
         let options = FitOptions { seed: args.seed, ..FitOptions::default() };
-        let start = match model.take().filter(|m| m.base.kind() == kind) {
+        // With chosen experiments all records are diagnosed anew: each probability is then one of all that was measured.
+        let start = match model.take().filter(|m| m.base.kind() == kind && args.until.is_none()) {
             Some(model) => model,
             None => fit(&train, kind, &options)?,
         };
         let told = |what: &str| progress.say(&format!("turn {turn}: {what}"));
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
         let found = diagnose_until(&train, None, &start, &options, &told, &host::stopping())?;
-        progress.say(&format!("turn {turn}: following a reference"));
-        let task = Task::of(&found.extended, &train, args.rate);
-        if turn == 1 {
-            plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
-            base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;
-        }
-        let files = Files { log: &file("run", turn, "mcap"), drive: &file("drive", turn, "csv") };
-        let Run { rmse, max_abs, shown_rmse, .. } =
-            task.judge(&task.through(daq, &found.extended, Some(&files))?, &found.extended);
         let name = |path: PathBuf| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         write(out, &name(file("model", turn, "json")), &found.extended.to_json())?;
         write(out, &name(file("findings", turn, "json")), &output::json(&found.findings)?)?;
         let names: Vec<String> = found.findings.effects.iter().map(|e| e.name.to_string()).collect();
         let remainder = &found.findings.remainder;
         let too_coarse = remainder.kind == RemainderKind::BaseCapacity && kind == Kind::Pi;
-        let nothing_new = names.is_empty();
+        let is_slow = remainder.slew_limit.is_some();
+        // Nothing is asked of records that the amplifier has not followed, nor of a base that is about to change.
+        let (open, why) = match args.until {
+            Some(_) if !(is_slow || too_coarse) => plan.next(&found.findings, &train, turn)?,
+            _ => (Vec::new(), None),
+        };
+        let ends = why.or_else(|| {
+            let done = args.until.is_none() && names.is_empty() && !(is_slow || too_coarse);
+            done.then(|| "nothing more is found".to_owned())
+        });
+        let tracking = if args.until.is_none() || ends.is_some() || turn == most {
+            progress.say(&format!("turn {turn}: following a reference"));
+            let task = Task::of(&found.extended, &train, args.rate);
+            if plain.is_nan() {
+                plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
+                base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;
+            }
+            let files = Files { log: &file("run", turn, "mcap"), drive: &file("drive", turn, "csv") };
+            let Run { rmse, max_abs, shown_rmse, .. } =
+                task.judge(&task.through(daq, &found.extended, Some(&files))?, &found.extended);
+            Some(Tracking { tracking_rmse: rmse, tracking_max_abs: max_abs, tracking_shown_rmse: shown_rmse })
+        } else {
+            None
+        };
         list.push(Turn {
             turn,
+            experiment,
             base: kind,
             before,
             found: names,
             remainder: remainder.kind,
             slew_limit: remainder.slew_limit,
             left: remainder.description.clone(),
-            tracking_rmse: rmse,
-            tracking_max_abs: max_abs,
-            tracking_shown_rmse: shown_rmse,
+            open,
+            tracking,
         });
+        if let Some(why) = ends {
+            ended = why;
+            break;
+        }
         if let Some(limit) = remainder.slew_limit {
             // What the amplifier has not followed says little of the actuator: all is measured anew, less steeply.
-            slew = Some(FOLLOWED * limit);
+            plan.stay_below(FOLLOWED * limit);
             records.clear();
             continue;
         }
         if too_coarse {
             // What is left is a map of the input's history: a richer one is fitted, and the effects are looked for anew on it.
             kind = Kind::Preisach;
-        } else if nothing_new {
-            ended = "nothing more is found".to_owned();
-            break;
         }
-        model = Some(found.extended);
+        model = Some(found.extended).filter(|_| !too_coarse || args.until.is_some());
     }
     Ok(Summary {
         unit: unit.map_or("", |u| u.suffix()).to_owned(),
         plain_gain_rmse: plain,
         base_inverse_rmse: base_alone,
         turns: list,
+        seconds: plan.spent(),
         ended,
         folder: out.clone(),
     })
-}
-
-/// Plays the identification drive of a turn over the device's range, no steeper than `slew` \[V/s\].
-fn experiment<D: Daq>(daq: &mut D, args: &CloseLoopArgs, turn: u32, slew: Option<f64>) -> CommandResult<Record> {
-    let range = daq.capabilities().voltage;
-    let limits = Limits { rate_hz: args.rate, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: slew };
-    let seed = args.seed.wrapping_add(u64::from(turn) << 32);
-    let drive: Drive = Identification::at_rate(args.rate, seed).within_slew(&limits, &|_| true).drive(&limits)?;
-    let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
-    let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(args.rate), |_| host::going())
-        .map_err(|failure| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}")))?;
-    recording::to_record(&recording, &format!("train-{turn}.csv"), recording::unit(daq.capabilities().output))
 }
 
 fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
@@ -191,6 +216,7 @@ fn said(summary: &Summary) -> String {
     };
     rows.push(blank("plain gain", summary.plain_gain_rmse));
     rows.push(blank("base inverse", summary.base_inverse_rmse));
+    let chosen = summary.turns.iter().any(|t| t.experiment.why.is_some());
     for t in &summary.turns {
         let slow = t.slew_limit.map(|_| "a slow amplifier");
         let found: Vec<&str> = t.found.iter().map(String::as_str).chain(slow).collect();
@@ -199,18 +225,28 @@ fn said(summary: &Summary) -> String {
             t.base.name().to_owned(),
             if found.is_empty() { "nothing".to_owned() } else { text::listed(&found) },
             t.before.map_or_else(String::new, |e| text::short(e.rmse)),
-            text::short(t.tracking_rmse),
-            text::short(t.tracking_max_abs),
+            t.tracking.map_or_else(String::new, |t| text::short(t.tracking_rmse)),
+            t.tracking.map_or_else(String::new, |t| text::short(t.tracking_max_abs)),
         ]);
     }
     let left = summary.turns.last().map_or("", |t| t.left.as_str());
-    let shown = summary.turns.last().filter(|t| (t.tracking_shown_rmse / t.tracking_rmse - 1.0).abs() > 0.01);
+    let last = summary.turns.last().and_then(|t| t.tracking);
+    let shown = last.filter(|t| (t.tracking_shown_rmse / t.tracking_rmse - 1.0).abs() > 0.01);
     let sensor = shown.map_or_else(String::new, |t| {
         let rmse = text::short(t.tracking_shown_rmse);
         format!("in the sensor: the last error is {rmse} {unit} with the drift and the tone that were found in it\n")
     });
+    let experiments: String = summary
+        .turns
+        .iter()
+        .filter_map(|t| {
+            let Experiment { drive, seconds, why } = &t.experiment;
+            Some(format!("experiment {}: {drive}, {} s, for {}\n", t.turn, text::short(*seconds), why.as_ref()?))
+        })
+        .collect();
+    let time = if chosen { format!("experiments: {} s\n", text::short(summary.seconds)) } else { String::new() };
     format!(
-        "{}\n{sensor}ended: {}\nleft: {left}\nwritten: {}",
+        "{}\n{experiments}{time}{sensor}ended: {}\nleft: {left}\nwritten: {}",
         text::table(&rows),
         summary.ended,
         summary.folder.display()

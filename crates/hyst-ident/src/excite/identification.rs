@@ -50,6 +50,16 @@ impl Identification {
         }
     }
 
+    /// A first look at an actuator, of which nothing is known: the same segments in a fifth of the time.
+    pub fn short(rate_hz: f64, seed: u64) -> Self {
+        let usual = Self::at_rate(rate_hz, seed);
+        let slow_hz = f64::min(1.5, rate_hz / 100.0);
+        // Five stairs, and what the decaying sine needs of its periods.
+        let (hold_s, rest_s) = (0.9, 0.3);
+        let active_s = f64::max(8.1 / slow_hz, 5.1 * (hold_s + usual.ramp_s));
+        Self { duration_s: active_s + 5.0 * rest_s, rest_s, slow_hz, hold_s, ..usual }
+    }
+
     /// The drive for a test record: about as long, over the same voltages and up to the same frequency. Levels and phases are drawn
     /// anew; periodic waves have frequencies a tenth of the way, on a logarithmic scale, further inside: with the usual 1 and
     /// 20 Hz these are 1.35 and 14.8 Hz. Where `slow_hz` and `fast_hz` are nearly the same, so are those of both drives.

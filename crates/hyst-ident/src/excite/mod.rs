@@ -18,7 +18,7 @@ use std::ops::Range;
 
 pub use identification::Identification;
 pub use scan::{Raster, Spiral};
-pub use separate::{SeparateOptions, Separation, Tried, Verdict, separate};
+pub use separate::{SeparateOptions, Separation, Tried, Verdict, separate, separations};
 pub use shapes::{DecayingSine, Forc, Multisine, Peak, Phases, Shape, Sine, Stairs, Sweep, Triangle};
 pub use waves::{AmSine, MinorLoops, Tone};
 

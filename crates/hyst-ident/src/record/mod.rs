@@ -112,9 +112,22 @@ pub struct Record {
     resampled: bool,
     /// What was done to read the file.
     notes: Vec<String>,
-    /// The file's text without a byte-order mark, for writing its columns again as they stand.
+    /// The file's text, for writing its columns again as they stand.
     #[serde(skip)]
-    text: Option<Arc<[u8]>>,
+    text: Option<Text>,
+}
+
+/// The bytes of a file of text, and where the text begins behind a byte-order mark.
+#[derive(Clone, Debug)]
+struct Text {
+    bytes: Arc<Vec<u8>>,
+    start: usize,
+}
+
+impl Text {
+    fn text(&self) -> &[u8] {
+        self.bytes.get(self.start..).unwrap_or_default()
+    }
 }
 
 /// Nothing is colder \[°C\].

@@ -1,5 +1,6 @@
 //! Reading records from files.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use super::repair::{place_of, repair};
 use super::roles::{Choice, Clock, File, Layout};
 use super::source::{self, Axis, Contents, Values, Wanted};
 use super::unit::OutputUnit;
-use super::{Columns, Origin, Record, sum_of};
+use super::{Columns, Origin, Record, Text, sum_of};
 
 /// How a file is read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,7 +58,7 @@ impl Record {
         }
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| RecordError::Io { file: file.clone(), source })?;
-        Self::parse(&file, &bytes, how, need)
+        Self::parse_bytes(&file, Cow::Owned(bytes), &how.into(), need)
     }
 
     /// Checks `bytes` as [`read`](Self::read) does a file's; `name` stands for the file in messages.
@@ -65,20 +66,35 @@ impl Record {
     /// # Errors
     /// As those of [`read`](Self::read).
     pub fn parse(name: &str, bytes: &[u8], how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
-        let how = how.into();
-        if is_run_log(bytes) {
-            return Self::parse_log(name, bytes, &how.map, need);
+        Self::parse_bytes(name, Cow::Borrowed(bytes), &how.into(), need)
+    }
+
+    /// A text's bytes are kept without a copy where they are owned.
+    fn parse_bytes(name: &str, bytes: Cow<'_, [u8]>, how: &Reading, need: Need) -> Result<Self, RecordError> {
+        if is_run_log(&bytes) {
+            return Self::parse_log(name, &bytes, &how.map, need);
         }
         // The sum over the file's bytes takes as long as reading them.
-        let (record, sum) = rayon::join(
+        let (found, sum) = rayon::join(
             || {
-                let unpacked = source::unpack(name, bytes)?;
+                let unpacked = source::unpack(name, &bytes)?;
                 let contents = source::open(name, &unpacked)?;
-                of_contents(name, contents.as_ref(), &how, need)
+                let found = with_layout(name, contents.as_ref(), how, need)?;
+                drop(contents);
+                // A text ends where its file does.
+                let start = |plain: usize| unpacked.len().saturating_sub(plain);
+                let start = found.plain.map(start);
+                let unpacked = if let Cow::Owned(unpacked) = unpacked { Some(unpacked) } else { None };
+                Ok((found.record, start, unpacked))
             },
-            || sum_of(bytes),
+            || sum_of(&bytes),
         );
-        Ok(record?.kept_with(sum))
+        let (mut record, start, unpacked): (Self, _, _) = found?;
+        record.text = start.map(|start| {
+            let bytes = Arc::new(unpacked.unwrap_or_else(|| bytes.into_owned()));
+            Text { bytes, start }
+        });
+        Ok(record.kept_with(sum))
     }
 }
 
@@ -89,7 +105,16 @@ pub(super) fn of_contents(
     how: &Reading,
     need: Need,
 ) -> Result<Record, RecordError> {
-    Ok(with_layout(name, contents, how, need)?.0)
+    Ok(with_layout(name, contents, how, need)?.record)
+}
+
+/// A record in a file's columns.
+pub(super) struct Found {
+    pub(super) record: Record,
+    /// The columns that it was read from.
+    pub(super) layout: Layout,
+    /// Length of the text whose rows can be carried through as they stand \[bytes\].
+    plain: Option<usize>,
 }
 
 /// The record in a file's columns, and which of them it was read from.
@@ -98,7 +123,7 @@ pub(super) fn with_layout(
     contents: &dyn Contents,
     how: &Reading,
     need: Need,
-) -> Result<(Record, Layout), RecordError> {
+) -> Result<Found, RecordError> {
     if let Some(rate) = how.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
         let problems = format!("the sample rate is {rate} Hz");
         let advice = "give a positive number of samples a second".to_owned();
@@ -216,8 +241,8 @@ pub(super) fn with_layout(
         .chain(&done.notes)
         .cloned()
         .collect();
-    record.text = contents.plain_text().filter(|_| !done.changed).map(|text| Arc::from(text.as_bytes()));
-    Ok((record, layout))
+    let plain = contents.plain_text().filter(|_| !done.changed).map(str::len);
+    Ok(Found { record, layout, plain })
 }
 
 /// Interpolates columns that have other times than the output (or, without one, the input) to its times, by straight lines. Before its first value

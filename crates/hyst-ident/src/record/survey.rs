@@ -6,7 +6,7 @@ use super::columns::{ColumnMap, Need};
 use super::error::RecordError;
 use super::heading::{Heading, Unit};
 use super::log::is_run_log;
-use super::read::{Reading, with_layout};
+use super::read::{Found, Reading, with_layout};
 use super::roles::{Clock, File, Layout, mapped};
 use super::source::{self, Contents};
 use super::unit::TimeUnit;
@@ -92,8 +92,8 @@ impl Survey {
     fn of(name: &str, contents: &dyn Contents, how: &Reading) -> Result<Self, RecordError> {
         let mut channels = channels(contents)?;
         let read = |need| with_layout(name, contents, how, need);
-        let (record, times) = match any(how.rate.is_some(), read, |(record, _)| record) {
-            Ok((record, layout)) => {
+        let (record, times) = match any(how.rate.is_some(), read, |found| &found.record) {
+            Ok(Found { record, layout, .. }) => {
                 mark(&mut channels, contents, &layout);
                 (Ok(record), Some(times(contents, how, &layout)))
             }

@@ -3,12 +3,11 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Write;
-use std::sync::Arc;
 
 use csv::ByteRecord;
 
 use super::grid::{self, Printed};
-use super::{OutputUnit, Record};
+use super::{OutputUnit, Record, Text};
 
 /// Why a record could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -157,9 +156,9 @@ impl Record {
     pub fn write_with(&self, out: impl Write, extra: &[Extra<'_>]) -> Result<(), WriteError> {
         extra.iter().try_for_each(|column| column.check(self.rows()))?;
         // As many rows, and a header.
-        let whole = |text: &&Arc<[u8]>| rows_of(text).byte_records().count() == self.rows() + 1;
-        let text = match self.text.as_ref().filter(whole) {
-            Some(text) => Cow::Borrowed(&text[..]),
+        let whole = |text: &&[u8]| rows_of(text).byte_records().count() == self.rows() + 1;
+        let text = match self.text.as_ref().map(Text::text).filter(whole) {
+            Some(text) => Cow::Borrowed(text),
             None => {
                 let mut text = Vec::new();
                 self.write_csv(&mut text)?;

@@ -87,18 +87,45 @@ pub struct Separation {
 /// # Errors
 /// When the two are the same, an option is out of range, or no drive of the family keeps to the limits.
 pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions) -> Result<Separation, ExciteError> {
+    let mut best: Option<(Tried, Drive)> = None;
+    let mut tried = Vec::new();
+    for (drive, found) in separations(&[(a, b)], limits, options)? {
+        let found = found[0];
+        if best.as_ref().is_none_or(|(best, _)| found.left() > best.left()) {
+            best = Some((found, drive));
+        }
+        tried.push(found);
+    }
+    tried.sort_by(|a, b| b.left().total_cmp(&a.left()));
+    let (found, drive) = best.ok_or(ExciteError::Nothing)?;
+    let verdict = match found.left() {
+        left if left >= 1.0 => Verdict::Clear,
+        left if left >= 0.1 => Verdict::Faint,
+        _ => Verdict::NotByADrive,
+    };
+    let reason = words::reason((a, b), verdict, &found, options);
+    Ok(Separation { verdict, tried, drive, reason })
+}
+
+/// How well each drive of the family tells the effects of each pair apart, in the order of the pairs.
+///
+/// # Errors
+/// As those of [`separate`].
+pub fn separations(
+    pairs: &[(Effect, Effect)],
+    limits: &Limits,
+    options: &SeparateOptions,
+) -> Result<Vec<(Drive, Vec<Tried>)>, ExciteError> {
     limits.check()?;
     require("duration_s", options.duration_s, (4.0..=120.0).contains(&options.duration_s), "between 4 and 120")?;
     require("noise", options.noise, options.noise > 0.0 && options.noise < 1.0, "above 0 and below 1")?;
     require("rate_hz", limits.rate_hz, limits.rate_hz >= 20.0, "at least 20 for the dynamics of an actuator")?;
-    if a == b {
+    if let Some((a, _)) = pairs.iter().find(|(a, b)| a == b) {
         return Err(ExciteError::Same { effect: a.name() });
     }
-    let candidates = drives::family(limits, options.duration_s);
     let mut refused = None;
-    let mut best: Option<(Tried, Drive)> = None;
     let mut tried = Vec::new();
-    for candidate in candidates {
+    for candidate in drives::family(limits, options.duration_s) {
         let drive = match candidate.drive(limits) {
             Ok(drive) => drive,
             Err(error) => {
@@ -107,22 +134,13 @@ pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions
             }
         };
         let rig = Rig::new(&candidate, limits, options)?;
-        let (first, second) = (Family::new(&rig, a), Family::new(&rig, b));
-        let found = compare(candidate.name, &rig, &first, &second, options.noise);
-        if best.as_ref().is_none_or(|(best, _)| found.left() > best.left()) {
-            best = Some((found, drive));
-        }
-        tried.push(found);
+        let of = |(a, b): &(Effect, Effect)| {
+            let (first, second) = (Family::new(&rig, *a), Family::new(&rig, *b));
+            compare(candidate.name, &rig, &first, &second, options.noise)
+        };
+        tried.push((drive, pairs.iter().map(of).collect()));
     }
-    tried.sort_by(|a, b| b.left().total_cmp(&a.left()));
-    let Some((found, drive)) = best else { return Err(refused.unwrap_or(ExciteError::Nothing)) };
-    let verdict = match found.left() {
-        left if left >= 1.0 => Verdict::Clear,
-        left if left >= 0.1 => Verdict::Faint,
-        _ => Verdict::NotByADrive,
-    };
-    let reason = words::reason((a, b), verdict, &found, options);
-    Ok(Separation { verdict, tried, drive, reason })
+    if tried.is_empty() { Err(refused.unwrap_or(ExciteError::Nothing)) } else { Ok(tried) }
 }
 
 fn compare(drive: &'static str, rig: &Rig, first: &Family, second: &Family, noise: f64) -> Tried {
