@@ -22,6 +22,29 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
     assert_eq!(files, 5 * turns.len() + 1);
 }
 
+/// Chosen experiments reach the same names in less time than the usual one of 36 s takes.
+#[test]
+fn experiments_are_chosen_until_all_is_known() {
+    let lab = Lab::new();
+    lab.write("plant.toml", hyst_tests::PLANT);
+    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --until 0.95 --within 30s --out loop --json");
+    let summary = ran.json();
+    let turns = summary["turns"].as_array().unwrap();
+    let last = turns.last().unwrap();
+    assert_eq!(last["found"], serde_json::json!(["lag"]), "{summary:#}");
+    assert!(summary["ended"].as_str().unwrap().starts_with("all that was asked is known"), "{summary:#}");
+    assert!(summary["seconds"].as_f64().unwrap() <= 30.0, "{summary:#}");
+    assert_eq!(turns[0]["experiment"]["why"], "a first look");
+    // The reference is followed once, in the end.
+    assert!(turns[..turns.len() - 1].iter().all(|turn| turn["tracking_rmse"].is_null()), "{summary:#}");
+    assert!(
+        last["tracking_rmse"].as_f64().unwrap() < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(),
+        "{summary:#}"
+    );
+    assert!(lab.refuses("close-loop --daq sim:plant.toml --out b --within 30", 2).contains("--until"));
+    assert!(lab.refuses("close-loop --daq sim:plant.toml --out b --until 1.5", 2).contains("probability"));
+}
+
 /// What an amplifier has not followed is measured anew with a drive that it follows.
 #[test]
 fn the_loop_closes_on_an_amplifier_that_is_slow() {

@@ -9,8 +9,10 @@
 use serde::Serialize;
 
 use crate::diagnose::{Findings, RemainderKind};
-use crate::excite::{Drive, ExciteError, Limits, SeparateOptions, separations};
+use crate::excite::{Drive, ExciteError, Identification, Limits, SeparateOptions, separations};
 use crate::model::Effect;
+use crate::range;
+use crate::record::Record;
 
 /// Evidence that decides a question: twice the logarithm of a likelihood ratio of e¹⁵, which leaves room for a misfit of the base that is
 /// not white.
@@ -132,53 +134,150 @@ pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
     open
 }
 
-/// The experiment that was chosen.
+/// An experiment to play.
 #[derive(Clone, Debug)]
-pub struct Choice {
+pub struct Experiment {
     /// Its drive.
     pub drive: Drive,
     /// What it is, in words.
     pub name: &'static str,
-    /// Questions that it decides by itself, as expected.
-    pub decides: usize,
-    /// Evidence that is expected, as a share of what decides each question, and mean over them.
-    pub expected: f64,
+    /// What it was chosen for, in words.
+    pub why: String,
+    /// How long it takes, rests included \[s\].
+    pub seconds: f64,
 }
 
-/// Chooses the drive that decides most of `questions` per second, not longer than `seconds_left`; `None` where no question is one of two effects
-/// or no time is left. `noise` is what is left of the output, noise and misfit, as a share of its span.
-///
-/// # Errors
-/// When no drive keeps to the limits.
-pub fn choose(
+impl Experiment {
+    fn new(drive: Drive, name: &'static str, why: String) -> Self {
+        let time = drive.time();
+        let seconds = time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0);
+        Self { drive, name, why, seconds }
+    }
+}
+
+/// What comes after a diagnosis.
+#[derive(Clone, Debug)]
+pub enum Next {
+    /// An experiment.
+    Play(Box<Experiment>),
+    /// None, for this reason.
+    End(String),
+}
+
+/// Chooses one experiment after the other.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    limits: Limits,
+    aim: Aim,
+    within_s: f64,
+    seed: u64,
+    planned: u64,
+    spent_s: f64,
+}
+
+impl Planner {
+    /// For drives within `limits` and, all together, `within_s` seconds.
+    pub fn new(limits: Limits, aim: Aim, within_s: f64, seed: u64) -> Self {
+        Self { limits, aim, within_s, seed, planned: 0, spent_s: 0.0 }
+    }
+
+    /// The time of all experiments so far \[s\].
+    pub fn spent(&self) -> f64 {
+        self.spent_s
+    }
+
+    /// Lets no later drive be steeper \[input unit/s\].
+    pub fn stay_below(&mut self, slew: f64) {
+        self.limits.slew_v_per_s = Some(slew);
+    }
+
+    /// A first look: a short identification drive, of which each call gives another one.
+    ///
+    /// # Errors
+    /// When no drive keeps to the limits.
+    pub fn first(&mut self) -> Result<Experiment, ExciteError> {
+        let first = self.identification("a first look".to_owned())?;
+        self.count(&first);
+        Ok(first)
+    }
+
+    fn identification(&self, why: String) -> Result<Experiment, ExciteError> {
+        let seed = self.seed.wrapping_add((self.planned + 1) << 32);
+        let drive = Identification::short(self.limits.rate_hz, seed).within_slew(&self.limits, &|_| true);
+        Ok(Experiment::new(drive.drive(&self.limits)?, "short identification", why))
+    }
+
+    fn count(&mut self, experiment: &Experiment) {
+        self.planned += 1;
+        self.spent_s += experiment.seconds;
+    }
+
+    /// What comes after the diagnosis of `record`, all that was measured so far, and what is open.
+    ///
+    /// # Errors
+    /// When no drive keeps to the limits.
+    pub fn next(&mut self, findings: &Findings, record: &Record) -> Result<(Vec<Question>, Next), ExciteError> {
+        let open = open_questions(findings, self.aim);
+        let seconds = |s: f64| format!("{s:.1}");
+        if open.is_empty() {
+            let why = format!("all that was asked is known after {} s of experiments", seconds(self.spent_s));
+            return Ok((open, Next::End(why)));
+        }
+        let words = open.iter().map(Question::words).collect::<Vec<_>>().join(", ");
+        let left = (self.within_s - self.spent_s).max(0.0);
+        let (low, high) = range(record.output().unwrap_or_default().iter().copied());
+        // What is missed is noise for whoever tells two effects apart.
+        let missed = findings.after.train.map_or(0.0, |errors| errors.rmse).max(findings.noise_floor);
+        let options = SeparateOptions {
+            noise: (missed / (high - low)).clamp(1e-6, 0.5),
+            thermometer: record.temperature().is_some(),
+            load_cell: record.load().is_some(),
+            ..SeparateOptions::default()
+        };
+        let next = match choose(&open, &self.limits, &options, left)? {
+            Some((drive, name)) => Some(Experiment::new(drive, name, words.clone())),
+            // What nothing explains may show under another drive.
+            None if open.contains(&Question::Rest) => Some(self.identification(words.clone())?),
+            None => None,
+        };
+        match next.filter(|next| next.seconds <= left) {
+            Some(next) => {
+                self.count(&next);
+                Ok((open, Next::Play(Box::new(next))))
+            }
+            None => Ok((open, Next::End(format!("no drive in the {} s that are left decides {words}", seconds(left))))),
+        }
+    }
+}
+
+/// The drive that decides most of `questions` per second, not longer than `seconds_left`; `None` where none of them is one of two effects or no
+/// time is left.
+fn choose(
     questions: &[Question],
     limits: &Limits,
-    noise: f64,
-    sensors: (bool, bool),
+    options: &SeparateOptions,
     seconds_left: f64,
-) -> Result<Option<Choice>, ExciteError> {
+) -> Result<Option<(Drive, &'static str)>, ExciteError> {
     let mut pairs: Vec<(Effect, Effect)> = Vec::new();
     for pair in questions.iter().filter_map(Question::pair) {
         if !pairs.contains(&pair) && pairs.len() < MAX_QUESTIONS {
             pairs.push(pair);
         }
     }
-    let mut best: Option<(f64, Choice)> = None;
-    let durations = DURATIONS_S.into_iter().filter(|duration| *duration <= seconds_left);
-    for duration_s in if pairs.is_empty() { Vec::new() } else { durations.collect() } {
-        let options =
-            SeparateOptions { duration_s, noise: noise.clamp(1e-6, 0.5), thermometer: sensors.0, load_cell: sensors.1 };
-        for (drive, tried) in separations(&pairs, limits, &options)? {
+    if pairs.is_empty() {
+        return Ok(None);
+    }
+    let mut best: Option<(f64, (Drive, &'static str))> = None;
+    for duration_s in DURATIONS_S.into_iter().filter(|duration| *duration <= seconds_left) {
+        for (drive, tried) in separations(&pairs, limits, &SeparateOptions { duration_s, ..*options })? {
             let rows = drive.voltage().len() as f64;
             let share = |left: f64| (rows * left * left / DECIDES).min(1.0);
-            let shares: Vec<f64> = tried.iter().map(|tried| share(tried.left())).collect();
-            let expected = shares.iter().sum::<f64>() / shares.len() as f64;
-            let seconds = rows / limits.rate_hz;
-            let decides = shares.iter().filter(|share| **share >= 1.0).count();
-            if best.as_ref().is_none_or(|(rate, _)| expected / seconds > *rate) {
-                best = Some((expected / seconds, Choice { drive, name: tried[0].drive, decides, expected }));
+            let decided: f64 = tried.iter().map(|tried| share(tried.left())).sum();
+            let per_second = decided * limits.rate_hz / rows;
+            if per_second > best.as_ref().map_or(0.0, |(most, _)| *most) {
+                best = Some((per_second, (drive, tried[0].drive)));
             }
         }
     }
-    Ok(best.map(|(_, choice)| choice).filter(|choice| choice.expected > 0.0))
+    Ok(best.map(|(_, choice)| choice))
 }

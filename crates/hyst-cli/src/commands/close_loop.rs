@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hyst_hw::Daq;
 use hyst_ident::atomic_file::write_atomic;
-use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, RemainderKind, diagnose_until};
+use hyst_ident::diagnose::{DiagnoseOptions, FOLLOWED, Findings, RemainderKind, diagnose_until};
 use hyst_ident::experiment::Question;
 use hyst_ident::fit::{FitOptions, fit};
 use hyst_ident::metrics::Errors;
@@ -122,26 +122,35 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let before = model.as_ref().map(|m| simulate(m, &record, Zero::None)).transpose()?.and_then(|s| s.errors);
         records.push(record);
         let train = Record::join(records.clone())?;
-        progress.say(&format!("turn {turn}: fit"));
-        let options = FitOptions { seed: args.seed, ..FitOptions::default() };
-        // With chosen experiments all records are diagnosed anew: each probability is then one of all that was measured.
-        let start = match model.take().filter(|m| m.base.kind() == kind && args.until.is_none()) {
-            Some(model) => model,
-            None => fit(&train, kind, &options)?,
-        };
         let told = |what: &str| progress.say(&format!("turn {turn}: {what}"));
+        let fitted = |kind: Kind| {
+            told("fit");
+            fit(&train, kind, &FitOptions { seed: args.seed, ..FitOptions::default() })
+        };
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
-        let found = diagnose_until(&train, None, &start, &options, &told, &host::stopping())?;
+        let diagnosed = |start: &Model| diagnose_until(&train, None, start, &options, &told, &host::stopping());
+        // With chosen experiments all records are diagnosed anew: each probability is then one of all that was measured.
+        let mut start = match model.take().filter(|m| m.base.kind() == kind && args.until.is_none()) {
+            Some(model) => model,
+            None => fitted(kind)?,
+        };
+        let mut found = diagnosed(&start)?;
+        if args.until.is_some() && is_too_coarse(&found.findings, kind) {
+            // A richer base needs no other experiment.
+            kind = Kind::Preisach;
+            start = fitted(kind)?;
+            found = diagnosed(&start)?;
+        }
         let name = |path: PathBuf| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         write(out, &name(file("model", turn, "json")), &found.extended.to_json())?;
         write(out, &name(file("findings", turn, "json")), &output::json(&found.findings)?)?;
         let names: Vec<String> = found.findings.effects.iter().map(|e| e.name.to_string()).collect();
         let remainder = &found.findings.remainder;
-        let too_coarse = remainder.kind == RemainderKind::BaseCapacity && kind == Kind::Pi;
+        let too_coarse = is_too_coarse(&found.findings, kind);
         let is_slow = remainder.slew_limit.is_some();
-        // Nothing is asked of records that the amplifier has not followed, nor of a base that is about to change.
+        // Nothing is asked of records that the amplifier has not followed.
         let (open, why) = match args.until {
-            Some(_) if !(is_slow || too_coarse) => plan.next(&found.findings, &train, turn)?,
+            Some(_) if !is_slow => plan.next(&found.findings, &train)?,
             _ => (Vec::new(), None),
         };
         let ends = why.or_else(|| {
@@ -188,7 +197,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             // What is left is a map of the input's history: a richer one is fitted, and the effects are looked for anew on it.
             kind = Kind::Preisach;
         }
-        model = Some(found.extended).filter(|_| !too_coarse || args.until.is_some());
+        model = Some(found.extended);
     }
     Ok(Summary {
         unit: unit.map_or("", |u| u.suffix()).to_owned(),
@@ -199,6 +208,11 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         ended,
         folder: out.clone(),
     })
+}
+
+/// Whether what is left is a map of the input's history that another base takes.
+fn is_too_coarse(findings: &Findings, kind: Kind) -> bool {
+    findings.remainder.kind == RemainderKind::BaseCapacity && kind == Kind::Pi
 }
 
 fn write(folder: &Path, name: &str, content: &str) -> CommandResult {

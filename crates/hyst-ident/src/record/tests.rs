@@ -66,7 +66,11 @@ fn sha256_is_that_of_the_files_bytes() {
 fn what_is_needed_decides_what_has_to_be_there() {
     let drive = "time_s,voltage_v\n0,0\n1,1\n";
     assert_eq!(read(drive, Need::Input).unwrap().output(), None);
-    refused(drive, Need::InputAndOutput, &["line 1", "the output", "displacement_um|displacement_nm", "--map"]);
+    refused(
+        drive,
+        Need::InputAndOutput,
+        &["line 1", "the output", "displacement_um|displacement_nm", "needs further ones: output"],
+    );
     let reference = "time_s,force_n\n0,0\n1,1\n";
     let record = read(reference, Need::Output).unwrap();
     assert!(record.input().is_empty());

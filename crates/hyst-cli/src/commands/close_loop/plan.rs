@@ -2,21 +2,20 @@
 
 use hyst_hw::{Daq, RecordOptions};
 use hyst_ident::diagnose::Findings;
-use hyst_ident::excite::{Drive, Identification, Limits};
-use hyst_ident::experiment::{Aim, Question, choose, open_questions};
-use hyst_ident::range;
+use hyst_ident::excite::{Identification, Limits};
+use hyst_ident::experiment::{self, Aim, Next, Planner, Question};
 use hyst_ident::record::Record;
 use serde::Serialize;
 
 use crate::cli::CloseLoopArgs;
 use crate::exit::{CommandError, CommandResult, Exit};
-use crate::{host, recording, text};
+use crate::{host, recording};
 
 /// A drive that was played.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Experiment {
     /// What it is.
-    pub(super) drive: String,
+    pub(super) drive: &'static str,
     /// How long it took, rests included \[s\].
     pub(super) seconds: f64,
     /// What it was chosen for, where experiments are chosen.
@@ -28,23 +27,20 @@ pub(super) struct Experiment {
 pub(super) struct Plan {
     limits: Limits,
     seed: u64,
-    /// What is to be known, and the time for it \[s\]; `None` for the usual experiments.
-    chosen: Option<(Aim, f64)>,
+    /// Chooses experiments; `None` for the usual ones.
+    planner: Option<Planner>,
     spent: f64,
     /// What comes next, if it was chosen.
-    next: Option<(Drive, Experiment)>,
+    next: Option<Box<experiment::Experiment>>,
 }
 
 impl Plan {
     pub(super) fn new(args: &CloseLoopArgs, daq: &impl Daq) -> Self {
         let range = daq.capabilities().voltage;
-        Self {
-            limits: Limits { rate_hz: args.rate, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None },
-            seed: args.seed,
-            chosen: args.until.map(|probability| (Aim { probability, precision: args.precision }, args.within)),
-            spent: 0.0,
-            next: None,
-        }
+        let limits = Limits { rate_hz: args.rate, lo_v: range.min_v, hi_v: range.max_v, slew_v_per_s: None };
+        let aim = args.until.map(|probability| Aim { probability, precision: args.precision });
+        let planner = aim.map(|aim| Planner::new(limits, aim, args.within, args.seed));
+        Self { limits, seed: args.seed, planner, spent: 0.0, next: None }
     }
 
     /// Time of all experiments so far \[s\].
@@ -55,33 +51,32 @@ impl Plan {
     /// Lets no later drive be steeper \[V/s\], and begins anew.
     pub(super) fn stay_below(&mut self, v_per_s: f64) {
         self.limits.slew_v_per_s = Some(v_per_s);
+        self.planner.iter_mut().for_each(|planner| planner.stay_below(v_per_s));
         self.next = None;
     }
 
     /// Plays the next experiment.
     pub(super) fn play(&mut self, daq: &mut impl Daq, turn: u32) -> CommandResult<(Experiment, Record)> {
-        let (drive, experiment) = match self.next.take() {
-            Some(chosen) => chosen,
-            None => self.identification(turn, self.chosen.map(|_| "a first look".to_owned()))?,
+        let (drive, name, why) = match (self.next.take(), &mut self.planner) {
+            (Some(next), _) => (next.drive, next.name, Some(next.why)),
+            (None, Some(planner)) => {
+                let first = planner.first()?;
+                (first.drive, first.name, Some(first.why))
+            }
+            (None, None) => {
+                let seed = self.seed.wrapping_add(u64::from(turn) << 32);
+                let usual = Identification::at_rate(self.limits.rate_hz, seed).within_slew(&self.limits, &|_| true);
+                (usual.drive(&self.limits)?, "identification", None)
+            }
         };
         let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
         let recording = hyst_hw::record(daq, &segments, &RecordOptions::at(self.limits.rate_hz), |_| host::going())
             .map_err(|failure| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{failure}")))?;
-        self.spent += experiment.seconds;
+        let seconds = drive.time().last().unwrap_or(&0.0) - drive.time().first().unwrap_or(&0.0);
+        self.spent += seconds;
         let unit = recording::unit(daq.capabilities().output);
-        Ok((experiment, recording::to_record(&recording, &format!("train-{turn}.csv"), unit)?))
-    }
-
-    /// The identification drive of a turn: the usual one, or a short one where experiments are chosen.
-    fn identification(&self, turn: u32, why: Option<String>) -> CommandResult<(Drive, Experiment)> {
-        let (rate, seed) = (self.limits.rate_hz, self.seed.wrapping_add(u64::from(turn) << 32));
-        let (name, drive) = match self.chosen {
-            None => ("identification", Identification::at_rate(rate, seed)),
-            Some(_) => ("short identification", Identification::short(rate, seed)),
-        };
-        let drive = drive.within_slew(&self.limits, &|_| true).drive(&self.limits)?;
-        let seconds = seconds(&drive);
-        Ok((drive, Experiment { drive: name.to_owned(), seconds, why }))
+        let record = recording::to_record(&recording, &format!("train-{turn}.csv"), unit)?;
+        Ok((Experiment { drive: name, seconds, why }, record))
     }
 
     /// Looks at what is open, and chooses the next experiment; the second part says why there is none.
@@ -89,35 +84,15 @@ impl Plan {
         &mut self,
         findings: &Findings,
         train: &Record,
-        turn: u32,
     ) -> CommandResult<(Vec<Question>, Option<String>)> {
-        let Some((aim, within)) = self.chosen else { return Ok((Vec::new(), None)) };
-        let open = open_questions(findings, aim);
-        if open.is_empty() {
-            return Ok((open, Some(format!("all that was asked is known after {} s", text::short(self.spent)))));
+        let Some(planner) = &mut self.planner else { return Ok((Vec::new(), None)) };
+        let (open, next) = planner.next(findings, train)?;
+        match next {
+            Next::Play(next) => {
+                self.next = Some(next);
+                Ok((open, None))
+            }
+            Next::End(why) => Ok((open, Some(why))),
         }
-        let words = text::listed(&open.iter().map(Question::words).collect::<Vec<_>>());
-        let left = within - self.spent;
-        let (low, high) = range(train.output().unwrap_or_default().iter().copied());
-        let missed = findings.after.train.map_or(findings.noise_floor, |errors| errors.rmse).max(findings.noise_floor);
-        let sensors = (train.temperature().is_some(), train.load().is_some());
-        if let Some(choice) = choose(&open, &self.limits, missed / (high - low), sensors, left)? {
-            let seconds = seconds(&choice.drive);
-            let experiment = Experiment { drive: choice.name.to_owned(), seconds, why: Some(words) };
-            self.next = Some((choice.drive, experiment));
-            return Ok((open, None));
-        }
-        // What nothing explains may show under another drive.
-        let (drive, experiment) = self.identification(turn + 1, Some(words.clone()))?;
-        if open.contains(&Question::Rest) && experiment.seconds <= left {
-            self.next = Some((drive, experiment));
-            return Ok((open, None));
-        }
-        Ok((open, Some(format!("no drive in the {} s that are left decides {words}", text::short(left.max(0.0))))))
     }
-}
-
-fn seconds(drive: &Drive) -> f64 {
-    let time = drive.time();
-    time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0)
 }
