@@ -48,6 +48,15 @@ fn info_names_channels_units_and_the_next_command() {
     assert!(told.contains("times from the column \"t\"") && told.contains("the file states no unit"), "{told}");
     lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
     assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
+    // A counter is no output, and a sensor in volts needs its scale.
+    lab.write("scope.csv", "Sample Interval,0.001\nX,CH1,CH2\nSequence,Volt,Volt\n0,1,2\n1,2,3\n2,4,4\n3,5,4\n");
+    let told = lab.ok("info scope.csv").stdout;
+    assert!(told.contains("--map voltage_v=CH1 --map 'displacement_um=GAIN*CH2'"), "{told}");
+    assert!(told.contains("Times are known from the sample interval"), "{told}");
+    let told = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
+    assert!(told.contains("2 µm*") && told.contains("are yours"), "{told}");
+    let refused = lab.refuses("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);
+    assert!(refused.contains("displacement_um=GAIN*CH2"), "{refused}");
     // A map is shown though columns are missing still, and a single column is said to be too few.
     lab.write("one.csv", "a\n1\n2\n4\n");
     let told = lab.ok("info one.csv").stdout;

@@ -126,6 +126,7 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         Some(record) => next(&file, record, &options),
         None => advice,
     };
+    let times = survey.times;
     let channel = |c: &Channel| ChannelSummary {
         name: c.name.clone(),
         role: c.role,
@@ -143,8 +144,11 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         format: survey.format,
         channels: survey.channels.iter().map(channel).collect(),
         picture: record.as_ref().map(picture).unwrap_or_default(),
-        record: record.as_ref().map(|record| of_record(record, survey.times)),
-        missing,
+        record: record.as_ref().map(|record| of_record(record, times.clone())),
+        missing: missing.map(|why| match &times {
+            Some(times) if record.is_none() => format!("{why}. Times are known from {times}"),
+            _ => why,
+        }),
         warnings,
         notes,
         next,
@@ -271,14 +275,14 @@ impl Summary {
         let wide = self.channels.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).clamp(7, 40);
         lines.push(format!(
             "  {:wide$}  {:11}  {:>8}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
-            "channel", "read as", "unit", "min", "max", "resolution", "rows", "missing"
+            "channel", "read as", "unit", "min", "max", "finest step", "rows", "missing"
         ));
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
             let name: String = c.name.chars().take(40).collect();
             let unit = match (c.unit, &c.mapped_unit) {
-                (Some(unit), _) => unit.to_owned(),
-                (None, Some(unit)) => format!("{unit}*"),
+                (_, Some(unit)) => format!("{unit}*"),
+                (Some(unit), None) => unit.to_owned(),
                 (None, None) if matches!(c.role, Some("segment")) || c.name == "segment" => "-".to_owned(),
                 (None, None) => "?".to_owned(),
             };
@@ -292,11 +296,13 @@ impl Summary {
                 c.missing
             ));
         }
-        if self.channels.iter().any(|c| c.unit.is_none() && c.mapped_unit.is_some()) {
-            lines.push("  * as --map says; the file states no unit".to_owned());
+        if self.channels.iter().any(|c| c.mapped_unit.is_some()) {
+            lines.push("  * as --map says; the file states no unit, or another one".to_owned());
         }
         if self.channels.iter().any(|c| c.unit_beside_name) {
-            lines.push("  units that a name does not state are from elsewhere in the file".to_owned());
+            lines.push(
+                "  units: beside the names in the file, as in its header, a row of units or attributes".to_owned(),
+            );
         }
         if self.channels.len() == MAX_CHANNELS {
             lines.push(format!("  (the first {MAX_CHANNELS})"));
@@ -332,8 +338,8 @@ impl Summary {
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         match (self.warnings.as_slice(), &self.record) {
             ([], Some(_)) => {
-                let notes = if self.notes.is_empty() { "" } else { " besides the notes" };
-                let mapped = self.channels.iter().any(|c| c.unit.is_none() && c.mapped_unit.is_some());
+                let notes = if self.notes.is_empty() { "" } else { "; the notes say what was done to read the file" };
+                let mapped = self.channels.iter().any(|c| c.mapped_unit.is_some());
                 let units = if mapped { "; the units with * are yours" } else { "" };
                 lines.push(format!("warnings: none{notes}{units}"));
             }

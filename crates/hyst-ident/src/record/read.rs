@@ -13,6 +13,7 @@ use super::log::is_run_log;
 use super::repair::{place_of, repair};
 use super::roles::{Choice, Clock, File, Layout};
 use super::source::{self, Axis, Contents, Values, Wanted};
+use super::survey::MAX_CHANNELS;
 use super::unit::OutputUnit;
 use super::{Columns, Origin, Record, Text, sum_of};
 
@@ -136,8 +137,15 @@ pub(super) fn with_layout(
         });
     }
     let heads = contents.heads();
-    let file = File { name, header: contents.header(), heads, texts: contents.texts() };
-    let layout = Layout::resolve(&file, &how.map, need, how.rate)?;
+    let file = File { name, header: contents.header(), heads, texts: contents.texts(), counters: &[] };
+    let layout = match Layout::resolve(&file, &how.map, need, how.rate) {
+        // The message proposes columns; what only counts rows is none of them.
+        Err(RecordError::Columns { .. }) => {
+            let counters = counters(contents)?;
+            Layout::resolve(&File { counters: &counters, ..file }, &how.map, need, how.rate)?
+        }
+        resolved => resolved?,
+    };
     let column = |at: usize| heads[at].name.as_str();
 
     // The time comes first.
@@ -243,6 +251,22 @@ pub(super) fn with_layout(
         .collect();
     let plain = contents.plain_text().filter(|_| !done.changed).map(str::len);
     Ok(Found { record, layout, plain })
+}
+
+/// Columns without a unit that hold the numbers of the rows.
+fn counters(contents: &dyn Contents) -> Result<Vec<usize>, RecordError> {
+    if contents.rows_per_row() > 1 {
+        return Ok(Vec::new());
+    }
+    let heads = contents.heads().iter().take(MAX_CHANNELS).enumerate();
+    let unstated = heads.filter(|(_, head)| Heading::parse(&head.name, head.unit.as_deref()).unit.is_none());
+    let unstated: Vec<usize> = unstated.map(|(at, _)| at).collect();
+    let is_counter = |values: &Values| {
+        let numbers = values.numbers.as_slice();
+        numbers.len() > 2 && numbers[0].fract() == 0.0 && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+    };
+    let values = contents.values(Wanted::all(&unstated))?;
+    Ok(unstated.into_iter().zip(values).filter(|(_, values)| is_counter(values)).map(|(at, _)| at).collect())
 }
 
 /// Interpolates columns that have other times than the output (or, without one, the input) to its times, by straight lines. Before its first value

@@ -52,6 +52,8 @@ pub(crate) struct File<'a> {
     pub(crate) heads: &'a [Head],
     /// Columns of text, with a cell of each.
     pub(crate) texts: &'a [(String, String)],
+    /// Columns that number the rows, where somebody has looked: neither inputs nor outputs.
+    pub(crate) counters: &'a [usize],
 }
 
 /// Names that a message lists.
@@ -293,9 +295,10 @@ impl Search<'_> {
         }
         // Words without a unit: of the heading, else of the path before it.
         let without = |at: &usize| self.headings[*at].unit.is_none();
+        let without = |at: &usize| without(at) && !self.counts(role, *at);
         let worded = |at: &usize| without(at) && self.headings[*at].suggests(words_of(role));
         let unknown = free().filter(worded).find(|at| required || self.states_unknown_unit(role, *at));
-        let by_path = |at: &usize| self.is_unstated(*at) && self.path_suggests(role, *at);
+        let by_path = |at: &usize| without(at) && self.is_unstated(*at) && self.path_suggests(role, *at);
         let unknown = unknown.or_else(|| if required { free().find(by_path) } else { None });
         match unknown {
             Some(at) => {
@@ -320,6 +323,11 @@ impl Search<'_> {
             _ => {}
         }
         None
+    }
+
+    /// Whether a column numbers the rows, where `role` is a quantity.
+    fn counts(&self, role: Role, column: usize) -> bool {
+        role != Role::Time && self.file.counters.contains(&column)
     }
 
     /// Whether a column goes by no unit, neither a known one nor another.
@@ -479,7 +487,10 @@ impl Search<'_> {
         RecordError::Columns {
             file: self.place(),
             problems: what,
-            advice: "map another column, or convert the values".to_owned(),
+            advice: format!(
+                "map another column, or scale this one by what one {} is, as --map '{}=GAIN*{}'",
+                unit.symbol, entry.canonical, entry.column
+            ),
             options: String::new(),
             columns: self.file.heads.len() + self.file.texts.len(),
         }
@@ -498,12 +509,30 @@ impl Search<'_> {
         let mut free: Vec<usize> = self.columns().filter(is_free).collect();
         // Of columns that say nothing of themselves, one whose path does, else the next.
         let mut next = |role: Role| {
-            let place = free.iter().position(|at| self.path_suggests(role, *at)).or((!free.is_empty()).then_some(0))?;
+            let fits = |at: &usize| !self.counts(role, *at);
+            let place = free.iter().position(|at| fits(at) && self.path_suggests(role, *at));
+            let place = place.or_else(|| free.iter().position(fits))?;
             Some(free.remove(place))
         };
         let mut open: Vec<(Role, Option<usize>)> = problems.open.clone();
         open.sort_by_key(|(role, _)| *role != Role::Time);
+        // A sensor often comes as a voltage, whose scale only its owner knows.
+        let driven: Vec<usize> = open
+            .iter()
+            .filter_map(|(role, guess)| guess.filter(|_| *role == Role::Input))
+            .chain(taken.iter().copied())
+            .collect();
+        let volts = |at: &usize| self.headings[*at].unit.is_some_and(|unit| unit.dimension == Dimension::Voltage);
+        let sensor = self.columns().filter(volts).find(|at| !driven.contains(at));
+        let sensor = sensor.filter(|_| open.iter().any(|(role, guess)| *role == Role::Output && guess.is_none()));
+        let mut list = problems.list;
+        list.extend(
+            sensor.map(|at| format!("{} may be the sensor: put its µm per V in place of GAIN", self.quoted(at))),
+        );
         let arguments = open.iter().map(|(role, guess)| {
+            if let (Role::Output, None, Some(at)) = (role, guess, sensor) {
+                return format!("--map '{}=GAIN*{}'", role.example(), self.name(at).replace('\'', r"'\''"));
+            }
             let known = |at: &usize| self.headings[*at].unknown.is_none();
             let column = guess.filter(known).or_else(|| next(*role));
             let canonical =
@@ -520,7 +549,7 @@ impl Search<'_> {
         if let Some(short) = self.too_few(&open, taken) {
             return RecordError::Columns {
                 file: self.place(),
-                problems: format!("{}; {short}", problems.list.join("; ")),
+                problems: format!("{}; {short}", list.join("; ")),
                 advice: format!("columns found: {}; put all columns side by side into one file", self.listed()),
                 options: String::new(),
                 columns: self.file.heads.len() + self.file.texts.len(),
@@ -530,7 +559,7 @@ impl Search<'_> {
         let rate = if no_time { "; for a file without times give the rate with --rate" } else { "" };
         RecordError::Columns {
             file: self.place(),
-            problems: problems.list.join("; "),
+            problems: list.join("; "),
             advice: format!("columns found: {}{rate}", self.listed()),
             options: line,
             columns: self.file.heads.len() + self.file.texts.len(),
@@ -731,7 +760,7 @@ mod tests {
 
     fn layout(names: &[&str], map: &[&str], need: Need) -> Result<Layout, String> {
         let heads: Vec<Head> = names.iter().map(|name| Head::new(*name)).collect();
-        let file = File { name: "x.csv", header: Some(Place::Line(1)), heads: &heads, texts: &[] };
+        let file = File { name: "x.csv", header: Some(Place::Line(1)), heads: &heads, texts: &[], counters: &[] };
         Layout::resolve(&file, &ColumnMap::parse(map).unwrap(), need, None).map_err(|error| error.to_string())
     }
 

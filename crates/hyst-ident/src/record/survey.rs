@@ -31,7 +31,7 @@ pub struct Channel {
     pub step: f64,
     /// What the record takes it for: `segment`, `time`, `input`, `output`, `temperature` or `load`.
     pub role: Option<&'static str>,
-    /// The unit that `--map` gives it, where the file states none; `0.001 V` where it scales the values.
+    /// The unit that `--map` gives it, where the file states none; `0.001 V` where it scales the values, whatever the file states.
     pub mapped_unit: Option<String>,
     /// Whether its unit is stated elsewhere in the file than in its name.
     pub unit_beside_name: bool,
@@ -99,7 +99,8 @@ impl Survey {
             }
             Err(error) => {
                 mark_mapped(&mut channels, name, contents, &how.map);
-                (Err(error), None)
+                let even = contents.heads().iter().any(|head| matches!(head.axis, source::Axis::Even { .. }));
+                (Err(error), even.then(|| "the sample interval in the file".to_owned()))
             }
         };
         Ok(Self { format: contents.format(), channels, texts: contents.texts().to_vec(), times, record })
@@ -132,7 +133,8 @@ fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
 
 /// The same for what a map says of columns that are no record yet. A map that is wrong is said so by the error.
 fn mark_mapped(channels: &mut [Channel], name: &str, contents: &dyn Contents, map: &ColumnMap) {
-    let file = File { name, header: contents.header(), heads: contents.heads(), texts: contents.texts() };
+    let file =
+        File { name, header: contents.header(), heads: contents.heads(), texts: contents.texts(), counters: &[] };
     for (role, choice) in mapped(&file, map).unwrap_or_default() {
         mark_one(channels, contents, (choice.column, role.word()), &choice.canonical, choice.factor);
     }
@@ -148,7 +150,8 @@ fn mark_one(
 ) {
     let Some(channel) = channels.get_mut(column) else { return };
     channel.role = Some(role);
-    if contents.heads().get(column).is_some_and(|head| !has_unit(head)) {
+    let is_scaled = factor.is_some_and(|factor| factor != -1.0);
+    if is_scaled || contents.heads().get(column).is_some_and(|head| !has_unit(head)) {
         let scale = factor.filter(|factor| *factor != -1.0).map_or(String::new(), |factor| format!("{factor} "));
         channel.mapped_unit = Unit::of_canonical(canonical).map(|unit| format!("{scale}{}", unit.symbol));
     }
