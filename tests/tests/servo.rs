@@ -185,7 +185,7 @@ fn has_the_hosts_bits(references: &[f64], rate: f64, measured: &[Sample]) {
 #[test]
 fn a_host_that_is_killed_leaves_the_firmware_to_its_watchdog() {
     let Some(machine) = machine() else { return };
-    let lab = hyst_tests::Lab::new();
+    let lab = Lab::new();
     // 20 s, of which the first few are played.
     lab.ok("excite sine --rate 500 --high 80 --frequency 0.05 --cycles 1 -o u.csv");
     let line = format!("run --daq serial:{} --drive u.csv --log run.mcap --slew 40", machine.port);
