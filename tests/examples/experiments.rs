@@ -95,14 +95,15 @@ fn both(case: &Case) -> (Vec<Effect>, Way, Way) {
     let usual = Identification::at_rate(RATE, case.seed).drive(&limits).expect("a drive");
     let train = played(&mut plant(), &usual, RATE, OutputUnit::Micrometre, "usual");
     let found = diagnosed(&train, case.kind);
-    let usual = way(&found, usual.voltage().len() as f64 / RATE, 1);
+    let time = usual.time();
+    let usual = way(&found, time.last().unwrap_or(&0.0) - time[0], 1);
     (truth, usual, chosen(&mut plant(), case, limits))
 }
 
-/// As `close-loop --until` does.
+/// As `close-loop --until` does, but for a slow amplifier, which none of these has.
 fn chosen(plant: &mut Plant, case: &Case, limits: Limits) -> Way {
     let mut planner = Planner::new(limits, AIM, WITHIN_S, case.seed);
-    let mut next = planner.first().expect("a drive");
+    let Next::Play(mut next) = planner.first().expect("a drive") else { panic!("there is time for a first look") };
     let (mut records, mut kind) = (Vec::new(), case.kind);
     loop {
         records.push(played(plant, &next.drive, RATE, OutputUnit::Micrometre, "chosen"));
@@ -113,7 +114,7 @@ fn chosen(plant: &mut Plant, case: &Case, limits: Limits) -> Way {
             found = diagnosed(&train, kind);
         }
         match planner.next(&found.findings, &train).expect("a drive").1 {
-            Next::Play(chosen) => next = *chosen,
+            Next::Play(chosen) => next = chosen,
             Next::End(_) => return way(&found, planner.spent(), records.len()),
         }
     }

@@ -54,13 +54,13 @@ fn info_names_channels_units_and_the_next_command() {
     assert!(told.contains("--map voltage_v=CH1 --map 'displacement_um=GAIN*CH2'"), "{told}");
     assert!(told.contains("Times are known from the sample interval"), "{told}");
     let told = lab.ok("info scope.csv --map voltage_v=CH1 --map displacement_um=2*CH2").stdout;
-    assert!(told.contains("2 µm*") && told.contains("are yours"), "{told}");
+    assert!(told.contains("2 µm*") && told.contains("marked * are from --map"), "{told}");
     let refused = lab.refuses("fit scope.csv --map voltage_v=CH1 --map displacement_um=CH2 --model pi -o m.json", 2);
     assert!(refused.contains("displacement_um=GAIN*CH2"), "{refused}");
     // A map is shown though columns are missing still, and a single column is said to be too few.
     lab.write("one.csv", "a\n1\n2\n4\n");
     let told = lab.ok("info one.csv").stdout;
-    assert!(told.contains("the file has one column, but needs further ones: time, input, output"), "{told}");
+    assert!(told.contains("the file has 1 column; a record needs also: time, input, output"), "{told}");
     assert!(!told.contains("COLUMN") && told.contains("--map displacement_um=a --rate HZ"), "{told}");
     let told = lab.ok("info one.csv --map displacement_um=a").stdout;
     assert!(told.contains("output") && told.contains("µm*"), "{told}");

@@ -215,7 +215,7 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
 
 /// What a log lost of its run, a sentence each.
 pub(crate) fn losses(lost: Losses) -> Vec<String> {
-    let cut = lost.cut_off.then(|| "the log was cut off: what is whole is read, its last half second may be missing; copy it again if it should be longer".to_owned());
+    let cut = lost.cut_off.then(|| "the log was cut off: what came after its last whole part is missing (of a log of hystctl run half a second at most); copy the file again if it should be longer".to_owned());
     cut.into_iter().chain(damage(lost.damaged)).chain(holes(lost.holes)).collect()
 }
 

@@ -8,7 +8,7 @@
 
 use serde::Serialize;
 
-use crate::diagnose::{Findings, RemainderKind};
+use crate::diagnose::{Findings, RemainderKind, usual_rival};
 use crate::excite::{Drive, ExciteError, Identification, Limits, SeparateOptions, separations};
 use crate::model::Effect;
 use crate::range;
@@ -16,18 +16,16 @@ use crate::record::Record;
 
 /// Evidence that decides a question: twice the logarithm of a likelihood ratio of e¹⁵, which leaves room for a misfit of the base that is
 /// not white.
-const DECIDES: f64 = 30.0;
+const DECISIVE_EVIDENCE: f64 = 30.0;
 /// Durations that are tried \[s\]; the shortest is what a few slow loops need.
 const DURATIONS_S: [f64; 3] = [4.0, 8.0, 16.0];
 /// Questions that a drive is chosen for, the most open first.
 const MAX_QUESTIONS: usize = 4;
-/// An effect that nearly every other one is told from by several rates and holds, and its own rival.
-const USUAL_RIVAL: (Effect, Effect) = (Effect::Lag, Effect::Creep);
 
 /// What is to be known in the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
-    /// Probability that each named effect has, and that no suspect reaches the complement of.
+    /// Probability that each named effect has. No effect without a name has half of one or more: a diagnosis calls such an effect a suspect.
     pub probability: f64,
     /// Standard error of the best known parameter of each effect, as a share of its value.
     pub precision: f64,
@@ -62,10 +60,10 @@ pub enum Question {
         /// What does nearly the same.
         rival: Effect,
         /// Standard error of its best known parameter, as a share of its value.
-        error: f64,
+        relative_error: f64,
     },
     /// What acts besides: something is left that nothing explains.
-    Rest,
+    Unexplained,
 }
 
 impl Question {
@@ -75,7 +73,7 @@ impl Question {
             Self::Suspect { effect, rival, .. }
             | Self::Name { effect, rival, .. }
             | Self::Size { effect, rival, .. } => Some((*effect, *rival)),
-            Self::Rest => None,
+            Self::Unexplained => None,
         }
     }
 
@@ -84,8 +82,8 @@ impl Question {
         match self {
             Self::Suspect { probability, .. } => 1.0 - (2.0 * probability - 1.0).abs(),
             Self::Name { probability, .. } => 1.0 - probability,
-            Self::Size { error, .. } => 0.1 * error.min(1.0),
-            Self::Rest => 0.0,
+            Self::Size { relative_error, .. } => 0.1 * relative_error.min(1.0),
+            Self::Unexplained => 0.0,
         }
     }
 
@@ -98,24 +96,25 @@ impl Question {
             Self::Name { effect, rival, probability } => {
                 format!("whether it is {effect} or {rival} (probability {probability:.2})")
             }
-            Self::Size { effect, error, .. } => format!("the size of {effect} (known to {:.0} %)", 100.0 * error),
-            Self::Rest => "what is left, which nothing explains".to_owned(),
+            Self::Size { effect, relative_error, .. } => {
+                format!("how large {effect} is (known to {:.0} %)", 100.0 * relative_error)
+            }
+            Self::Unexplained => "what the unexplained residual is".to_owned(),
         }
     }
 }
 
 /// What findings leave open, the most open first; empty where all is known as well as was asked.
 pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
-    let usual = |effect: Effect| if effect == USUAL_RIVAL.0 { USUAL_RIVAL.1 } else { USUAL_RIVAL.0 };
     let mut open = Vec::new();
-    for suspect in findings.suspects.iter().filter(|s| s.probability > 1.0 - aim.probability) {
-        let (effect, rival) = (suspect.name, usual(suspect.name));
+    for suspect in &findings.suspects {
+        let (effect, rival) = (suspect.name, suspect.rival.unwrap_or(usual_rival(suspect.name)));
         open.push(Question::Suspect { effect, rival, probability: suspect.probability });
     }
     for named in &findings.effects {
         let effect = named.name;
         let rival = named.alternatives.iter().map(|other| other.name).find(|other| *other != effect);
-        let rival = rival.unwrap_or(usual(effect));
+        let rival = rival.unwrap_or(usual_rival(effect));
         if named.probability < aim.probability {
             open.push(Question::Name { effect, rival, probability: named.probability });
             continue;
@@ -124,11 +123,11 @@ pub fn open_questions(findings: &Findings, aim: Aim) -> Vec<Question> {
             |found: &crate::diagnose::Found| Some((found.std_error? / found.value).abs()).filter(|e| e.is_finite());
         let error = named.parameters.values().filter_map(share).fold(f64::INFINITY, f64::min);
         if error.is_finite() && error > aim.precision {
-            open.push(Question::Size { effect, rival, error });
+            open.push(Question::Size { effect, rival, relative_error: error });
         }
     }
     if findings.remainder.kind == RemainderKind::Unexplained {
-        open.push(Question::Rest);
+        open.push(Question::Unexplained);
     }
     open.sort_by(|a, b| b.openness().total_cmp(&a.openness()));
     open
@@ -149,13 +148,18 @@ pub struct Experiment {
 
 impl Experiment {
     fn new(drive: Drive, name: &'static str, why: String) -> Self {
-        let time = drive.time();
-        let seconds = time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0);
+        let seconds = seconds(&drive);
         Self { drive, name, why, seconds }
     }
 }
 
-/// What comes after a diagnosis.
+/// How long a drive takes, rests included \[s\].
+fn seconds(drive: &Drive) -> f64 {
+    let time = drive.time();
+    time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0)
+}
+
+/// What comes next.
 #[derive(Clone, Debug)]
 pub enum Next {
     /// An experiment.
@@ -181,7 +185,7 @@ impl Planner {
         Self { limits, aim, within_s, seed, planned: 0, spent_s: 0.0 }
     }
 
-    /// The time of all experiments so far \[s\].
+    /// The time of all experiments that were handed out \[s\].
     pub fn spent(&self) -> f64 {
         self.spent_s
     }
@@ -195,10 +199,26 @@ impl Planner {
     ///
     /// # Errors
     /// When no drive keeps to the limits.
-    pub fn first(&mut self) -> Result<Experiment, ExciteError> {
+    pub fn first(&mut self) -> Result<Next, ExciteError> {
         let first = self.identification("a first look".to_owned())?;
+        if first.seconds > self.left() {
+            return Ok(Next::End(self.no_time(first.seconds)));
+        }
         self.count(&first);
-        Ok(first)
+        Ok(Next::Play(Box::new(first)))
+    }
+
+    /// Time that is left \[s\].
+    fn left(&self) -> f64 {
+        (self.within_s - self.spent_s).max(0.0)
+    }
+
+    fn no_time(&self, needed: f64) -> String {
+        let left = self.left();
+        format!(
+            "{left:.1} of {} s are left, and the next experiment takes {needed:.1} s; allow more time",
+            self.within_s
+        )
     }
 
     fn identification(&self, why: String) -> Result<Experiment, ExciteError> {
@@ -218,13 +238,16 @@ impl Planner {
     /// When no drive keeps to the limits.
     pub fn next(&mut self, findings: &Findings, record: &Record) -> Result<(Vec<Question>, Next), ExciteError> {
         let open = open_questions(findings, self.aim);
-        let seconds = |s: f64| format!("{s:.1}");
         if open.is_empty() {
-            let why = format!("all that was asked is known after {} s of experiments", seconds(self.spent_s));
+            let why = format!(
+                "all that was asked is known after {:.1} s of experiments: each effect has a probability of {} or more and a parameter known to {} %",
+                self.spent_s,
+                self.aim.probability,
+                100.0 * self.aim.precision
+            );
             return Ok((open, Next::End(why)));
         }
         let words = open.iter().map(Question::words).collect::<Vec<_>>().join(", ");
-        let left = (self.within_s - self.spent_s).max(0.0);
         let (low, high) = range(record.output().unwrap_or_default().iter().copied());
         // What is missed is noise for whoever tells two effects apart.
         let missed = findings.after.train.map_or(0.0, |errors| errors.rmse).max(findings.noise_floor);
@@ -232,21 +255,31 @@ impl Planner {
             noise: (missed / (high - low)).clamp(1e-6, 0.5),
             thermometer: record.temperature().is_some(),
             load_cell: record.load().is_some(),
+            // No drive is played twice: other levels and phases say more.
+            seed: self.seed.wrapping_add(self.planned + 1),
             ..SeparateOptions::default()
         };
-        let next = match choose(&open, &self.limits, &options, left)? {
+        let shortest = DURATIONS_S[0];
+        if self.left() < shortest {
+            return Ok((open, Next::End(format!("{}, for {words}", self.no_time(shortest)))));
+        }
+        let next = match choose(&open, &self.limits, &options, self.left())? {
             Some((drive, name)) => Some(Experiment::new(drive, name, words.clone())),
             // What nothing explains may show under another drive.
-            None if open.contains(&Question::Rest) => Some(self.identification(words.clone())?),
+            None if open.contains(&Question::Unexplained) => Some(self.identification(words.clone())?),
             None => None,
         };
-        match next.filter(|next| next.seconds <= left) {
-            Some(next) => {
+        let end = match next {
+            Some(next) if next.seconds <= self.left() => {
                 self.count(&next);
-                Ok((open, Next::Play(Box::new(next))))
+                return Ok((open, Next::Play(Box::new(next))));
             }
-            None => Ok((open, Next::End(format!("no drive in the {} s that are left decides {words}", seconds(left))))),
-        }
+            Some(next) => format!("{}, for {words}", self.no_time(next.seconds)),
+            None => format!(
+                "no drive within the limits decides {words}; measure temperature or load besides, if these may act"
+            ),
+        };
+        Ok((open, Next::End(end)))
     }
 }
 
@@ -271,10 +304,11 @@ fn choose(
     for duration_s in DURATIONS_S.into_iter().filter(|duration| *duration <= seconds_left) {
         for (drive, tried) in separations(&pairs, limits, &SeparateOptions { duration_s, ..*options })? {
             let rows = drive.voltage().len() as f64;
-            let share = |left: f64| (rows * left * left / DECIDES).min(1.0);
+            let share = |left: f64| (rows * left * left / DECISIVE_EVIDENCE).min(1.0);
             let decided: f64 = tried.iter().map(|tried| share(tried.left())).sum();
-            let per_second = decided * limits.rate_hz / rows;
-            if per_second > best.as_ref().map_or(0.0, |(most, _)| *most) {
+            let seconds = seconds(&drive);
+            let per_second = decided / seconds;
+            if seconds <= seconds_left && per_second > best.as_ref().map_or(0.0, |(most, _)| *most) {
                 best = Some((per_second, (drive, tried[0].drive)));
             }
         }

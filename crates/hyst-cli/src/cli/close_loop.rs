@@ -29,7 +29,7 @@ pub(crate) struct CloseLoopArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=20))]
     pub(crate) turns: Option<u32>,
     /// Choose the experiments: begin with a short one, then play the drive that decides most of what is open per second, until each named
-    /// effect has this probability and no other one is in doubt
+    /// effect has this probability and no effect without a name has 0.5 or more
     #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) until: Option<f64>,
     /// Time for the chosen experiments [s], as 120 or 120s
@@ -53,8 +53,10 @@ pub(crate) struct CloseLoopArgs {
 
 /// A probability that can be reached and is worth asking for.
 fn probability(text: &str) -> Result<f64, String> {
-    let usable = |p: &f64| (0.5..1.0).contains(p);
-    text.parse().ok().filter(usable).ok_or_else(|| "it has to be a probability from 0.5 to below 1, as 0.95".to_owned())
+    let usable = |p: &f64| (0.9..1.0).contains(p);
+    text.parse().ok().filter(usable).ok_or_else(|| {
+        "it has to be a probability from 0.9, where a diagnosis names an effect, to below 1, as 0.95".to_owned()
+    })
 }
 
 /// Seconds, with or without their unit.

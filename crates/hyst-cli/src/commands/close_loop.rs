@@ -26,6 +26,9 @@ use plan::{Experiment, Plan};
 
 mod plan;
 
+/// Least sample rate of chosen experiments \[Hz\].
+const LEAST_RATE_HZ: f64 = 20.0;
+
 /// One turn.
 #[derive(Debug, Serialize)]
 struct Turn {
@@ -43,9 +46,9 @@ struct Turn {
     slew_limit: Option<f64>,
     /// What is left, in words.
     left: String,
-    /// What is open where experiments are chosen.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    open: Vec<Question>,
+    /// What is open where experiments are chosen; empty if nothing is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    open: Option<Vec<Question>>,
     /// How a reference was followed; chosen experiments follow it in the end.
     #[serde(flatten)]
     tracking: Option<Tracking>,
@@ -88,6 +91,10 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
         return Err(CommandError::bad_input(
             "close-loop runs simulated plants alone (sim:PLANT.toml): an actuator that moves for minutes wants somebody beside it; go the same way with excite, run, fit, diagnose and run again, with --limit and --slew",
         ));
+    }
+    // Below it nothing typical of an actuator's dynamics can be told apart.
+    if args.until.is_some() && args.rate < LEAST_RATE_HZ {
+        return Err(CommandError::bad_input(format!("--rate: experiments are chosen from {LEAST_RATE_HZ} Hz on")));
     }
     let mut device = AnyDevice::open(&args.daq, &Wishes::default())?;
     fs::create_dir_all(out)
@@ -180,7 +187,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             remainder: remainder.kind,
             slew_limit: remainder.slew_limit,
             left: remainder.description.clone(),
-            open,
+            open: args.until.map(|_| open),
             tracking,
         });
         if let Some(why) = ends {
@@ -255,7 +262,7 @@ fn said(summary: &Summary) -> String {
         .iter()
         .filter_map(|t| {
             let Experiment { drive, seconds, why } = &t.experiment;
-            Some(format!("experiment {}: {drive}, {} s, for {}\n", t.turn, text::short(*seconds), why.as_ref()?))
+            Some(format!("experiment {}: {drive}, {} s, to decide: {}\n", t.turn, text::short(*seconds), why.as_ref()?))
         })
         .collect();
     let time = if chosen { format!("experiments: {} s\n", text::short(summary.seconds)) } else { String::new() };

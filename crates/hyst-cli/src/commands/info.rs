@@ -29,10 +29,12 @@ struct ChannelSummary {
     /// The unit that the file states.
     unit: Option<&'static str>,
     /// The unit that `--map` states instead.
-    mapped_unit: Option<String>,
+    mapped_unit: Option<&'static str>,
+    /// How many of that unit one of the file's numbers is, if `--map` says so.
+    scale: Option<f64>,
     /// Whether the unit is stated elsewhere in the file than in the channel's name.
     #[serde(skip)]
-    unit_beside_name: bool,
+    unit_outside_name: bool,
     rows: usize,
     missing: usize,
     min: Option<f64>,
@@ -117,12 +119,14 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     warnings.extend(survey.texts.iter().map(text));
     warnings.extend(record.iter().flat_map(input::oddities));
     // The table of channels says already what is read as what.
-    let told = |note: &&String| !note.contains(" is read as ") || note.contains("converted");
+    let told = |note: &&String| {
+        // A warning says more of a log that was cut off.
+        (!note.contains(" is read as ") || note.contains("converted")) && !note.starts_with("the log was cut off")
+    };
     let notes = record.iter().flat_map(|record| record.notes().iter().filter(told).cloned()).collect();
     let options = further(&input::columns(&args.map));
     let next = match &record {
-        // A fit refuses a record that never moves.
-        Some(record) if still(record) => None,
+        Some(record) if cannot_be_fitted(record) => None,
         Some(record) => next(&file, record, &options),
         None => advice,
     };
@@ -131,8 +135,9 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         name: c.name.clone(),
         role: c.role,
         unit: c.unit,
-        mapped_unit: c.mapped_unit.clone(),
-        unit_beside_name: c.unit_beside_name,
+        mapped_unit: c.mapped_unit,
+        scale: c.scale,
+        unit_outside_name: c.unit_outside_name,
         rows: c.rows,
         missing: c.missing,
         min: c.range.map(|r| r.0),
@@ -155,10 +160,9 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     }
 }
 
-/// Whether the input or the output has one value throughout.
-fn still(record: &Record) -> bool {
-    let constant = |values: &[f64]| values.windows(2).all(|pair| pair[0] == pair[1]);
-    !record.input().is_empty() && constant(record.input()) || record.output().is_some_and(constant)
+/// Whether a record has input and output, and a fit refuses it because one of them never moves.
+fn cannot_be_fitted(record: &Record) -> bool {
+    !record.input().is_empty() && record.output().is_some() && input::refuse_still(record).is_err()
 }
 
 fn never_moves(channel: &Channel) -> Option<String> {
@@ -205,12 +209,8 @@ fn next(file: &str, record: &Record, options: &str) -> Option<String> {
     let file = quoted(file);
     match (record.input().is_empty(), record.output().is_some()) {
         (false, true) => Some(format!("hystctl fit {file}{options} --model pi -o {model}")),
-        (false, false) => Some(format!(
-            "hystctl simulate --model MODEL.json {file}{options} -o predicted.csv (MODEL.json: from hystctl fit)"
-        )),
-        (true, true) => Some(format!(
-            "hystctl compensate --model MODEL.json {file}{options} -o drive.csv (MODEL.json: from hystctl fit)"
-        )),
+        (false, false) => Some(format!("hystctl simulate --model MODEL.json {file}{options} -o predicted.csv")),
+        (true, true) => Some(format!("hystctl compensate --model MODEL.json {file}{options} -o drive.csv")),
         (true, false) => None,
     }
 }
@@ -280,8 +280,9 @@ impl Summary {
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
             let name: String = c.name.chars().take(40).collect();
-            let unit = match (c.unit, &c.mapped_unit) {
-                (_, Some(unit)) => format!("{unit}*"),
+            let scale = c.scale.map_or_else(String::new, |scale| format!("{} ", text::short(scale)));
+            let unit = match (c.unit, c.mapped_unit) {
+                (_, Some(unit)) => format!("{scale}{unit}*"),
                 (Some(unit), None) => unit.to_owned(),
                 (None, None) if matches!(c.role, Some("segment")) || c.name == "segment" => "-".to_owned(),
                 (None, None) => "?".to_owned(),
@@ -297,12 +298,11 @@ impl Summary {
             ));
         }
         if self.channels.iter().any(|c| c.mapped_unit.is_some()) {
-            lines.push("  * as --map says; the file states no unit, or another one".to_owned());
+            lines.push("  * from --map, not from the file".to_owned());
         }
-        if self.channels.iter().any(|c| c.unit_beside_name) {
-            lines.push(
-                "  units: beside the names in the file, as in its header, a row of units or attributes".to_owned(),
-            );
+        if self.channels.iter().any(|c| c.unit_outside_name) {
+            lines
+                .push("  units come from the header, a row of units or attributes where a name states none".to_owned());
         }
         if self.channels.len() == MAX_CHANNELS {
             lines.push(format!("  (the first {MAX_CHANNELS})"));
@@ -340,7 +340,7 @@ impl Summary {
             ([], Some(_)) => {
                 let notes = if self.notes.is_empty() { "" } else { "; the notes say what was done to read the file" };
                 let mapped = self.channels.iter().any(|c| c.mapped_unit.is_some());
-                let units = if mapped { "; the units with * are yours" } else { "" };
+                let units = if mapped { "; units marked * are from --map" } else { "" };
                 lines.push(format!("warnings: none{notes}{units}"));
             }
             (warnings, _) => lines.extend(warnings.iter().map(|what| format!("warning: {what}"))),
@@ -353,6 +353,9 @@ impl Summary {
             lines.push("rates, noise and further warnings follow once columns and units are known".to_owned());
         }
         lines.extend(self.next.iter().flat_map(|next| [String::new(), format!("next: {next}")]));
+        if self.next.as_ref().is_some_and(|next| next.contains("MODEL.json")) {
+            lines.push("(MODEL.json is what hystctl fit writes)".to_owned());
+        }
         lines.join("\n")
     }
 }

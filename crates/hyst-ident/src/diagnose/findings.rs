@@ -143,6 +143,9 @@ pub struct Suspect {
     pub probability: f64,
     /// Cross-validated RMSE with it \[output unit\].
     pub cv_rmse: f64,
+    /// What explains nearly as much in its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rival: Option<Effect>,
     /// The command that makes the record that would decide.
     pub command: String,
 }

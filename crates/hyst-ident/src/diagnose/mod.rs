@@ -45,7 +45,7 @@ pub use findings::{
 };
 pub use limits::Limit;
 pub use probability::Weighed;
-pub use suspects::{FOLLOWED, drive_options};
+pub use suspects::{FOLLOWED, drive_options, usual_rival};
 
 use extension::{Own, Shaped};
 

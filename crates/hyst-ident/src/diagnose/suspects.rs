@@ -10,8 +10,10 @@ use crate::samples::Samples;
 /// Share of the slope at which an amplifier has been seen to fall behind that a drive may have.
 pub const FOLLOWED: f64 = 0.8;
 
-/// What only a record that drives several rates and amplitudes can tell apart.
-const USUAL_RIVAL: Effect = Effect::Lag;
+/// What an effect is told from where nothing else comes near: only a record that drives several rates and amplitudes tells it from a lag.
+pub fn usual_rival(effect: Effect) -> Effect {
+    if effect == Effect::Lag { Effect::Creep } else { Effect::Lag }
+}
 
 /// Range and rate of a record's drive as options of `excite`, and the slope that the amplifier follows where it has not followed every one
 /// \[input unit/s\].
@@ -55,13 +57,13 @@ pub(super) fn suspects(
     let has = |column: &Option<Vec<f64>>, option: &'static str| if column.is_some() { option } else { "" };
     let sensors = format!("{}{}", has(&samples.temperature, " --thermometer"), has(&samples.load, " --load-cell"));
     let of = |n: &Candidate| {
-        let usual = if n.effect == USUAL_RIVAL { Effect::Creep } else { USUAL_RIVAL };
-        let (name, other) = (n.effect, n.rival.unwrap_or(usual));
+        let (name, other) = (n.effect, n.rival.unwrap_or(usual_rival(n.effect)));
         Suspect {
             name,
             kind: EffectKind::of(name),
             probability: n.evidence.probability(),
             cv_rmse: n.cv_rmse,
+            rival: Some(other),
             command: format!("hystctl excite separate {name} {other} {options}{sensors} -o next.csv"),
         }
     };

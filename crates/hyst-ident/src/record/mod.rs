@@ -125,7 +125,7 @@ struct Text {
 }
 
 impl Text {
-    fn text(&self) -> &[u8] {
+    fn as_bytes(&self) -> &[u8] {
         self.bytes.get(self.start..).unwrap_or_default()
     }
 }

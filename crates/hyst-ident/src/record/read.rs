@@ -81,19 +81,21 @@ impl Record {
                 let unpacked = source::unpack(name, &bytes)?;
                 let contents = source::open(name, &unpacked)?;
                 let found = with_layout(name, contents.as_ref(), how, need)?;
+                // A text in UTF-8 ends where its file does; of other encodings the decoded text is kept.
+                let text = contents.plain_text().filter(|_| found.is_plain).map(|text| {
+                    let start = unpacked.len().saturating_sub(text.len());
+                    if unpacked.ends_with(text.as_bytes()) { Ok(start) } else { Err(text.as_bytes().to_vec()) }
+                });
                 drop(contents);
-                // A text ends where its file does.
-                let start = |plain: usize| unpacked.len().saturating_sub(plain);
-                let start = found.plain.map(start);
                 let unpacked = if let Cow::Owned(unpacked) = unpacked { Some(unpacked) } else { None };
-                Ok((found.record, start, unpacked))
+                Ok((found.record, text, unpacked))
             },
             || sum_of(&bytes),
         );
-        let (mut record, start, unpacked): (Self, _, _) = found?;
-        record.text = start.map(|start| {
-            let bytes = Arc::new(unpacked.unwrap_or_else(|| bytes.into_owned()));
-            Text { bytes, start }
+        let (mut record, text, unpacked): (Self, _, _) = found?;
+        record.text = text.map(|text| match text {
+            Ok(start) => Text { bytes: Arc::new(unpacked.unwrap_or_else(|| bytes.into_owned())), start },
+            Err(decoded) => Text { bytes: Arc::new(decoded), start: 0 },
         });
         Ok(record.kept_with(sum))
     }
@@ -114,8 +116,8 @@ pub(super) struct Found {
     pub(super) record: Record,
     /// The columns that it was read from.
     pub(super) layout: Layout,
-    /// Length of the text whose rows can be carried through as they stand \[bytes\].
-    plain: Option<usize>,
+    /// Whether the rows of a plain text are those of the record, and can be carried through as they stand.
+    is_plain: bool,
 }
 
 /// The record in a file's columns, and which of them it was read from.
@@ -141,7 +143,7 @@ pub(super) fn with_layout(
     let layout = match Layout::resolve(&file, &how.map, need, how.rate) {
         // The message proposes columns; what only counts rows is none of them.
         Err(RecordError::Columns { .. }) => {
-            let counters = counters(contents)?;
+            let counters = counters(contents).unwrap_or_default();
             Layout::resolve(&File { counters: &counters, ..file }, &how.map, need, how.rate)?
         }
         resolved => resolved?,
@@ -249,11 +251,10 @@ pub(super) fn with_layout(
         .chain(&done.notes)
         .cloned()
         .collect();
-    let plain = contents.plain_text().filter(|_| !done.changed).map(str::len);
-    Ok(Found { record, layout, plain })
+    Ok(Found { record, layout, is_plain: !done.changed })
 }
 
-/// Columns without a unit that hold the numbers of the rows.
+/// Columns without a unit that hold the numbers of the rows. Only messages ask for them.
 fn counters(contents: &dyn Contents) -> Result<Vec<usize>, RecordError> {
     if contents.rows_per_row() > 1 {
         return Ok(Vec::new());

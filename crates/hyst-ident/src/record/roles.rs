@@ -295,7 +295,9 @@ impl Search<'_> {
         }
         // Words without a unit: of the heading, else of the path before it.
         let without = |at: &usize| self.headings[*at].unit.is_none();
-        let without = |at: &usize| without(at) && !self.counts(role, *at);
+        // A letter is hardly a word: a column "X" of row numbers is no position.
+        let letter = |at: &usize| leaf(self.name(*at)).chars().count() == 1;
+        let without = |at: &usize| without(at) && !(letter(at) && self.is_counter(role, *at));
         let worded = |at: &usize| without(at) && self.headings[*at].suggests(words_of(role));
         let unknown = free().filter(worded).find(|at| required || self.states_unknown_unit(role, *at));
         let by_path = |at: &usize| without(at) && self.is_unstated(*at) && self.path_suggests(role, *at);
@@ -326,7 +328,7 @@ impl Search<'_> {
     }
 
     /// Whether a column numbers the rows, where `role` is a quantity.
-    fn counts(&self, role: Role, column: usize) -> bool {
+    fn is_counter(&self, role: Role, column: usize) -> bool {
         role != Role::Time && self.file.counters.contains(&column)
     }
 
@@ -488,8 +490,10 @@ impl Search<'_> {
             file: self.place(),
             problems: what,
             advice: format!(
-                "map another column, or scale this one by what one {} is, as --map '{}=GAIN*{}'",
-                unit.symbol, entry.canonical, entry.column
+                "map another column, or give its scale: --map '{}=GAIN*{}', GAIN per {}",
+                entry.canonical,
+                entry.column.replace('\'', r"'\''"),
+                unit.symbol
             ),
             options: String::new(),
             columns: self.file.heads.len() + self.file.texts.len(),
@@ -498,6 +502,27 @@ impl Search<'_> {
 
     fn place(&self) -> String {
         self.file.header.map_or_else(|| self.file.name.to_owned(), |place| format!("{}, {place}", self.file.name))
+    }
+
+    /// What is missing where the file has fewer columns than the roles that are open.
+    fn too_few(&self, open: &[(Role, Option<usize>)], taken: &[usize]) -> Option<String> {
+        let count = self.file.heads.len();
+        let free = count.saturating_sub(taken.len());
+        // A rate stands for a column of time.
+        let needed = open.iter().filter(|(role, _)| *role != Role::Time).count();
+        if free >= needed {
+            return None;
+        }
+        let columns = if count == 1 { "1 column".to_owned() } else { format!("{count} columns") };
+        let words: Vec<&str> = open.iter().map(|(role, _)| role.word()).collect();
+        let time = if words.contains(&Role::Time.word()) { " (--rate HZ replaces a column of time)" } else { "" };
+        let alone = if free == 1 && taken.is_empty() {
+            let example = argument(Role::Output.example(), None, self.name(0));
+            format!("; for a reference, which is an output alone: --map {example} --rate HZ")
+        } else {
+            String::new()
+        };
+        Some(format!("the file has {columns}; a record needs also: {}{time}{alone}", words.join(", ")))
     }
 
     /// All problems in one message, with a map that is complete.
@@ -509,7 +534,7 @@ impl Search<'_> {
         let mut free: Vec<usize> = self.columns().filter(is_free).collect();
         // Of columns that say nothing of themselves, one whose path does, else the next.
         let mut next = |role: Role| {
-            let fits = |at: &usize| !self.counts(role, *at);
+            let fits = |at: &usize| !self.is_counter(role, *at);
             let place = free.iter().position(|at| fits(at) && self.path_suggests(role, *at));
             let place = place.or_else(|| free.iter().position(fits))?;
             Some(free.remove(place))
@@ -564,29 +589,6 @@ impl Search<'_> {
             options: line,
             columns: self.file.heads.len() + self.file.texts.len(),
         }
-    }
-}
-
-impl Search<'_> {
-    /// What is missing where the file has fewer columns than the roles that are open.
-    fn too_few(&self, open: &[(Role, Option<usize>)], taken: &[usize]) -> Option<String> {
-        let count = self.file.heads.len();
-        let free = count.saturating_sub(taken.len());
-        // A rate stands for a column of time.
-        let needed = open.iter().filter(|(role, _)| *role != Role::Time).count();
-        if free >= needed {
-            return None;
-        }
-        let columns = if count == 1 { "one column".to_owned() } else { format!("{count} columns") };
-        let words: Vec<&str> = open.iter().map(|(role, _)| role.word()).collect();
-        let time = if words.contains(&Role::Time.word()) { " (--rate HZ replaces a column of time)" } else { "" };
-        let alone = if free == 1 && taken.is_empty() {
-            let example = argument(Role::Output.example(), None, self.name(0));
-            format!("; for a reference, which is an output alone: --map {example} --rate HZ")
-        } else {
-            String::new()
-        };
-        Some(format!("the file has {columns}, but needs further ones: {}{time}{alone}", words.join(", ")))
     }
 }
 

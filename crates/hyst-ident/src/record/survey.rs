@@ -31,10 +31,12 @@ pub struct Channel {
     pub step: f64,
     /// What the record takes it for: `segment`, `time`, `input`, `output`, `temperature` or `load`.
     pub role: Option<&'static str>,
-    /// The unit that `--map` gives it, where the file states none; `0.001 V` where it scales the values, whatever the file states.
-    pub mapped_unit: Option<String>,
+    /// The unit that `--map` gives it, where the file states none or `--map` scales its values.
+    pub mapped_unit: Option<&'static str>,
+    /// How many of that unit one of the file's numbers is, if `--map` says so.
+    pub scale: Option<f64>,
     /// Whether its unit is stated elsewhere in the file than in its name.
-    pub unit_beside_name: bool,
+    pub unit_outside_name: bool,
 }
 
 /// What a file holds.
@@ -46,7 +48,7 @@ pub struct Survey {
     pub channels: Vec<Channel>,
     /// Columns that hold text, with a cell of each.
     pub texts: Vec<(String, String)>,
-    /// Where the times of the record come from, as `the column "t"` or `the sample interval in the file`.
+    /// Where the times of the record come from, or would, as `the column "t"` or `the sample interval in the file`.
     pub times: Option<String>,
     /// The record, or why it is none yet.
     pub record: Result<Record, RecordError>,
@@ -99,7 +101,9 @@ impl Survey {
             }
             Err(error) => {
                 mark_mapped(&mut channels, name, contents, &how.map);
-                let even = contents.heads().iter().any(|head| matches!(head.axis, source::Axis::Even { .. }));
+                // A rate or a clock that was named stands for it.
+                let open = matches!(error, RecordError::Columns { .. }) && how.rate.is_none();
+                let even = open && contents.heads().iter().any(|head| matches!(head.axis, source::Axis::Even { .. }));
                 (Err(error), even.then(|| "the sample interval in the file".to_owned()))
             }
         };
@@ -150,10 +154,9 @@ fn mark_one(
 ) {
     let Some(channel) = channels.get_mut(column) else { return };
     channel.role = Some(role);
-    let is_scaled = factor.is_some_and(|factor| factor != -1.0);
-    if is_scaled || contents.heads().get(column).is_some_and(|head| !has_unit(head)) {
-        let scale = factor.filter(|factor| *factor != -1.0).map_or(String::new(), |factor| format!("{factor} "));
-        channel.mapped_unit = Unit::of_canonical(canonical).map(|unit| format!("{scale}{}", unit.symbol));
+    channel.scale = factor.filter(|factor| *factor != -1.0);
+    if channel.scale.is_some() || contents.heads().get(column).is_some_and(|head| !has_unit(head)) {
+        channel.mapped_unit = Unit::of_canonical(canonical).map(|unit| unit.symbol);
     }
 }
 
@@ -224,7 +227,8 @@ fn channels(contents: &dyn Contents) -> Result<Vec<Channel>, RecordError> {
             step: quantisation(&there) * 12f64.sqrt(),
             role: None,
             mapped_unit: None,
-            unit_beside_name: Heading::parse(&head.name, None).unit.is_none() && has_unit(head),
+            scale: None,
+            unit_outside_name: Heading::parse(&head.name, None).unit.is_none() && has_unit(head),
         }
     };
     Ok(heads.iter().zip(values).map(channel).collect())

@@ -69,7 +69,7 @@ fn what_is_needed_decides_what_has_to_be_there() {
     refused(
         drive,
         Need::InputAndOutput,
-        &["line 1", "the output", "displacement_um|displacement_nm", "needs further ones: output"],
+        &["line 1", "the output", "displacement_um|displacement_nm", "needs also: output"],
     );
     let reference = "time_s,force_n\n0,0\n1,1\n";
     let record = read(reference, Need::Output).unwrap();
@@ -496,4 +496,22 @@ proptest! {
         prop_assert_eq!(record.sample_period(), 1.0 / rate);
         assert_same(&record, &rewritten(&record));
     }
+}
+
+#[test]
+fn columns_of_a_text_in_another_encoding_are_carried_through() {
+    let text = "time_s,voltage_v,displacement_um,gain_x\n0,0,0,7\n1,1,1,8\n2,2,2,9\n";
+    let orders: [fn(u16) -> [u8; 2]; 2] = [u16::to_le_bytes, u16::to_be_bytes];
+    for order in orders {
+        let bytes: Vec<u8> = format!("\u{feff}{text}").encode_utf16().flat_map(order).collect();
+        let record = Record::parse("run.csv", &bytes, &ColumnMap::default(), Need::InputAndOutput).unwrap();
+        let mut written = Vec::new();
+        record.write_with(&mut written, &[]).unwrap();
+        assert_eq!(String::from_utf8(written).unwrap(), text);
+    }
+    let marked = format!("\u{feff}{text}");
+    let record = Record::parse("run.csv", marked.as_bytes(), &ColumnMap::default(), Need::InputAndOutput).unwrap();
+    let mut written = Vec::new();
+    record.write_with(&mut written, &[]).unwrap();
+    assert_eq!(String::from_utf8(written).unwrap(), text);
 }

@@ -157,7 +157,7 @@ impl Record {
         extra.iter().try_for_each(|column| column.check(self.rows()))?;
         // As many rows, and a header.
         let whole = |text: &&[u8]| rows_of(text).byte_records().count() == self.rows() + 1;
-        let text = match self.text.as_ref().map(Text::text).filter(whole) {
+        let text = match self.text.as_ref().map(Text::as_bytes).filter(whole) {
             Some(text) => Cow::Borrowed(text),
             None => {
                 let mut text = Vec::new();

@@ -59,10 +59,10 @@ impl Plan {
     pub(super) fn play(&mut self, daq: &mut impl Daq, turn: u32) -> CommandResult<(Experiment, Record)> {
         let (drive, name, why) = match (self.next.take(), &mut self.planner) {
             (Some(next), _) => (next.drive, next.name, Some(next.why)),
-            (None, Some(planner)) => {
-                let first = planner.first()?;
-                (first.drive, first.name, Some(first.why))
-            }
+            (None, Some(planner)) => match planner.first()? {
+                Next::Play(first) => (first.drive, first.name, Some(first.why)),
+                Next::End(why) => return Err(CommandError::bad_input(format!("--within: {why}"))),
+            },
             (None, None) => {
                 let seed = self.seed.wrapping_add(u64::from(turn) << 32);
                 let usual = Identification::at_rate(self.limits.rate_hz, seed).within_slew(&self.limits, &|_| true);
@@ -79,7 +79,7 @@ impl Plan {
         Ok((Experiment { drive: name, seconds, why }, record))
     }
 
-    /// Looks at what is open, and chooses the next experiment; the second part says why there is none.
+    /// Looks at what is open, and chooses the next experiment; the second part states why there is none.
     pub(super) fn next(
         &mut self,
         findings: &Findings,

@@ -36,6 +36,7 @@ pub(super) fn run(args: &SeparateArgs) -> CommandResult {
         noise: args.noise,
         thermometer: args.thermometer,
         load_cell: args.load_cell,
+        ..SeparateOptions::default()
     };
     let progress = Progress::spinner("trying drives");
     let found = separate(args.first, args.second, &limits, &options).map_err(in_options)?;

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::SeparateOptions;
 use crate::excite::{
     AmSine, DecayingSine, Drive, ExciteError, Limits, MinorLoops, Multisine, Phases, Shape, Sine, Stairs, Sweep,
     Triangle,
@@ -23,8 +24,9 @@ impl Candidate {
     }
 }
 
-/// The drives, each about `duration` seconds long, as fast as the limits allow.
-pub(super) fn family(limits: &Limits, duration: f64) -> Vec<Candidate> {
+/// The drives, each about as long as the options say, as fast as the limits allow.
+pub(super) fn family(limits: &Limits, options: &SeparateOptions) -> Vec<Candidate> {
+    let (duration, seed) = (options.duration_s, options.seed);
     let span = limits.hi_v - limits.lo_v;
     let slew = limits.slew_v_per_s.unwrap_or(f64::INFINITY);
     // A full-span sine is π f span steep; a fifth is kept for smooth ramps and sums. Without a slew limit to go by, 60 Hz
@@ -38,7 +40,7 @@ pub(super) fn family(limits: &Limits, duration: f64) -> Vec<Candidate> {
     };
     let stairs = |levels: u32, seconds: f64| {
         let hold_s = (seconds / f64::from(levels) - ramp_s).max(ramp_s);
-        Shape::Stairs(Stairs { levels, hold_s, ramp_s, seed: 1 })
+        Shape::Stairs(Stairs { levels, hold_s, ramp_s, seed })
     };
     let loops = f64::min(8.0 * slow, fast);
     let one = |name, shape| Candidate { name, shapes: vec![shape], rest_s: 0.0 };
@@ -88,7 +90,7 @@ pub(super) fn family(limits: &Limits, duration: f64) -> Vec<Candidate> {
                 high_hz: fast,
                 lines: ((fast - slow) * duration).floor().clamp(1.0, 60.0) as u32,
                 periods: 1,
-                phases: Phases::Random(1),
+                phases: Phases::Random(seed),
                 duration_s: duration,
                 fade_s: 0.1 * duration,
             }),

@@ -31,11 +31,13 @@ pub struct SeparateOptions {
     pub thermometer: bool,
     /// Whether the record has `load_n`.
     pub load_cell: bool,
+    /// Seed of levels and phases.
+    pub seed: u64,
 }
 
 impl Default for SeparateOptions {
     fn default() -> Self {
-        Self { duration_s: 30.0, noise: 1e-3, thermometer: false, load_cell: false }
+        Self { duration_s: 30.0, noise: 1e-3, thermometer: false, load_cell: false, seed: 1 }
     }
 }
 
@@ -110,7 +112,7 @@ pub fn separate(a: Effect, b: Effect, limits: &Limits, options: &SeparateOptions
 /// How well each drive of the family tells the effects of each pair apart, in the order of the pairs.
 ///
 /// # Errors
-/// As those of [`separate`].
+/// As those of [`separate`], and without a pair.
 pub fn separations(
     pairs: &[(Effect, Effect)],
     limits: &Limits,
@@ -120,12 +122,15 @@ pub fn separations(
     require("duration_s", options.duration_s, (4.0..=120.0).contains(&options.duration_s), "between 4 and 120")?;
     require("noise", options.noise, options.noise > 0.0 && options.noise < 1.0, "above 0 and below 1")?;
     require("rate_hz", limits.rate_hz, limits.rate_hz >= 20.0, "at least 20 for the dynamics of an actuator")?;
+    if pairs.is_empty() {
+        return Err(ExciteError::Nothing);
+    }
     if let Some((a, _)) = pairs.iter().find(|(a, b)| a == b) {
         return Err(ExciteError::Same { effect: a.name() });
     }
     let mut refused = None;
     let mut tried = Vec::new();
-    for candidate in drives::family(limits, options.duration_s) {
+    for candidate in drives::family(limits, options) {
         let drive = match candidate.drive(limits) {
             Ok(drive) => drive,
             Err(error) => {

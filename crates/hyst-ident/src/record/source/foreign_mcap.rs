@@ -21,7 +21,7 @@ mod tests;
 use crate::record::error::RecordError;
 use crate::record::log::LogRecords;
 
-use super::{Axis, Head, Table};
+use super::{Axis, CUT_OFF, Head, Table};
 use clock::Clock;
 use log::Log;
 use series::Series;
@@ -48,6 +48,9 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let damaged = |what: String| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what };
     let log = Log::read(bytes).map_err(damaged)?;
     let (mut topics, mut notes, mut left_out) = (Vec::new(), log.notes(), log.left_out.clone());
+    if !log.is_closed() {
+        notes.insert(0, CUT_OFF.to_owned());
+    }
     let encodings = log.encodings();
     let (is_empty, cut_off) = (log.is_empty(), !log.is_closed());
     for topic in log.topics {
@@ -67,9 +70,6 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     }
     topics.retain(|(series, _)| !series.columns.is_empty());
     if topics.is_empty() {
-        if cut_off {
-            notes.insert(0, "the log was cut off: its end is missing".to_owned());
-        }
         return Err(damaged(why_nothing(is_empty, &left_out, &notes)));
     }
     notes.extend(align::align(&mut topics));

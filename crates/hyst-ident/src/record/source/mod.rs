@@ -43,6 +43,9 @@ use super::grid::Printed;
 pub(crate) const FORMATS: &str =
     "tables of text as CSV, also compressed; MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files";
 
+/// The note of a log without its end.
+pub(crate) const CUT_OFF: &str = "the log was cut off: its end is missing";
+
 /// What the other columns of a file, or the file itself, say of the times of a column's rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Axis {
@@ -148,7 +151,7 @@ pub(crate) trait Contents {
         &[]
     }
 
-    /// Whether the end of the file is missing, and no note says so.
+    /// Whether the end of the file is missing.
     fn cut_off(&self) -> bool {
         false
     }

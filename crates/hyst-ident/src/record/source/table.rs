@@ -15,7 +15,7 @@ pub(crate) struct Table {
     pub(crate) values: Vec<Vec<f64>>,
     /// What was done to read the file that its owner may want to know.
     pub(crate) notes: Vec<String>,
-    /// Whether the end of the file is missing, and no note says so.
+    /// Whether the end of the file is missing.
     pub(crate) cut_off: bool,
 }
 
