@@ -280,7 +280,7 @@ impl Summary {
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
             let name: String = c.name.chars().take(40).collect();
-            let scale = c.scale.map_or_else(String::new, |scale| format!("{} ", text::short(scale)));
+            let scale = c.scale.map_or_else(String::new, |scale| format!("{scale} "));
             let unit = match (c.unit, c.mapped_unit) {
                 (_, Some(unit)) => format!("{scale}{unit}*"),
                 (Some(unit), None) => unit.to_owned(),
