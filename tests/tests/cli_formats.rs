@@ -45,7 +45,7 @@ fn info_names_channels_units_and_the_next_command() {
     assert_eq!(line("V")[1..3], ["input", "V*"], "{told}");
     assert_eq!(line("x")[1..4], ["output", "2", "µm*"], "{told}");
     assert_eq!(line("w")[1..3], ["-", "?"], "{told}");
-    assert!(told.contains("times from the column \"t\"") && told.contains("the file states no unit"), "{told}");
+    assert!(told.contains("times from the column \"t\"") && told.contains("from --map, not from the file"), "{told}");
     lab.write("rated.csv", "voltage_v,displacement_um\n1,2\n2,3\n3,4\n");
     assert!(lab.ok("info rated.csv --rate 10").stdout.contains("times from --rate"));
     // A counter is no output, and a sensor in volts needs its scale.
