@@ -25,14 +25,14 @@ pub(crate) struct CloseLoopArgs {
     /// Base model to begin with: pi or preisach
     #[arg(long, value_name = "KIND", default_value = "pi", value_parser = base)]
     pub(crate) model: Kind,
-    /// Most turns [default: 4, with --until 12]
+    /// Most turns; 4 if nothing is given, with --until 12
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=20))]
     pub(crate) turns: Option<u32>,
     /// Choose the experiments: begin with a short one, then play the drive that decides most of what is open per second, until each named
     /// effect has this probability and no effect without a name has 0.5 or more
     #[arg(long, value_name = "PROBABILITY", value_parser = probability)]
     pub(crate) until: Option<f64>,
-    /// Time for the chosen experiments [s], as 120 or 120s
+    /// Time for the chosen experiments in seconds, as 120 or 120s
     #[arg(long, value_name = "SECONDS", default_value = "120", requires = "until", value_parser = duration)]
     pub(crate) within: f64,
     /// Standard error that the best known parameter of each effect is to have, as a share of its value
