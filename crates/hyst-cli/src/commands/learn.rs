@@ -22,6 +22,9 @@ use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
 use crate::{recording, text};
 
+/// How often a pass is played again in which the device had no next value in time.
+const REPLAYS: u32 = 4;
+
 /// An effect that the passes show.
 #[derive(Debug, Serialize)]
 struct Found {
@@ -184,12 +187,17 @@ impl<'a> Passes<'a> {
         error
     }
 
-    /// One pass: the outputs of each play at the rows of the drive. A pass in which the device had to wait for its drive is played again, once.
+    /// One pass: the outputs of each play at the rows of the drive. A pass in which the device had to wait for its drive is played again: a host that
+    /// is held up now and then spoils some, a line that is too slow all of them.
     fn plays(&mut self, learner: &Learner<'_>, number: usize) -> CommandResult<Vec<Vec<f64>>> {
         let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}.mcap")));
         let (mut recording, mut gaps) = self.played(learner, name.as_deref())?;
-        if gaps > 0 {
-            let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}-again.mcap")));
+        for again in 1..=REPLAYS {
+            if gaps == 0 {
+                break;
+            }
+            let ending = if again == 1 { "again".to_owned() } else { format!("again-{again}") };
+            let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}-{ending}.mcap")));
             say(&format!(
                 "note: pass {number} is played again: the device had no next value in time, so its drive was another one"
             ));
