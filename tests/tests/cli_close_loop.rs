@@ -1,13 +1,19 @@
 //! `close-loop`: measure, find, add, compensate, measure again.
 
 use hyst_tests::Lab;
+use serde_json::Value;
+
+/// The folder in which the loop was closed on a plant, and the summary.
+fn closed(plant: &str, options: &str) -> (Lab, Value) {
+    let lab = Lab::new();
+    lab.write("plant.toml", plant);
+    let summary = lab.ok(&format!("close-loop --daq sim:plant.toml {options} --out loop --json")).json();
+    (lab, summary)
+}
 
 #[test]
 fn the_loop_closes_on_an_actuator_with_a_lag() {
-    let lab = Lab::new();
-    lab.write("plant.toml", hyst_tests::PLANT);
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --turns 3 --out loop --json");
-    let summary = ran.json();
+    let (lab, summary) = closed(hyst_tests::PLANT, "--rate 250 --turns 3");
     let turns = summary["turns"].as_array().unwrap();
     assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
     // With the lag in the model of a base that is fine enough nothing more is found.
@@ -25,10 +31,7 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
 /// Chosen experiments reach the same names in less time than the usual one of 36 s takes.
 #[test]
 fn experiments_are_chosen_until_all_is_known() {
-    let lab = Lab::new();
-    lab.write("plant.toml", hyst_tests::PLANT);
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --until 0.95 --within 30s --out loop --json");
-    let summary = ran.json();
+    let (lab, summary) = closed(hyst_tests::PLANT, "--rate 250 --until 0.95 --within 30s");
     let turns = summary["turns"].as_array().unwrap();
     let last = turns.last().unwrap();
     assert_eq!(last["found"], serde_json::json!(["lag"]), "{summary:#}");
@@ -48,10 +51,8 @@ fn experiments_are_chosen_until_all_is_known() {
 /// What an amplifier has not followed is measured anew with a drive that it follows.
 #[test]
 fn the_loop_closes_on_an_amplifier_that_is_slow() {
-    let lab = Lab::new();
-    lab.write("plant.toml", format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT));
-    let ran = lab.ok("close-loop --daq sim:plant.toml --rate 250 --turns 2 --out loop --json");
-    let summary = ran.json();
+    let plant = format!("{}\n[[disturbance]]\nkind = \"slew-limit\"\nv_per_s = 1500\n", hyst_tests::PLANT);
+    let (lab, summary) = closed(&plant, "--rate 250 --turns 2");
     let turns = summary["turns"].as_array().unwrap();
     let limit = turns[0]["slew_limit"].as_f64().unwrap();
     assert!((limit / 1500.0 - 1.0).abs() < 0.1, "{summary:#}");

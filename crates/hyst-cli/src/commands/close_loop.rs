@@ -116,7 +116,8 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
     let mut kind = args.model;
     let mut unit = None;
     let mut plan = Plan::new(args, daq);
-    let (mut plain, mut base_alone) = (f64::NAN, f64::NAN);
+    // Errors of a plain gain and of the inverse of the base alone, once a reference was followed.
+    let mut without_effects = None;
     let mut ended = format!("all {most} turns are done; give more with --turns");
     for turn in 1..=most {
         progress.say(&format!("turn {turn}: experiment"));
@@ -167,9 +168,10 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let tracking = if args.until.is_none() || ends.is_some() || turn == most {
             progress.say(&format!("turn {turn}: following a reference"));
             let task = Task::of(&found.extended, &train, args.rate);
-            if plain.is_nan() {
-                plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
-                base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;
+            if without_effects.is_none() {
+                let plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
+                let base_alone = task.judge(&task.through(daq, &start, None)?, &found.extended).rmse;
+                without_effects = Some((plain, base_alone));
             }
             let files = Files { log: &file("run", turn, "mcap"), drive: &file("drive", turn, "csv") };
             let Run { rmse, max_abs, shown_rmse, .. } =
@@ -206,6 +208,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         }
         model = Some(found.extended);
     }
+    let (plain, base_alone) = without_effects.unwrap_or((f64::NAN, f64::NAN));
     Ok(Summary {
         unit: unit.map_or("", |u| u.suffix()).to_owned(),
         plain_gain_rmse: plain,
