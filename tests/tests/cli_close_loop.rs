@@ -56,9 +56,9 @@ fn the_loop_closes_on_an_amplifier_that_is_slow() {
     let turns = summary["turns"].as_array().unwrap();
     let limit = turns[0]["slew_limit"].as_f64().unwrap();
     assert!((limit / 1500.0 - 1.0).abs() < 0.1, "{summary:#}");
-    assert_eq!(turns[1]["slew_limit"], serde_json::Value::Null, "{summary:#}");
+    assert_eq!(turns[1]["slew_limit"], Value::Null, "{summary:#}");
     assert_eq!(turns[1]["found"], serde_json::json!(["lag"]), "{summary:#}");
-    let error = |turn: &serde_json::Value| turn["tracking_rmse"].as_f64().unwrap();
+    let error = |turn: &Value| turn["tracking_rmse"].as_f64().unwrap();
     assert!(error(turns.last().unwrap()) < 0.5 * summary["base_inverse_rmse"].as_f64().unwrap(), "{summary:#}");
     let drive = lab.read("loop/train-2.csv");
     let volts: Vec<f64> = drive.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
