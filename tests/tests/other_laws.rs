@@ -199,6 +199,21 @@ fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
+/// A Bouc-Wen model is kept as it is: no other past is tried for it, however little it follows where the record begins.
+#[test]
+fn a_lag_is_found_behind_an_operator_that_is_not_refitted() {
+    let late = |t: &[f64], u: &[f64]| {
+        let (share, mut y) = ((-(t[1] - t[0]) / 0.012).exp(), None);
+        let mut follow = |to: f64| *y.insert(y.map_or(to, |y: f64| share * y + (1.0 - share) * to));
+        let mut noise = noise(t);
+        bouc_wen(t, u).into_iter().map(|to| follow(to) + noise()).collect()
+    };
+    let d = diagnosed(Kind::BoucWen, &from_the_middle(&late));
+    assert_eq!(names(&d), ["lag"], "{:#?}", d.findings);
+    let lag = d.extended.effects.lag.unwrap();
+    assert!((lag.seconds / 0.012 - 1.0).abs() < 0.1, "{lag:?}");
+}
+
 /// A stop that bends softly at both ends turns a loop over into itself like any symmetric bend; but it halves what moves there.
 #[test]
 fn a_soft_stop_at_both_ends_is_a_saturation() {

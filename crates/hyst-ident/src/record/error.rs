@@ -149,7 +149,9 @@ pub enum RecordError {
         hint: &'static str,
     },
     /// A field is not a number.
-    #[error("{file}, {place}, column \"{column}\": \"{text}\" is not a number; write it as 1.25 or 1.25e-3")]
+    #[error(
+        "{file}, {place}, column \"{column}\": \"{text}\" is not a number; write it as 1.25 or 1.25e-3, or leave the cell empty if the value is unknown"
+    )]
     NotANumber {
         /// The file.
         file: String,
@@ -280,7 +282,7 @@ pub enum RecordError {
     },
     /// Columns given in memory differ in length.
     #[error(
-        "{name}, column \"{column}\": {found} values, but \"time_s\" has {expected}; give every column the same length"
+        "{name}, column \"{column}\": {found} values, but \"time_s\" has {expected}; every column needs one value per time: find out which rows lack one"
     )]
     Lengths {
         /// The record.

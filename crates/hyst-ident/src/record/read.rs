@@ -195,18 +195,13 @@ pub(super) fn with_layout(
         (None, Clock::Column { .. }) => (Vec::new(), Printed::EXACT),
     };
     let place = |row: usize| contents.place(row);
-    let named = [
-        ("the input", input.as_ref().map(Vec::len)),
-        ("the output", output.as_ref().map(Vec::len)),
-        ("the temperature", temperature.as_ref().map(Vec::len)),
-        ("the load", load.as_ref().map(Vec::len)),
-        ("the segment", labels.as_ref().map(|values| values.numbers.len())),
-    ];
-    for (role, found) in named {
-        if let Some(found) = found.filter(|found| *found != time.len()) {
+    let lengths = [&input, &output, &temperature, &load].map(|values| values.as_ref().map(Vec::len));
+    let of_labels = (layout.segment, labels.as_ref().map(|values| values.numbers.len()));
+    for (at, found) in chosen.into_iter().zip(lengths).chain([of_labels]) {
+        if let (Some(at), Some(found)) = (at, found.filter(|found| *found != time.len())) {
             return Err(RecordError::Lengths {
                 name: name.to_owned(),
-                column: role.to_owned(),
+                column: column(at).to_owned(),
                 found,
                 expected: time.len(),
             });

@@ -319,7 +319,8 @@ impl Search<'_> {
                 );
             }
             _ if required => {
-                let what = format!("no heading states a unit of {}, as {} does", role.words(), role.accepted());
+                let which = if self.is_without_names() { "no column has a name, and none" } else { "no heading" };
+                let what = format!("{which} states a unit of {}, as {} does", role.words(), role.accepted());
                 problems.add(role, None, what);
             }
             _ => {}
@@ -330,6 +331,11 @@ impl Search<'_> {
     /// Whether a column numbers the rows, where `role` is a quantity.
     fn is_counter(&self, role: Role, column: usize) -> bool {
         role != Role::Time && self.file.counters.contains(&column)
+    }
+
+    /// Whether all columns go by their numbers.
+    fn is_without_names(&self) -> bool {
+        (0..self.headings.len()).all(|at| self.name(at).bytes().all(|byte| byte.is_ascii_digit()))
     }
 
     /// Whether a column goes by no unit, neither a known one nor another.

@@ -228,7 +228,9 @@ pub(crate) fn unpack<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, R
     if unpacked.len() as u64 > limit {
         return Err(damaged(
             format,
-            format!("expands to more than {MAX_EXPANSION} times its size, as no table of numbers does"),
+            format!(
+                "expands to more than {MAX_EXPANSION} times its size, as measured values do not; unpack it yourself if you trust it, and read the file inside"
+            ),
         ));
     }
     Ok(Cow::Owned(unpacked))

@@ -88,7 +88,9 @@ pub(super) fn variables(bytes: &[u8]) -> Result<Structs<'_>, String> {
             .and_then(|size| size.checked_add(start));
         let Some(data) = end.and_then(|end| rest.get(start..end)) else {
             let [rows, columns] = header.dims;
-            return Err(cut(&format!(", \"{name}\" of {rows} × {columns} numbers")));
+            return Err(format!(
+                "variable {number}, \"{name}\", announces {rows} × {columns} numbers, more than the file holds; the file is cut off or this size is damaged: copy it again, or save it again"
+            ));
         };
         values.push(array(header, data));
         names.push(name);
