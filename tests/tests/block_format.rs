@@ -18,7 +18,7 @@ use hyst_core::{
     CreepParams, Curve, DelayParams, DpmParams, DriftParams, EffectParams, GlOrder, GpiParams, IfmParams,
     InterferenceParams, Kind, LagParams, LfdmParams, List, LoadParams, MaxwellSlipParams, MirrorParams, OperatorParams,
     PiParams, PreisachParams, RateLaw, RateParams, ResonanceParams, SaturationParams, SlipReading, TdEmParams,
-    TdPiParams, TemperatureParams, ViscousPiParams, read_block, write_block,
+    TdPiParams, TemperatureParams, ViscousPiParams, WideningParams, read_block, write_block,
 };
 use hyst_tests::root;
 
@@ -118,6 +118,14 @@ fn effects() -> Vec<(&'static str, Effects)> {
         delay: Some(DelayParams { seconds: 1.5 }),
         lag: Some(LagParams { seconds: 2.5 }),
         rate: Some(RateParams { volts: 1.5, exponent: 2.5, reference_rate: 3.5, law: RateLaw::Holds }),
+        widening: Some(WideningParams {
+            growth: 1.5,
+            exponent: 2.5,
+            reference_rate: 3.5,
+            seconds: 4.5,
+            thresholds: vec![5.5],
+            weights: vec![6.5],
+        }),
         asymmetry: Some(AsymmetryParams::before(vec![1.5, 2.5], vec![3.5, 4.5])),
         temperature: Some(TemperatureParams { per_kelvin: 1.5, reference_degc: 2.5, expansion: 3.25, seconds: 4.25 }),
         creep: Some(CreepParams { seconds: vec![1.5, 2.5], shares: vec![3.5, 4.5] }),
@@ -133,11 +141,24 @@ fn effects() -> Vec<(&'static str, Effects)> {
         }),
     };
     // Taken apart by name: a stage that is added has to be added here.
-    let Effects { delay, lag, rate, asymmetry, temperature, creep, load, resonances, saturation, drift, interference } =
-        all.clone();
+    let Effects {
+        delay,
+        lag,
+        rate,
+        widening,
+        asymmetry,
+        temperature,
+        creep,
+        load,
+        resonances,
+        saturation,
+        drift,
+        interference,
+    } = all.clone();
     vec![
         ("delay", Effects { delay, ..none() }),
         ("lag", Effects { lag, ..none() }),
+        ("widening", Effects { widening, ..none() }),
         ("rate", Effects { rate, ..none() }),
         ("asymmetry", Effects { asymmetry, ..none() }),
         ("temperature", Effects { temperature, ..none() }),

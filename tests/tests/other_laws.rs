@@ -271,6 +271,51 @@ fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
+/// Relays with the coercive voltages of the rate \[µm\], which each feels as the mean of the last 16 ms.
+fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
+    const STEPS: u32 = 4;
+    let mut relays: Vec<(f64, f64, f64)> = (0..1600)
+        .map(|i| (f64::from(i % 40) * 1.5 - 20.0, 0.5 + f64::from(i / 40) * 1.2))
+        .map(|(middle, half)| (middle, half, -1.0))
+        .collect();
+    let (mut noise, mut from, mut last) = (noise(t), u[0], [0.0; 8]);
+    let mut row = |(k, to): (usize, &f64)| {
+        last[k % 8] = (to - from).abs() / 2e-3;
+        let rate = last.iter().sum::<f64>() / 8.0;
+        let wider = 1.0 + 0.12 * (1.0 + rate / 20.0).ln();
+        for step in 1..=STEPS {
+            let v = from + (to - from) * f64::from(step) / f64::from(STEPS);
+            for (middle, half, state) in &mut relays {
+                if (v - *middle).abs() >= *half * wider {
+                    *state = (v - *middle).signum();
+                }
+            }
+        }
+        from = *to;
+        0.2 * to + 20.0 * relays.iter().map(|r| r.2).sum::<f64>() / 1600.0 + noise()
+    };
+    u.iter().enumerate().map(&mut row).collect()
+}
+
+/// Coercive voltages that grow with the logarithm of the rate, as it is felt over some milliseconds: no overdrive common to all loops, and no power of
+/// the rate of the moment.
+#[test]
+fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
+    let drive = |t: f64| {
+        let swing = 45.0 * (0.75 + 0.25 * (0.9 * t).cos());
+        // From 0.5 to 12 Hz and back.
+        swing * (0.5 * t + 3.6 * (1.0 - (0.3 * t).cos())).mul_add(std::f64::consts::TAU, 0.0).sin()
+    };
+    for kind in [Kind::Pi, Kind::Preisach] {
+        let made = |name: &str, after: f64, rows: usize| one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate);
+        let d = diagnosed(kind, &(made("train", 0.0, 12_000), made("test", 2.0, 6000)));
+        assert_eq!(names(&d), ["rate-dependence"], "{kind}: {:#?}", d.findings);
+        assert_eq!(d.findings.effects[0].law.as_deref(), Some("power-thresholds"), "{kind}");
+        let (before, after) = (d.findings.before.test.unwrap().rmse, d.findings.after.test.unwrap().rmse);
+        assert!(after < 0.6 * before, "{kind}: {before} {after}");
+    }
+}
+
 /// Relays that switch in three lumps, driven by stairs and a slow walk of few turns. A rich base fits a part of each of three effects and predicts
 /// badly; none shows by itself on it.
 #[test]

@@ -5,7 +5,7 @@ use crate::{
     Asymmetry, AsymmetryParams, Build, Creep, CreepParams, CreepState, CurveSide, Delay, DelayParams, DelayState,
     Drift, DriftParams, Env, Error, Interference, InterferenceParams, Lag, LagParams, LagState, Load, LoadParams, Rate,
     RateParams, RateState, Real, Resonance, ResonanceParams, ResonanceState, Sampling, Saturation, SaturationParams,
-    Stage, Temperature, TemperatureParams, TemperatureState,
+    Stage, Temperature, TemperatureParams, TemperatureState, Widening, WideningParams, WideningState,
 };
 
 /// Structural modes that one chain can hold.
@@ -14,7 +14,7 @@ pub const MAX_RESONANCES: usize = 2;
 /// Dead zones that the asymmetry of one chain can hold.
 pub const MAX_DEAD_ZONES: usize = 8;
 
-/// `u → delay → lag → rate → asymmetry before it, ±HYSTERESIS, asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
+/// `u → delay → lag → rate → asymmetry before it, ±(HYSTERESIS + widening), asymmetry behind it → ×temperature → +creep → +load → resonance(s) → saturation → +drift →
 /// +interference → + zero → y`, every stage but the hysteresis optional.
 ///
 /// `H` is the hysteresis, `D` the samples the delay can hold, `C` the elements of the creep bank.
@@ -30,6 +30,8 @@ pub struct Chain<T, H, const D: usize, const C: usize> {
     pub input_curve: Option<Asymmetry<T, MAX_DEAD_ZONES>>,
     /// The memory operator.
     pub hysteresis: H,
+    /// What the loops are wider by at a rate, beside the memory operator.
+    pub widening: Option<Widening<T>>,
     /// Whether the output falls where the operator rises: a negative gain.
     pub falls: bool,
     /// Curve behind the memory operator.
@@ -62,6 +64,7 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     lag: LagState<T>,
     rate: RateState<T>,
     hysteresis: S,
+    widening: WideningState<T>,
     felt: TemperatureState<T>,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],
@@ -76,6 +79,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             rate: None,
             input_curve: None,
             hysteresis,
+            widening: None,
             falls: false,
             asymmetry: None,
             temperature: None,
@@ -113,6 +117,15 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
     /// As [`RateParams::build`].
     pub fn with_rate(mut self, p: &RateParams, cx: &Sampling) -> Result<Self, Error> {
         self.rate = Some(p.build(cx)?);
+        Ok(self)
+    }
+
+    /// Adds loops that widen with the rate in proportion to their width.
+    ///
+    /// # Errors
+    /// As [`WideningParams::build`].
+    pub fn with_widening<L: AsRef<[f64]>>(mut self, p: &WideningParams<L>, cx: &Sampling) -> Result<Self, Error> {
+        self.widening = Some(p.build(cx)?);
         Ok(self)
     }
 
@@ -238,6 +251,7 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
             lag: LagState::default(),
             rate: RateState::default(),
             hysteresis: self.hysteresis.state(),
+            widening: WideningState::default(),
             felt: TemperatureState::default(),
             creep: CreepState::new(),
             resonances: [ResonanceState::default(); MAX_RESONANCES],
@@ -259,7 +273,9 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Stage<T> for Chain<T,
         x = through(&self.lag, x, |g, x| g.step(&mut s.lag, e, x));
         x = through(&self.rate, x, |g, x| g.step(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.step(&mut (), e, x));
-        x = signed(self.falls, self.hysteresis.step(&mut s.hysteresis, e, x));
+        let memory = self.hysteresis.step(&mut s.hysteresis, e, x);
+        let memory = through(&self.widening, memory, |g, memory| memory + g.step(&mut s.widening, e, x));
+        x = signed(self.falls, memory);
         x = through(&self.asymmetry, x, |g, x| g.step(&mut (), e, x));
         x = through(&self.temperature, x, |g, x| g.step(&mut s.felt, e, x));
         x = through(&self.creep, x, |g, x| g.step(&mut s.creep, e, x));
@@ -286,14 +302,22 @@ impl<T: Real, H: Stage<T>, const D: usize, const C: usize> Chain<T, H, D, C> {
         x = through(&self.rate, x, |g, x| g.reset(&mut s.rate, e, x));
         x = through(&self.input_curve, x, |g, x| g.reset(&mut (), e, x));
         let mut past = past.iter().filter(|u| u.is_finite());
+        s.widening = WideningState::default();
+        let widen = |s: &mut WideningState<T>, u: T| self.widening.iter().for_each(|g| g.rest(s, u));
         x = match past.next() {
-            None => self.hysteresis.reset(&mut s.hysteresis, e, x),
+            None => {
+                widen(&mut s.widening, x);
+                self.hysteresis.reset(&mut s.hysteresis, e, x)
+            }
             Some(first) => {
                 let bent = |u: T| through(&self.input_curve, u, |g, u| g.reset(&mut (), e, u));
                 self.hysteresis.reset(&mut s.hysteresis, e, bent(*first));
+                widen(&mut s.widening, bent(*first));
                 for u in past {
                     self.hysteresis.step(&mut s.hysteresis, e, bent(*u));
+                    widen(&mut s.widening, bent(*u));
                 }
+                widen(&mut s.widening, x);
                 self.hysteresis.step(&mut s.hysteresis, e, x)
             }
         };

@@ -6,7 +6,7 @@ use crate::stage::{hold, rest};
 use crate::{
     AsymmetryInverse, Build, Chain, Complex, CreepInverse, CreepInverseState, Delay, DelayParams, DelayState, Env,
     Error, Invert, Load, MAX_DEAD_ZONES, RateInverse, RateState, Real, Sampling, SaturationInverse, Stage, Temperature,
-    TemperatureState,
+    TemperatureState, Widening, WideningState,
 };
 
 /// How the dynamic stages are inverted.
@@ -20,9 +20,11 @@ pub struct CompensatorOptions {
 
 /// The inverse chain, stage by stage from the output back to the input:
 ///
-/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹, HYSTERESIS⁻¹, asymmetry⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
+/// `y − zero → saturation⁻¹ → resonances⁻¹ → −load → creep⁻¹ → ÷temperature → asymmetry⁻¹ → −widening, HYSTERESIS⁻¹, asymmetry⁻¹ → rate⁻¹ → (lag, delay)⁻¹ → u`.
 ///
-/// All but rate, resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached); of the rate see [`RateInverse`]. Resonances, lag and delay are inverted in
+/// All but rate, widening, resonances, lag and delay is inverted exactly (saturation as far as its limits can be reached); of the rate see [`RateInverse`]. What a widening
+/// adds is taken where the drive would be if it went on as it did: off by the second difference of the drive, times the weights of the widening. With an
+/// inverse hysteresis that needs preview it is that of the last drive that is known. Resonances, lag and delay are inverted in
 /// a band with [`lead`](Self::lead) samples of preview; [`error`](Self::error) states how well. Drift
 /// and interference are in the sensor, not in the motion: the drive does not follow them.
 ///
@@ -39,6 +41,7 @@ pub struct Compensator<T, HI, const D: usize, const C: usize, const N: usize> {
     asymmetry: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     falls: bool,
     hysteresis: HI,
+    widening: Option<Widening<T>>,
     input_curve: Option<AsymmetryInverse<T, MAX_DEAD_ZONES>>,
     rate: Option<RateInverse<T>>,
     input_side: Option<Preview<T, N>>,
@@ -65,6 +68,9 @@ pub struct CompensatorState<T, S, const C: usize, const N: usize> {
     temperature: DelayState<T, N>,
     felt: TemperatureState<T>,
     hysteresis: S,
+    widening: WideningState<T>,
+    /// Where the hysteresis was driven to last, and before.
+    driven: [T; 2],
     rate: RateState<T>,
     input_side: PreviewState<T, N>,
 }
@@ -155,6 +161,7 @@ impl<T: Real, H, const D: usize, const C: usize> Chain<T, H, D, C> {
             hysteresis_lead: hysteresis.lead,
             hysteresis_band: hysteresis.band,
             hysteresis: hysteresis.inverse,
+            widening: self.widening,
             input_curve: self.input_curve.as_ref().map(Invert::invert).transpose()?,
             rate: self.rate.as_ref().map(Invert::invert).transpose()?,
             input_side,
@@ -220,6 +227,8 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             temperature: DelayState::new(),
             felt: TemperatureState::default(),
             hysteresis: self.hysteresis.state(),
+            widening: WideningState::default(),
+            driven: [T::ZERO; 2],
             rate: RateState::default(),
             input_side: PreviewState::new(),
         }
@@ -253,6 +262,10 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
             x = asymmetry.reset(&mut (), e, x);
         }
         x = self.hysteresis.reset(&mut s.hysteresis, e, signed(self.falls, x));
+        if let Some(widening) = &self.widening {
+            widening.reset(&mut s.widening, e, x);
+        }
+        s.driven = [x; 2];
         if let Some(curve) = &self.input_curve {
             x = curve.reset(&mut (), e, x);
         }
@@ -296,7 +309,17 @@ impl<T: Real, HI: Stage<T>, const D: usize, const C: usize, const N: usize> Stag
         if let Some(asymmetry) = &self.asymmetry {
             x = asymmetry.step(&mut (), e, x);
         }
-        x = self.hysteresis.step(&mut s.hysteresis, e, signed(self.falls, x));
+        x = signed(self.falls, x);
+        if let Some(widening) = &self.widening {
+            let [last, before] = s.driven;
+            let next = if self.hysteresis_lead == 0 { last + (last - before) } else { last };
+            x -= widening.at(&s.widening, next);
+        }
+        x = self.hysteresis.step(&mut s.hysteresis, e, x);
+        if let Some(widening) = &self.widening {
+            widening.step(&mut s.widening, e, x);
+            s.driven = [x, s.driven[0]];
+        }
         if let Some(curve) = &self.input_curve {
             x = curve.step(&mut (), e, x);
         }
@@ -375,6 +398,26 @@ mod tests {
     fn smooth(k: usize) -> f64 {
         let t = 1e-3 * k as f64;
         3.0 * (1.0 - libm::cos(6.0 * t)) + 1.0 * (1.0 - libm::cos(41.0 * t))
+    }
+
+    /// What is left is of the second difference of the drive, a small part of what the widening adds.
+    #[test]
+    fn a_widening_is_inverted_but_for_the_second_difference_of_the_drive() {
+        let widening = crate::WideningParams {
+            growth: 0.3,
+            exponent: 0.4,
+            reference_rate: 300.0,
+            seconds: 4e-3,
+            thresholds: [5.0, 12.0, 25.0],
+            weights: [0.02, 0.02, 0.01],
+        };
+        let chain = Plain::new(pi()).with_widening(&widening, &PERIOD).unwrap();
+        let (missed, _) = worst(&chain, smooth, 4000);
+        let plain = Plain::new(pi()).compensator(&PERIOD, &CompensatorOptions::default()).unwrap();
+        let without = super::tests::missed(&chain, &Box::new(plain), smooth, 4000);
+        assert!(without > 0.2 * widening.wider() && missed < 0.02 * without, "{missed} {without}");
+        let (falling, _) = worst(&chain.with_falling(true), |k| -0.4 * smooth(k), 4000);
+        assert!(falling < 0.02 * without, "{falling}");
     }
 
     #[test]

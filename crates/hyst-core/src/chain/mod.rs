@@ -16,6 +16,7 @@ mod rate;
 mod resonance;
 mod saturation;
 mod temperature;
+mod widening;
 
 pub use asymmetry::{Asymmetry, AsymmetryInverse, AsymmetryParams, CurveSide};
 pub use chain::{Chain, ChainState, MAX_DEAD_ZONES, MAX_RESONANCES};
@@ -32,3 +33,4 @@ pub use rate::{Rate, RateInverse, RateLaw, RateParams, RateState};
 pub use resonance::{Resonance, ResonanceParams, ResonanceState};
 pub use saturation::{Saturation, SaturationInverse, SaturationParams};
 pub use temperature::{Temperature, TemperatureParams, TemperatureState};
+pub use widening::{MAX_WIDENING, Widening, WideningParams, WideningState};

@@ -15,8 +15,9 @@ use super::ChainParams;
 /// Version of the blocks that this version of the library writes and reads.
 ///
 /// 1: as first written. 2: `volt_seconds` behind `seconds` in the parameters of viscous plays. 3: the rate stage behind the lag, what settles
-/// behind the rate of a drift, harmonics behind the phase of a tone. 4: the side of a curve. 5: whether the output falls, before the zero.
-pub const BLOCK_VERSION: u8 = 5;
+/// behind the rate of a drift, harmonics behind the phase of a tone. 4: the side of a curve. 5: whether the output falls, before the zero. 6: the widening
+/// behind the rate stage.
+pub const BLOCK_VERSION: u8 = 6;
 
 /// A list of at most `N` numbers without heap.
 pub type List<const N: usize> = heapless::Vec<f64, N>;

@@ -3,7 +3,7 @@
 use super::OperatorParams;
 use crate::{
     AsymmetryParams, Chain, CreepParams, DelayParams, DriftParams, Error, InterferenceParams, LagParams, LoadParams,
-    MAX_RESONANCES, RateParams, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams,
+    MAX_RESONANCES, RateParams, Real, ResonanceParams, Sampling, SaturationParams, TemperatureParams, WideningParams,
 };
 
 /// The optional stages of a chain, in its order. `L` is any list of numbers.
@@ -16,6 +16,8 @@ pub struct EffectParams<L> {
     pub lag: Option<LagParams>,
     /// Loops that widen with the rate of the drive.
     pub rate: Option<RateParams>,
+    /// Loops that widen with the rate, each in proportion to its width.
+    pub widening: Option<WideningParams<L>>,
     /// Curve behind or before the hysteresis.
     pub asymmetry: Option<AsymmetryParams<L>>,
     /// Gain and expansion over temperature.
@@ -53,6 +55,9 @@ impl<L: AsRef<[f64]>> EffectParams<L> {
         }
         if let Some(p) = &self.rate {
             chain = chain.with_rate(p, cx)?;
+        }
+        if let Some(p) = &self.widening {
+            chain = chain.with_widening(p, cx)?;
         }
         if let Some(p) = &self.asymmetry {
             chain = chain.with_asymmetry(p)?;

@@ -60,6 +60,7 @@ fn law(model: &Model, effect: Effect) -> Option<&'static str> {
     Some(match effect {
         Effect::Delay => "dead-time",
         Effect::Lag => "first-order",
+        Effect::RateDependence if e.widening.is_some() => "power-thresholds",
         Effect::RateDependence if e.rate.is_none() => "viscous-plays",
         Effect::RateDependence => match e.rate?.law {
             RateLaw::Follows => "power-follows",
@@ -115,6 +116,17 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             };
             format!(
                 "the curve {side} the hysteresis has slope {low:.3} at its lower end and {high:.3} at its upper end"
+            )
+        }
+        Effect::RateDependence if e.widening.is_some() => {
+            let p = e.widening.as_ref()?;
+            format!(
+                "loops widen with the rate to the power of {:.2}, wide ones more than narrow ones: at {} {input}/s the branches of a wide loop are {} {} farther \
+                 apart than on a slow drive",
+                p.exponent,
+                short(p.reference_rate),
+                short(2.0 * p.wider()),
+                symbol(m)
             )
         }
         Effect::RateDependence if e.rate.is_some() => {
@@ -271,6 +283,12 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
                 put("asymmetry", &format!("thresholds[{i}]"), *s, unit);
                 put("asymmetry", &format!("weights[{i}]"), *c, "1");
             }
+        }),
+        Effect::RateDependence if e.widening.is_some() => e.widening.iter().for_each(|p| {
+            put("rate-dependence", "wider", p.wider(), y);
+            put("rate-dependence", "exponent", p.exponent, "1");
+            put("rate-dependence", "seconds", p.seconds, "s");
+            put("rate-dependence", "reference_rate", p.reference_rate, &format!("{input}/s"));
         }),
         Effect::RateDependence if e.rate.is_some() => e.rate.iter().for_each(|p| {
             put("rate-dependence", "volts", p.volts, input);

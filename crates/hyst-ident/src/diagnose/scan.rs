@@ -6,7 +6,7 @@
 use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
 use super::starts::{PER_DECADE, bank, starting_temperature, stops};
-use crate::model::{Effect, Effects};
+use crate::model::{Effect, Effects, Widening};
 use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, SignalPath, Vantage, hat, owed};
 use crate::samples::range;
 
@@ -24,7 +24,7 @@ pub(super) struct Scan<'a> {
     pub(super) vantage: Vantage<'a>,
     /// Gain in Σ residual² that is asked for.
     pub(super) least_gain: f64,
-    promising: f64,
+    pub(super) promising: f64,
 }
 
 impl<'a> Scan<'a> {
@@ -57,6 +57,16 @@ impl<'a> Scan<'a> {
         let mut moved = self.problem.motion(h, &self.from.solution)?;
         moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
         Ok(moved)
+    }
+
+    /// Gain of the plays of a widening together.
+    pub(super) fn gain_of_widening(&self, widening: &Widening) -> Result<f64, Error> {
+        let mut h = self.from.hypothesis.clone();
+        h.effects.widening = Some(widening.clone());
+        let path = SignalPath::new(self.problem.samples, &h)?;
+        let mut columns = path.widening();
+        path.output_side_of(&mut columns);
+        Ok(self.vantage.projector.joint_gain(&columns, &self.residual))
     }
 
     /// What stages behind the motion change it by.

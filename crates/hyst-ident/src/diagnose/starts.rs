@@ -11,7 +11,7 @@ use hyst_core::{
 use super::scan::Scan;
 use super::spectrum::{peaks, tone};
 use crate::base::DragParams;
-use crate::model::{CreepBank, Effect, Effects};
+use crate::model::{CreepBank, Effect, Effects, Widening};
 use crate::nested::{Cause, Fitted, Hypothesis, shown_motion, slopes};
 use crate::samples::Samples;
 
@@ -68,7 +68,9 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
             let in_the_plays = [linear, root].map(|drag| also(&|h| h.drag = Some(drag)));
             // And one on the whole drive, for any base.
             let on_the_drive = widenings(scan)?.into_iter().map(|rate| with(&|e| e.rate = Some(rate)));
-            in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).collect()
+            // And thresholds that grow with the rate, beside any base.
+            let grown = grown_thresholds(scan)?.map(|widening| with(&|e| e.widening = Some(widening.clone())));
+            in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).chain(grown).collect()
         }
         // It is looked for on the user's base.
         Effect::Asymmetry => Vec::new(),
@@ -206,6 +208,50 @@ fn widenings(scan: &Scan<'_>) -> Result<Vec<RateParams>, Error> {
         }
     }
     Ok(chosen)
+}
+
+/// Growth of the thresholds at the reference rate, which is that of the median moving row; and the thresholds, evenly over half the range.
+const GROWTH: f64 = 0.3;
+const GROWN: usize = 6;
+/// Exponents, and times over which the rate is felt in samples, that are tried.
+const GROWTH_EXPONENTS: [f64; 2] = [0.3, 0.8];
+const FELT_OVER: [f64; 3] = [1.5, 12.0, 100.0];
+
+/// The thresholds that grow with the rate whose columns take most of the residual, if that is promising.
+fn grown_thresholds(scan: &Scan<'_>) -> Result<Option<Widening>, Error> {
+    let samples = scan.problem.samples;
+    let (low, high) = samples.input_range();
+    let Some(reference_rate) = median_rate(samples) else { return Ok(None) };
+    let thresholds: Vec<f64> = (1..=GROWN).map(|i| 0.5 * (high - low) * i as f64 / (GROWN + 1) as f64).collect();
+    let mut best: Option<(f64, Widening)> = None;
+    for exponent in GROWTH_EXPONENTS {
+        for felt_over in FELT_OVER {
+            let seconds = felt_over * samples.period;
+            if seconds > MOST_LATE * samples.longest_segment() {
+                continue;
+            }
+            let (thresholds, weights) = (thresholds.clone(), vec![0.0; GROWN]);
+            let widening = Widening { growth: GROWTH, exponent, reference_rate, seconds, thresholds, weights };
+            let gain = scan.gain_of_widening(&widening)?;
+            if gain >= best.as_ref().map_or(scan.promising, |(most, _)| *most) {
+                best = Some((gain, widening));
+            }
+        }
+    }
+    Ok(best.map(|(_, widening)| widening))
+}
+
+/// Median rate of the rows that move \[V/s\].
+fn median_rate(samples: &Samples) -> Option<f64> {
+    let (low, high) = samples.input_range();
+    let mut rates: Vec<f64> = Vec::with_capacity(samples.len());
+    for (i, rows) in samples.segments.iter().enumerate() {
+        let period = samples.period_of(i);
+        rates.extend(samples.input[rows.clone()].windows(2).map(|w| (w[1] - w[0]).abs() / period));
+    }
+    rates.retain(|rate| *rate * samples.period > 1e-6 * (high - low));
+    rates.sort_by(f64::total_cmp);
+    rates.get(rates.len() / 2).copied()
 }
 
 /// Slopes of the drive from which on it may not be followed, the one that takes most of the residual and a neighbour.

@@ -58,7 +58,10 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
             false => unsure("drift.per_second", p.per_second),
         }),
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
-        Effect::RateDependence => e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts)),
+        Effect::RateDependence => {
+            e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts))
+                || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.wider", p.wider()))
+        }
         // A stop acts or does not; a curve has several parameters of which one may be idle.
         Effect::Saturation | Effect::Asymmetry => false,
     };
@@ -134,6 +137,16 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
     let total: f64 = shares().filter_map(|(a, b)| covariance_of(a, b)).sum();
     if total > 0.0 {
         errors.insert("creep.total".into(), total.sqrt());
+    }
+    if let Some(p) = &fit.hypothesis.effects.widening {
+        // Neighbouring weights are far less certain than what they make together.
+        let plays = || layout.widening.clone().zip(&p.thresholds);
+        let pairs = plays().flat_map(|a| plays().map(move |b| (a, b)));
+        let parts = pairs.filter_map(|((a, r), (b, s))| Some(r * s * covariance_of(a, b)?));
+        let variance: f64 = parts.sum::<f64>() * p.growth * p.growth;
+        if variance > 0.0 {
+            errors.insert("rate-dependence.wider".into(), variance.sqrt());
+        }
     }
     let mut put = |name: String, unknown: Option<usize>| {
         if let Some(e) = unknown.and_then(of) {

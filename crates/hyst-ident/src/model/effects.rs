@@ -6,6 +6,7 @@ use std::str::FromStr;
 use hyst_core::{
     AsymmetryParams, CreepParams, CurveSide, DelayParams, DriftParams, EffectParams, InterferenceParams, LagParams,
     LoadParams, MAX_RESONANCES, Meta, Params, RateParams, ResonanceParams, SaturationParams, TemperatureParams,
+    WideningParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -109,6 +110,9 @@ const LEAST_BEND: f64 = -0.9;
 /// A bank of creep elements, as parameters.
 pub type CreepBank = CreepParams<Vec<f64>>;
 
+/// Plays whose thresholds grow with the rate, as parameters.
+pub type Widening = WideningParams<Vec<f64>>;
+
 /// Which effects a chain has, and their parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects {
@@ -118,6 +122,8 @@ pub struct Effects {
     pub lag: Option<LagParams>,
     /// Loops that widen with the rate of the drive, whatever the base; `pi` also has plays with drag.
     pub rate: Option<RateParams>,
+    /// Loops that widen with the rate in proportion to their width, whatever the base.
+    pub widening: Option<Widening>,
     /// Gain and expansion over temperature.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
@@ -166,7 +172,7 @@ impl Effects {
         push(self.delay.is_some(), Effect::Delay);
         push(self.lag.is_some(), Effect::Lag);
         push(self.asymmetry.is_some(), Effect::Asymmetry);
-        push(self.rate.is_some(), Effect::RateDependence);
+        push(self.rate.is_some() || self.widening.is_some(), Effect::RateDependence);
         push(self.temperature.is_some(), Effect::Temperature);
         push(self.creep.is_some(), Effect::Creep);
         push(self.load.is_some(), Effect::Load);
@@ -186,6 +192,7 @@ impl Effects {
             delay: self.delay,
             lag: self.lag,
             rate: self.rate,
+            widening: self.widening.clone(),
             asymmetry: self.asymmetry.clone(),
             temperature: self.temperature,
             creep: self.creep.clone(),
@@ -215,7 +222,7 @@ impl Effects {
             Effect::Delay => less.delay = None,
             Effect::Lag => less.lag = None,
             Effect::Asymmetry => less.asymmetry = None,
-            Effect::RateDependence => less.rate = None,
+            Effect::RateDependence => (less.rate, less.widening) = (None, None),
             Effect::Temperature => less.temperature = None,
             Effect::Creep => less.creep = None,
             Effect::Load => less.load = None,
@@ -240,7 +247,7 @@ impl Effects {
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// The rate and the height of a drift, load, a thermal expansion, the weights of an asymmetry behind the hysteresis, and the amplitude and phase of a tone enter linearly and are
+    /// The rate and the height of a drift, load, a thermal expansion, the weights of a widening and of an asymmetry behind the hysteresis, and the amplitude and phase of a tone enter linearly and are
     /// not among them.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
@@ -262,6 +269,13 @@ impl Effects {
         }
         if let Some(p) = &mut self.rate {
             pass(Effect::RateDependence, "", p, f);
+        }
+        if let Some(p) = &mut self.widening {
+            pass(Effect::RateDependence, "", p, &mut |parameter| {
+                if parameter.name != "weights" {
+                    f(parameter);
+                }
+            });
         }
         if let Some(p) = self.asymmetry.as_mut().filter(|p| p.side == CurveSide::Input) {
             let mut at = 0;

@@ -9,7 +9,7 @@ mod operator;
 mod stages;
 mod units;
 
-pub use effects::{CreepBank, Effect, Effects};
+pub use effects::{CreepBank, Effect, Effects, Widening};
 pub use elsewhere::Ends;
 pub use file::{Channel, FittedOn, Model, ModelError, SCHEMA, ZERO};
 pub use hyst_core::Kind;

@@ -83,6 +83,9 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
     if let Some(p) = &mut e.rate {
         push("rate", "rate-dependence", value(p), p);
     }
+    if let Some(p) = &mut e.widening {
+        push("widening", "rate-dependence", value(p), p);
+    }
     match &mut model.base.clone() {
         Base::ViscousPi(p) => {
             push("pi", "pi", value(&p.pi), &mut p.pi);
@@ -202,6 +205,10 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
                 "rate" => {
                     key = "rate-dependence";
                     only(&mut effects.rate, name, value)?;
+                }
+                "widening" => {
+                    key = "rate-dependence";
+                    only(&mut effects.widening, name, value)?;
                 }
                 "asymmetry" => only(&mut effects.asymmetry, name, value)?,
                 "temperature" => only(&mut effects.temperature, name, value)?,

@@ -32,6 +32,7 @@ fn of_given(field: &str) -> Option<&'static str> {
     Some(match field {
         "reference_degc" => "degC",
         "reference_rate" => "u/s",
+        "growth" => "",
         "since_s" => "s",
         "per_metre" => "y/m",
         "cells" | "plays" | "rates" | "changes" => "",

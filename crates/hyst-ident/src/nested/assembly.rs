@@ -75,14 +75,17 @@ impl Problem<'_> {
         };
         for _ in 1..if near.is_some() { ROUNDS_NEAR } else { ROUNDS } {
             let Some(round) = self.round(h, &path, &base, Some(point), None) else { return Ok(None) };
-            point = self.point(h, &path, self.combined(h, &base, &round.solution), &round.solution);
+            point = self.point(h, &path, self.combined(h, &path, &base, &round.solution), &round.solution);
         }
         Ok(self.round(h, &path, &base, Some(point), None))
     }
 
     /// The output of the operator for a solution.
-    fn combined(&self, h: &Hypothesis, base: &BaseColumns<'_>, z: &DVector<f64>) -> Vec<f64> {
-        base.combined(&z.as_slice()[self.layout(h).weights], self.samples.len())
+    fn combined(&self, h: &Hypothesis, path: &SignalPath<'_>, base: &BaseColumns<'_>, z: &DVector<f64>) -> Vec<f64> {
+        let layout = self.layout(h);
+        let mut operator = base.combined(&z.as_slice()[layout.weights], self.samples.len());
+        path.widen(&mut operator, &z.as_slice()[layout.widening]);
+        operator
     }
 
     /// The straight model's motion; where the output stands in the knee of a stop, the motion that would show it.
@@ -96,7 +99,7 @@ impl Problem<'_> {
         (straight.effects.asymmetry, straight.effects.saturation, straight.gain_wanders) = (None, None, false);
         let plain = SignalPath::new(self.samples, &straight)?;
         let Some(first) = self.round(&straight, &plain, base, None, None) else { return Ok(None) };
-        let operator = self.combined(&straight, base, &first.solution);
+        let operator = self.combined(&straight, &plain, base, &first.solution);
         let mut point = self.point(&straight, &plain, operator, &first.solution);
         if h.effects.saturation.is_some() {
             let zero = &first.solution.as_slice()[self.layout(&straight).zeros];
@@ -136,7 +139,9 @@ impl Problem<'_> {
 
     /// The course of the motion for a solution.
     pub(super) fn point_at(&self, h: &Hypothesis, path: &SignalPath<'_>, z: &DVector<f64>) -> Point {
-        let operator = self.operator(path, h, &z.as_slice()[self.layout(h).weights]);
+        let layout = self.layout(h);
+        let mut operator = self.operator(path, h, &z.as_slice()[layout.weights]);
+        path.widen(&mut operator, &z.as_slice()[layout.widening]);
         self.point(h, path, operator, z)
     }
 
@@ -217,6 +222,9 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
             columns.push((c, slowed(&shift)));
         }
+        let mut wider = path.widening();
+        path.output_side_of(&mut wider);
+        columns.extend(layout.widening.clone().zip(&wider).map(|(c, column)| (c, slowed(column))));
         if let (Some(p), Some(point)) = (h.effects.curve(CurveSide::Output), point) {
             let bend = |s: f64| point.operator.iter().map(|v| dead_zone(*v, s)).collect();
             let mut zones: Vec<Vec<f64>> = p.thresholds.iter().map(|s| bend(*s)).collect();

@@ -76,7 +76,7 @@ impl Hypothesis {
     /// Causes that are present, in the chain's order; a second mode counts once more.
     pub(crate) fn causes(&self) -> Vec<Cause> {
         let mut list: Vec<Effect> = self.effects.names();
-        if self.drag.is_some() && self.effects.rate.is_none() {
+        if self.drag.is_some() && !list.contains(&Effect::RateDependence) {
             list.push(Effect::RateDependence);
             list.sort();
         }
@@ -101,7 +101,9 @@ impl Hypothesis {
     /// Whether there is room for (another) one.
     pub(crate) fn has_room(&self, cause: Cause) -> bool {
         match cause {
-            Cause::Effect(Effect::RateDependence) => self.drag.is_none() && self.effects.rate.is_none(),
+            Cause::Effect(Effect::RateDependence) => {
+                self.drag.is_none() && self.effects.has_room(Effect::RateDependence)
+            }
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
@@ -114,7 +116,10 @@ impl Hypothesis {
     pub(crate) fn without(&self, cause: Cause) -> Self {
         let mut less = self.clone();
         match cause {
-            Cause::Effect(Effect::RateDependence) => (less.drag, less.effects.rate) = (None, None),
+            Cause::Effect(Effect::RateDependence) => {
+                less.drag = None;
+                less.effects = self.effects.without(Effect::RateDependence);
+            }
             Cause::Effect(e) => {
                 less.effects = self.effects.without(e);
                 less.goes_on &= less.is_slow();
@@ -139,6 +144,10 @@ impl Hypothesis {
                 let more = |p: TemperatureParams| usize::from(p.expansion != 0.0) + usize::from(p.seconds > 0.0);
                 Effect::Temperature.complexity() + self.effects.temperature.map_or(0, more)
             }
+            Cause::Effect(Effect::RateDependence) => {
+                let weights = self.effects.widening.as_ref().map_or(0, |p| p.weights.len());
+                Effect::RateDependence.complexity() + weights
+            }
             Cause::Effect(e) => e.complexity(),
             // No cause of its own: an actuator is seldom at rest when a record begins.
             Cause::GoesOn => 0,
@@ -157,6 +166,7 @@ impl Hypothesis {
         self.drag == other.drag
             && self.slew_limit == other.slew_limit
             && self.effects.input_side() == other.effects.input_side()
+            && self.effects.widening == other.effects.widening
     }
 
     /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.

@@ -22,6 +22,8 @@ pub(crate) struct Layout {
     pub(crate) load: Range<usize>,
     /// Thermal expansion.
     pub(crate) expansion: Range<usize>,
+    /// Plays of the widening.
+    pub(crate) widening: Range<usize>,
     /// Dead zones of the asymmetry.
     pub(crate) zones: Range<usize>,
     pub(crate) zero_hats: Range<usize>,
@@ -47,6 +49,7 @@ impl Layout {
             tone: next(some(e.interference.is_some(), 2 + HARMONIC_PARTS)),
             load: next(some(e.load.is_some(), 1)),
             expansion: next(some(e.temperature.is_some_and(|p| p.expansion != 0.0), 1)),
+            widening: next(e.widening.as_ref().map_or(0, |p| p.weights.len())),
             zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),
@@ -55,9 +58,10 @@ impl Layout {
     }
 
     /// The places of each kind, in order.
-    fn kinds(&self) -> [Range<usize>; 10] {
-        let Self { weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats, owed } = self.clone();
-        [weights, zeros, drift, tone, load, expansion, zones, zero_hats, gain_hats, owed]
+    fn kinds(&self) -> [Range<usize>; 11] {
+        let Self { weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, owed } =
+            self.clone();
+        [weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, owed]
     }
 
     /// A solution in this layout as it stands in another one, and the places there that this one does not have, or has in another number.

@@ -4,8 +4,10 @@ use std::borrow::Cow;
 
 use hyst_core::{
     Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
-    SaturationInverse, Stage, Temperature, TemperatureParams,
+    SaturationInverse, Stage, Temperature, TemperatureParams, Widening, WideningParams,
 };
+
+use rayon::prelude::*;
 
 use super::Hypothesis;
 use crate::Samples;
@@ -23,6 +25,8 @@ pub(crate) struct SignalPath<'a> {
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
+    /// Each play of the widening by itself, of weight one.
+    widening: Vec<PerSegment<Widening<f64>>>,
     warmth: Option<Warmth>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
     resonances: Vec<PerSegment<Resonance<f64>>>,
@@ -53,6 +57,12 @@ impl<'a> SignalPath<'a> {
             lag: lag.map(|p| for_each(samples, &p)).transpose()?,
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
+            widening: effects
+                .widening
+                .iter()
+                .flat_map(each_play)
+                .map(|p| for_each(samples, &p))
+                .collect::<Result<_, _>>()?,
             warmth: warmth.flatten(),
             creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
             resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
@@ -88,13 +98,44 @@ impl<'a> SignalPath<'a> {
         Cow::Owned(self.samples.pasts.iter().map(through).collect())
     }
 
+    /// What each play of the widening adds to the output of the operator, for a weight of one; none without a widening.
+    pub(crate) fn widening(&self) -> Vec<Vec<f64>> {
+        if self.widening.is_empty() {
+            return Vec::new();
+        }
+        let (drive, pasts, env) = (self.input_side(), self.pasts(), Env::default());
+        let sign = if self.samples.falls { -1.0 } else { 1.0 };
+        let column = |stages: &PerSegment<Widening<f64>>| {
+            let mut column = vec![0.0; drive.len()];
+            for (i, segment) in self.samples.segments.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
+                let stage = stages.of(i);
+                let mut state = stage.state();
+                pasts.get(i).into_iter().flatten().for_each(|u| stage.rest(&mut state, *u));
+                // The device has rested at its first input.
+                stage.rest(&mut state, drive[segment.start]);
+                for k in segment.clone().skip(1) {
+                    column[k] = sign * stage.step(&mut state, &env, drive[k]);
+                }
+            }
+            column
+        };
+        self.widening.par_iter().map(column).collect()
+    }
+
+    /// Adds what the widening does with these weights.
+    pub(super) fn widen(&self, operator: &mut [f64], weights: &[f64]) {
+        for (column, w) in self.widening().iter().zip(weights) {
+            operator.iter_mut().zip(column).for_each(|(v, x)| *v += w * x);
+        }
+    }
+
     /// Carries what the hysteresis gives on to the stop, in place.
     pub(crate) fn output_side(&self, v: &mut [f64]) {
         self.carry([v]);
     }
 
     /// The same for several columns.
-    pub(super) fn output_side_of(&self, columns: &mut [Vec<f64>]) {
+    pub(crate) fn output_side_of(&self, columns: &mut [Vec<f64>]) {
         for columns in columns.chunks_mut(BESIDE) {
             match columns {
                 [a, b, c, d] => self.carry([a, b, c, d]),
@@ -181,6 +222,13 @@ impl<'a> SignalPath<'a> {
     }
 }
 
+/// A widening of one play, of weight one, for each of its plays.
+fn each_play(p: &WideningParams<Vec<f64>>) -> impl Iterator<Item = WideningParams<[f64; 1]>> + use<> {
+    let WideningParams { growth, exponent, reference_rate, seconds, .. } = *p;
+    let of = move |r| WideningParams { growth, exponent, reference_rate, seconds, thresholds: [r], weights: [1.0] };
+    p.thresholds.clone().into_iter().map(of)
+}
+
 /// What the temperature does in each row.
 pub(crate) struct Warmth {
     /// Gain.
@@ -228,6 +276,44 @@ mod tests {
     use super::*;
     use crate::model::Effects;
     use hyst_core::{CreepParams, ResonanceParams};
+
+    /// Its plays, each with its weight, are what the chain's stage adds, after a past too.
+    #[test]
+    fn a_widening_is_that_of_the_chain() {
+        let input: Vec<f64> = (0..600).map(|k| 20.0 * (0.002 * f64::from(k * k) / 10.0).sin()).collect();
+        let past = vec![35.0, -20.0];
+        let samples = Samples {
+            segments: vec![0..250, 250..600],
+            file_of_segment: vec![0, 0],
+            pasts: vec![past.clone(), Vec::new()],
+            ..Samples::of_columns(1e-3, input.clone(), input.clone())
+        };
+        let widening = WideningParams {
+            growth: 0.4,
+            exponent: 0.5,
+            reference_rate: 300.0,
+            seconds: 4e-3,
+            thresholds: vec![3.0, 8.0],
+            weights: vec![0.02, 0.05],
+        };
+        let h = Hypothesis::of(Effects { widening: Some(widening.clone()), ..Effects::default() });
+        let mut found = vec![0.0; input.len()];
+        SignalPath::new(&samples, &h).unwrap().widen(&mut found, &widening.weights);
+        let stage: Widening<f64> = widening.build(&Sampling { period: 1e-3 }).unwrap();
+        let mut state = stage.state();
+        for (k, u) in input.iter().enumerate() {
+            let expected = match k {
+                0 => {
+                    past.iter().chain([u]).for_each(|u| stage.rest(&mut state, *u));
+                    0.0
+                }
+                250 => stage.reset(&mut state, &Env::default(), *u),
+                _ => stage.step(&mut state, &Env::default(), *u),
+            };
+            assert!((found[k] - expected).abs() < 1e-15, "row {k}: {} {expected}", found[k]);
+        }
+        assert!(found.iter().any(|y| y.abs() > 0.1 * widening.wider()));
+    }
 
     #[test]
     fn columns_side_by_side_are_each_as_alone() {

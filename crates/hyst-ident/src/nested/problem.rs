@@ -186,6 +186,8 @@ impl<'a> Problem<'a> {
         let mut bounds = self.basis.bounds();
         let layout = self.layout(h);
         bounds.resize(layout.len(), Bounds::FREE);
+        // Loops that narrow are another effect.
+        bounds[layout.widening.clone()].fill(Bounds::above(0.0));
         // A curve that falls would have no inverse.
         bounds[layout.zones.clone()].fill(Bounds::above(-0.9));
         if h.goes_on {
@@ -216,6 +218,7 @@ impl<'a> Problem<'a> {
                 (layout.load, load.collect::<Vec<f64>>()),
                 (layout.expansion, e.temperature.iter().map(|p| p.expansion).collect()),
                 (layout.drift, drift.collect()),
+                (layout.widening, e.widening.iter().flat_map(|p| p.weights.clone()).collect()),
                 (layout.tone, tone.collect()),
             ];
             for (at, values) in held {
@@ -455,6 +458,9 @@ impl<'a> Problem<'a> {
         if let (Some(temperature), [expansion]) = (&mut h.effects.temperature, &z[layout.expansion.clone()]) {
             // Nothing but zero is none.
             temperature.expansion = if *expansion == 0.0 { f64::MIN_POSITIVE } else { *expansion };
+        }
+        if let Some(widening) = &mut h.effects.widening {
+            widening.weights = z[layout.widening.clone()].to_vec();
         }
         if let Some(curve) = h.effects.asymmetry.as_mut().filter(|p| p.side == CurveSide::Output) {
             curve.weights = z[layout.zones.clone()].to_vec();

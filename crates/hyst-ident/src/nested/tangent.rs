@@ -57,7 +57,11 @@ impl<'a> Problem<'a> {
         });
         let input = path.input_side();
         let mut tangent = Tangent { samples: Samples { input, ..self.samples.clone() }, path, curve, gain };
-        let mut output = [point.operator];
+        // A widening stands beside the operator.
+        let mut operator = point.operator;
+        let without: Vec<f64> = z[layout.widening.clone()].iter().map(|w| -w).collect();
+        tangent.path.widen(&mut operator, &without);
+        let mut output = [operator];
         tangent.through(&mut output);
         [tangent.samples.output] = output;
         tangent.samples.output.iter_mut().zip(self.residual(fit)?).for_each(|(y, left)| *y += left);
