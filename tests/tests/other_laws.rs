@@ -307,7 +307,8 @@ fn coercive_voltages_that_grow_with_the_rate_are_a_rate_dependence() {
         swing * (0.5 * t + 3.6 * (1.0 - (0.3 * t).cos())).mul_add(std::f64::consts::TAU, 0.0).sin()
     };
     for kind in [Kind::Pi, Kind::Preisach] {
-        let made = |name: &str, after: f64, rows: usize| one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate);
+        let made =
+            |name: &str, after: f64, rows: usize| one_segment(name, &|t| drive(t + after), rows, &relays_of_the_rate);
         let d = diagnosed(kind, &(made("train", 0.0, 12_000), made("test", 2.0, 6000)));
         assert_eq!(names(&d), ["rate-dependence"], "{kind}: {:#?}", d.findings);
         assert_eq!(d.findings.effects[0].law.as_deref(), Some("power-thresholds"), "{kind}");

@@ -1,10 +1,12 @@
 //! A base whose loops change with the rate in any way: the rival of what is named beside a law of the rate.
 //!
 //! No formula of a rate is an actuator's to the last digit: coercive voltages grow with a power of the rate, with its logarithm, or otherwise. Beside a
-//! base stand its plays times hat functions of the logarithm of the rate: weights and thresholds that depend on it in any smooth way, to first order.
+//! base stand its plays times hat functions of the logarithm of the rate: weights and thresholds that depend on it in any smooth way, to first order. And
+//! plays whose thresholds grow with several powers of the rate, which remember at what rate they were moved.
 
 use std::ops::Range;
 
+use hyst_core::{Build, Env, Sampling, Stage, Widening, WideningParams};
 use nalgebra::DMatrix;
 
 use super::pi::plays;
@@ -17,6 +19,10 @@ const KNOTS: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
 /// Thresholds, as shares of half the range; the first is that of the drive itself.
 const THRESHOLDS: [f64; 5] = [0.0, 0.08, 0.2, 0.4, 0.7];
 
+/// Exponents of thresholds that grow, and their growth at the median rate.
+const EXPONENTS: [f64; 3] = [0.15, 0.4, 1.0];
+const GROWTH: f64 = 0.3;
+
 /// Another base, and plays that change with the rate.
 pub(crate) struct RatedBasis<'a> {
     base: &'a dyn Basis,
@@ -25,11 +31,16 @@ pub(crate) struct RatedBasis<'a> {
     thresholds: Vec<f64>,
     /// Sample period of each segment \[s\].
     periods: Vec<f64>,
+    /// Median rate \[V/s\], and the time over which thresholds that grow feel it \[s\].
+    median: f64,
+    felt_over: f64,
+    /// Whether columns fall where the plays rise.
+    falls: bool,
 }
 
 impl<'a> RatedBasis<'a> {
-    /// Around a base; none where the drive has one rate only.
-    pub(crate) fn around(base: &'a dyn Basis, samples: &Samples) -> Option<Self> {
+    /// Around a base; none where the drive has one rate only. Thresholds that grow feel the rate over a time \[s\].
+    pub(crate) fn around(base: &'a dyn Basis, samples: &Samples, felt_over: f64) -> Option<Self> {
         let (low, high) = samples.input_range();
         let periods: Vec<f64> = (0..samples.segments.len()).map(|i| samples.period_of(i)).collect();
         let mut moving: Vec<f64> = rates(&samples.input, &samples.segments, &periods);
@@ -40,7 +51,39 @@ impl<'a> RatedBasis<'a> {
         let mut knots: Vec<f64> = KNOTS.iter().filter_map(|share| at(*share)).collect();
         knots.dedup_by(|a, b| *a - *b < 0.1);
         let thresholds = THRESHOLDS.iter().map(|share| 0.5 * share * (high - low)).collect();
-        (knots.len() > 1).then_some(Self { base, knots, thresholds, periods })
+        let median = moving.get(moving.len() / 2).copied()?;
+        let falls = samples.falls;
+        (knots.len() > 1).then_some(Self { base, knots, thresholds, periods, median, felt_over, falls })
+    }
+
+    /// Columns of the hats, and of thresholds that grow: the first threshold is zero, which does not.
+    fn counts(&self) -> (usize, usize) {
+        ((self.knots.len() - 1) * self.thresholds.len(), EXPONENTS.len() * (self.thresholds.len() - 1))
+    }
+
+    /// What a play adds whose threshold grows; nothing where a stage cannot be built.
+    fn grown(&self, at: usize, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        let plays = self.thresholds.len() - 1;
+        let weight = if self.falls { -1.0 } else { 1.0 };
+        let widening = WideningParams {
+            growth: GROWTH,
+            exponent: EXPONENTS[at / plays],
+            reference_rate: self.median,
+            seconds: self.felt_over,
+            thresholds: [self.thresholds[1 + at % plays]],
+            weights: [weight],
+        };
+        let mut column = vec![0.0; drive.len()];
+        for (rows, period) in segments.iter().zip(&self.periods) {
+            let stage: Result<Widening<f64>, _> = widening.build(&Sampling { period: *period });
+            let (Ok(stage), Some(first)) = (stage, drive.get(rows.start)) else { continue };
+            let (mut state, env) = (stage.state(), Env::default());
+            stage.reset(&mut state, &env, *first);
+            for k in rows.clone().skip(1) {
+                column[k] = stage.step(&mut state, &env, drive[k]);
+            }
+        }
+        column
     }
 
     /// The hat of a knot over the rows.
@@ -78,11 +121,13 @@ impl Basis for RatedBasis<'_> {
         }
         let rates = rates(drive, segments, &self.periods);
         let plays = plays(drive, segments, &self.thresholds, &Drag::NONE);
-        for column in of.start.max(own)..of.end {
+        let hats = own + self.counts().0;
+        for column in of.start.max(own)..of.end.min(hats) {
             let (knot, threshold) = ((column - own) / self.thresholds.len(), (column - own) % self.thresholds.len());
             let hat = self.hat(knot + 1, &rates);
             columns.push(plays[threshold].iter().zip(hat).map(|(p, hat)| p * hat).collect());
         }
+        columns.extend((of.start.max(hats)..of.end.max(hats)).map(|column| self.grown(column - hats, drive, segments)));
         columns
     }
 
@@ -100,7 +145,8 @@ impl Basis for RatedBasis<'_> {
 
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = self.base.bounds();
-        bounds.resize(bounds.len() + (self.knots.len() - 1) * self.thresholds.len(), Bounds::FREE);
+        let (hats, grown) = self.counts();
+        bounds.resize(bounds.len() + hats + grown, Bounds::FREE);
         bounds
     }
 
@@ -111,5 +157,45 @@ impl Basis for RatedBasis<'_> {
             penalty.view_mut((0, 0), (own, own)).copy_from(&base);
         }
         Some(penalty)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hyst_core::play;
+
+    use super::*;
+    use crate::base::PiBasis;
+    use crate::lsq::Blocks;
+    use crate::nested::{Hypothesis, Problem};
+
+    /// Thresholds that grow with the logarithm of the rate as it is felt over 5 ms, which is no power of it.
+    #[test]
+    fn it_takes_a_law_of_the_rate_that_has_no_name() {
+        let drive = |t: f64| 50.0 + 45.0 * (5.0 * t * (1.0 + 0.8 * t)).sin() * (0.7 + 0.3 * (1.7 * t).cos());
+        let input: Vec<f64> = (0..8000).map(|k| drive(1e-3 * f64::from(k))).collect();
+        let (mut rate, mut last, mut plays) = (0.0, input[0], [0.0; 12]);
+        let output = input.iter().map(|u| {
+            let wider = 1.0 + 0.1 * (1.0_f64 + rate / 30.0).ln();
+            plays.iter_mut().zip(1..).for_each(|(p, i)| *p = play(*p, *u, 3.4 * f64::from(i) * wider));
+            rate += 0.18 * ((u - last).abs() / 1e-3 - rate);
+            last = *u;
+            0.1 * u + 0.01 * plays.iter().sum::<f64>()
+        });
+        let output: Vec<f64> = output.collect();
+        let samples = Samples::of_columns(1e-3, input, output);
+        let base = PiBasis::for_samples(&samples);
+        let rated = RatedBasis::around(&base, &samples, 5e-3).unwrap();
+        let blocks = Blocks::new(&samples, 40, 4000);
+        let left = |basis: &dyn Basis| {
+            Problem::new(&samples, basis, &blocks, false).fit(&Hypothesis::default()).unwrap().unwrap().rmse()
+        };
+        let (without, with) = (left(&base), left(&rated));
+        assert!(with < 0.15 * without, "{with} {without}");
+        // However many columns are made at a time.
+        let all = rated.columns(0..rated.len(), &samples.input, &samples.segments, &Drag::NONE);
+        for first in 0..rated.len() {
+            assert_eq!(rated.columns(first..first + 1, &samples.input, &samples.segments, &Drag::NONE)[0], all[first]);
+        }
     }
 }

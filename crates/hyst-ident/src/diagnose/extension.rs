@@ -257,7 +257,7 @@ impl<'a> Own<'a> {
         for begun in std::iter::once(None).chain(begun.map(Some)) {
             let own = Own { samples: begun.as_ref().unwrap_or(self.samples), ..*self };
             let of = |hypothesis: &Hypothesis, errors: BTreeMap<String, f64>| {
-                let model = own.extended(hypothesis, &errors)?;
+                let model = own.extended(hypothesis, &errors, begun.is_some())?;
                 let after = simulate(&model, self.train, zero)?;
                 Ok::<_, FitError>(Extension {
                     hypothesis: hypothesis.clone(),
@@ -276,7 +276,8 @@ impl<'a> Own<'a> {
         extensions.sort_by(|a, b| left(a).total_cmp(&left(b)));
         let mut best = 0;
         for (at, e) in extensions.iter().enumerate() {
-            if self.is_helped(self.before, &e.after) && self.transfers(known, &e.hypothesis)? {
+            let own = Own { samples: e.begun.as_ref().unwrap_or(self.samples), ..*self };
+            if own.is_helped(self.before, &e.after) && own.transfers(known, &e.hypothesis)? {
                 best = at;
                 break;
             }
@@ -285,14 +286,20 @@ impl<'a> Own<'a> {
     }
 
     /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a
-    /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again.
-    fn extended(&self, hypothesis: &Hypothesis, errors: &BTreeMap<String, f64>) -> Result<Model, FitError> {
-        self.refitted(hypothesis, errors, true)
+    /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again. `begun` says that the start of the record was
+    /// found beside these effects.
+    fn extended(
+        &self,
+        hypothesis: &Hypothesis,
+        errors: &BTreeMap<String, f64>,
+        begun: bool,
+    ) -> Result<Model, FitError> {
+        self.refitted(hypothesis, errors, true, begun)
     }
 
     /// The model as it is with all solved again that it is linear in.
     pub(super) fn fitted_anew(&self, hypothesis: &Hypothesis) -> Result<Model, FitError> {
-        self.refitted(hypothesis, &BTreeMap::new(), false)
+        self.refitted(hypothesis, &BTreeMap::new(), false, false)
     }
 
     fn refitted(
@@ -300,6 +307,7 @@ impl<'a> Own<'a> {
         hypothesis: &Hypothesis,
         errors: &BTreeMap<String, f64>,
         holds: bool,
+        begun: bool,
     ) -> Result<Model, FitError> {
         let mut motion = without_sensor_effects(self.samples, &hypothesis.effects);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
@@ -315,7 +323,9 @@ impl<'a> Own<'a> {
             Ok::<_, FitError>(Some((fit, starting)))
         };
         // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
-        let known = Settled::from(self.before.settling.clone(), &mut fitted)?;
+        // One that was found beside what was found lasts as long as it did there.
+        let starting = if begun { &self.samples.settling } else { &self.before.settling };
+        let known = Settled::from(starting.clone(), &mut fitted)?;
         let known = known.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
         let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
         motion.settling = settling;

@@ -15,7 +15,7 @@ use super::shape::own_stop;
 use super::starts::starts;
 use super::trial::Trial;
 use super::uncertainty::{Undetermined, standard_errors};
-use crate::base::{PreisachBasis, RatedBasis, ScreeningBasis};
+use crate::base::{Basis, PreisachBasis, ROWS_PER_UNKNOWN, RatedBasis, ScreeningBasis};
 use crate::criteria::{LARGE_RATIO, MIN_RMSE_DROP, MIN_SHARE_BESIDE_SLEW_LIMIT, MINOR_SHARE};
 use crate::lsq::Blocks;
 use crate::model::Effect;
@@ -48,7 +48,7 @@ pub(super) fn refine(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
     beside_nameless(problem, found, already)?;
-    beside_a_law_of_the_rate(problem, found, already, seed)?;
+    beside_a_law_of_the_rate(problem, found, already, seed, progress)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -224,30 +224,55 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
     beside(problem, found, already, &still, &|_| MINOR_SHARE)
 }
 
-/// Takes back a creep beside a law of the rate that any other law of the rate takes as well.
+/// Looks once more for what else acts beside a law of the rate, on a base that takes any law of the rate: what a formula misses of an actuator's own law
+/// would be taken for a lag, a creep or a zero that wanders, and hides what is there.
 fn beside_a_law_of_the_rate(
     problem: &Problem<'_>,
     found: &mut Search,
     already: &[Cause],
     seed: u64,
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(), Error> {
-    let creep = Cause::Effect(Effect::Creep);
-    let h = found.best.fit.hypothesis.clone();
-    let new = beyond(&h, already);
-    if !new.contains(&creep) || !new.contains(&Cause::Effect(Effect::RateDependence)) {
+    let rate = Cause::Effect(Effect::RateDependence);
+    let h = &found.best.fit.hypothesis;
+    let mut others = beyond(h, already);
+    let is_explained = found.best.cv_rmse() <= (1.0 + MIN_RMSE_DROP) * found.noise;
+    if !others.contains(&rate) || (others == [rate] && is_explained) {
         return Ok(());
     }
-    let Some(rated) = RatedBasis::around(problem.basis, problem.samples) else { return Ok(()) };
+    others.retain(|cause| *cause != rate);
+    let alone = others.iter().fold(h.clone(), |h, cause| h.without(*cause));
+    // The time over which the rate is felt: that of the law that was found, or of one whose thresholds grow in its place.
+    let grows = |h: &Hypothesis| h.effects.widening.as_ref().map(|p| p.seconds);
+    let felt_over = match grows(h) {
+        Some(seconds) => Some(seconds),
+        None => match problem.fit_linear(&alone.without(rate))? {
+            Some(without) => {
+                let starts = starts(&Scan::new(problem, &without, 0.0)?, rate)?;
+                let start = starts.into_iter().find(|h| grows(h).is_some());
+                start.map(|h| problem.fit(&h)).transpose()?.flatten().and_then(|fit| grows(&fit.hypothesis))
+            }
+            None => None,
+        },
+    };
+    let felt_over = felt_over.unwrap_or(0.0);
+    let rated = RatedBasis::around(problem.basis, problem.samples, felt_over);
+    let Some(rated) = rated.filter(|rated| ROWS_PER_UNKNOWN * rated.len() <= problem.samples.len()) else {
+        return Ok(());
+    };
     let any_law = Problem::new(problem.samples, &rated, problem.blocks, problem.zero_per_file);
-    let fitted = |h: &Hypothesis| Ok::<_, Error>(any_law.fit(h)?.and_then(|f| Trial::of(&any_law, f)));
-    let (Some(without), Some(with)) = (fitted(&h.without(creep))?, fitted(&h)?) else { return Ok(()) };
-    if score::judge(&any_law, &without, &with, found.noise, seed).accepted() {
+    let Some(base) = any_law.fit(&alone)? else { return Ok(()) };
+    let known: Vec<Cause> = already.iter().copied().chain([rate]).collect();
+    progress("searching beside any law of the rate");
+    let anew = further(&any_law, base, &known, found.noise, seed, progress)?;
+    let Some(trial) = problem.fit(&anew.best.fit.hypothesis)?.and_then(|f| Trial::of(problem, f)) else {
         return Ok(());
-    }
-    if let Some(trial) = problem.fit(&h.without(creep))?.and_then(|f| Trial::of(problem, f)) {
-        found.named.retain(|n| n.effect != Effect::Creep);
-        found.best = trial;
-    }
+    };
+    found.best = trial;
+    found.named.retain(|n| n.effect == Effect::RateDependence);
+    found.named.extend(anew.named);
+    found.named.sort_by_key(|n| n.effect);
+    (found.near, found.beside_wandering) = (anew.near, anew.beside_wandering);
     Ok(())
 }
 

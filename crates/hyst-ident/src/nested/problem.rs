@@ -218,7 +218,6 @@ impl<'a> Problem<'a> {
                 (layout.load, load.collect::<Vec<f64>>()),
                 (layout.expansion, e.temperature.iter().map(|p| p.expansion).collect()),
                 (layout.drift, drift.collect()),
-                (layout.widening, e.widening.iter().flat_map(|p| p.weights.clone()).collect()),
                 (layout.tone, tone.collect()),
             ];
             for (at, values) in held {
