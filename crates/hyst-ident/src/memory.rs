@@ -11,7 +11,7 @@ use hyst_core::Error;
 use rayon::prelude::*;
 
 use crate::base::{Basis, Drag};
-use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE};
+use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
 use crate::settle::{centre, first_cycles, started, windows};
@@ -274,8 +274,9 @@ pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 }
 
 /// The past after which least is left of the first rows. None unless their error above the `level` of as many other rows falls by [`MIN_PAST_RATIO`] (`level`
-/// and `squares` are Σ residual²). Near 0 V, where a memory is that of a rest and what stands out may be a transient of the sensor, nothing may stand
-/// out any more.
+/// and `squares` are Σ residual²). Near 0 V, where a memory may be that of a rest and what stands out a transient of the sensor, it has to explain all but a
+/// [`NEGLIGIBLE_SHARE`] of that, or nothing may stand out any more: an actuator that was cycled before keeps a remanence at 0 V, and no transient of a
+/// sensor has the course of a loop.
 pub(crate) fn best(
     pasts: Vec<Vec<f64>>,
     level: f64,
@@ -290,7 +291,8 @@ pub(crate) fn best(
     let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
     let least = all.iter().copied().fold(f64::INFINITY, f64::min);
     let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
-    let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || least < stands_out));
+    let explains_all = least - level <= NEGLIGIBLE_SHARE * (from_rest - level);
+    let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || explains_all || least < stands_out));
     found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }
 

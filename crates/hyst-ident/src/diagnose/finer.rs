@@ -241,20 +241,22 @@ fn beside_a_law_of_the_rate(
         return Ok(());
     }
     others.retain(|cause| *cause != rate);
-    let alone = others.iter().fold(h.clone(), |h, cause| h.without(*cause));
-    // The time over which the rate is felt: that of the law that was found, or of one whose thresholds grow in its place.
-    let grows = |h: &Hypothesis| h.effects.widening.as_ref().map(|p| p.seconds);
-    let felt_over = match grows(h) {
-        Some(seconds) => Some(seconds),
-        None => match problem.fit_linear(&alone.without(rate))? {
-            Some(without) => {
-                let starts = starts(&Scan::new(problem, &without, 0.0)?, rate)?;
-                let start = starts.into_iter().find(|h| grows(h).is_some());
-                start.map(|h| problem.fit(&h)).transpose()?.flatten().and_then(|fit| grows(&fit.hypothesis))
+    let mut alone = others.iter().fold(h.clone(), |h, cause| h.without(*cause));
+    // Thresholds that grow say over what time the rate is felt, and are the law if they do better than the one that was found among the others.
+    let felt = |h: &Hypothesis| h.effects.widening.as_ref().map(|p| p.seconds);
+    let mut felt_over = felt(&alone);
+    if felt_over.is_none()
+        && let Some(without) = problem.fit_linear(&alone.without(rate))?
+        && let Some(start) = starts(&Scan::new(problem, &without, 0.0)?, rate)?.into_iter().find(|h| felt(h).is_some())
+    {
+        let fitted = |h: &Hypothesis| Ok::<_, Error>(problem.fit(h)?.and_then(|f| Trial::of(problem, f)));
+        if let (Some(grown), Some(was)) = (fitted(&start)?, fitted(&alone)?) {
+            felt_over = felt(&grown.fit.hypothesis);
+            if grown.total() < was.total() {
+                alone = grown.fit.hypothesis;
             }
-            None => None,
-        },
-    };
+        }
+    }
     let felt_over = felt_over.unwrap_or(0.0);
     let rated = RatedBasis::around(problem.basis, problem.samples, felt_over);
     let Some(rated) = rated.filter(|rated| ROWS_PER_UNKNOWN * rated.len() <= problem.samples.len()) else {
