@@ -275,8 +275,8 @@ fn a_lag_and_a_drift_are_found_in_a_record_of_two_sample_rates() {
 fn relays_of_the_rate(t: &[f64], u: &[f64]) -> Vec<f64> {
     const STEPS: u32 = 4;
     let mut relays: Vec<(f64, f64, f64)> = (0..1600)
-        .map(|i| (f64::from(i % 40) * 1.5 - 20.0, 0.5 + f64::from(i / 40) * 1.2))
-        .map(|(middle, half)| (middle, half, -1.0))
+        .map(|i| (f64::from(i % 40) * 1.5 - 29.25, 0.5 + f64::from(i / 40) * 1.2))
+        .map(|(middle, half)| (middle, half, if middle > 0.0 { -1.0 } else { 1.0 }))
         .collect();
     let (mut noise, mut from, mut last) = (noise(t), u[0], [0.0; 8]);
     let mut row = |(k, to): (usize, &f64)| {

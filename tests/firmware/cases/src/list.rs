@@ -46,8 +46,9 @@ macro_rules! all_cases {
             tanh_anti_causal: AntiCausal<T, 64>, 0.0..6.0 => Build::<Activation<T>>::build(&given((ActivationKind::Tanh, XIE)), &PERIOD)?.anti_causal(1e-3);
             delay: Delay<T, 16>, 0.0..120.0 => given(DEAD_TIME).build(&PERIOD);
             lag: Lag<T>, 0.0..120.0 => given(LAG).build(&PERIOD);
-            rate: Rate<T>, 0.0..120.0 => given(WIDENING).build(&PERIOD);
-            rate_inverse: RateInverse<T>, 0.0..120.0 => Build::<Rate<T>>::build(&given(WIDENING), &PERIOD)?.invert();
+            rate: Rate<T>, 0.0..120.0 => given(OVERDRIVE).build(&PERIOD);
+            rate_inverse: RateInverse<T>, 0.0..120.0 => Build::<Rate<T>>::build(&given(OVERDRIVE), &PERIOD)?.invert();
+            widening_6: Widening<T>, 0.0..120.0 => given(GROWING).build(&PERIOD);
             creep_4: Creep<T, 4>, 0.0..20.0 => given(CREEP).build(&PERIOD);
             creep_4_inverse: CreepInverse<T, 4>, 0.0..20.0 => Build::<Creep<T, 4>>::build(&given(CREEP), &PERIOD)?.invert();
             resonance: Resonance<T>, 0.0..20.0 => given(MODE).build(&PERIOD);

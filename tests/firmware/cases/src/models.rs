@@ -31,8 +31,16 @@ pub(crate) const GAINS: PidParams = PidParams {
     high: 120.0,
 };
 pub(crate) const DRIFT: DriftParams = DriftParams { per_second: 0.01, settling: 0.2, seconds: 2.0, since_s: 0.5 };
-pub(crate) const WIDENING: RateParams =
+pub(crate) const OVERDRIVE: RateParams =
     RateParams { volts: 0.8, exponent: 0.4, reference_rate: 120.0, law: RateLaw::Relaxes };
+pub(crate) const GROWING: WideningParams<[f64; 6]> = WideningParams {
+    growth: 0.3,
+    exponent: 0.35,
+    reference_rate: 120.0,
+    seconds: 0.004,
+    thresholds: [8.0, 16.0, 24.0, 32.0, 40.0, 48.0],
+    weights: [0.02, 0.015, 0.01, 0.01, 0.005, 0.005],
+};
 pub(crate) const MAINS: InterferenceParams = InterferenceParams {
     hz: 50.0,
     amplitude: 0.05,
