@@ -30,6 +30,9 @@ const SEARCHED_CELLS: usize = 16;
 /// Rows that the comparison uses.
 const ROWS: usize = 8_000;
 
+/// What a hysteresis that takes its time may be taken for.
+const SLOW: [Effect; 4] = [Effect::Delay, Effect::Lag, Effect::Resonance, Effect::Creep];
+
 /// What is known in the end.
 pub(super) struct Finer {
     pub(super) hypothesis: Hypothesis,
@@ -48,7 +51,7 @@ pub(super) fn refine(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
     beside_nameless(problem, found, already)?;
-    beside_a_law_of_the_rate(problem, found, already, seed, progress)?;
+    beside_a_law_of_the_rate(problem, found, already, seed)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -185,9 +188,8 @@ fn searched_anew(
 /// Whether what the triangle alone calls late, or creep, is better explained by a hysteresis that takes its time, which the triangle cannot do:
 /// the base of the search, which can, is asked.
 fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<bool, Error> {
-    let slow = [Effect::Delay, Effect::Lag, Effect::Resonance, Effect::Creep];
     let late: Vec<Effect> =
-        anew.named.iter().map(|n| n.effect).filter(|e| slow.contains(e) && !is_named(found, *e)).collect();
+        anew.named.iter().map(|n| n.effect).filter(|e| SLOW.contains(e) && !is_named(found, *e)).collect();
     if late.is_empty() {
         return Ok(false);
     }
@@ -224,58 +226,45 @@ fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause])
     beside(problem, found, already, &still, &|_| MINOR_SHARE)
 }
 
-/// Looks once more for what else acts beside a law of the rate, on a base that takes any law of the rate: what a formula misses of an actuator's own law
-/// would be taken for a lag, a creep or a zero that wanders, and hides what is there.
+/// Takes back what is late or slow beside a law of the rate where any other law of the rate takes it as well: what a formula misses of an actuator's own
+/// law would be called a lag or a creep.
 fn beside_a_law_of_the_rate(
     problem: &Problem<'_>,
     found: &mut Search,
     already: &[Cause],
     seed: u64,
-    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<(), Error> {
-    let rate = Cause::Effect(Effect::RateDependence);
-    let h = &found.best.fit.hypothesis;
-    let mut others = beyond(h, already);
-    let is_explained = found.best.cv_rmse() <= (1.0 + MIN_RMSE_DROP) * found.noise;
-    if !others.contains(&rate) || (others == [rate] && is_explained) {
-        return Ok(());
-    }
-    others.retain(|cause| *cause != rate);
-    let mut alone = others.iter().fold(h.clone(), |h, cause| h.without(*cause));
-    // Thresholds that grow say over what time the rate is felt, and are the law if they do better than the one that was found among the others.
-    let felt = |h: &Hypothesis| h.effects.widening.as_ref().map(|p| p.seconds);
-    let mut felt_over = felt(&alone);
-    if felt_over.is_none()
-        && let Some(without) = problem.fit_linear(&alone.without(rate))?
-        && let Some(start) = starts(&Scan::new(problem, &without, 0.0)?, rate)?.into_iter().find(|h| felt(h).is_some())
-    {
-        let fitted = |h: &Hypothesis| Ok::<_, Error>(problem.fit(h)?.and_then(|f| Trial::of(problem, f)));
-        if let (Some(grown), Some(was)) = (fitted(&start)?, fitted(&alone)?) {
-            felt_over = felt(&grown.fit.hypothesis);
-            if grown.total() < was.total() {
-                alone = grown.fit.hypothesis;
+    loop {
+        let h = found.best.fit.hypothesis.clone();
+        let new = beyond(&h, already);
+        let late: Vec<Cause> = SLOW.map(Cause::Effect).into_iter().filter(|cause| new.contains(cause)).collect();
+        if late.is_empty() || !new.contains(&Cause::Effect(Effect::RateDependence)) {
+            return Ok(());
+        }
+        // A law whose thresholds grow says over what time the rate is felt.
+        let felt_over = h.effects.widening.as_ref().map_or(0.0, |p| p.seconds);
+        let rated = RatedBasis::around(problem.basis, problem.samples, felt_over);
+        let Some(rated) = rated.filter(|rated| ROWS_PER_UNKNOWN * rated.len() <= problem.samples.len()) else {
+            return Ok(());
+        };
+        let any_law = Problem::new(problem.samples, &rated, problem.blocks, problem.zero_per_file);
+        let fitted = |h: &Hypothesis| Ok::<_, Error>(any_law.fit(h)?.and_then(|f| Trial::of(&any_law, f)));
+        let Some(with) = fitted(&h)? else { return Ok(()) };
+        let mut needless: Option<(Cause, Trial)> = None;
+        for cause in late {
+            let Some(without) = fitted(&h.without(cause))? else { continue };
+            if !score::judge(&any_law, &without, &with, found.noise, seed).accepted()
+                && needless.as_ref().is_none_or(|(_, least)| without.total() < least.total())
+            {
+                needless = Some((cause, without));
             }
         }
+        let Some((cause, _)) = needless else { return Ok(()) };
+        let Some(trial) = problem.fit(&h.without(cause))?.and_then(|f| Trial::of(problem, f)) else { return Ok(()) };
+        found.best = trial;
+        let stays = beyond(&found.best.fit.hypothesis, already);
+        found.named.retain(|n| stays.contains(&Cause::Effect(n.effect)));
     }
-    let felt_over = felt_over.unwrap_or(0.0);
-    let rated = RatedBasis::around(problem.basis, problem.samples, felt_over);
-    let Some(rated) = rated.filter(|rated| ROWS_PER_UNKNOWN * rated.len() <= problem.samples.len()) else {
-        return Ok(());
-    };
-    let any_law = Problem::new(problem.samples, &rated, problem.blocks, problem.zero_per_file);
-    let Some(base) = any_law.fit(&alone)? else { return Ok(()) };
-    let known: Vec<Cause> = already.iter().copied().chain([rate]).collect();
-    progress("searching beside any law of the rate");
-    let anew = further(&any_law, base, &known, found.noise, seed, progress)?;
-    let Some(trial) = problem.fit(&anew.best.fit.hypothesis)?.and_then(|f| Trial::of(problem, f)) else {
-        return Ok(());
-    };
-    found.best = trial;
-    found.named.retain(|n| n.effect == Effect::RateDependence);
-    found.named.extend(anew.named);
-    found.named.sort_by_key(|n| n.effect);
-    (found.near, found.beside_wandering) = (anew.near, anew.beside_wandering);
-    Ok(())
 }
 
 /// Takes back what explains less than a share of what was found does beyond `less`, which lacks something without a name.
