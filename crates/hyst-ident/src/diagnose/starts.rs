@@ -68,8 +68,8 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
             let in_the_plays = [linear, root].map(|drag| also(&|h| h.drag = Some(drag)));
             // And one on the whole drive, for any base.
             let on_the_drive = widenings(scan)?.into_iter().map(|rate| with(&|e| e.rate = Some(rate)));
-            // And thresholds that grow with the rate. Of what an operator that is not refitted misses, their weights would take a part.
-            let grown = if problem.basis.remembers() { grown_thresholds(scan)? } else { None };
+            // And thresholds that grow with the rate.
+            let grown = if problem.grows { grown_thresholds(scan)? } else { None };
             let grown = grown.map(|widening| with(&|e| e.widening = Some(widening.clone())));
             in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).chain(grown).collect()
         }
