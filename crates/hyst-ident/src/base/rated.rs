@@ -194,8 +194,8 @@ mod tests {
         assert!(with < 0.35 * without, "{with} {without}");
         // However many columns are made at a time.
         let all = rated.columns(0..rated.len(), &samples.input, &samples.segments, &Drag::NONE);
-        for first in 0..rated.len() {
-            assert_eq!(rated.columns(first..first + 1, &samples.input, &samples.segments, &Drag::NONE)[0], all[first]);
+        for (at, column) in all.iter().enumerate() {
+            assert_eq!(rated.columns(at..at + 1, &samples.input, &samples.segments, &Drag::NONE)[0], *column);
         }
     }
 }
