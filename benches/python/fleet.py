@@ -54,7 +54,7 @@ def make(folder, count):
         actuator(k).save(folder / f"P-{k:04}.csv")
     head = "time_s,voltage_v,displacement_um\n"
     good = (folder / f"P-{count - 1:04}.csv").read_text()
-    broken = [b"", head.encode(), good.encode()[: len(head) + 7], good.replace("displacement_um", "x y").encode(), os.urandom(4000)]
+    broken = [b"", head.encode(), good.encode()[: len(head) + 7], good.replace("displacement_um", "x y").encode(), np.random.default_rng(0).bytes(4000)]
     for k, content in zip(range(count - CORRUPT, count), broken):
         (folder / f"P-{k:04}.csv").write_bytes(content)
 

@@ -64,7 +64,7 @@ pub struct ChainState<T, S, const D: usize, const C: usize> {
     lag: LagState<T>,
     rate: RateState<T>,
     hysteresis: S,
-    widening: WideningState<T>,
+    pub(super) widening: WideningState<T>,
     felt: TemperatureState<T>,
     creep: CreepState<T, C>,
     resonances: [ResonanceState<T>; MAX_RESONANCES],

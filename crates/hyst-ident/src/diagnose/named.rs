@@ -125,7 +125,7 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                  apart than on a slow drive",
                 p.exponent,
                 short(p.reference_rate),
-                short(2.0 * p.wider()),
+                short(2.0 * p.extra_half_width()),
                 symbol(m)
             )
         }
@@ -285,7 +285,7 @@ fn parameters(m: &Material<'_>, effect: Effect) -> BTreeMap<String, Found> {
             }
         }),
         Effect::RateDependence if e.widening.is_some() => e.widening.iter().for_each(|p| {
-            put("rate-dependence", "wider", p.wider(), y);
+            put("rate-dependence", "extra_half_width", p.extra_half_width(), y);
             put("rate-dependence", "exponent", p.exponent, "1");
             put("rate-dependence", "seconds", p.seconds, "s");
             put("rate-dependence", "reference_rate", p.reference_rate, &format!("{input}/s"));

@@ -64,7 +64,7 @@ impl<'a> Scan<'a> {
         let mut h = self.from.hypothesis.clone();
         h.effects.widening = Some(widening.clone());
         let path = SignalPath::new(self.problem.samples, &h)?;
-        let mut columns = path.widening();
+        let mut columns = path.widening().to_vec();
         path.output_side_of(&mut columns);
         Ok(self.vantage.projector.joint_gain(&columns, &self.residual))
     }

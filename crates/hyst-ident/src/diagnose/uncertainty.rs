@@ -60,7 +60,7 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
         Effect::Interference => e.interference.is_some_and(|p| unsure("interference.amplitude", p.amplitude)),
         Effect::RateDependence => {
             e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts))
-                || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.wider", p.wider()))
+                || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.extra_half_width", p.extra_half_width()))
         }
         // A stop acts or does not; a curve has several parameters of which one may be idle.
         Effect::Saturation | Effect::Asymmetry => false,
@@ -145,7 +145,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         let parts = pairs.filter_map(|((a, r), (b, s))| Some(r * s * covariance_of(a, b)?));
         let variance: f64 = parts.sum::<f64>() * p.growth * p.growth;
         if variance > 0.0 {
-            errors.insert("rate-dependence.wider".into(), variance.sqrt());
+            errors.insert("rate-dependence.extra_half_width".into(), variance.sqrt());
         }
     }
     let mut put = |name: String, unknown: Option<usize>| {

@@ -222,7 +222,7 @@ impl Problem<'_> {
         if let (Some(c), Some(shift)) = (layout.expansion.clone().next(), path.expansion()) {
             columns.push((c, slowed(&shift)));
         }
-        let mut wider = path.widening();
+        let mut wider = path.widening().to_vec();
         path.output_side_of(&mut wider);
         columns.extend(layout.widening.clone().zip(&wider).map(|(c, column)| (c, slowed(column))));
         if let (Some(p), Some(point)) = (h.effects.curve(CurveSide::Output), point) {

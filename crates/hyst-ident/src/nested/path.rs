@@ -1,6 +1,7 @@
 //! The stages around the hysteresis, over whole columns.
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 use hyst_core::{
     Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
@@ -27,6 +28,8 @@ pub(crate) struct SignalPath<'a> {
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
     /// Each play of the widening by itself, of weight one.
     widening: Vec<PerSegment<Widening<f64>>>,
+    /// What each of them adds, once somebody has asked.
+    wider: OnceLock<Vec<Vec<f64>>>,
     warmth: Option<Warmth>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
     resonances: Vec<PerSegment<Resonance<f64>>>,
@@ -57,6 +60,7 @@ impl<'a> SignalPath<'a> {
             lag: lag.map(|p| for_each(samples, &p)).transpose()?,
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
+            wider: OnceLock::new(),
             widening: effects
                 .widening
                 .iter()
@@ -99,7 +103,15 @@ impl<'a> SignalPath<'a> {
     }
 
     /// What each play of the widening adds to the output of the operator, for a weight of one; none without a widening.
-    pub(crate) fn widening(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn widening(&self) -> &[Vec<f64>] {
+        // Found outside of the cell: a thread that waits for others in here may come by again with another job.
+        if self.wider.get().is_none() {
+            let _ = self.wider.set(self.widened());
+        }
+        self.wider.get().map_or(&[], Vec::as_slice)
+    }
+
+    fn widened(&self) -> Vec<Vec<f64>> {
         if self.widening.is_empty() {
             return Vec::new();
         }
@@ -312,7 +324,7 @@ mod tests {
             };
             assert!((found[k] - expected).abs() < 1e-15, "row {k}: {} {expected}", found[k]);
         }
-        assert!(found.iter().any(|y| y.abs() > 0.1 * widening.wider()));
+        assert!(found.iter().any(|y| y.abs() > 0.1 * widening.extra_half_width()));
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub(crate) struct Problem<'a> {
     /// Whether load, drift and tone are what a hypothesis says, though they could be solved for.
     holds: bool,
     /// Whether thresholds that grow with the rate may be tried: of what an operator that is not refitted misses, their weights would take a part.
-    pub(crate) grows: bool,
+    pub(crate) may_widen: bool,
     /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// How many columns the base has.
@@ -118,7 +118,7 @@ impl<'a> Problem<'a> {
             used,
             zero_per_file,
             holds: false,
-            grows: basis.remembers(),
+            may_widen: basis.remembers(),
             raw,
             width,
             penalty,
@@ -133,8 +133,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Tries thresholds that grow only where another problem of the same model does.
-    pub(crate) fn growing_as(self, other: &Self) -> Self {
-        Self { grows: other.grows, ..self }
+    pub(crate) fn widening_as(self, other: &Self) -> Self {
+        Self { may_widen: other.may_widen, ..self }
     }
 
     /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
