@@ -283,7 +283,7 @@ pub(crate) fn sign_matters(kind: Kind) -> bool {
 pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
-    /// An operator of another kind, kept as it is.
+    /// An operator of another kind, near its parameters.
     Fixed(Box<FixedBasis>),
 }
 
@@ -309,7 +309,7 @@ impl BasisOf {
                 Base::Pi(PiParams { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() })
             }
             Self::Preisach(b) => Base::Preisach(b.spec(&clean)),
-            Self::Fixed(b) => b.base.clone(),
+            Self::Fixed(b) => b.operator(weights),
         }
     }
 }
@@ -403,9 +403,6 @@ pub(crate) fn fit_settled(
                 .map_err(|source| FitError::Stage { record: name(), source })
         };
         let by_plays = recalled(samples, |samples| run(samples, &plays), &recalls)?;
-        if !basis.remembers() {
-            samples.pasts.iter_mut().for_each(Vec::clear);
-        }
         samples.settling.copy_from_slice(&samples.blind);
         let all = run(samples, basis)?;
         (found, _) = start_up_found(samples, all, Some(&by_plays), |samples| run(samples, basis))?;

@@ -1,10 +1,14 @@
-//! An operator that is kept as it is, as one column.
+//! An operator that is not linear in its parameters, by its output and how that changes with each of them.
+//!
+//! Near parameters p a model f(u; p) is the plane `f(u; p) + Σᵢ wᵢ cᵢ ∂f/∂pᵢ`, cᵢ the size of the parameter: the weights are relative changes. A model
+//! that was fitted while an effect stood in the record has taken a part of it, and gives that back by small changes of its parameters.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use hyst_core::Error;
+use hyst_core::{Error, Params, Stage};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::{Basis, Drag, turned};
 use crate::drive::{Drive, Passes};
@@ -13,15 +17,42 @@ use crate::model::{Base, Model, Operator};
 use crate::samples::PerSegment;
 use crate::{BetweenSamples, Samples};
 
-/// Any operator with the parameters that it has: around it effects are looked for, in it nothing is refitted.
+/// Step of the difference quotients, as a share of a parameter.
+const STEP: f64 = 1e-4;
+/// Largest change of a parameter, as a share of it, and of the output where that is more: the plane says little of what is farther.
+const FARTHEST: f64 = 0.3;
+const FARTHEST_MOTION: f64 = 0.05;
+/// Parameters that are changed at most: those that move the output most.
+const MOST: usize = 16;
+/// Motion for a change by all of a parameter, as a share of the output, below which it is rounding.
+const LEAST_MOTION: f64 = 1e-6;
+/// What holds the changes where the record does not tell two parameters apart.
+const PENALTY: f64 = 1e-7;
+
+/// Any operator near the parameters that it has.
 #[derive(Clone, Debug)]
 pub(crate) struct FixedBasis {
     pub(crate) base: Base,
     falls: bool,
     between: BetweenSamples,
+    /// Lowest and highest input of the record that it is for.
+    range: [f64; 2],
     operator: Arc<PerSegment<Operator>>,
-    /// Segments and surroundings of the record that it is for.
-    samples: Samples,
+    slopes: Vec<Slope>,
+    /// Segments and surroundings of that record.
+    samples: Arc<Samples>,
+}
+
+/// An operator with one parameter changed either way.
+#[derive(Clone, Debug)]
+struct Slope {
+    /// Its place in the order of a visit.
+    parameter: usize,
+    /// Of the relative change.
+    bounds: Bounds,
+    /// Root of the squares of the motion for a change by all of the parameter \[y\].
+    motion: f64,
+    sides: Arc<[PerSegment<Operator>; 2]>,
 }
 
 impl FixedBasis {
@@ -32,31 +63,141 @@ impl FixedBasis {
     pub(crate) fn new(model: &Model, samples: &Samples) -> Result<Self, Error> {
         let (low, high) = samples.input_range();
         let between = model.between_samples;
-        let drive = Drive::new(samples, between, Passes::Once);
-        let operator = drive.stages(|sampling| Operator::new(&model.base, [low, high], sampling))?;
-        Ok(Self {
-            base: model.base.clone(),
-            falls: model.falls,
-            between,
-            operator: Arc::new(operator),
-            samples: samples.clone(),
-        })
+        let base = model.base.clone();
+        let operator = Arc::new(built(&base, [low, high], samples, between)?);
+        let samples = Arc::new(samples.clone());
+        let plane =
+            Self { base, falls: model.falls, between, range: [low, high], operator, slopes: Vec::new(), samples };
+        let mut count = 0;
+        plane.base.clone().visit(&mut |_, _| count += 1);
+        let mut slopes = plane.slopes(0..count);
+        slopes.sort_by(|a, b| b.motion.total_cmp(&a.motion));
+        slopes.truncate(MOST);
+        Ok(Self { slopes, ..plane })
     }
+
+    /// The operator where these weights bring it.
+    pub(crate) fn operator(&self, weights: &[f64]) -> Base {
+        let mut base = self.base.clone();
+        let mut at = 0;
+        base.visit(&mut |_, x| {
+            let slope = self.slopes.iter().position(|slope| slope.parameter == at);
+            if let Some(weight) = slope.and_then(|slope| weights.get(1 + slope)) {
+                *x *= 1.0 + weight;
+            }
+            at += 1;
+        });
+        base
+    }
+
+    /// The plane around other parameters; none where there is no operator.
+    pub(crate) fn around(&self, base: Base) -> Option<Self> {
+        let operator = built(&base, self.range, &self.samples, self.between).ok()?;
+        let mut moved = Self { base, operator: Arc::new(operator), slopes: Vec::new(), ..self.clone() };
+        moved.slopes = moved.slopes(self.slopes.iter().map(|slope| slope.parameter));
+        Some(moved)
+    }
+
+    /// The same over another record within the range of its own.
+    pub(crate) fn on(&self, samples: &Samples) -> Option<Self> {
+        let there = Self { samples: Arc::new(samples.clone()), ..self.clone() };
+        // Which of several sample periods that has is not known here.
+        if self.samples.periods.is_empty() { Some(there) } else { there.around(self.base.clone()) }
+    }
+
+    /// The operator alone.
+    pub(crate) fn alone(&self) -> Self {
+        Self { slopes: Vec::new(), ..self.clone() }
+    }
+
+    /// How the output changes with these parameters; not with one that is zero or moves nothing, nor where there is no operator on either side.
+    fn slopes(&self, parameters: impl Iterator<Item = usize>) -> Vec<Slope> {
+        let Samples { input, segments, .. } = self.samples.as_ref();
+        let output = size(&self.driven(&self.operator, input, segments));
+        let slope = |parameter: usize| {
+            let ((limits, above), (_, below)) = (self.changed(parameter, STEP)?, self.changed(parameter, -STEP)?);
+            let sides = Arc::new([above, below]);
+            let motion = size(&self.moved_by(&sides, input, segments));
+            let farthest = FARTHEST.max(FARTHEST_MOTION * output / motion);
+            let bounds = Bounds { lower: limits.lower.max(-farthest), upper: limits.upper.min(farthest) };
+            let moves = motion.is_finite() && motion > LEAST_MOTION * output;
+            moves.then_some(Slope { parameter, bounds, motion, sides })
+        };
+        parameters.collect::<Vec<_>>().into_par_iter().filter_map(slope).collect()
+    }
+
+    /// The operator with a parameter changed by a share of it, and how far it may be changed.
+    fn changed(&self, parameter: usize, by: f64) -> Option<(Bounds, PerSegment<Operator>)> {
+        let (mut base, mut at, mut limits) = (self.base.clone(), 0, None);
+        base.visit(&mut |meta, x| {
+            if at == parameter && *x != 0.0 {
+                let ends = [meta.lower / *x - 1.0, meta.upper / *x - 1.0];
+                limits = Some(Bounds { lower: ends[0].min(ends[1]).min(0.0), upper: ends[0].max(ends[1]).max(0.0) });
+                *x *= 1.0 + by;
+            }
+            at += 1;
+        });
+        Some((limits?, built(&base, self.range, &self.samples, self.between).ok()?))
+    }
+
+    /// Output over a drive that may have rows before each segment of the record: the past that it begins after, in the surroundings of its first row.
+    fn driven(&self, operator: &PerSegment<Operator>, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        let own = |i: usize| segments[i].end - self.samples.segments[i].len()..segments[i].end;
+        let past = |i: usize| &drive[segments[i].start..own(i).start];
+        let rows: Vec<f64> = (0..segments.len()).flat_map(|i| drive[own(i)].iter().copied()).collect();
+        let mut output = vec![0.0; rows.len()];
+        Drive::of(&self.samples, &rows, self.between, Passes::Once).run_from(
+            operator,
+            |state, i, env, u0| {
+                let stage = operator.of(i);
+                let mut all = past(i).iter().copied().chain([u0]);
+                let start = stage.reset(state, env, all.next().unwrap_or(u0));
+                all.fold(start, |_, u| stage.step(state, env, u))
+            },
+            &mut output,
+        );
+        let mut column = vec![0.0; drive.len()];
+        for (i, of) in self.samples.segments.iter().enumerate() {
+            column[own(i)].copy_from_slice(&output[of.clone()]);
+        }
+        column
+    }
+
+    fn moved_by(&self, sides: &[PerSegment<Operator>; 2], drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        let [mut above, below] = [0, 1].map(|side| self.driven(&sides[side], drive, segments));
+        above.iter_mut().zip(&below).for_each(|(a, b)| *a = (*a - b) / (2.0 * STEP));
+        above
+    }
+}
+
+fn built(
+    base: &Base,
+    range: [f64; 2],
+    samples: &Samples,
+    between: BetweenSamples,
+) -> Result<PerSegment<Operator>, Error> {
+    Drive::new(samples, between, Passes::Once).stages(|sampling| Operator::new(base, range, sampling))
+}
+
+fn size(rows: &[f64]) -> f64 {
+    rows.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 impl Basis for FixedBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        assert_eq!(segments, self.samples.segments, "the columns of a fixed base are those of its own record");
-        let column = |_| {
-            let mut column = vec![0.0; drive.len()];
-            Drive::of(&self.samples, drive, self.between, Passes::Once).run(&self.operator, &mut column);
-            column
+        let column = |i: usize| match i.checked_sub(1) {
+            None => self.driven(&self.operator, drive, segments),
+            Some(slope) => self.moved_by(&self.slopes[slope].sides, drive, segments),
         };
         turned(self.falls, of.map(column).collect())
     }
 
-    fn remembers(&self) -> bool {
-        false
+    fn together(&self) -> usize {
+        1
+    }
+
+    fn over(&self, samples: &Samples) -> Option<Box<dyn Basis>> {
+        Some(Box::new(self.on(samples)?))
     }
 
     fn drags(&self) -> bool {
@@ -64,10 +205,11 @@ impl Basis for FixedBasis {
     }
 
     fn bounds(&self) -> Vec<Bounds> {
-        vec![Bounds { lower: 1.0, upper: 1.0 }]
+        std::iter::once(Bounds { lower: 1.0, upper: 1.0 }).chain(self.slopes.iter().map(|s| s.bounds)).collect()
     }
 
-    fn penalty(&self, _level: f64) -> Option<DMatrix<f64>> {
-        None
+    fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
+        let weight = |r, c| if r == c && r > 0 { PENALTY * level } else { 0.0 };
+        (!self.slopes.is_empty()).then(|| DMatrix::from_fn(self.len(), self.len(), weight))
     }
 }

@@ -19,6 +19,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use crate::Samples;
 use crate::lsq::Bounds;
 
 /// Columns that run through an operator or a filter side by side: each waits for its own last sample only.
@@ -48,9 +49,9 @@ pub(crate) trait Basis: Sync {
     fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         None
     }
-    /// Whether a segment may have a [past](crate::memory): the columns depend on drive and segments alone.
-    fn remembers(&self) -> bool {
-        true
+    /// The same base over another record, where its columns depend on more than drive and segments.
+    fn over(&self, _samples: &Samples) -> Option<Box<dyn Basis>> {
+        None
     }
     /// Whether there is a drag: a rate-dependent form of the operator.
     fn drags(&self) -> bool {
@@ -75,7 +76,6 @@ pub(crate) trait Basis: Sync {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Samples;
 
     /// Two segments with minor loops; virgin memory at the start of each.
     fn samples() -> Samples {

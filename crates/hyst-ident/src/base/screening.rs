@@ -4,8 +4,8 @@
 //! Prandtl-Ishlinskii operator is the case of straight lines. Here ψ_r is a polynomial of degree 3:
 //! enough that the residual of a fit is not the base's own shape, which would otherwise be taken for
 //! an effect. A bank that relaxes with the travel of the drive ([`travel`](super::travel)) is added for hysteresis that is no superposition of
-//! relays: an effect is named only for what no rate-independent memory takes as well. An operator that is not refitted is a further column:
-//! it may ring, lag or follow the temperature by itself.
+//! relays: an effect is named only for what no rate-independent memory takes as well. An operator that is not
+//! linear in its parameters is added with its slopes: it may ring, lag or follow the temperature by itself.
 
 use std::ops::Range;
 
@@ -92,7 +92,7 @@ impl Basis for ScreeningBasis {
         if let Some(own) = self.kept.as_ref().filter(|_| of.end > kept) {
             // In volts like the others, whatever its unit: one penalty is for all.
             let size = |column: &[f64]| column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-            let mut own = own.columns(0..1, drive, segments, drag);
+            let mut own = own.columns(of.start.max(kept) - kept..of.end - kept, drive, segments, drag);
             for column in &mut own {
                 let scale = size(drive) / size(column);
                 column.iter_mut().filter(|_| scale.is_finite()).for_each(|y| *y *= scale);
@@ -138,8 +138,9 @@ impl Basis for ScreeningBasis {
         Some(v)
     }
 
-    fn remembers(&self) -> bool {
-        self.kept.is_none()
+    fn over(&self, samples: &Samples) -> Option<Box<dyn Basis>> {
+        let kept = self.kept.as_ref()?.on(samples)?;
+        Some(Box::new(Self { kept: Some(Box::new(kept)), ..self.clone() }))
     }
 
     fn drags(&self) -> bool {
@@ -147,7 +148,7 @@ impl Basis for ScreeningBasis {
     }
 
     fn bounds(&self) -> Vec<Bounds> {
-        vec![Bounds::FREE; self.ends().1 + usize::from(self.kept.is_some())]
+        vec![Bounds::FREE; self.ends().1 + self.kept.as_ref().map_or(0, |own| own.len())]
     }
 
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use hyst_core::{CurveSide, Error};
 
+use super::follow::followed;
 use super::search::{Named, Search, further, with_own_laws};
 use super::shape::Bent;
 use super::trial::Trial;
 use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
-use crate::base::{Drag, PiBasis};
+use crate::base::{Drag, FixedBasis, PiBasis};
 use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, RMSE_TOLERANCE};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
@@ -225,14 +226,28 @@ impl<'a> Own<'a> {
         seed: u64,
     ) -> Result<Option<Fitted>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks);
         let stage = |e| self.stage(e);
-        let held = shape::plain(&self.on(self.basis, &blocks).holding(), hypothesis).map_err(stage)?;
+        let basis = match self.basis {
+            BasisOf::Fixed(plane) => {
+                let on = |basis: &FixedBasis, solve: &dyn Fn(Problem<'_>) -> Result<Option<Fitted>, Error>| {
+                    solve(Problem::new(self.samples, basis, &blocks, self.per_record)).map_err(stage)
+                };
+                let fit = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit(h));
+                let solve = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
+                let followed = followed(plane, hypothesis, &fit, &solve)?;
+                BasisOf::Fixed(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there)))
+            }
+            other => other.clone(),
+        };
+        let problem = self.on(&basis, &blocks);
+        let held = shape::plain(&self.on(&basis, &blocks).holding(), hypothesis).map_err(stage)?;
         let follows = |trial: &Trial| {
             let cv_rmse = trial.cv_rmse();
             let is_worth = || held.as_ref().is_none_or(|held| score::is_worth(held, trial));
             let is_near = cv_rmse <= shape::CLOSED_ANEW * richest || cv_rmse <= shape::CLOSED * richest && is_worth();
-            is_near && score::sensible(&problem, trial)
+            // Or what it takes is not what the rich one gives it at all.
+            let is_another = || held.as_ref().is_some_and(|held| score::is_far_better(held, trial));
+            (is_near || is_another()) && score::sensible(&problem, trial)
         };
         let fit = problem.fit(hypothesis).map_err(stage)?;
         let Some(mut trial) = fit.and_then(|fit| Trial::of(&problem, fit)) else { return Ok(None) };
@@ -329,12 +344,25 @@ impl<'a> Own<'a> {
         let known = known.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
         let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
         motion.settling = settling;
+        let (basis, fit) = match self.basis {
+            BasisOf::Fixed(plane) => {
+                let solve = |basis: &FixedBasis, hypothesis: &Hypothesis| {
+                    let problem = Problem::new(&motion, basis, &blocks, self.per_record);
+                    let problem = if holds { problem.holding() } else { problem };
+                    problem.fit_linear(hypothesis).map_err(|e| self.stage(e))
+                };
+                let followed = followed(plane, &moving, &solve, &solve)?;
+                let (there, fit) = followed.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
+                (BasisOf::Fixed(Box::new(there)), fit)
+            }
+            other => (other.clone(), fit),
+        };
         // Its reach is that of the motion, not of the sensor.
-        let mut extended = to_model(self.train, &motion, self.basis, &fit, self.model.seed);
+        let mut extended = to_model(self.train, &motion, &basis, &fit, self.model.seed);
         extended.effects.drift = hypothesis.effects.drift;
         extended.effects.interference = hypothesis.effects.interference;
         extended.between_samples = self.model.between_samples;
-        if let BasisOf::Fixed(_) = self.basis {
+        if extended.base == self.model.base {
             // What is known of an operator that stays as it is stays known.
             let of_operator = format!("{}.", self.model.base.kind().name());
             let own = |name: &&String| name.starts_with(&of_operator);

@@ -19,6 +19,7 @@ mod extension;
 mod few_unknowns;
 mod findings;
 mod finer;
+mod follow;
 mod history;
 mod limits;
 mod named;
@@ -49,7 +50,7 @@ pub use suspects::{FOLLOWED, drive_options, usual_rival};
 
 use extension::{Own, Shaped};
 
-use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
+use crate::base::{Basis, DragParams, PiBasis, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
@@ -169,22 +170,17 @@ fn found_in(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    // An operator that is not refitted has no unknowns that could be fewer.
-    let few = (!matches!(own, BasisOf::Fixed(_))).then(|| own.as_ref());
-    let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
+    let base_of = |on_own: bool| if on_own { own.as_ref() } else { &screening };
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
         let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
         let (mut problem, mut found, mut on_own) = (problem, found, false);
-        if let Some(few) = few {
-            let own = Problem::new(samples, few, &blocks, per_record);
-            let start = (from, start.causes());
-            let anew = few_unknowns::search(&own, &found, start, options.seed, progress).map_err(stage)?;
-            if let Some(anew) = anew {
-                (problem, found, on_own) = (own, anew, true);
-            }
+        let few = Problem::new(samples, own.as_ref(), &blocks, per_record);
+        let begin = (from, start.causes());
+        if let Some(anew) = few_unknowns::search(&few, &found, begin, options.seed, progress).map_err(stage)? {
+            (problem, found, on_own) = (few, anew, true);
         }
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
         Ok::<_, FitError>((found, start_up_rows(samples, &residual), on_own))
@@ -195,6 +191,17 @@ fn found_in(
         progress("searching again without the start-up rows that have come to light");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
         (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
+    }
+    // So may what the actuator remembered when the record began.
+    if !found.named.is_empty() {
+        let plays = BasisOf::Pi(PiBasis::for_samples(&samples));
+        let asked = Own { model, train, samples: &samples, basis: &plays, before: &before, per_record };
+        let begun = asked.start(&found.best.fit.hypothesis, found.best.cv_rmse())?;
+        if let Some(begun) = begun.filter(|begun| begun.pasts != samples.pasts) {
+            progress("searching again after the past of the drive that has come to light");
+            samples = begun;
+            (found, _, on_own) = searched(&samples, &start)?;
+        }
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
@@ -294,7 +301,7 @@ fn found_in(
     }
     let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
-    if found.named.is_empty() && only_loop.is_none() && !matches!(own, BasisOf::Fixed(_)) {
+    if found.named.is_empty() && only_loop.is_none() {
         progress("asking whether the model's own base with an effect explains as much");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {

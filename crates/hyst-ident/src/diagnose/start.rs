@@ -61,10 +61,6 @@ impl Own<'_> {
         richest: f64,
         side: Option<CurveSide>,
     ) -> Result<Option<Start>, FitError> {
-        // An operator that stays as it is starts as its model does.
-        if !self.basis.as_ref().remembers() {
-            return Ok(None);
-        }
         let stage = |e| self.stage(e);
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let plain = shape::plain(&self.on(self.basis, &blocks), hypothesis).map_err(stage)?;

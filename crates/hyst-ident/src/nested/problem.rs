@@ -30,8 +30,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) zero_per_file: bool,
     /// Whether load, drift and tone are what a hypothesis says, though they could be solved for.
     holds: bool,
-    /// Whether thresholds that grow with the rate may be tried: of what an operator that is not refitted misses, their weights would take a part.
-    pub(crate) may_widen: bool,
     /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// How many columns the base has.
@@ -118,7 +116,6 @@ impl<'a> Problem<'a> {
             used,
             zero_per_file,
             holds: false,
-            may_widen: basis.remembers(),
             raw,
             width,
             penalty,
@@ -130,11 +127,6 @@ impl<'a> Problem<'a> {
     /// Keeps what load, drift and tone add as a hypothesis says it: solved on a coarse base, they would take up its misfit.
     pub(crate) fn holding(self) -> Self {
         Self { holds: true, ..self }
-    }
-
-    /// Tries thresholds that grow only where another problem of the same model does.
-    pub(crate) fn widening_as(self, other: &Self) -> Self {
-        Self { may_widen: other.may_widen, ..self }
     }
 
     /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
@@ -256,8 +248,10 @@ impl<'a> Problem<'a> {
 
     /// What a fit of this problem says of the motion in other rows, as the sensor would show it without zero, drift and tone.
     pub(crate) fn motion_in(&self, fit: &Fitted, samples: &Samples) -> Result<Vec<f64>, Error> {
+        let over = self.basis.over(samples);
         let there = Problem {
             samples,
+            basis: over.as_deref().unwrap_or(self.basis),
             used: Vec::new(),
             raw: None,
             penalty: None,

@@ -1,0 +1,47 @@
+//! How an operator that is not linear in its parameters follows what was found.
+//!
+//! Its plane ([`FixedBasis`]) holds near its parameters only. So it goes there in Gauss-Newton steps, each as far as it lowers the error, with a new
+//! plane after each.
+
+use crate::base::FixedBasis;
+use crate::fit::FitError;
+use crate::nested::{Fitted, Hypothesis};
+
+/// Steps at most.
+const STEPS: usize = 16;
+/// Shares of a step that are tried, the whole one first.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+/// Relative fall of the squares at which it has arrived.
+const LEAST_FALL: f64 = 1e-3;
+
+/// The plane where fits beside a hypothesis lead, and the fit of the operator alone there; none if that cannot be solved. `fit` fits on a plane, as much of
+/// the hypothesis as shall follow too; `solve` solves what is linear in the unknowns.
+pub(super) fn followed(
+    plane: &FixedBasis,
+    hypothesis: &Hypothesis,
+    fit: &dyn Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
+    solve: &dyn Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
+) -> Result<Option<(FixedBasis, Fitted)>, FitError> {
+    let Some(mut best) = solve(&plane.alone(), hypothesis)? else { return Ok(None) };
+    let mut plane = plane.clone();
+    for _ in 0..STEPS {
+        let Some(step) = fit(&plane, &best.hypothesis)? else { break };
+        let mut next = None;
+        for share in SHARES {
+            let weights: Vec<f64> = step.weights.iter().map(|w| share * w).collect();
+            let Some(there) = plane.around(plane.operator(&weights)) else { continue };
+            next =
+                solve(&there.alone(), &step.hypothesis)?.filter(|held| held.squares < best.squares).map(|f| (there, f));
+            if next.is_some() {
+                break;
+            }
+        }
+        let Some((there, held)) = next else { break };
+        let has_arrived = held.squares > (1.0 - LEAST_FALL) * best.squares;
+        (plane, best) = (there, held);
+        if has_arrived {
+            break;
+        }
+    }
+    Ok(Some((plane, best)))
+}
