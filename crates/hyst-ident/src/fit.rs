@@ -343,7 +343,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-        _ => BasisOf::Fixed(Box::new(FixedBasis::new(model, samples)?)),
+        _ => BasisOf::Fixed(Box::new(FixedBasis::new(&model.base, model.falls, model.between_samples, samples)?)),
     })
 }
 

@@ -2,11 +2,26 @@
 
 use std::ops::Range;
 
+use realfft::RealFftPlanner;
+
+use crate::criteria::MIN_RMSE_RATIO;
+
+/// Rows of a segment that has lines to speak of.
+const SHORTEST: usize = 64;
+
 /// Standard deviation of the white part of a residual \[its unit\].
 ///
-/// Fourth differences remove everything smooth; their median magnitude ignores edges. White noise of
-/// deviation σ gives fourth differences of deviation √70 σ, and the median of |N(0, s²)| is 0.6745 s.
+/// What differences from row to row show of it. A tone near half the sample rate is more than that: where the spectrum between its lines is far lower, that
+/// counts.
 pub fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
+    let between_rows = between_rows(residual, segments);
+    let between_lines = between_lines(residual, segments);
+    if MIN_RMSE_RATIO * between_lines < between_rows { between_lines } else { between_rows }
+}
+
+/// The white part by fourth differences: they remove everything smooth, and their median magnitude ignores edges. White noise of deviation σ gives
+/// fourth differences of deviation √70 σ, and the median of |N(0, s²)| is 0.6745 s.
+fn between_rows(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let mut magnitudes: Vec<f64> = segments
         .iter()
         .flat_map(|s| residual[s.clone()].windows(5))
@@ -18,6 +33,35 @@ pub fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let middle = magnitudes.len() / 2;
     let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f64::total_cmp);
     *median / 0.6745 / 70f64.sqrt()
+}
+
+/// The white part by the median line of the spectrum from a quarter to half of the sample rate. The squared magnitude of a line of white noise is
+/// exponential, its median ln 2 of its mean σ² Σw² with w the window.
+fn between_lines(residual: &[f64], segments: &[Range<usize>]) -> f64 {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let mut densities = Vec::new();
+    for rows in segments.iter().map(|s| &residual[s.clone()]).filter(|rows| rows.len() >= SHORTEST) {
+        let fft = planner.plan_fft_forward(rows.len());
+        let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
+        let mut weight = 0.0;
+        for (k, (x, r)) in input.iter_mut().zip(rows).enumerate() {
+            // Nothing of what is slow may spill over.
+            let window = (std::f64::consts::PI * (k as f64 + 0.5) / rows.len() as f64).sin().powi(4);
+            *x = window * r;
+            weight += window * window;
+        }
+        // Lengths are the planner's own.
+        if fft.process(&mut input, &mut output).is_ok() {
+            let upper = output.len() / 2..output.len() - 1;
+            densities.extend(output[upper].iter().map(|c| c.norm_sqr() / weight));
+        }
+    }
+    if densities.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = densities.len() / 2;
+    let (_, median, _) = densities.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / std::f64::consts::LN_2).sqrt()
 }
 
 /// Standard deviation that the output's own steps bring \[its unit\]: q/√12 with q the smallest gap between two of its
@@ -35,12 +79,33 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    #[test]
-    fn white_noise_under_a_smooth_signal_is_measured() {
+    /// White noise of deviation 0.05 on a sine of this frequency \[cycles a row\] and height.
+    fn noisy(rows: u32, frequency: f64, height: f64) -> Vec<f64> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
-        let x: Vec<f64> = (0..40_000).map(|k| 3.0 * (0.02 * f64::from(k)).sin() + 0.05 * normal()).collect();
-        let s = noise_floor(&x, std::slice::from_ref(&(0..x.len())));
-        assert!((s / 0.05 - 1.0).abs() < 0.03, "{s}");
+        let sine = |k: u32| (std::f64::consts::TAU * frequency * f64::from(k)).sin();
+        (0..rows).map(|k| height * sine(k) + 0.05 * normal()).collect()
+    }
+
+    #[test]
+    fn white_noise_under_a_smooth_signal_is_measured() {
+        let x = noisy(40_000, 0.003, 3.0);
+        let rows = 0..x.len();
+        let whole = std::slice::from_ref(&rows);
+        for s in [noise_floor(&x, whole), between_lines(&x, whole)] {
+            assert!((s / 0.05 - 1.0).abs() < 0.03, "{s}");
+        }
+    }
+
+    #[test]
+    fn a_tone_near_half_the_rate_is_no_noise() {
+        for (rows, frequency) in [(4_000, 0.416_4), (900, 0.374_7)] {
+            let x = noisy(rows, frequency, 0.5);
+            let all = 0..x.len();
+            let whole = std::slice::from_ref(&all);
+            assert!(between_rows(&x, whole) > 0.2);
+            let s = noise_floor(&x, whole);
+            assert!((s / 0.05 - 1.0).abs() < 0.15, "{s}");
+        }
     }
 }

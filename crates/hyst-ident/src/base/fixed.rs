@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::{Basis, Drag, turned};
 use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
-use crate::model::{Base, Model, Operator};
+use crate::model::{Base, Operator};
 use crate::samples::PerSegment;
 use crate::{BetweenSamples, Samples};
 
@@ -52,22 +52,28 @@ struct Slope {
     bounds: Bounds,
     /// Root of the squares of the motion for a change by all of the parameter \[y\].
     motion: f64,
-    sides: Arc<[PerSegment<Operator>; 2]>,
+    sides: Sides,
+}
+
+/// An operator with a parameter made larger and smaller, and how far these are apart as a share of it.
+#[derive(Clone, Debug)]
+struct Sides {
+    above: Arc<PerSegment<Operator>>,
+    below: Arc<PerSegment<Operator>>,
+    apart: f64,
 }
 
 impl FixedBasis {
-    /// For a record, its drive going on between the samples as the model has it.
+    /// For a record whose drive goes on `between` the samples in one way.
     ///
     /// # Errors
     /// If the operator cannot be built at the record's sample period.
-    pub(crate) fn new(model: &Model, samples: &Samples) -> Result<Self, Error> {
+    pub(crate) fn new(base: &Base, falls: bool, between: BetweenSamples, samples: &Samples) -> Result<Self, Error> {
         let (low, high) = samples.input_range();
-        let between = model.between_samples;
-        let base = model.base.clone();
-        let operator = Arc::new(built(&base, [low, high], samples, between)?);
-        let samples = Arc::new(samples.clone());
+        let (base, range) = (base.clone(), [low, high]);
+        let operator = Arc::new(built(&base, range, samples, between)?);
         let plane =
-            Self { base, falls: model.falls, between, range: [low, high], operator, slopes: Vec::new(), samples };
+            Self { base, falls, between, range, operator, slopes: Vec::new(), samples: Arc::new(samples.clone()) };
         let mut count = 0;
         plane.base.clone().visit(&mut |_, _| count += 1);
         let mut slopes = plane.slopes(0..count);
@@ -115,8 +121,15 @@ impl FixedBasis {
         let Samples { input, segments, .. } = self.samples.as_ref();
         let output = size(&self.driven(&self.operator, input, segments));
         let slope = |parameter: usize| {
-            let ((limits, above), (_, below)) = (self.changed(parameter, STEP)?, self.changed(parameter, -STEP)?);
-            let sides = Arc::new([above, below]);
+            let limits = self.limits(parameter)?;
+            let here = || Arc::clone(&self.operator);
+            // At the end of what is possible there is one side only.
+            let sides = match (self.changed(parameter, STEP), self.changed(parameter, -STEP)) {
+                (Some(above), Some(below)) => Sides { above, below, apart: 2.0 * STEP },
+                (Some(above), None) => Sides { above, below: here(), apart: STEP },
+                (None, Some(below)) => Sides { above: here(), below, apart: STEP },
+                (None, None) => return None,
+            };
             let motion = size(&self.moved_by(&sides, input, segments));
             let farthest = FARTHEST.max(FARTHEST_MOTION * output / motion);
             let bounds = Bounds { lower: limits.lower.max(-farthest), upper: limits.upper.min(farthest) };
@@ -126,18 +139,29 @@ impl FixedBasis {
         parameters.collect::<Vec<_>>().into_par_iter().filter_map(slope).collect()
     }
 
-    /// The operator with a parameter changed by a share of it, and how far it may be changed.
-    fn changed(&self, parameter: usize, by: f64) -> Option<(Bounds, PerSegment<Operator>)> {
-        let (mut base, mut at, mut limits) = (self.base.clone(), 0, None);
-        base.visit(&mut |meta, x| {
+    /// How far a parameter can be changed, as shares of it; none of one that is zero.
+    fn limits(&self, parameter: usize) -> Option<Bounds> {
+        let (mut at, mut limits) = (0, None);
+        self.base.clone().visit(&mut |meta, x| {
             if at == parameter && *x != 0.0 {
                 let ends = [meta.lower / *x - 1.0, meta.upper / *x - 1.0];
                 limits = Some(Bounds { lower: ends[0].min(ends[1]).min(0.0), upper: ends[0].max(ends[1]).max(0.0) });
+            }
+            at += 1;
+        });
+        limits
+    }
+
+    /// The operator with a parameter changed by a share of it.
+    fn changed(&self, parameter: usize, by: f64) -> Option<Arc<PerSegment<Operator>>> {
+        let (mut base, mut at) = (self.base.clone(), 0);
+        base.visit(&mut |_, x| {
+            if at == parameter {
                 *x *= 1.0 + by;
             }
             at += 1;
         });
-        Some((limits?, built(&base, self.range, &self.samples, self.between).ok()?))
+        built(&base, self.range, &self.samples, self.between).ok().map(Arc::new)
     }
 
     /// Output over a drive that may have rows before each segment of the record: the past that it begins after, in the surroundings of its first row.
@@ -163,10 +187,11 @@ impl FixedBasis {
         column
     }
 
-    fn moved_by(&self, sides: &[PerSegment<Operator>; 2], drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
-        let [mut above, below] = [0, 1].map(|side| self.driven(&sides[side], drive, segments));
-        above.iter_mut().zip(&below).for_each(|(a, b)| *a = (*a - b) / (2.0 * STEP));
-        above
+    fn moved_by(&self, sides: &Sides, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        let mut moved = self.driven(&sides.above, drive, segments);
+        let below = self.driven(&sides.below, drive, segments);
+        moved.iter_mut().zip(&below).for_each(|(a, b)| *a = (*a - b) / sides.apart);
+        moved
     }
 }
 
@@ -211,5 +236,66 @@ impl Basis for FixedBasis {
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let weight = |r, c| if r == c && r > 0 { PENALTY * level } else { 0.0 };
         (!self.slopes.is_empty()).then(|| DMatrix::from_fn(self.len(), self.len(), weight))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hyst_core::BoucWenParams;
+
+    use super::*;
+
+    fn samples() -> Samples {
+        let input: Vec<f64> = (0..1200).map(|k| f64::from(k) * 0.02).map(|t| 5.0 + 4.0 * t * (1.0 - t.cos())).collect();
+        let output = input.iter().map(|u| 0.3 * u).collect();
+        Samples::of_columns(1e-2, input, output)
+    }
+
+    fn plane(n: f64, samples: &Samples) -> FixedBasis {
+        let base = BoucWenParams { k0: 0.4, alpha: -0.2, beta: 0.03, gamma: -0.01, n };
+        FixedBasis::new(&Base::BoucWen(base), false, BetweenSamples::Linear, samples).unwrap()
+    }
+
+    fn output(plane: &FixedBasis, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+        plane.columns(0..1, drive, segments, &Drag::NONE).remove(0)
+    }
+
+    #[test]
+    fn small_changes_of_the_parameters_move_the_output_as_the_plane_says() {
+        let samples = samples();
+        let plane = plane(1.2, &samples);
+        assert_eq!(plane.len(), 6, "the output and five parameters");
+        let weights = [1.0, 1e-3, -2e-3, 2e-3, -1e-3, 1e-3];
+        let moved = plane.around(plane.operator(&weights)).unwrap();
+        let there = output(&moved, &samples.input, &samples.segments);
+        let columns = plane.columns(0..6, &samples.input, &samples.segments, &Drag::NONE);
+        for (k, there) in there.iter().enumerate() {
+            let said: f64 = columns.iter().zip(weights).map(|(column, w)| w * column[k]).sum();
+            // Of second order in changes of 2e-3.
+            assert!((there - said).abs() < 1e-5 * 30.0, "row {k}: {there} {said}");
+            assert!(k == 0 || (there - columns[0][k]).abs() > 1e-4, "row {k} has not moved");
+        }
+    }
+
+    #[test]
+    fn a_past_does_what_the_same_rows_of_a_record_do() {
+        let whole = samples();
+        let past = 300;
+        let rest = Samples::of_columns(1e-2, whole.input[past..].to_vec(), whole.output[past..].to_vec());
+        let (of_whole, of_rest) = (plane(1.2, &whole), plane(1.2, &rest));
+        let in_one = output(&of_whole, &whole.input, &whole.segments);
+        assert_eq!(output(&of_rest, &whole.input, &whole.segments)[past..], in_one[past..]);
+        let forgotten = output(&of_rest, &rest.input, &rest.segments);
+        assert!((forgotten[0] - in_one[past]).abs() > 0.1, "{} {}", forgotten[0], in_one[past]);
+        // Over another record as well.
+        assert_eq!(output(&of_rest.on(&whole).unwrap(), &whole.input, &whole.segments), in_one);
+    }
+
+    #[test]
+    fn a_parameter_at_its_end_is_changed_to_one_side() {
+        let plane = plane(1.0, &samples());
+        let bounds = plane.bounds();
+        assert_eq!(bounds.len(), 6);
+        assert_eq!(bounds.iter().filter(|b| b.lower == 0.0 && b.upper > 0.0).count(), 1);
     }
 }
