@@ -15,6 +15,7 @@ use crate::criteria::{
 };
 use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
 use crate::samples::range;
+use crate::settle::windows;
 
 /// Bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
@@ -161,7 +162,10 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.lag.is_none_or(|p| time(p.seconds))
         && e.rate.is_none_or(|p| p.volts > 0.0)
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
-        && e.drift.is_none_or(|p| p.seconds == 0.0 || p.seconds > MIN_DRIFT_TIME * samples.duration())
+        && e.drift.is_none_or(|p| {
+            p.seconds == 0.0
+                || p.seconds > MIN_DRIFT_TIME * samples.duration() && outlasts_the_start(samples, p.seconds)
+        })
         && e.saturation.is_none_or(|p| stops_something(samples, &trial.fit, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < HALF)
@@ -172,6 +176,14 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
                 && p.hz < 0.9 * nyquist
         })
         && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, MIN_TONE_HZ) && !is_harmonic(problem, p.hz))
+}
+
+/// Whether what settles with a time constant \[s\] is still seen once the drive has wiped out what the actuator remembered from before the record: within that
+/// time an unknown start settles too.
+fn outlasts_the_start(samples: &Samples, seconds: f64) -> bool {
+    let begins_at_rest = samples.pasts.first().is_none_or(Vec::is_empty);
+    let rows = windows(samples).first().copied().unwrap_or(0);
+    begins_at_rest || seconds > rows as f64 * samples.period_of(0)
 }
 
 /// Whether a mode rings: by itself it goes on for some periods, or its own part at its frequency, g/(2ζ), exceeds the part of the motion that does
