@@ -3,6 +3,7 @@
 ok     the names, or a tie that the diagnosis declares, are the expected set or one that the case accepts (`unknown`: no name, and the
        verdict is unexplained)
 WRONG  a name that is in no accepted set
+0.98   probability of each name, in their order
 ratio  test error of the extended model over that of the same kind of model fitted to the twin without the effects
 Errors are computed here from what `simulate` writes, not read from the findings.
 """
@@ -63,6 +64,7 @@ def score(hystctl, case):
         expected=truth["expect"],
         law=truth["base"],
         named=named,
+        probabilities=[effect["probability"] for effect in findings["effects"]],
         ok=any(sorted(reading) in accepted for reading in itertools.product(*ties)),
         wrong=[names[0] for names in ties if names[0] != "unknown" and not known & set(names)],
         before=before,
@@ -91,8 +93,9 @@ def main():
                 continue
             mark = "ok" if result["ok"] else "WRONG" if result["wrong"] else "missed"
             expected, named = (",".join(result[key]) or "-" for key in ("expected", "named"))
+            probable = " ".join(f"{p:.2f}" for p in result["probabilities"])
             errors = f"{result['before']:.4f} -> {result['after']:.4f} um, ratio {result['ratio']:.2f}"
-            print(f"{name:26} {mark:6} {result['law']:10} expected {expected:26} named {named:26} {errors}", flush=True)
+            print(f"{name:26} {mark:6} {result['law']:10} expected {expected:26} named {named:26} {probable:14} {errors}", flush=True)
     scored = [result for result in results if not isinstance(result, str)]
     ratios = [result["ratio"] for result in scored if np.isfinite(result["ratio"])]
     print(f"{sum(r['ok'] for r in scored)} of {len(results)} right, {sum(bool(r['wrong']) for r in scored)} with a wrong name, "
