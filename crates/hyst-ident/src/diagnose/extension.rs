@@ -234,7 +234,7 @@ impl<'a> Own<'a> {
                 };
                 let fit = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit(h));
                 let solve = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
-                let followed = followed(plane, hypothesis, &fit, &solve)?;
+                let followed = followed(plane, hypothesis, fit, solve)?;
                 BasisOf::Fixed(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there)))
             }
             other => other.clone(),
@@ -351,7 +351,7 @@ impl<'a> Own<'a> {
                     let problem = if holds { problem.holding() } else { problem };
                     problem.fit_linear(hypothesis).map_err(|e| self.stage(e))
                 };
-                let followed = followed(plane, &moving, &solve, &solve)?;
+                let followed = followed(plane, &moving, solve, solve)?;
                 let (there, fit) = followed.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
                 (BasisOf::Fixed(Box::new(there)), fit)
             }

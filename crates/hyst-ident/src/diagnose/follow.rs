@@ -19,8 +19,8 @@ const LEAST_FALL: f64 = 1e-3;
 pub(super) fn followed(
     plane: &FixedBasis,
     hypothesis: &Hypothesis,
-    fit: &dyn Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
-    solve: &dyn Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
+    fit: impl Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
+    solve: impl Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
 ) -> Result<Option<(FixedBasis, Fitted)>, FitError> {
     let Some(mut best) = solve(&plane.alone(), hypothesis)? else { return Ok(None) };
     let mut plane = plane.clone();

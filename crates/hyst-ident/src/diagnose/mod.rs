@@ -50,7 +50,7 @@ pub use suspects::{FOLLOWED, drive_options, usual_rival};
 
 use extension::{Own, Shaped};
 
-use crate::base::{Basis, DragParams, PiBasis, ROWS_PER_UNKNOWN, ScreeningBasis};
+use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
 use crate::lsq::Blocks;
 use crate::model::{Base, Effect, Model};
@@ -191,17 +191,6 @@ fn found_in(
         progress("searching again without the start-up rows that have come to light");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
         (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
-    }
-    // So may what the actuator remembered when the record began.
-    if !found.named.is_empty() {
-        let plays = BasisOf::Pi(PiBasis::for_samples(&samples));
-        let asked = Own { model, train, samples: &samples, basis: &plays, before: &before, per_record };
-        let begun = asked.start(&found.best.fit.hypothesis, found.best.cv_rmse())?;
-        if let Some(begun) = begun.filter(|begun| begun.pasts != samples.pasts) {
-            progress("searching again after the past of the drive that has come to light");
-            samples = begun;
-            (found, _, on_own) = searched(&samples, &start)?;
-        }
     }
     // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
     if !found.named.is_empty() {
