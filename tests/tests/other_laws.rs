@@ -199,13 +199,14 @@ fn a_curve_and_a_drift_are_found_where_the_record_begins_away_from_rest() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
-/// A Bouc-Wen model is kept as it is: no other past is tried for it, however little it follows where the record begins.
+/// A Bouc-Wen model that was fitted while the zero drifted has taken a part of the drift, and where the amplitude fades with time rich memory takes the rest.
+/// The drift may be missed there, but nothing else is named in its place, and the error does not rise.
 #[test]
-fn a_diagnosis_of_an_operator_that_is_not_refitted_asks_for_no_other_past() {
+fn a_drift_beside_a_bouc_wen_model_gets_no_wrong_name() {
     let settles = |t: f64| 3.0 * (1.0 - (-t / 6.0).exp());
     let drifts = |t: &[f64], u: &[f64]| bouc_wen(t, u).iter().zip(t).map(|(y, t)| y + settles(*t)).collect();
     let d = diagnosed(Kind::BoucWen, &from_the_middle(&drifts));
-    assert!(!d.findings.effects.is_empty(), "{:#?}", d.findings);
+    assert!(names(&d).iter().all(|name| *name == "drift"), "{:#?}", d.findings);
     let (before, after) = (d.findings.before.train.unwrap().rmse, d.findings.after.train.unwrap().rmse);
     assert!(after <= before, "{before} {after}");
 }

@@ -403,6 +403,9 @@ pub(crate) fn fit_settled(
                 .map_err(|source| FitError::Stage { record: name(), source })
         };
         let by_plays = recalled(samples, |samples| run(samples, &plays), &recalls)?;
+        if !basis.remembers() {
+            samples.pasts.iter_mut().for_each(Vec::clear);
+        }
         samples.settling.copy_from_slice(&samples.blind);
         let all = run(samples, basis)?;
         (found, _) = start_up_found(samples, all, Some(&by_plays), |samples| run(samples, basis))?;

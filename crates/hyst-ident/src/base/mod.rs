@@ -49,6 +49,10 @@ pub(crate) trait Basis: Sync {
     fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         None
     }
+    /// Whether a search on it may take a [past](crate::memory) that plays show: an operator of another kind remembers in another way.
+    fn remembers(&self) -> bool {
+        true
+    }
     /// The same base over another record, where its columns depend on more than drive and segments.
     fn over(&self, _samples: &Samples) -> Option<Box<dyn Basis>> {
         None

@@ -131,6 +131,10 @@ impl Basis for RatedBasis<'_> {
         columns
     }
 
+    fn remembers(&self) -> bool {
+        self.base.remembers()
+    }
+
     fn drags(&self) -> bool {
         self.base.drags()
     }

@@ -5,7 +5,7 @@
 //! enough that the residual of a fit is not the base's own shape, which would otherwise be taken for
 //! an effect. A bank that relaxes with the travel of the drive ([`travel`](super::travel)) is added for hysteresis that is no superposition of
 //! relays: an effect is named only for what no rate-independent memory takes as well. An operator that is not
-//! linear in its parameters is added with its slopes: it may ring, lag or follow the temperature by itself.
+//! linear in its parameters is a further column: it may ring, lag or follow the temperature by itself.
 
 use std::ops::Range;
 
@@ -136,6 +136,10 @@ impl Basis for ScreeningBasis {
         let relaxed = self.travel.columns(0..self.travel.len(), drive, segments);
         relaxed.iter().zip(of_travel).for_each(|(e, w)| v.iter_mut().zip(e).for_each(|(v, e)| *v += w * e));
         Some(v)
+    }
+
+    fn remembers(&self) -> bool {
+        self.kept.is_none()
     }
 
     fn over(&self, samples: &Samples) -> Option<Box<dyn Basis>> {

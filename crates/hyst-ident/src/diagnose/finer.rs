@@ -64,13 +64,13 @@ pub(super) fn refine(
     let blocks = Blocks::new(samples, problem.blocks.rows.len(), ROWS);
     let basis = PreisachBasis::for_samples(samples, CELLS);
     let mut settled = samples.clone();
-    let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file);
+    let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file).widening_as(problem);
     let Some(rough) = placed(&first, &found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
     // A triangle that keeps every turn in its memory also shows how long an unknown start lasts.
     let starting = start_up_rows(samples, &first.residual(&rough)?);
     settled.settling.iter_mut().zip(starting).for_each(|(known, starts)| *known |= starts);
     drop(first);
-    let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file);
+    let triangle = Problem::new(&settled, &basis, &blocks, problem.zero_per_file).widening_as(problem);
     let fitted = |h: &Hypothesis| Ok::<_, Error>(triangle.fit(h)?.and_then(|f| Trial::of(&triangle, f)));
     let from = [&found.best.fit.hypothesis, &rough.hypothesis];
     let differ = from[0] != from[1];
@@ -173,7 +173,7 @@ fn searched_anew(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Option<Search>, Error> {
     let basis = PreisachBasis::for_samples(problem.samples, SEARCHED_CELLS);
-    let coarser = Problem::new(triangle.samples, &basis, triangle.blocks, triangle.zero_per_file);
+    let coarser = Problem::new(triangle.samples, &basis, triangle.blocks, triangle.zero_per_file).widening_as(problem);
     let rough = placed(&coarser, &found.best.fit.hypothesis)?;
     let from = rough.map(|rough| coarser.fit(&rough.hypothesis)).transpose()?.flatten();
     let from = from.and_then(|f| Trial::of(&coarser, f));
@@ -194,7 +194,7 @@ fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<b
         return Ok(false);
     }
     let basis = ScreeningBasis::for_samples(problem.samples, true, None);
-    let dragging = Problem::new(problem.samples, &basis, problem.blocks, problem.zero_per_file);
+    let dragging = Problem::new(problem.samples, &basis, problem.blocks, problem.zero_per_file).widening_as(problem);
     let squares =
         |h: &Hypothesis| Ok::<_, Error>(dragging.fit(h)?.and_then(|f| Trial::of(&dragging, f)).map(|t| t.total()));
     let with = &anew.best.fit.hypothesis;

@@ -149,7 +149,7 @@ fn found_in(
 
     let own = basis_of(model, &samples).map_err(stage)?;
     let kept = match &own {
-        BasisOf::Fixed(kept) => Some(kept.clone()),
+        BasisOf::Fixed(kept) => Some(Box::new(kept.alone())),
         _ => None,
     };
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
@@ -170,17 +170,22 @@ fn found_in(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    let base_of = |on_own: bool| if on_own { own.as_ref() } else { &screening };
+    // The plane of an operator that was fitted while something stood in the record holds no search: what it misses far from there looks like effects.
+    let few = (!matches!(own, BasisOf::Fixed(_))).then(|| own.as_ref());
+    let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
         let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
         let (mut problem, mut found, mut on_own) = (problem, found, false);
-        let few = Problem::new(samples, own.as_ref(), &blocks, per_record);
-        let begin = (from, start.causes());
-        if let Some(anew) = few_unknowns::search(&few, &found, begin, options.seed, progress).map_err(stage)? {
-            (problem, found, on_own) = (few, anew, true);
+        if let Some(few) = few {
+            let own = Problem::new(samples, few, &blocks, per_record);
+            let start = (from, start.causes());
+            let anew = few_unknowns::search(&own, &found, start, options.seed, progress).map_err(stage)?;
+            if let Some(anew) = anew {
+                (problem, found, on_own) = (own, anew, true);
+            }
         }
         let residual = problem.residual(&found.best.fit).map_err(stage)?;
         Ok::<_, FitError>((found, start_up_rows(samples, &residual), on_own))
@@ -290,7 +295,7 @@ fn found_in(
     }
     let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
-    if found.named.is_empty() && only_loop.is_none() {
+    if let (true, None, Some(_)) = (found.named.is_empty(), only_loop, few) {
         progress("asking whether the model's own base with an effect explains as much");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {

@@ -69,7 +69,7 @@ pub(super) fn starts(scan: &Scan<'_>, cause: Cause) -> Result<Vec<Hypothesis>, E
             // And one on the whole drive, for any base.
             let on_the_drive = widenings(scan)?.into_iter().map(|rate| with(&|e| e.rate = Some(rate)));
             // And thresholds that grow with the rate.
-            let grown = grown_thresholds(scan)?;
+            let grown = if problem.may_widen { grown_thresholds(scan)? } else { None };
             let grown = grown.map(|widening| with(&|e| e.widening = Some(widening.clone())));
             in_the_plays.into_iter().filter(|_| problem.basis.drags()).chain(on_the_drive).chain(grown).collect()
         }

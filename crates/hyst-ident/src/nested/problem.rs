@@ -30,6 +30,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) zero_per_file: bool,
     /// Whether load, drift and tone are what a hypothesis says, though they could be solved for.
     holds: bool,
+    /// Whether thresholds that grow with the rate may be tried: of what an operator beside plays misses, their weights would take a part.
+    pub(crate) may_widen: bool,
     /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
     pub(super) raw: Option<Vec<Vec<f64>>>,
     /// How many columns the base has.
@@ -116,6 +118,7 @@ impl<'a> Problem<'a> {
             used,
             zero_per_file,
             holds: false,
+            may_widen: basis.remembers(),
             raw,
             width,
             penalty,
@@ -127,6 +130,11 @@ impl<'a> Problem<'a> {
     /// Keeps what load, drift and tone add as a hypothesis says it: solved on a coarse base, they would take up its misfit.
     pub(crate) fn holding(self) -> Self {
         Self { holds: true, ..self }
+    }
+
+    /// Tries thresholds that grow only where another problem of the same model does.
+    pub(crate) fn widening_as(self, other: &Self) -> Self {
+        Self { may_widen: other.may_widen, ..self }
     }
 
     /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
