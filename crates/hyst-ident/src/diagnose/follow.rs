@@ -4,6 +4,7 @@
 //! plane after each.
 
 use crate::base::FixedBasis;
+use crate::criteria::MIN_RMSE_DROP;
 use crate::fit::FitError;
 use crate::nested::{Fitted, Hypothesis};
 
@@ -14,7 +15,8 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
 /// Relative fall of the squares at which it has arrived.
 const LEAST_FALL: f64 = 1e-3;
 
-/// The plane where fits beside a hypothesis lead, and the fit of the operator alone there; none if that cannot be solved. `fit` fits on a plane, as much of
+/// The plane where fits beside a hypothesis lead, and the fit of the operator alone there; where it was, if it errs hardly less there; none if that cannot be
+/// solved. `fit` fits on a plane, as much of
 /// the hypothesis as shall follow too; `solve` solves what is linear in the unknowns.
 pub(super) fn followed(
     plane: &FixedBasis,
@@ -22,8 +24,8 @@ pub(super) fn followed(
     fit: impl Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
     solve: impl Fn(&FixedBasis, &Hypothesis) -> Result<Option<Fitted>, FitError>,
 ) -> Result<Option<(FixedBasis, Fitted)>, FitError> {
-    let Some(mut best) = solve(&plane.alone(), hypothesis)? else { return Ok(None) };
-    let mut plane = plane.clone();
+    let Some(as_it_was) = solve(&plane.alone(), hypothesis)? else { return Ok(None) };
+    let (own, mut plane, mut best) = (plane, plane.clone(), as_it_was.clone());
     for _ in 0..STEPS {
         let Some(step) = fit(&plane, &best.hypothesis)? else { break };
         let mut next = None;
@@ -43,5 +45,7 @@ pub(super) fn followed(
             break;
         }
     }
-    Ok(Some((plane, best)))
+    // What is known of its parameters is not given up for what another draw of the noise would change as well.
+    let is_worth = best.rmse() <= (1.0 - MIN_RMSE_DROP) * as_it_was.rmse();
+    Ok(Some(if is_worth { (plane, best) } else { (own.clone(), as_it_was) }))
 }
