@@ -1,4 +1,4 @@
-"""Fits, diagnoses and scores the cases that first.py, second.py, third.py, fourth.py, fifth.py, sixth.py, seventh.py or eighth.py wrote: `python score.py HYSTCTL CASES [id-prefix ...]` (needs numpy).
+"""Fits, diagnoses and scores the cases that a script beside it wrote: `python score.py HYSTCTL CASES [id-prefix ...]` (needs numpy).
 
 ok     the names, or a tie that the diagnosis declares, are the expected set or one that the case accepts (`unknown`: no name, and the
        verdict is unexplained)

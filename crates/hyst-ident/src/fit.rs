@@ -10,7 +10,7 @@ use std::ops::{ControlFlow, Range};
 use hyst_core::{Grid, PiParams, ViscousPiParams};
 
 use crate::BetweenSamples;
-use crate::base::{Basis, DragParams, FixedBasis, PiBasis, PreisachBasis};
+use crate::base::{Basis, DragParams, LinearisedBasis, PiBasis, PreisachBasis};
 use crate::criteria::MINOR_SHARE;
 use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
@@ -284,7 +284,7 @@ pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
     /// An operator of another kind, near its parameters.
-    Fixed(Box<FixedBasis>),
+    Linearised(Box<LinearisedBasis>),
 }
 
 impl BasisOf {
@@ -292,7 +292,7 @@ impl BasisOf {
         match self {
             Self::Pi(b) => b,
             Self::Preisach(b) => b,
-            Self::Fixed(b) => b.as_ref(),
+            Self::Linearised(b) => b.as_ref(),
         }
     }
 
@@ -309,7 +309,7 @@ impl BasisOf {
                 Base::Pi(PiParams { gain: clean[0], thresholds: b.thresholds.clone(), weights: clean[1..].to_vec() })
             }
             Self::Preisach(b) => Base::Preisach(b.spec(&clean)),
-            Self::Fixed(b) => b.operator(weights),
+            Self::Linearised(b) => b.operator(weights),
         }
     }
 }
@@ -343,7 +343,12 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
                 ..PreisachBasis::for_samples(samples, spec.cells)
             })
         }
-        _ => BasisOf::Fixed(Box::new(FixedBasis::new(&model.base, model.falls, model.between_samples, samples)?)),
+        _ => BasisOf::Linearised(Box::new(LinearisedBasis::new(
+            &model.base,
+            model.falls,
+            model.between_samples,
+            samples,
+        )?)),
     })
 }
 

@@ -1,7 +1,7 @@
 //! Hysteresis bases as columns: each is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
 
 mod drag;
-mod fixed;
+mod linearised;
 mod pi;
 mod preisach;
 mod rated;
@@ -9,7 +9,7 @@ mod screening;
 mod travel;
 
 pub(crate) use drag::{Drag, DragParams};
-pub(crate) use fixed::FixedBasis;
+pub(crate) use linearised::LinearisedBasis;
 pub(crate) use pi::{PiBasis, SlidingPlays, play_column};
 pub(crate) use preisach::PreisachBasis;
 pub(crate) use rated::RatedBasis;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::pi::plays;
 use super::travel::TravelBank;
-use super::{BESIDE, Basis, Drag, FixedBasis, PiBasis};
+use super::{BESIDE, Basis, Drag, LinearisedBasis, PiBasis};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::repetition::only_loop;
@@ -33,13 +33,13 @@ pub(crate) struct ScreeningBasis {
     half: f64,
     travel: TravelBank,
     drags: bool,
-    kept: Option<Box<FixedBasis>>,
+    kept: Option<Box<LinearisedBasis>>,
 }
 
 impl ScreeningBasis {
     /// For the input range of a record; with drag only where the base that is extended in the end has one too, and with that base
     /// if it is kept as it is.
-    pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
+    pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
         // A short record determines fewer curves.
         // Its weights have either sign.
         let plays = |by| PiBasis { falls: false, ..PiBasis::coarser(samples, by) };
@@ -48,7 +48,7 @@ impl ScreeningBasis {
         (1..COARSEST).map(of).find(fits).unwrap_or_else(|| of(COARSEST))
     }
 
-    fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<FixedBasis>>) -> Self {
+    fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
         let (low, high) = samples.input_range();
         // The identity (r = 0) and every second play.
         let curved = std::iter::once(0.0).chain(linear.thresholds.iter().copied().skip(1).step_by(2)).collect();

@@ -9,7 +9,7 @@ use super::search::{Named, Search, further, with_own_laws};
 use super::shape::Bent;
 use super::trial::Trial;
 use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
-use crate::base::{Drag, FixedBasis, PiBasis};
+use crate::base::{Drag, LinearisedBasis, PiBasis};
 use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, RMSE_TOLERANCE};
 use crate::fit::{BLOCKS, BasisOf, FitError, to_model};
 use crate::lsq::Blocks;
@@ -228,14 +228,14 @@ impl<'a> Own<'a> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let stage = |e| self.stage(e);
         let basis = match self.basis {
-            BasisOf::Fixed(plane) => {
-                let on = |basis: &FixedBasis, solve: &dyn Fn(Problem<'_>) -> Result<Option<Fitted>, Error>| {
+            BasisOf::Linearised(plane) => {
+                let on = |basis: &LinearisedBasis, solve: &dyn Fn(Problem<'_>) -> Result<Option<Fitted>, Error>| {
                     solve(Problem::new(self.samples, basis, &blocks, self.per_record)).map_err(stage)
                 };
-                let fit = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit(h));
-                let solve = |basis: &FixedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
+                let fit = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit(h));
+                let solve = |basis: &LinearisedBasis, h: &Hypothesis| on(basis, &|problem| problem.fit_linear(h));
                 let followed = followed(plane, hypothesis, fit, solve)?;
-                BasisOf::Fixed(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there)))
+                BasisOf::Linearised(Box::new(followed.map_or_else(|| plane.as_ref().clone(), |(there, _)| there)))
             }
             other => other.clone(),
         };
@@ -345,15 +345,15 @@ impl<'a> Own<'a> {
         let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
         motion.settling = settling;
         let (basis, fit) = match self.basis {
-            BasisOf::Fixed(plane) => {
-                let solve = |basis: &FixedBasis, hypothesis: &Hypothesis| {
+            BasisOf::Linearised(plane) => {
+                let solve = |basis: &LinearisedBasis, hypothesis: &Hypothesis| {
                     let problem = Problem::new(&motion, basis, &blocks, self.per_record);
                     let problem = if holds { problem.holding() } else { problem };
                     problem.fit_linear(hypothesis).map_err(|e| self.stage(e))
                 };
                 let followed = followed(plane, &moving, solve, solve)?;
                 let (there, fit) = followed.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
-                (BasisOf::Fixed(Box::new(there)), fit)
+                (BasisOf::Linearised(Box::new(there)), fit)
             }
             other => (other.clone(), fit),
         };

@@ -149,7 +149,7 @@ fn found_in(
 
     let own = basis_of(model, &samples).map_err(stage)?;
     let kept = match &own {
-        BasisOf::Fixed(kept) => Some(Box::new(kept.alone())),
+        BasisOf::Linearised(kept) => Some(Box::new(kept.alone())),
         _ => None,
     };
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
@@ -171,7 +171,7 @@ fn found_in(
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
     // The plane of an operator that was fitted while something stood in the record holds no search: what it misses far from there looks like effects.
-    let few = (!matches!(own, BasisOf::Fixed(_))).then(|| own.as_ref());
+    let few = (!matches!(own, BasisOf::Linearised(_))).then(|| own.as_ref());
     let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
@@ -295,7 +295,7 @@ fn found_in(
     }
     let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
-    if let (true, None, Some(_)) = (found.named.is_empty(), only_loop, few) {
+    if found.named.is_empty() && only_loop.is_none() && few.is_some() {
         progress("asking whether the model's own base with an effect explains as much");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {

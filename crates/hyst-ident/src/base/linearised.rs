@@ -31,7 +31,7 @@ const PENALTY: f64 = 1e-7;
 
 /// Any operator near the parameters that it has.
 #[derive(Clone, Debug)]
-pub(crate) struct FixedBasis {
+pub(crate) struct LinearisedBasis {
     pub(crate) base: Base,
     falls: bool,
     between: BetweenSamples,
@@ -63,7 +63,7 @@ struct Sides {
     apart: f64,
 }
 
-impl FixedBasis {
+impl LinearisedBasis {
     /// For a record whose drive goes on `between` the samples in one way.
     ///
     /// # Errors
@@ -96,24 +96,38 @@ impl FixedBasis {
         base
     }
 
-    /// The plane around other parameters; none where there is no operator.
-    pub(crate) fn around(&self, base: Base) -> Option<Self> {
+    /// The operator with other parameters alone; none where there is no such operator.
+    pub(crate) fn at(&self, base: Base) -> Option<Self> {
         let operator = built(&base, self.range, &self.samples, self.between).ok()?;
-        let mut moved = Self { base, operator: Arc::new(operator), slopes: Vec::new(), ..self.clone() };
-        moved.slopes = moved.slopes(self.slopes.iter().map(|slope| slope.parameter));
-        Some(moved)
+        Some(Self { base, operator: Arc::new(operator), ..self.alone() })
+    }
+
+    /// The same with its changes with those parameters that `other` changes.
+    pub(crate) fn with_slopes_of(self, other: &Self) -> Self {
+        let slopes = self.slopes(other.slopes.iter().map(|slope| slope.parameter));
+        Self { slopes, ..self }
     }
 
     /// The same over another record within the range of its own.
     pub(crate) fn on(&self, samples: &Samples) -> Option<Self> {
         let there = Self { samples: Arc::new(samples.clone()), ..self.clone() };
         // Which of several sample periods that has is not known here.
-        if self.samples.periods.is_empty() { Some(there) } else { there.around(self.base.clone()) }
+        if self.samples.periods.is_empty() {
+            Some(there)
+        } else {
+            Some(there.at(self.base.clone())?.with_slopes_of(self))
+        }
     }
 
     /// The operator alone.
     pub(crate) fn alone(&self) -> Self {
-        Self { slopes: Vec::new(), ..self.clone() }
+        Self {
+            base: self.base.clone(),
+            operator: Arc::clone(&self.operator),
+            samples: Arc::clone(&self.samples),
+            slopes: Vec::new(),
+            ..*self
+        }
     }
 
     /// How the output changes with these parameters; not with one that is zero or moves nothing, nor where there is no operator on either side.
@@ -208,7 +222,7 @@ fn size(rows: &[f64]) -> f64 {
     rows.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-impl Basis for FixedBasis {
+impl Basis for LinearisedBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
         let column = |i: usize| match i.checked_sub(1) {
             None => self.driven(&self.operator, drive, segments),
@@ -251,12 +265,12 @@ mod tests {
         Samples::of_columns(1e-2, input, output)
     }
 
-    fn plane(n: f64, samples: &Samples) -> FixedBasis {
+    fn plane(n: f64, samples: &Samples) -> LinearisedBasis {
         let base = BoucWenParams { k0: 0.4, alpha: -0.2, beta: 0.03, gamma: -0.01, n };
-        FixedBasis::new(&Base::BoucWen(base), false, BetweenSamples::Linear, samples).unwrap()
+        LinearisedBasis::new(&Base::BoucWen(base), false, BetweenSamples::Linear, samples).unwrap()
     }
 
-    fn output(plane: &FixedBasis, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
+    fn output(plane: &LinearisedBasis, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
         plane.columns(0..1, drive, segments, &Drag::NONE).remove(0)
     }
 
@@ -266,7 +280,7 @@ mod tests {
         let plane = plane(1.2, &samples);
         assert_eq!(plane.len(), 6, "the output and five parameters");
         let weights = [1.0, 1e-3, -2e-3, 2e-3, -1e-3, 1e-3];
-        let moved = plane.around(plane.operator(&weights)).unwrap();
+        let moved = plane.at(plane.operator(&weights)).unwrap();
         let there = output(&moved, &samples.input, &samples.segments);
         let columns = plane.columns(0..6, &samples.input, &samples.segments, &Drag::NONE);
         for (k, there) in there.iter().enumerate() {
