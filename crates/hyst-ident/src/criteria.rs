@@ -36,6 +36,10 @@ pub(crate) const DOMINANT_SHARE: f64 = 0.9;
 /// From this share on it is the whole.
 pub(crate) const WHOLE_SHARE: f64 = 0.98;
 
+/// Share of the hysteresis (RMS) that a model of another law than the actuator's may miss: 16 plays or 120 relays, fitted to clean records of twelve
+/// laws, miss 0.2 to 3 % of it.
+pub(crate) const LAW_ACCURACY: f64 = 0.03;
+
 // Heights in noise floors (RMS).
 
 /// What an effect has to add.

@@ -11,7 +11,7 @@ use hyst_core::{Grid, PiParams, ViscousPiParams};
 
 use crate::BetweenSamples;
 use crate::base::{Basis, DragParams, LinearisedBasis, PiBasis, PreisachBasis};
-use crate::criteria::MINOR_SHARE;
+use crate::criteria::{MIN_RMSE_DROP, MINOR_SHARE};
 use crate::identify::{Estimate, TableEstimate};
 use crate::lsq::Blocks;
 use crate::memory;
@@ -20,13 +20,13 @@ use crate::nested::{Fitted, Hypothesis, Problem};
 use crate::optimize::{Progress, Trials};
 use crate::record::{Record, RecordError};
 use crate::samples::Samples;
-use crate::settle::{start_up_rows, windows, without_beginnings};
+use crate::settle::{start_up_rows, started, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
 
 /// A fit, and what it leaves in some rows or in every row \[y\].
 type Left = (Fitted, Vec<f64>);
-/// The past of each segment, as a fit with what it leaves in every row calls for it where it is asked for.
-type Recalls<'a> = dyn Fn(&Samples, &Left, &[bool]) -> Result<Vec<Vec<f64>>, FitError> + 'a;
+/// The past of each segment, as a fit with what it leaves in every row calls for it where it is asked for, and where it is no surprise.
+type Recalls<'a> = dyn Fn(&Samples, &Left, &[bool], &[bool]) -> Result<Vec<Vec<f64>>, FitError> + 'a;
 
 /// How often the past of a record is asked for, each time with what was fitted to the rows that the last one explains.
 const RECALLS: usize = 2;
@@ -396,21 +396,18 @@ pub(crate) fn fit_settled(
     if samples.mark_spikes(&all.1) {
         all = run(samples, basis)?;
     }
-    let (mut found, _) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
-    if memory::asked(samples, &samples.settling).contains(&true) {
+    let (mut found, late) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
+    if memory::standing_out(samples, &late.1).contains(&true) {
         // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
-        let recalls = |samples: &Samples, (fitted, residual): &Left, asked: &[bool]| {
+        let recalls = |samples: &Samples, (fitted, residual): &Left, asked: &[bool], surely: &[bool]| {
             let blocks = Blocks::new(samples, BLOCKS, ROWS);
             let problem = Problem::new(samples, &plays, &blocks, options.zero_per_record);
-            memory::recalled(&problem, fitted, residual, asked)
+            memory::recalled(&problem, fitted, residual, asked, surely)
                 .map_err(|source| FitError::Stage { record: name(), source })
         };
         let by_plays = recalled(samples, |samples| run(samples, &plays), &recalls)?;
-        if !basis.remembers() {
-            samples.pasts.iter_mut().for_each(Vec::clear);
-        }
         samples.settling.copy_from_slice(&samples.blind);
         let all = run(samples, basis)?;
         (found, _) = start_up_found(samples, all, Some(&by_plays), |samples| run(samples, basis))?;
@@ -425,14 +422,17 @@ fn recalled(
     recalls: &Recalls<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
-    let asked = memory::asked(samples, &samples.settling);
+    let asked = memory::standing_out(samples, &late.1);
     if !asked.contains(&true) {
         return Ok(found.1);
     }
-    // A part of what came before is seen all through the record.
+    // A part of what came before is seen all through the record. Where no start-up shows, or near 0 V, where one may be a transient of the sensor, the turns
+    // alone are asked for.
     let rest = without_beginnings(samples);
+    let starts = started(samples, &samples.settling);
+    let surely: Vec<bool> = memory::away(samples).iter().zip(starts).map(|(away, starts)| *away && starts).collect();
     let histories =
-        memory::with_histories(&rest, &asked, &mut |samples: &Samples| Ok::<_, FitError>(run(samples)?.0.squares))?;
+        memory::with_histories(&rest, &surely, &mut |samples: &Samples| Ok::<_, FitError>(run(samples)?.0.squares))?;
     if histories.pasts != samples.pasts {
         samples.pasts = histories.pasts;
         samples.settling.copy_from_slice(&samples.blind);
@@ -440,7 +440,7 @@ fn recalled(
         (found, late) = start_up_found(samples, all, None, &run)?;
     }
     for _ in 0..RECALLS {
-        let pasts = memory::kept(&samples.pasts, recalls(samples, &late, &asked)?);
+        let pasts = memory::kept(&samples.pasts, recalls(samples, &late, &asked, &surely)?);
         if pasts == samples.pasts {
             break;
         }
@@ -448,7 +448,10 @@ fn recalled(
         let all = run(&recalled)?;
         let with_past = start_up_found(&mut recalled, all, None, &run)?;
         let count = |samples: &Samples| samples.settling.iter().filter(|s| **s).count();
-        if count(&recalled) >= count(samples) {
+        // It leaves fewer rows to a start-up, or as many and clearly less of all.
+        let (now, then) = (count(samples), count(&recalled));
+        let errs_less = with_past.0.0.rmse() <= (1.0 - MIN_RMSE_DROP) * found.0.rmse();
+        if then > now || (then == now && !errs_less) {
             break;
         }
         *samples = recalled;

@@ -14,7 +14,7 @@ use crate::base::{Basis, Drag};
 use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
-use crate::settle::{centre, first_cycles, started, windows};
+use crate::settle::{centre, first_cycles, windows};
 
 /// Levels at which the drive may have turned, over the range of the record.
 const LEVELS: usize = 13;
@@ -158,10 +158,17 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     samples.segments.iter().map(|s| samples.input[s.start].abs() > MINOR_SHARE * reach).collect()
 }
 
-/// Segments whose past is worth asking for before it is known what acts: a start-up shows, and they do not begin near 0 V, where what stands out is a
-/// transient or an effect that is missing.
-pub(crate) fn asked(samples: &Samples, settling: &[bool]) -> Vec<bool> {
-    away(samples).into_iter().zip(started(samples, settling)).map(|(away, starts)| starts && away).collect()
+/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows.
+pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    let windows = windows(samples);
+    let centred = centre(samples, residual, &windows, &samples.blind);
+    let stands_out = |i: usize| {
+        let start = samples.segments[i].start;
+        let rows = (start..start + windows[i]).filter(|k| !samples.blind[*k]);
+        let squares: f64 = rows.map(|k| centred[k] * centred[k]).sum();
+        squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * level(samples, &centred, &windows, i)
+    };
+    (0..samples.segments.len()).map(stands_out).collect()
 }
 
 /// A drive with the past of each segment before it.
@@ -227,7 +234,7 @@ pub(crate) fn combined(
 
 /// The past of each segment after which a fit follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
 /// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment. `residual` is what the fit has
-/// left in all rows.
+/// left in all rows; `surely` are the segments in which a memory of something else than rest is no surprise.
 ///
 /// # Errors
 /// If a stage of the fit cannot be built.
@@ -236,10 +243,11 @@ pub(crate) fn recalled(
     fitted: &Fitted,
     residual: &[f64],
     asked: &[bool],
+    surely: &[bool],
 ) -> Result<Vec<Vec<f64>>, Error> {
     let samples = problem.samples;
     let (windows, cycles) = (windows(samples), first_cycles(samples));
-    let (centred, away) = (centre(samples, residual, &windows, &samples.blind), away(samples));
+    let centred = centre(samples, residual, &windows, &samples.blind);
     let of_segment = |i: usize| -> Result<Vec<f64>, Error> {
         let (start, window) = (samples.segments[i].start, windows[i]);
         if window == 0 || !asked[i] {
@@ -263,7 +271,7 @@ pub(crate) fn recalled(
         pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
         pasts.extend(continued(samples, i));
         pasts.extend(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned());
-        Ok(best(pasts, level, away[i], |past| squares(past).unwrap_or(f64::INFINITY)))
+        Ok(best(pasts, level, surely[i], |past| squares(past).unwrap_or(f64::INFINITY)))
     };
     (0..asked.len()).map(of_segment).collect()
 }
@@ -441,6 +449,26 @@ mod tests {
         assert!(best(pasts(), 1.0, false, squares).is_empty(), "nine times the level");
         assert_eq!(best(pasts(), 8.0, false, squares), [1.0]);
         assert!(best(pasts(), 60.0, true, squares).is_empty(), "nothing stands out");
+    }
+
+    /// At 0 V, too, an actuator remembers that it was driven before; the amplitude fades, so that the first rise alone shows the lower half.
+    #[test]
+    fn a_record_that_begins_at_0_v_after_use_is_followed_from_its_first_row() {
+        let input: Vec<f64> =
+            (0..3000).map(|k| 50.0 - 50.0 * (1.0 - f64::from(k) / 4000.0) * (f64::from(k) / 80.0).cos()).collect();
+        let plays =
+            PiBasis { thresholds: vec![8.0, 17.0, 31.0, 42.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
+        let whole = std::slice::from_ref(&(0..input.len())).to_vec();
+        let columns = columns_after(&plays, &input, &whole, &[path(&[100.0], 0.0)]);
+        let noise = |k: usize| 0.02 * (1e3 * (k as f64).sin()).sin();
+        let output = (0..input.len()).map(|k| columns.iter().map(|c| 0.05 * c[k]).sum::<f64>() + noise(k)).collect();
+        let mut samples = Samples::of_columns(1e-3, input, output);
+        let basis = PiBasis::for_samples(&samples);
+        let (fitted, _) = fit_settled(&mut samples, &basis, &FitOptions::default(), &String::new).unwrap();
+        assert!(!samples.pasts[0].is_empty());
+        assert!(samples.settling.iter().all(|s| !s));
+        let hysteresis = crate::metrics::rms(&samples.hysteresis().1);
+        assert!(fitted.rmse() < crate::criteria::LAW_ACCURACY * hysteresis, "{} of {hysteresis}", fitted.rmse());
     }
 
     #[test]

@@ -174,6 +174,11 @@ fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
+/// `sqrt(mean(x²))`; zero of no values.
+pub(crate) fn rms(x: &[f64]) -> f64 {
+    (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

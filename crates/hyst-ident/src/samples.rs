@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use hyst_core::Env;
+use nalgebra::{DMatrix, DVector};
 
 use crate::clipping::clipped_rows;
 use crate::frozen::frozen_rows;
@@ -181,6 +182,18 @@ impl Samples {
     pub fn output_span(&self) -> f64 {
         let (low, high) = range(self.settled_output());
         (high - low).max(0.0)
+    }
+
+    /// The hysteresis: what the best cubic of the drive leaves of the output in each settled row, and these rows \[output unit\].
+    pub(crate) fn hysteresis(&self) -> (Vec<usize>, Vec<f64>) {
+        let (low, high) = self.input_range();
+        let rows: Vec<usize> = (0..self.len()).filter(|k| !self.settling[*k]).collect();
+        let scaled = |k: usize| (2.0 * self.input[k] - low - high) / (high - low).max(f64::MIN_POSITIVE);
+        let powers = DMatrix::from_fn(rows.len(), 4, |i, power| scaled(rows[i]).powi(power as i32));
+        let output = DVector::from_iterator(rows.len(), rows.iter().map(|k| self.output[*k]));
+        let curve = powers.tr_mul(&powers).cholesky().map(|c| c.solve(&powers.tr_mul(&output)));
+        let left = curve.map_or_else(|| vec![0.0; rows.len()], |c| (output - powers * c).iter().copied().collect());
+        (rows, left)
     }
 
     /// Number of files that the rows came from.

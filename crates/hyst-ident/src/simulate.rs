@@ -4,6 +4,7 @@ use hyst_core::CreepParams;
 use serde::{Deserialize, Serialize};
 
 use crate::creep_rest::{self, Estimate};
+use crate::criteria::MIN_RMSE_DROP;
 use crate::drive::{Drive, Passes};
 use crate::fit::FitError;
 use crate::memory;
@@ -136,14 +137,16 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         samples.mark_spikes(&residual);
         settling = start_up_rows(&samples, &residual);
         let starts = started(&samples, &settling);
+        let asked = memory::standing_out(&samples, &residual);
         // A period of a steady state has its own history.
-        if !options.periodic && starts.contains(&true) {
+        if !options.periodic && (starts.contains(&true) || asked.contains(&true)) {
             let from_rest = residual.clone();
             let drive = || Drive::new(&samples, model.between_samples, passes);
             let mut others = Vec::new();
             // The drive may have turned before the record began, ...
             let creep = model.effects.creep.as_ref().filter(|_| !options.at_rest);
-            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &starts, creep);
+            let beginnings = Beginnings { asked: &asked, starts: &starts };
+            let pasts = recalled(&samples, &from_rest, &drive(), &chain, &beginnings, creep);
             if pasts.iter().any(|past| !past.is_empty()) {
                 let mut turned = vec![0.0; samples.len()];
                 drive().run_from(&chain, |s, i, env, u0| chain.of(i).reset_after(s, env, u0, &pasts[i]), &mut turned);
@@ -165,7 +168,9 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                     let squares = |residual: &[f64]| {
                         segment.clone().filter(|k| !settling[*k]).map(|k| residual[k] * residual[k]).sum::<f64>()
                     };
-                    if starting(&after) < starting(&now) && squares(&left) <= squares(&from_rest) {
+                    let (fewer, as_many) = (starting(&after) < starting(&now), starting(&after) == starting(&now));
+                    let enough = if as_many { (1.0 - MIN_RMSE_DROP).powi(2) } else { 1.0 };
+                    if (fewer || as_many) && squares(&left) <= enough * squares(&from_rest) {
                         predicted[segment.clone()].copy_from_slice(&other[segment.clone()]);
                         *in_mid_cycle = true;
                     }
@@ -216,20 +221,26 @@ fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
         .collect()
 }
 
-/// The past of each segment that is `asked` for after which the model follows its first rows best; `residual` is that from rest.
+/// Segments whose past is asked for, and those in which a start-up shows.
+struct Beginnings<'a> {
+    asked: &'a [bool],
+    starts: &'a [bool],
+}
+
+/// The past of each segment that is asked for after which the model follows its first rows best; `residual` is that from rest.
 fn recalled(
     samples: &Samples,
     residual: &[f64],
     drive: &Drive<'_>,
     chain: &PerSegment<HostChain>,
-    asked: &[bool],
+    of: &Beginnings<'_>,
     creep: Option<&CreepParams<Vec<f64>>>,
 ) -> Vec<Vec<f64>> {
     let windows = windows(samples);
     let (centred, away) = (centre(samples, residual, &windows, &samples.blind), memory::away(samples));
-    let of = |i: usize| -> Vec<f64> {
+    let past = |i: usize| -> Vec<f64> {
         let rows = samples.segments[i].start..samples.segments[i].start + windows[i];
-        if !asked[i] || rows.is_empty() {
+        if !(of.asked[i] || of.starts[i]) || rows.is_empty() {
             return Vec::new();
         }
         let zero = residual[rows.start] - centred[rows.start];
@@ -249,9 +260,9 @@ fn recalled(
         let level = memory::level(samples, &centred, &windows, i);
         let mut pasts = memory::pasts(samples.input[rows.start], samples.input_range());
         pasts.extend(memory::continued(samples, i));
-        memory::best(pasts, level, away[i], squares)
+        memory::best(pasts, level, away[i] && of.starts[i], squares)
     };
-    (0..asked.len()).map(of).collect()
+    (0..of.asked.len()).map(past).collect()
 }
 
 /// What to do about a record whose output is in this unit, and not in the model's.

@@ -1,7 +1,7 @@
 //! Rows in which the sensor shows for a moment what no device does: spikes.
 //!
 //! A spike stands out of the rows on both sides of it by far more than the output goes from row to row around it, and by more than the drive has
-//! gone in a row shortly before. What turns, rings, or jumps and stays is none.
+//! turned in a row shortly before. What turns, rings, or jumps and stays is none.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ const BEFORE: usize = 64;
 const USUAL: f64 = 0.7;
 /// How many usual steps a spike stands out: of white noise that is seven deviations.
 const STANDS_OUT: f64 = 5.0;
-/// How many steps of the drive it stands out, each as a share of its own span.
+/// By how many turns of the drive it stands out, each as a share of its own span: an output follows a drive that goes on evenly without a spike.
 const MORE_THAN_THE_DRIVE: f64 = 2.0;
 /// Share of the rows beyond which what stands out is no fault but the record.
 const MOST: f64 = 0.1;
@@ -78,8 +78,8 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], segments: &[Range<usize
                 continue;
             }
             let before = k.saturating_sub(BEFORE).max(s.start)..=k + BESIDE;
-            let driven = input[before].windows(2).fold(0.0, |m: f64, u| m.max((u[1] - u[0]).abs()));
-            if out <= per_input * driven {
+            let turned = input[before].windows(3).fold(0.0, |m: f64, u| m.max((u[2] - 2.0 * u[1] + u[0]).abs()));
+            if out <= per_input * turned {
                 continue;
             }
             let around = k.saturating_sub(AROUND).max(s.start)..(k + AROUND + 1).min(s.end);
@@ -151,6 +151,18 @@ mod tests {
         assert!(!spiked_rows(&samples.input, &samples.output, &samples.segments).contains(&true));
         let found = spiked_residual(&samples, &residual);
         assert!((0..rows).all(|k| found[k] == at(k)));
+    }
+
+    /// A drive that goes far from row to row, evenly: it makes no spike.
+    #[test]
+    fn an_even_drive_hides_no_spike_of_a_residual() {
+        let input: Vec<f64> = (0..2000).map(|k| 5.0 * (1.0 - (0.0251 * f64::from(k)).cos())).collect();
+        let residual: Vec<f64> =
+            (0..2000).map(|k| 0.01 * (2.0 * f64::from(k)).sin() + if k == 700 { 0.6 } else { 0.0 }).collect();
+        let output: Vec<f64> = input.iter().zip(&residual).map(|(u, r)| 3.0 * u + r).collect();
+        let samples = Samples::of_columns(4e-3, input, output);
+        let found = spiked_residual(&samples, &residual);
+        assert!((0..2000).all(|k| found[k] == (k == 700)));
     }
 
     #[test]

@@ -49,8 +49,8 @@ pub(crate) trait Basis: Sync {
     fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         None
     }
-    /// Whether a search on it may take a [past](crate::memory) that plays show: an operator of another kind remembers in another way.
-    fn remembers(&self) -> bool {
+    /// Whether a search on it may add plays whose thresholds grow with the rate: beside an operator of another kind they take its misfit.
+    fn may_widen(&self) -> bool {
         true
     }
     /// The same base over another record, where its columns depend on more than drive and segments.

@@ -131,8 +131,8 @@ impl Basis for RatedBasis<'_> {
         columns
     }
 
-    fn remembers(&self) -> bool {
-        self.base.remembers()
+    fn may_widen(&self) -> bool {
+        self.base.may_widen()
     }
 
     fn drags(&self) -> bool {

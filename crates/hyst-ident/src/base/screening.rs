@@ -138,7 +138,7 @@ impl Basis for ScreeningBasis {
         Some(v)
     }
 
-    fn remembers(&self) -> bool {
+    fn may_widen(&self) -> bool {
         self.kept.is_none()
     }
 

@@ -3,12 +3,16 @@
 use super::findings::{Remainder, RemainderKind};
 use super::search::Search;
 use super::{colour, history};
-use crate::criteria::{DOMINANT_SHARE, HALF, MIN_RMSE_RATIO, MINOR_SHARE};
+use crate::criteria::{DOMINANT_SHARE, HALF, LAW_ACCURACY, MIN_RMSE_RATIO, MINOR_SHARE};
 use crate::digits::short;
+use crate::metrics::rms;
 use crate::model::Effect;
 use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
+
+/// Parts of a record in each of which a residual has to be small.
+const PARTS: usize = 20;
 
 /// Whether the rest is noise, lack of capacity of the base, or unexplained. `amplified` is what the model says, without and with what was
 /// found, about the record as an amplifier drives it that does not follow every slope. The drive is in the unit `input`.
@@ -106,6 +110,18 @@ pub(super) fn judge(
             );
             return left(RemainderKind::None, what);
         }
+        let (rows, hysteresis) = samples.hysteresis();
+        if is_as_of_another_law(&residual, &rows, &hysteresis, found.noise) {
+            let hysteresis = rms(&hysteresis);
+            let what = format!(
+                "{:.2} % of span stands above the noise floor of {:.2} %; that is {:.1} % of the hysteresis, and no law of hysteresis describes an \
+                 actuator more closely",
+                percent(rmse),
+                percent(found.noise),
+                100.0 * above.sqrt() / hysteresis
+            );
+            return left(RemainderKind::BaseCapacity, what);
+        }
     }
     let map = "a map of the input's history that this base is too coarse for";
     let (kind, rest) = if taken >= DOMINANT_SHARE || (taken >= HALF && richest <= MIN_RMSE_RATIO * found.noise) {
@@ -133,6 +149,17 @@ pub(super) fn judge(
     };
     let richer = format!("a richer rate-independent base would leave {:.2} %", percent(richest));
     left(kind, format!("{:.2} % of span; {richer}: {rest}", percent(rmse)))
+}
+
+/// Whether a residual is nowhere larger than what a model of another law misses: in each part of the record, at most [`LAW_ACCURACY`] of the hysteresis
+/// of that part or of the whole record.
+fn is_as_of_another_law(residual: &[f64], rows: &[usize], hysteresis: &[f64], noise: f64) -> bool {
+    let whole = rms(hysteresis);
+    let rows_each = rows.len().div_ceil(PARTS).max(1);
+    rows.chunks(rows_each).zip(hysteresis.chunks(rows_each)).all(|(rows, hysteresis)| {
+        let left = rows.iter().map(|k| residual[*k] * residual[*k]).sum::<f64>() / rows.len() as f64;
+        (left - noise * noise).max(0.0).sqrt() <= LAW_ACCURACY * rms(hysteresis).max(whole)
+    })
 }
 
 impl Remainder {

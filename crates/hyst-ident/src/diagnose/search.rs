@@ -11,7 +11,10 @@ use super::score::{self, Judgement, judge};
 use super::trial::Trial;
 use super::uncertainty::Undetermined;
 use super::{hidden, starts};
-use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MAX_ZERO_STEP, MIN_NOISE_FLOORS, MIN_RMSE_DROP, NEGLIGIBLE_SHARE};
+use crate::criteria::{
+    DOMINANT_SHARE, LARGE_RATIO, LAW_ACCURACY, MAX_ZERO_STEP, MIN_NOISE_FLOORS, MIN_RMSE_DROP, NEGLIGIBLE_SHARE,
+};
+use crate::metrics::rms;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted, Hypothesis, Problem};
 use crate::noise::{noise_floor, quantisation};
@@ -345,13 +348,19 @@ fn eliminate(judge: &Judge<'_>, best: &Trial, already: &[Cause]) -> Result<Optio
     let reduced: Vec<Option<Trial>> = reduced.into_iter().collect::<Result<_, _>>()?;
     let explained = |trial: &Option<Trial>| trial.as_ref().map_or(f64::INFINITY, |t| t.total() - best.total());
     let takes_time = |cause: &Cause| cause.effect().is_some_and(|e| TAKES_TIME.contains(&e));
-    // No law is the device's to the last digit: a second law of the same kind takes what the first one misses.
+    // No law is the device's to the last digit: a second law of the same kind takes what the first one misses, or what the base misses once that acts.
+    let missed_by_laws = LAW_ACCURACY * rms(&judge.problem.samples.hysteresis().1);
+    let size = |trial: &Option<Trial>| {
+        trial.as_ref().map_or(f64::INFINITY, |t| (t.cv_rmse().powi(2) - best.cv_rmse().powi(2)).max(0.0).sqrt())
+    };
     let of_its_kind: Vec<bool> = names
         .iter()
         .zip(&reduced)
         .map(|(cause, own)| {
             let mut others = names.iter().zip(&reduced).filter(|(other, _)| takes_time(other) && *other != cause);
-            takes_time(cause) && others.any(|(_, t)| explained(own) < NEGLIGIBLE_SHARE * explained(t))
+            let is_small =
+                |t: &Option<Trial>| explained(own) < NEGLIGIBLE_SHARE * explained(t) || size(own) < missed_by_laws;
+            takes_time(cause) && others.any(|(_, t)| is_small(t))
         })
         .collect();
     let mut least: Option<Trial> = None;

@@ -84,7 +84,7 @@ impl Own<'_> {
             let Some(fit) = fit else { return Ok(None) };
             let residual = problem.residual(&fit)?;
             let asked: Vec<bool> = asked.iter().map(|asked| recalls && *asked).collect();
-            let pasts = memory::recalled(&problem, &fit, &residual, &asked)?;
+            let pasts = memory::recalled(&problem, &fit, &residual, &asked, &memory::away(samples))?;
             Ok::<_, Error>(Trial::of(&problem, fit).map(|trial| (trial, residual, pasts)))
         };
         let squares = |samples: &Samples| {

@@ -15,6 +15,7 @@ use super::projection::{Projected, Projection};
 use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
 use crate::Samples;
 use crate::drive::{Drive, Passes};
+use crate::metrics::rms;
 use crate::model::{Base, Operator};
 use crate::optimize::{Scale, Space, Variable};
 
@@ -329,8 +330,4 @@ fn positive(scale: f64) -> f64 {
 
 fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn rms(rows: &[f64]) -> f64 {
-    (product(rows, rows) / rows.len().max(1) as f64).sqrt()
 }

@@ -118,7 +118,7 @@ impl<'a> Problem<'a> {
             used,
             zero_per_file,
             holds: false,
-            may_widen: basis.remembers(),
+            may_widen: basis.may_widen(),
             raw,
             width,
             penalty,
