@@ -1,4 +1,4 @@
-//! Which state of the source is built: `git describe` of the repository, where there is one and git can be asked.
+//! Sets `HYST_GIT` and `HYST_VERSION` from `git describe`; without a repository or git, `HYST_GIT` is empty.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -13,18 +13,18 @@ fn main() {
     let more = if git.is_empty() { String::new() } else { format!(" ({git})") };
     println!("cargo::rustc-env=HYST_VERSION={version}{more}");
     println!("cargo::rerun-if-changed=build.rs");
-    // What is compiled into the program, and what a commit changes.
+    // Sources that are compiled into the program, and git files that change with a commit.
     for name in ["hyst-cli", "hyst-core", "hyst-hw", "hyst-ident"] {
         watch(&workspace.join("crates").join(name).join("src"));
     }
     for name in ["HEAD", "logs/HEAD"] {
-        if let Some(path) = git_says(&workspace, &["rev-parse", "--git-path", name]) {
+        if let Some(path) = git_output(&workspace, &["rev-parse", "--git-path", name]) {
             watch(&workspace.join(path));
         }
     }
 }
 
-/// Tells cargo to look at a file or folder; one that is absent would count as changed each time.
+/// Asks cargo to watch a file or folder. Cargo treats a missing path as changed in every build, so it is skipped.
 fn watch(path: &Path) {
     if path.exists() {
         println!("cargo::rerun-if-changed={}", path.display());
@@ -32,16 +32,16 @@ fn watch(path: &Path) {
 }
 
 fn described(workspace: &Path) -> Option<String> {
-    // The sources may lie in somebody else's repository.
-    let top = PathBuf::from(git_says(workspace, &["rev-parse", "--show-toplevel"])?);
+    // The sources may be a folder of another repository; its state is not theirs.
+    let top = PathBuf::from(git_output(workspace, &["rev-parse", "--show-toplevel"])?);
     if top.canonicalize().ok()? != workspace.canonicalize().ok()? {
         return None;
     }
-    git_says(workspace, &["describe", "--always", "--dirty"])
+    git_output(workspace, &["describe", "--always", "--dirty"])
 }
 
-fn git_says(folder: &Path, arguments: &[&str]) -> Option<String> {
-    let said = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
-    let text = String::from_utf8(said.stdout).ok()?.trim().to_owned();
-    (said.status.success() && !text.is_empty()).then_some(text)
+fn git_output(folder: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+    (output.status.success() && !text.is_empty()).then_some(text)
 }

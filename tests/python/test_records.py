@@ -81,7 +81,7 @@ def test_reading(tmp_path):
         hyst.read_record(path)
     with pytest.raises(hyst.RecordError, match="cannot be read"):
         hyst.read_record(tmp_path / "nothing.csv")
-    with pytest.raises(hyst.RecordError, match="NAME=COLUMN|no column of the record format"):
+    with pytest.raises(hyst.RecordError, match="NAME=COLUMN|not a column name of the record format"):
         hyst.read_record(path, map={"volts": "Vin"})
     with pytest.raises(ValueError, match="need is"):
         hyst.read_record(path, need="everything")

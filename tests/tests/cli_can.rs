@@ -85,10 +85,10 @@ fn interfaces_are_listed_and_refused_with_advice() {
         found
             .iter()
             .any(|port| port["daq"] == "can:cli-list"
-                && port["what"] == "CAN; with can:cli-list,fd in frames of CAN FD; up"),
+                && port["what"] == "CAN; can:cli-list,fd for CAN FD frames; up"),
         "{found:?}"
     );
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.002,1\n0.004,0\n");
     let message = lab.refuses("run --daq can:cli-none --drive u.csv --record out.csv", 3);
-    assert!(message.contains("there are cli-list"), "{message}");
+    assert!(message.contains("this computer has cli-list"), "{message}");
 }

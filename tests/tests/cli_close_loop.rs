@@ -18,7 +18,7 @@ fn the_loop_closes_on_an_actuator_with_a_lag() {
     assert_eq!(turns[0]["found"], serde_json::json!(["lag"]), "{summary:#}");
     // With the lag in the model of a base that is fine enough nothing more is found.
     assert_eq!(turns.last().unwrap()["found"], serde_json::json!([]), "{summary:#}");
-    assert_eq!(summary["ended"], "nothing more is found");
+    assert_eq!(summary["ended"], "no further effect is found");
     let plain = summary["plain_gain_rmse"].as_f64().unwrap();
     let base = summary["base_inverse_rmse"].as_f64().unwrap();
     let last = turns.last().unwrap()["tracking_rmse"].as_f64().unwrap();

@@ -101,7 +101,7 @@ fn limits_are_kept_and_reported() {
 
     let ran = lab.ok("compensate --model model.json reference.csv -o drive.csv --limit 0,50");
     assert!(ran.stderr.contains(&format!("limited by voltage in {limited} rows")), "{}", ran.stderr);
-    assert!(ran.stderr.contains("the reference asks for more than 50.00 V"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the reference needs more than 50.00 V"), "{}", ran.stderr);
 }
 
 #[test]
@@ -191,10 +191,10 @@ fn a_drive_beyond_what_was_fitted_is_told() {
     lab.reference("reference.csv", 2.0, 24.0);
     let line = "compensate --model model.json reference.csv -o drive.csv --limit 0,150";
     let ran = lab.ok(line);
-    assert!(ran.stderr.contains("the drive lies beyond 0 to 100.0 V"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the drive is outside 0 to 100.0 V"), "{}", ran.stderr);
     let found = &lab.ok(&format!("{line} --json")).json()["extrapolated"];
     let rows = found["rows"].as_u64().unwrap();
     assert!((1..1000).contains(&rows) && found["largest"].as_f64().unwrap() > 5.0, "{found}");
     lab.reference("reference.csv", 2.0, 15.0);
-    assert!(!lab.ok(line).stderr.contains("lies beyond"));
+    assert!(!lab.ok(line).stderr.contains("the drive is outside"));
 }

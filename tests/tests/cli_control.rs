@@ -110,7 +110,7 @@ fn a_log_that_was_cut_off_is_recovered_but_for_its_last_second() {
     lab.write("damaged.mcap", damaged);
     let said = fitted("damaged.mcap");
     for told in
-        ["damaged.mcap: 1 damaged piece of the log left out", "damaged.mcap: 1 hole in time", "is not known there"]
+        ["damaged.mcap: 1 damaged piece of the log left out", "damaged.mcap: 1 gap in time", "drive history is unknown"]
     {
         assert!(said.contains(told), "{told}: {said}");
     }

@@ -33,7 +33,7 @@ fn half_sine_curves_of_several_durations_make_a_model() {
 fn violated_cells_are_listed_and_the_nearest_surface_is_taken() {
     let lab = curves(RINGING, "--seconds 1 --rest 0.5 --peak triangle");
     let ran = lab.ok("fit fod.csv --model preisach --from fod -o model.json");
-    for part in ["warning: in", "alpha [V]", "sigmas", "half-sine peaks", "nearest valid"] {
+    for part in ["warning: in", "alpha [V]", "sigmas", "half-sine peaks", "nearest monotone surface"] {
         assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
     }
     let report = lab.ok("fit fod.csv --model preisach --from fod -o model.json --json").json();
@@ -101,5 +101,5 @@ fn a_dynamic_model_comes_from_records_at_several_rates() {
     let ran = lab.ok("fit slow.csv 60.csv --model dpm -o one.json");
     assert!(ran.stdout.contains("mirror function from"), "{}", ran.stdout);
     // One fast rate leaves much of the grid untouched, and that is said.
-    assert!(ran.stderr.contains("no row comes near") && ran.stderr.contains("rate [V/s]"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("no row is near") && ran.stderr.contains("rate [V/s]"), "{}", ran.stderr);
 }

@@ -107,7 +107,7 @@ fn a_header_explains_its_constants() {
     let end = "-> drift -> interference -> + hyst_zero -> displacement_um";
     let weights = "weights[i] play[i]";
     let header = says("model.json", &[order, end, weights, "hyst_core::read_block (feature block)", "shares[i] x[i]"]);
-    assert_eq!(header.matches("What the sensor shows at rest").count(), 1, "{header}");
+    assert_eq!(header.matches("Sensor zero (reading at rest)").count(), 1, "{header}");
     lab.write("pi.json", paper(Kind::Pi));
     says("pi.json", &["sqrt(volt_seconds v) = o", "hyst_rate_dependence_volt_seconds = 0.001; /* V s */"]);
     lab.write("preisach.json", paper(Kind::Preisach));
@@ -162,7 +162,7 @@ fn constants_in_c_have_their_units() {
                 "static const double hyst_td_em_coupling[3] = {0.000883, -1.466e-5, 3.477e-7}; /* N/V, N/(V K), N/(V K^2) */"
             }
             Kind::TdPi => "static const double hyst_td_pi_eta = 0.0091; /* 1/K */",
-            _ => "/* What hyst_core::read_block reads. */",
+            _ => "/* Parameter block for hyst_core::read_block. */",
         };
         lab.write(kind.name(), paper(kind));
         look(kind.name(), &[some]);

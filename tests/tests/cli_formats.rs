@@ -60,14 +60,14 @@ fn info_names_channels_units_and_the_next_command() {
     // A map is shown though columns are missing still, and a single column is said to be too few.
     lab.write("one.csv", "a\n1\n2\n4\n");
     let told = lab.ok("info one.csv").stdout;
-    assert!(told.contains("the file has 1 column; a record needs also: time, input, output"), "{told}");
+    assert!(told.contains("the file has 1 column; a record also needs: time, input, output"), "{told}");
     assert!(!told.contains("COLUMN") && told.contains("--map displacement_um=a --rate HZ"), "{told}");
     let told = lab.ok("info one.csv --map displacement_um=a").stdout;
     assert!(told.contains("output") && told.contains("µm*"), "{told}");
     // Nothing is proposed for a record that a fit refuses.
     lab.write("still.csv", "time_s,voltage_v,displacement_um\n0,1,2\n1,2,2\n2,3,2\n");
     let told = lab.ok("info still.csv").stdout;
-    assert!(told.contains("never moves") && !told.contains("next:"), "{told}");
+    assert!(told.contains("is constant") && !told.contains("next:"), "{told}");
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn plot_draws_records_and_what_models_miss() {
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 20_000, "{} bytes", png.len());
     assert!(lab.refuses("plot train.csv -o a.pdf", 2).contains(".svg or .png"));
     lab.write("force.csv", "time_s,voltage_v,force_n\n0,1,2\n1,2,3\n2,3,5\n");
-    assert!(lab.refuses("plot train.csv force.csv -o b.svg", 2).contains("do not share an axis"));
+    assert!(lab.refuses("plot train.csv force.csv -o b.svg", 2).contains("cannot share an axis"));
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn a_dropout_is_reported_and_not_fitted() {
     }
     lab.write("dropout.csv", rows.join("\n"));
     let told = lab.ok("info dropout.csv").stdout;
-    assert!(told.contains("repeats one value: 20 rows, the most from row 801"), "{told}");
+    assert!(told.contains("repeats one value in 20 rows; the longest run starts in row 801"), "{told}");
     let rmse = |file: &str| {
         lab.ok(&format!("fit {file} --model pi -o pi.json --json")).json()["errors"]["rmse"].as_f64().unwrap()
     };

@@ -34,7 +34,7 @@ fn a_port_that_another_program_holds_is_busy() {
     // The pair holds it already; opened once more it is locked for sure.
     let _locked = Serial::open(&path, 115_200);
     let message = lab.refuses(&format!("run --daq serial:{path} --drive u.csv --record y.csv"), 3);
-    assert!(message.contains(&path) && message.contains("another program holds the port"), "{message}");
+    assert!(message.contains(&path) && message.contains("another program uses the port"), "{message}");
 }
 
 #[cfg(unix)]
@@ -91,13 +91,13 @@ fn another_device_is_told_from_one_that_is_silent() {
         let _ = stream.write_all(b"ERROR\r\n\0");
     });
     let message = lab.refuses(&format!("run --daq {modem} --drive u.csv --record y.csv"), 3);
-    assert!(message.contains("something else speaks there") && message.contains("right port"), "{message}");
+    assert!(message.contains("other data arrives there") && message.contains("check the port"), "{message}");
     let silent = somebody(|_, _| {});
     let message = lab.refuses(&format!("run --daq {silent} --drive u.csv --record y.csv"), 3);
     assert!(message.contains("no answer within 2 s") && message.contains("powered"), "{message}");
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let message = lab.refuses(&format!("run --daq tcp:{nobody} --drive u.csv --record y.csv"), 3);
-    assert!(message.contains("nobody answers"), "{message}");
+    assert!(message.contains("no connection"), "{message}");
 }
 
 #[test]

@@ -86,7 +86,7 @@ fn limited(lab: &Lab, blocks: usize, line: &str) -> Ran {
 /// What has to be said of a log that could not be written to its end.
 fn told(ran: &Ran, log: &RunLog, because: &str) {
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    for part in ["run.mcap: the log cannot be written any further", because, "free space", "log recover run.mcap"] {
+    for part in ["run.mcap: the log cannot be continued", because, "free space", "log recover run.mcap"] {
         assert!(ran.stderr.contains(part), "\"{part}\" is missing in: {}", ran.stderr);
     }
     let safe = ran.stderr.split("at least the first ").nth(1).and_then(|rest| rest.split(' ').next());
@@ -111,12 +111,8 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     // That there is no room for the record either does not hide what has ended the run.
     let ran = limited(&lab, 16, "run --daq sim:plant.toml --drive u.csv --log small.mcap --record small.csv");
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    assert!(ran.stderr.contains("error: small.mcap: the log cannot be written any further"), "{}", ran.stderr);
-    assert!(
-        ran.stderr.contains("cannot be kept there: small.csv") && !lab.path("small.csv").exists(),
-        "{}",
-        ran.stderr
-    );
+    assert!(ran.stderr.contains("error: small.mcap: the log cannot be continued"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("could not be saved: small.csv") && !lab.path("small.csv").exists(), "{}", ran.stderr);
     // All of it, as a run without limits has it.
     let ran = lab.ok(&format!("{run} --record u-record.csv"));
     assert!(ran.stderr.contains("run.mcap.~1~"), "{}", ran.stderr);
@@ -132,7 +128,7 @@ fn a_log_that_cannot_grow_ends_the_run_at_rest() {
     assert!(512 * room < whole.len(), "{last} {}", whole.len());
     let ran = limited(&lab, 10_000.min(room), &format!("{run} --record late.csv"));
     assert_eq!(ran.code, 3, "{}", ran.stderr);
-    assert!(ran.stderr.contains("run.mcap: the log cannot be written any further"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("run.mcap: the log cannot be continued"), "{}", ran.stderr);
     assert_eq!(parsed(&lab, "run.mcap").samples, all.samples);
 
     // Nothing moves where not even its beginning can be written.

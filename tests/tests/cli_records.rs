@@ -107,7 +107,7 @@ fn clocks_and_sensors_are_repaired_with_a_note() {
     noted(with_header(HEADER, &rows), "", &["jitter by 0.0", "monotone cubic"]);
     let mut rows = long();
     rows.remove(500);
-    noted(with_header(HEADER, &rows), "", &["1 row lost between others"]);
+    noted(with_header(HEADER, &rows), "", &["1 row missing in the time grid"]);
     rows.drain(500..600);
     noted(with_header(HEADER, &rows), "", &["an interruption of 0.204 s"]);
     let mut rows = long();
@@ -220,12 +220,12 @@ fn records_that_do_not_go_together() {
 #[test]
 fn loops_that_are_passed_the_wrong_way_round_are_told() {
     let lab = Lab::with_train("");
-    let said = "runs ahead of the input";
+    let said = "the output leads the input";
     assert!(!lab.ok("fit train.csv --model pi -o a.json").stderr.contains(said));
     let exchanged = lab.read("train.csv").replacen("voltage_v,displacement_um", "displacement_um,voltage_v", 1);
     lab.write("exchanged.csv", exchanged);
     let ran = lab.ok("fit exchanged.csv --model pi -o b.json");
-    assert!(ran.stderr.contains(said) && ran.stderr.contains("exchanged?"), "{}", ran.stderr);
+    assert!(ran.stderr.contains(said) && ran.stderr.contains("are exchanged"), "{}", ran.stderr);
     let turned = "--map displacement_um=-displacement_um";
     let ran = lab.ok(&format!("fit train.csv --model pi -o c.json {turned}"));
     assert!(!ran.stderr.contains(said) && ran.stdout.contains("negative gain"), "{}{}", ran.stdout, ran.stderr);

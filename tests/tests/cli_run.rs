@@ -66,7 +66,7 @@ fn what_was_measured_before_is_kept() {
     let first = lab.read("train.csv");
     let ran = lab.ok(&format!("{run} --seed 4"));
     for note in
-        ["train.csv was there already; it is train.csv.~1~ now", "run.mcap was there already; it is run.mcap.~1~ now"]
+        ["train.csv existed and was renamed to train.csv.~1~", "run.mcap existed and was renamed to run.mcap.~1~"]
     {
         assert!(ran.stderr.contains(note), "{}", ran.stderr);
     }
@@ -126,7 +126,7 @@ fn a_reference_is_followed_and_logged() {
     assert_eq!(of(&plain, "delay_s"), None);
     assert!(of(&allowed, "delay_s").unwrap() < -1e-3 && of(&allowed, "rmse") < of(&plain, "rmse"), "{allowed}");
     let said = lab.ok(&format!("{follow} --model model.json --allow-delay")).stdout;
-    assert!(said.contains("ms earlier, which was allowed") && said.contains("turning point"), "{said}");
+    assert!(said.contains("ms earlier (--allow-delay)") && said.contains("turning point"), "{said}");
     // Ramps to the first voltage and back to rest are in the log and not in the record.
     assert!(samples.iter().any(|sample| sample["phase"] == "approach"));
     assert_eq!(samples.last().unwrap()["phase"], "retreat");
@@ -203,7 +203,7 @@ fn drives_beyond_the_limits_are_refused() {
     let message = lab.refuses(&format!("{run} fine.csv --limit 0,80"), 2);
     assert!(message.contains("outside 0 to 80 V"), "{message}");
     let message = lab.refuses(&format!("{run} fine.csv --limit 0,120"), 2);
-    assert!(message.contains("beyond the device"), "{message}");
+    assert!(message.contains("exceeds the range of the device"), "{message}");
     let message = lab.refuses(&format!("{run} fine.csv --slew 100"), 2);
     assert!(message.contains("steeper than 100 V/s"), "{message}");
     lab.ok(&format!("{run} fine.csv --limit 0,95 --slew 1000"));
@@ -216,7 +216,7 @@ fn the_limits_of_a_reference_are_kept() {
     let follow = "run --daq sim:plant.toml --model model.json --reference reference.csv --record out.csv --json";
     let limited = lab.ok(&format!("{follow} --limit 0,40"));
     // What goes wrong by the plan is told before anything moves.
-    let foreseen = "note: with the drive as planned the model itself misses the reference by ";
+    let foreseen = "note: for the planned drive the model predicts a tracking error of ";
     assert!(limited.stderr.contains(foreseen) && limited.stderr.contains("the voltage is limited in"), "{limited:?}");
     let report = limited.json();
     assert!(report["compensation"]["voltage_limited_rows"].as_u64().unwrap() > 0, "{report}");
@@ -254,8 +254,8 @@ fn arguments_have_to_make_sense_together() {
         ("--model model.json --record out.csv", "--reference"),
         ("--model model.json --reference reference.csv --drive u.csv --record out.csv", "--drive"),
         ("--drive u.csv --record out.csv --bandwidth 10", "--bandwidth"),
-        ("--drive u.csv --record u.csv", "read by the same command"),
-        ("--drive u.csv --log plant.toml", "read by the same command"),
+        ("--drive u.csv --record u.csv", "the same command reads this file"),
+        ("--drive u.csv --log plant.toml", "the same command reads this file"),
         ("--drive u.csv --record out.csv --log out.csv", "two outputs"),
         ("--drive train.csv --record out.csv --rest -1", "--rest"),
         ("--drive reference.csv --record out.csv", "reference.csv, line 1"),
@@ -296,7 +296,7 @@ fn a_record_that_its_folder_refuses_is_kept_elsewhere() {
         let ran = hyst_tests::Ran::from(lab.command(line).env("TMPDIR", lab.path("")).output().unwrap());
         assert_eq!(ran.code, 3, "{ran:?}");
         let refuge = lab.files().into_iter().find(|name| name.starts_with("full-")).expect("it is kept");
-        assert!(ran.stderr.contains(&format!("/{refuge}: take it from there")), "{ran:?}");
+        assert!(ran.stderr.contains(&format!("/{refuge}; copy that file")), "{ran:?}");
         assert!(column(&lab.read(&refuge), "displacement_um").len() > 100);
         fs::remove_file(lab.path(&refuge)).unwrap();
     }
@@ -307,7 +307,7 @@ fn what_is_something_else_is_not_overwritten() {
     let lab = Lab::with_model();
     let record = lab.read("train.csv");
     let drive = "excite sine --rate 500 --high 50 --cycles 1 -o train.csv";
-    assert!(lab.ok(drive).stderr.contains("train.csv was there already; it is train.csv.~1~ now"));
+    assert!(lab.ok(drive).stderr.contains("train.csv existed and was renamed to train.csv.~1~"));
     assert_eq!(lab.read("train.csv.~1~"), record);
     // A drive that is designed anew takes the older one's place.
     assert!(!lab.ok(drive).stderr.contains("note: "));
@@ -344,7 +344,7 @@ fn an_interrupt_ramps_the_device_to_rest() {
     let logged: Vec<f64> =
         samples.iter().filter(|s| s["phase"] == "record").map(|s| s["drive_v"].as_f64().unwrap()).collect();
     assert_eq!(kept, logged);
-    assert!(ran.stderr.contains("is kept in out.csv"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("are saved in out.csv"), "{}", ran.stderr);
     assert_eq!(samples.last().unwrap()["drive_v"], 0.0);
 }
 

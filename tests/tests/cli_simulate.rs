@@ -109,7 +109,7 @@ fn records_that_the_model_does_not_suit_are_refused() {
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     }
     let message = lab.refuses("simulate --model model.json train.csv -o train.csv", 2);
-    assert!(message.contains("read by the same command"), "{message}");
+    assert!(message.contains("the same command reads this file"), "{message}");
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn inputs_beyond_the_models_range_are_reported() {
     let largest = beyond.iter().copied().fold(0.0, f64::max);
     assert!(largest > 29.0 && beyond.len() > 100, "{largest} {}", beyond.len());
     let ran = lab.ok("simulate --model model.json far.csv -o out.csv --json");
-    let said = format!("warning: in {} rows the input lies beyond 0 to 100.0 V", beyond.len());
+    let said = format!("warning: in {} rows the input is outside 0 to 100.0 V", beyond.len());
     assert!(ran.stderr.contains(&said), "{}", ran.stderr);
     let report = &ran.json()["extrapolated"];
     assert_eq!((report["rows"].as_u64(), report["largest"].as_f64()), (Some(beyond.len() as u64), Some(largest)));

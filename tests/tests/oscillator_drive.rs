@@ -161,10 +161,10 @@ fn files_options_and_exports_say_where_it_holds() {
         let said = |model: &str| lab.ok(&format!("export {model} --format {format} -o {format}.out")).stderr;
         assert_eq!(said("linear.json"), "");
         let note = said("band.json");
-        assert!(note.contains("a board sees it linear"), "{note}");
+        assert!(note.contains("a board interpolates it linearly"), "{note}");
     }
     for written in ["c.out", "rust.out"] {
-        assert!(lab.read(written).contains("a board sees it linear"), "{written}");
+        assert!(lab.read(written).contains("a board interpolates it linearly"), "{written}");
     }
     file["input"]["between_samples"] = "cubic".into();
     lab.write("cubic.json", file.to_string());

@@ -43,9 +43,9 @@ fn a_page_says_what_the_findings_say_and_loads_nothing() {
     // The same bytes again, on stdout.
     let piped = lab.ok("diagnose train.csv --test test.csv --model model.json --report -");
     assert!(piped.stdout == lab.read("report.html"));
-    assert!(piped.stderr.contains("the model lacks lag"), "{}", piped.stderr);
+    assert!(piped.stderr.contains("explained in part by lag"), "{}", piped.stderr);
     let message = lab.refuses("diagnose train.csv --model model.json --report model.json", 2);
-    assert!(message.contains("read by the same command"), "{message}");
+    assert!(message.contains("the same command reads this file"), "{message}");
 }
 
 fn says_what_the_findings_say(lab: &Lab) {
@@ -56,7 +56,7 @@ fn says_what_the_findings_say(lab: &Lab) {
     let says = |sentence: &Value| has(&sentence.as_str().unwrap()[1..].replace('\'', "&#39;"));
     has("<html lang=\"en\">");
     has("<title>Diagnosis of model.json on train.csv</title>");
-    has("Explained in part: the model lacks lag.");
+    has("Explained in part by lag.");
     for when in ["before", "after"] {
         for record in ["train", "test"] {
             for figure in ["rmse", "max_abs"] {

@@ -1,16 +1,16 @@
-//! The browser in which a test opens the report of a diagnosis.
+//! The browser for the test of the diagnosis report.
 
 use crate::command::{Outcome, install, which};
 
-/// Debian's package, and its program.
+/// Name of Debian's package and of its program.
 const CHROMIUM: &str = "chromium";
-/// The same under other names; the test knows them as well.
+/// Other names of the program, which the test also accepts.
 const OTHERS: [&str; 2] = ["chromium-browser", "google-chrome"];
 
-/// Whether there is one; it is installed if that can be done without asking.
+/// Passes if there is a browser; installs one as root.
 pub(crate) fn check() -> Outcome {
     if which(CHROMIUM).is_some() || OTHERS.iter().any(|name| which(name).is_some()) || install(&[CHROMIUM]) {
         return Outcome::Passed;
     }
-    Outcome::Skipped(format!("no browser, so no report is opened in one (Debian: `apt-get install {CHROMIUM}`)"))
+    Outcome::Skipped(format!("no browser to open the report in (Debian: `apt-get install {CHROMIUM}`)"))
 }

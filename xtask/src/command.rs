@@ -1,4 +1,4 @@
-//! Programs that a check runs.
+//! Runs the programs of the checks.
 
 use std::env;
 use std::ffi::OsStr;
@@ -8,29 +8,29 @@ use std::sync::OnceLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// How a check ended.
+/// Result of a check.
 pub(crate) enum Outcome {
     Passed,
     Failed,
     Skipped(String),
 }
 
-/// One check: what it is, and the cargo command that does it.
+/// A check that is a cargo command.
 pub(crate) struct Check {
     pub(crate) name: &'static str,
     pub(crate) arguments: &'static [&'static str],
     pub(crate) environment: &'static [(&'static str, &'static str)],
 }
 
-/// The folder of the workspace.
+/// Returns the folder of the workspace.
 pub(crate) fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap_or(package).to_owned()
 }
 
-/// The cargo that this was started by, in the folder of the workspace.
+/// Returns a command of the same cargo that started this program, in the folder of the workspace.
 pub(crate) fn cargo() -> Command {
-    // Cargo tells its subcommands which cargo they belong to.
+    // Cargo sets this variable for its subcommands.
     let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     if let Some(program) = BUILT.get() {
@@ -39,11 +39,13 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// The program `hystctl`, once it is built and up to date.
+/// Path of the program `hystctl`, after it is built.
 static BUILT: OnceLock<PathBuf> = OnceLock::new();
 
-/// The whole workspace, built once. All checks name it as a whole: of a package alone cargo builds most dependencies anew, with fewer
-/// features. Tests take `hystctl` from here.
+/// Arguments of cargo that build the whole workspace.
+///
+/// All checks use the whole workspace: for a single package, cargo builds most dependencies again, with
+/// fewer features. Tests use `hystctl` from this build.
 pub(crate) const BUILD: [&str; 5] = ["build", "--workspace", "--lib", "--bins", "--tests"];
 
 pub(crate) fn build() -> Outcome {
@@ -54,7 +56,7 @@ pub(crate) fn build() -> Outcome {
     outcome
 }
 
-/// Where `hystctl` is built.
+/// Returns the path of the built `hystctl`.
 pub(crate) fn program() -> PathBuf {
     target().join("debug").join(format!("hystctl{}", env::consts::EXE_SUFFIX))
 }
@@ -63,7 +65,7 @@ pub(crate) fn run(check: &Check) -> Outcome {
     passes(cargo().args(check.arguments).envs(check.environment.iter().copied()))
 }
 
-/// Whether the command ends well.
+/// Runs a command; passes if it exits successfully.
 pub(crate) fn passes(command: &mut Command) -> Outcome {
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,
@@ -75,13 +77,13 @@ pub(crate) fn passes(command: &mut Command) -> Outcome {
     }
 }
 
-/// What the command prints, if it ends well.
+/// Runs a command and returns its output; `None` if it fails.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
     let output = command.output().ok().filter(|o| o.status.success())?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// Waits for a program, but no longer than `limit`; `None` if it had to be ended.
+/// Waits for a program for at most `limit`; then ends it and returns `None`.
 pub(crate) fn wait(mut child: Child, limit: Duration) -> Option<ExitStatus> {
     let start = Instant::now();
     while start.elapsed() < limit {
@@ -91,34 +93,34 @@ pub(crate) fn wait(mut child: Child, limit: Duration) -> Option<ExitStatus> {
             Err(_) => break,
         }
     }
-    // It may have ended by itself in the meantime, which is as good.
+    // It may already have ended, so errors are ignored.
     let _ = child.kill();
     let _ = child.wait();
     None
 }
 
-/// Where a program is on the search path.
+/// Returns the path of a program on the search path.
 pub(crate) fn which(program: impl AsRef<OsStr>) -> Option<PathBuf> {
     let path = env::var_os("PATH")?;
     env::split_paths(&path).map(|folder| folder.join(program.as_ref())).find(|file| file.is_file())
 }
 
-/// The folder of what is built.
+/// Returns the target folder.
 pub(crate) fn target() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |folder| root().join(folder))
 }
 
-/// Whether this may do anything.
+/// Returns whether this program runs as root.
 pub(crate) fn as_root() -> bool {
     output(Command::new("id").arg("-u")).is_some_and(|id| id == "0")
 }
 
-/// Whether the command ends well; what it prints to standard output is nobody's.
+/// Runs a command without its standard output; returns whether it exits successfully.
 pub(crate) fn passes_quietly(command: &mut Command) -> bool {
     command.stdin(Stdio::null()).stdout(Stdio::null()).status().is_ok_and(|status| status.success())
 }
 
-/// Installs Debian packages, where that needs nobody's leave.
+/// Installs Debian packages, if this program runs as root; returns whether that succeeds.
 pub(crate) fn install(packages: &[&str]) -> bool {
     if !as_root() || which("apt-get").is_none() {
         return false;
@@ -127,7 +129,7 @@ pub(crate) fn install(packages: &[&str]) -> bool {
         let mut command = Command::new("apt-get");
         passes_quietly(command.args(["-qq"]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive"))
     };
-    let ask = [&["install", "-y", "--no-install-recommends"], packages].concat();
+    let install = [&["install", "-y", "--no-install-recommends"], packages].concat();
     eprintln!("apt-get install {}", packages.join(" "));
-    apt(&ask) || (apt(&["update"]) && apt(&ask))
+    apt(&install) || (apt(&["update"]) && apt(&install))
 }

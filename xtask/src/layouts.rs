@@ -1,4 +1,6 @@
-//! Files of laboratories: written by the programs that write them there, read by `hystctl`, and compared with the truth.
+//! The layout check: `hystctl` reads files that other programs write.
+//!
+//! The values are compared with the written ones.
 
 use std::path::Path;
 use std::process::Command;
@@ -23,7 +25,10 @@ pub(crate) fn check() -> Outcome {
         && passes_quietly(python(&program).args(pip).arg(sources.join("requirements.txt")));
     if !installed {
         let wanted = sources.join("requirements.txt");
-        return Outcome::Skipped(format!("{} could not be installed; see what pip says", wanted.display()));
+        return Outcome::Skipped(format!(
+            "{} could not be installed; the messages of pip above have the reason",
+            wanted.display()
+        ));
     }
     let Outcome::Passed = command::build() else { return Outcome::Failed };
     let hystctl = command::program();

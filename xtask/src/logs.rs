@@ -1,4 +1,4 @@
-//! Logs of runs, read by programs of others: Foxglove's Go library and its command line.
+//! The log checks: Foxglove's Go library and its command-line program read logs of runs.
 
 use std::env;
 use std::ffi::OsStr;
@@ -8,16 +8,16 @@ use std::sync::OnceLock;
 
 use crate::command::{Outcome, build, cargo, passes, program, root, target, which};
 
-/// Where the command line comes from.
+/// Go package of the command-line program.
 const TOOL: &str = "github.com/foxglove/mcap/go/cli/mcap@latest";
 const GO: &str = "go";
 
-/// A folder with logs of every kind of run, made once; `None` if they could not be.
+/// Writes logs of all kinds of runs, once, and returns their folder; `None` if that fails.
 pub(crate) fn made() -> Option<PathBuf> {
     static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
     let make = || {
         let folder = target().join("logs");
-        // What an older version has left is no log of this one.
+        // Logs of an earlier version must not be checked.
         let _ = std::fs::remove_dir_all(&folder);
         let example = ["build", "--workspace", "--tests", "--example", "every_log"];
         let (Outcome::Passed, Outcome::Passed) = (build(), passes(cargo().args(example))) else { return None };
@@ -32,7 +32,7 @@ pub(crate) fn made() -> Option<PathBuf> {
 pub(crate) fn library() -> Outcome {
     if which(GO).is_none() {
         return Outcome::Skipped(
-            "there is no Go, which reads the logs (https://go.dev/dl, Debian: `apt-get install golang`)".to_owned(),
+            "Go is missing, which reads the logs (https://go.dev/dl, Debian: `apt-get install golang`)".to_owned(),
         );
     }
     let Some(folder) = made() else { return Outcome::Failed };
@@ -41,11 +41,11 @@ pub(crate) fn library() -> Outcome {
     passes(&mut read)
 }
 
-/// Looks at every log with `mcap doctor` and `mcap info`.
+/// Checks every log with `mcap doctor` and `mcap info`.
 pub(crate) fn tool() -> Outcome {
     let Some(tool) = found() else {
         return Outcome::Skipped(format!(
-            "there is no `mcap` on the path, and `go install {TOOL}` gives none; https://mcap.dev/guides/cli tells how to get it"
+            "there is no `mcap` on the path, and `go install {TOOL}` failed; https://mcap.dev/guides/cli explains the installation"
         ));
     };
     let Some(folder) = made() else { return Outcome::Failed };
@@ -57,24 +57,24 @@ pub(crate) fn tool() -> Outcome {
     for log in &logs {
         for what in ["doctor", "info"] {
             match Command::new(&tool).arg(what).arg(log).output() {
-                // The doctor's warnings are what it prints: of a sound file it says nothing but its name.
-                Ok(said) if said.status.success() && (what == "info" || silent(&said.stdout)) => {}
-                said => {
+                // For a valid file, `mcap doctor` prints only its name; every other line is a warning.
+                Ok(output) if output.status.success() && (what == "info" || has_no_warnings(&output.stdout)) => {}
+                output => {
                     bad += 1;
-                    eprintln!("error: mcap {what} {}: {said:?}", log.display());
+                    eprintln!("error: mcap {what} {}: {output:?}", log.display());
                 }
             }
         }
     }
-    eprintln!("{} logs, {bad} complaints", logs.len());
+    eprintln!("{} logs, {bad} errors and warnings", logs.len());
     if bad == 0 && !logs.is_empty() { Outcome::Passed } else { Outcome::Failed }
 }
 
-fn silent(said: &[u8]) -> bool {
-    String::from_utf8_lossy(said).lines().all(|line| line.trim().is_empty() || line.starts_with("Examining "))
+fn has_no_warnings(printed: &[u8]) -> bool {
+    String::from_utf8_lossy(printed).lines().all(|line| line.trim().is_empty() || line.starts_with("Examining "))
 }
 
-/// The program `mcap`: on the path, or in the target folder, where it is installed if that can be done.
+/// Returns the program `mcap`: on the path, or in the target folder, where Go installs it.
 fn found() -> Option<PathBuf> {
     let tools = target().join("tools");
     let own = tools.join(format!("mcap{}", env::consts::EXE_SUFFIX));
@@ -91,8 +91,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_doctor_that_warns_is_not_silent() {
-        assert!(silent(b"") && silent(b"Examining a.mcap\n"));
-        assert!(!silent(b"Examining a.mcap\nDuplicate schema records in data section with ID 1\n"));
+    fn lines_other_than_the_file_name_are_warnings() {
+        assert!(has_no_warnings(b"") && has_no_warnings(b"Examining a.mcap\n"));
+        assert!(!has_no_warnings(b"Examining a.mcap\nDuplicate schema records in data section with ID 1\n"));
     }
 }

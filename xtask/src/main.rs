@@ -1,6 +1,6 @@
-//! `cargo xtask test`: every check of the project, in the order in which they fail fastest.
+//! `cargo xtask test`: all checks of the project, the fastest ones first.
 //!
-//! It runs all of them and ends with a table; a check that cannot run here says why and how to make it run.
+//! It runs all checks and prints a table. For a check that cannot run, the table contains the reason and what to install.
 
 mod browser;
 mod can;
@@ -16,14 +16,14 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 const USAGE: &str = "\
-cargo xtask test                run every check: format, lints, tests, documentation, firmware, CAN, logs, Python
-cargo xtask firmware            run the firmware check alone: the core on a Cortex-M4F, in QEMU
-cargo xtask firmware --table    the same, and write its figures to docs/firmware.md
-cargo xtask can                 run the CAN check alone: against python-can, and in QEMU against Linux's own ISO-TP and slcan
-cargo xtask fuzz [CASES]        frames and bytes by chance against whatever takes them, 1,000,000 cases of each kind; half an hour
-cargo xtask logs                run the log checks alone: logs of every kind of run, read with Foxglove's Go programs
-cargo xtask layouts             run the layout check alone: files that other programs write, read by hystctl as they are
-cargo xtask python              run the Python check alone: the wheel in a fresh environment, against the references
+cargo xtask test                run all checks: format, lints, tests, documentation, firmware, CAN, logs, layouts, Python
+cargo xtask firmware            run only the firmware check: the core on a Cortex-M4F, in QEMU
+cargo xtask firmware --table    run the firmware check and write its figures to docs/firmware.md
+cargo xtask can                 run only the CAN check: against python-can, and in QEMU against ISO-TP and slcan of Linux
+cargo xtask fuzz [CASES]        feed random frames and bytes to all readers; default 1,000,000 cases of each kind, about 30 minutes
+cargo xtask logs                run only the log checks: Foxglove's Go programs read logs of all kinds of runs
+cargo xtask layouts             run only the layout check: hystctl reads files that other programs write
+cargo xtask python              run only the Python check: the wheel in a fresh environment, against the references
 ";
 
 fn main() -> ExitCode {
@@ -43,7 +43,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         _ => {
-            eprintln!("error: no task is called {:?}\n{USAGE}", arguments.join(" "));
+            eprintln!("error: unknown task {:?}; expected one of these:\n{USAGE}", arguments.join(" "));
             ExitCode::from(2)
         }
     }
@@ -59,7 +59,7 @@ const FIRST: &[Check] = &[
 ];
 
 const AFTER_BUILD: &[Check] = &[
-    // Without `--lib`, which would test libraries that say they have no tests. The lints have compiled the examples, and no test runs one.
+    // Not `--lib`: some libraries have `test = false`. Not `--examples`: the lints have compiled them, and no test runs one.
     Check { name: "tests", arguments: &["test", "--workspace", "--no-fail-fast", "--tests"], environment: &[] },
     Check { name: "examples in texts", arguments: &["test", "--workspace", "--doc"], environment: &[] },
     Check {
@@ -80,7 +80,7 @@ const AFTER_BUILD: &[Check] = &[
 ];
 
 fn test() -> ExitCode {
-    // Before the tests: one of them needs it.
+    // Before the tests, because one of them needs the browser.
     let mut results = vec![("browser", timed("browser", browser::check))];
     let run =
         |checks: &'static [Check]| checks.iter().map(|check| (check.name, timed(check.name, || command::run(check))));
@@ -95,7 +95,7 @@ fn test() -> ExitCode {
     table(&results)
 }
 
-/// Says by itself what to do with a number of cases that is none.
+/// Runs the fuzz example, which checks its arguments itself.
 fn fuzz(arguments: &[&str]) -> Outcome {
     let program = ["run", "--release", "--quiet", "--package", "hyst-tests", "--example", "fuzz", "--"];
     command::passes(command::cargo().args(program).args(arguments))

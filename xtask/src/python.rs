@@ -1,4 +1,6 @@
-//! The Python package: installed by pip in a fresh environment, from a wheel of the development profile, and tested against the references.
+//! The Python check: pip installs the package in a fresh environment, and tests compare it with references.
+//!
+//! The package is built in the development profile.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -6,7 +8,7 @@ use std::process::Command;
 
 use crate::command::Outcome;
 
-/// What the tests need besides the package.
+/// Packages that the tests need.
 const NEEDED: &[&str] = &[
     "numpy",
     "scipy",
@@ -30,15 +32,15 @@ const NEEDED: &[&str] = &[
     "pymcap-cli==0.34.0",
     "jsonschema",
 ];
-/// Interpreters to try, in this order.
+/// Interpreters, in the order in which they are tried.
 const INTERPRETERS: &[&str] =
     &["python3", "python", "python3.14", "python3.13", "python3.12", "python3.11", "python3.10"];
-/// Succeeds where the package can be built and tested.
+/// Program that succeeds if the interpreter can build and test the package.
 const SUITABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
 pub(crate) const INSTALL: &str =
-    "Python 3.10 or newer with its module venv is needed, and none was found; on Debian `apt install python3-venv`";
+    "no Python 3.10 or newer with the module venv was found (Debian: `apt-get install python3-venv`)";
 
-/// An interpreter that is new enough and has what environments need.
+/// Returns an interpreter that is new enough and can create environments.
 pub(crate) fn interpreter() -> Option<&'static str> {
     let suitable = |python: &&str| {
         Command::new(python).args(["-c", SUITABLE]).output().is_ok_and(|output| output.status.success())
@@ -46,7 +48,7 @@ pub(crate) fn interpreter() -> Option<&'static str> {
     INTERPRETERS.iter().copied().find(suitable)
 }
 
-/// The interpreter of an environment.
+/// Returns the interpreter of an environment.
 pub(crate) fn program(environment: &Path) -> PathBuf {
     environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" })
 }
@@ -56,12 +58,12 @@ pub(crate) fn check() -> Outcome {
     let Some(python) = interpreter() else { return Outcome::Skipped(INSTALL.to_owned()) };
     let Some(logs) = crate::logs::made() else { return Outcome::Failed };
     let own = root.join("target").join("python-tests");
-    // The other checks have compiled nearly all of the wheel in this profile already.
+    // The other checks have already compiled most of the wheel in this profile.
     let builds = [("MATURIN_PEP517_ARGS", "--profile dev")];
     let run = |program: &Path, arguments: &[&str], environment: &[(&str, &str)]| {
         let mut command = Command::new(program);
         command.current_dir(root).args(arguments).env("HYST_LOGS", &logs);
-        // An environment of the caller's must not lend its packages.
+        // Packages of the caller's environment must not be used.
         command.env_remove("PYTHONPATH").env_remove("PYTHONHOME").env_remove("VIRTUAL_ENV");
         command.envs(environment.iter().copied());
         match command.status() {

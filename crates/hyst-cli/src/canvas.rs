@@ -1,4 +1,4 @@
-//! What pictures are drawn on: SVG or PNG, by the ending of the file's name.
+//! Drawing area of pictures: SVG or PNG, selected by the ending of the file name.
 
 use std::io;
 use std::sync::Once;
@@ -10,9 +10,9 @@ use plotters_backend::{BackendColor, BackendStyle, BackendTextStyle, DrawingErro
 use crate::exit::{CommandError, CommandResult};
 use crate::output::Target;
 
-/// What drawing returns.
+/// Result of drawing.
 pub(crate) type Drawn = Result<(), Box<dyn std::error::Error>>;
-/// Where pictures and their panels are drawn.
+/// Area of a picture or of one of its panels.
 pub(crate) type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// The format of a picture.
@@ -23,22 +23,22 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// The format of a picture that goes to `target`; SVG on standard output.
+    /// Returns the format of a picture that goes to `target`; SVG on stdout.
     ///
     /// # Errors
-    /// When the file's name ends in something else.
+    /// When the file name has another ending.
     pub(crate) fn of(target: &Target) -> CommandResult<Self> {
         let ending = target.file().map(|path| path.extension().map(|ending| ending.to_ascii_lowercase()));
         match ending.as_ref().map(|ending| ending.as_deref().and_then(|ending| ending.to_str())) {
             None | Some(Some("svg")) => Ok(Self::Svg),
             Some(Some("png")) => Ok(Self::Png),
             Some(_) => Err(CommandError::bad_input(format!(
-                "{target}: pictures are written as SVG or PNG; end the name in .svg or .png"
+                "{target}: pictures are written as SVG or PNG; give a name that ends in .svg or .png"
             ))),
         }
     }
 
-    /// The picture that `draw` makes on an area of this size \[pixels\].
+    /// Returns the file content of the picture that `draw` makes on an area of `size` \[pixels\].
     ///
     /// # Errors
     /// When it cannot be drawn.
@@ -59,7 +59,7 @@ impl Format {
 }
 
 fn on(canvas: Canvas<'_>, draw: impl FnOnce(&Area<'_>) -> Drawn) -> CommandResult {
-    register_letters();
+    register_font();
     let root = canvas.into_drawing_area();
     let all = || -> Drawn {
         root.fill(&WHITE)?;
@@ -73,11 +73,11 @@ fn failed(error: &dyn std::error::Error) -> CommandError {
     CommandError::failed(format!("the picture could not be drawn: {error}"))
 }
 
-/// One font for all systems: a picture is the same everywhere.
-fn register_letters() {
+/// Registers a built-in font, so that a picture is the same on all systems.
+fn register_font() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // Fails only for a font that is damaged; drawing says so then.
+        // Fails only for a damaged font; drawing then reports the error.
         let _ = plotters::style::register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular());
     });
 }
@@ -92,7 +92,7 @@ fn encoded(pixels: &[u8], (width, height): (u32, u32)) -> Result<Vec<u8>, png::E
     Ok(bytes)
 }
 
-/// One of the two kinds of picture.
+/// A drawing backend: SVG or PNG.
 pub(crate) enum Canvas<'a> {
     Svg(SVGBackend<'a>),
     Png(BitMapBackend<'a>),
@@ -100,19 +100,20 @@ pub(crate) enum Canvas<'a> {
 
 type Outcome<T = ()> = Result<T, DrawingErrorKind<io::Error>>;
 
-fn told<T, E: std::error::Error + Send + Sync + 'static>(outcome: Result<T, DrawingErrorKind<E>>) -> Outcome<T> {
+/// Converts the error of a backend.
+fn converted<T, E: std::error::Error + Send + Sync + 'static>(outcome: Result<T, DrawingErrorKind<E>>) -> Outcome<T> {
     outcome.map_err(|error| match error {
         DrawingErrorKind::DrawingError(error) => DrawingErrorKind::DrawingError(io::Error::other(error.to_string())),
         DrawingErrorKind::FontError(error) => DrawingErrorKind::FontError(error),
     })
 }
 
-/// The same call on either.
+/// Makes the same call on either backend.
 macro_rules! either {
     ($canvas:expr, $call:ident($($argument:expr),*)) => {
         match $canvas {
-            Canvas::Svg(svg) => told(svg.$call($($argument),*)),
-            Canvas::Png(png) => told(png.$call($($argument),*)),
+            Canvas::Svg(svg) => converted(svg.$call($($argument),*)),
+            Canvas::Png(png) => converted(png.$call($($argument),*)),
         }
     };
 }

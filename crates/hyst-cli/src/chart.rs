@@ -21,15 +21,15 @@ pub(crate) struct Chart {
     small: bool,
 }
 
-/// Room around the entries of a legend, length of its lines, and height of a row of it \[pixels\].
+/// Margin around the entries of a legend, length of its lines, and height of its rows \[pixels\].
 const LEGEND_MARGIN: i32 = 14;
 const LEGEND_LINE: i32 = 18;
 const LEGEND_HEIGHT: i32 = 17;
-/// Points of one curve that are drawn: more than this no screen shows.
-const POINTS: usize = 4000;
+/// Maximum number of points of a curve; more are not visible on a screen.
+const MAX_POINTS: usize = 4000;
 
 impl Chart {
-    /// An empty panel; a description that is empty takes no room.
+    /// Creates an empty panel; an empty description of an axis takes no room.
     pub(crate) fn new(title: &str, x: &str, y: &str) -> Self {
         Self {
             title: title.into(),
@@ -43,46 +43,46 @@ impl Chart {
         }
     }
 
-    /// The same with a logarithmic vertical axis: what is not positive is not drawn.
+    /// Returns the panel with a logarithmic vertical axis; values of zero and below are not drawn.
     pub(crate) fn logarithmic(self) -> Self {
         Self { log: true, ..self }
     }
 
-    /// The same as one of many: small letters, no legend.
+    /// Returns the panel with small letters and without a legend, for pictures with many panels.
     pub(crate) fn small(self) -> Self {
         Self { small: true, ..self }
     }
 
-    /// A function of time, in pieces.
+    /// Adds a function of time, in pieces.
     pub(crate) fn curve(&mut self, name: &str, colour: RGBColor, pieces: &[Vec<(f64, f64)>]) {
         let points = pieces.iter().map(Vec::len).sum();
         self.curves.push((name.into(), colour, pieces.iter().map(|p| thinned(p, points)).collect()));
     }
 
-    /// A path, as a loop is: evenly thinned, in the order in which it was passed.
+    /// Adds a path, for example a loop: its points are connected in their order.
     pub(crate) fn path(&mut self, name: &str, colour: RGBColor, x: &[f64], y: &[f64]) {
         self.paths(name, colour, &[x.iter().copied().zip(y.iter().copied()).collect()]);
     }
 
-    /// A path in pieces.
+    /// Adds a path in pieces.
     pub(crate) fn paths(&mut self, name: &str, colour: RGBColor, pieces: &[Vec<(f64, f64)>]) {
         let points: usize = pieces.iter().map(Vec::len).sum();
-        let step = points.div_ceil(POINTS).max(1);
+        let step = points.div_ceil(MAX_POINTS).max(1);
         let thinned = pieces.iter().map(|piece| piece.iter().copied().step_by(step).collect()).collect();
         self.curves.push((name.into(), colour, thinned));
     }
 
-    /// The same with these bounds of the vertical axis, as panels that are compared share them.
+    /// Returns the panel with bounds of the vertical axis, for panels that are compared on one scale.
     pub(crate) fn between(self, low: f64, high: f64) -> Self {
         Self { bounds: Some((low, high)), ..self }
     }
 
-    /// The same with a logarithmic horizontal axis too.
+    /// Returns the panel with a logarithmic horizontal axis.
     pub(crate) fn log_across(self) -> Self {
         Self { log_across: true, ..self }
     }
 
-    /// Draws it, unless there is nothing to draw.
+    /// Draws the panel unless all curves are empty.
     pub(crate) fn draw_if_any(&self, area: &Area<'_>) -> Drawn {
         if self.curves.iter().any(|(_, _, pieces)| pieces.iter().any(|piece| !piece.is_empty())) {
             self.draw(area)
@@ -91,7 +91,7 @@ impl Chart {
         }
     }
 
-    /// Draws it.
+    /// Draws the panel.
     pub(crate) fn draw(&self, area: &Area<'_>) -> Drawn {
         let shown = |p: &&(f64, f64)| !self.log || p.1 > 0.0;
         let points = || self.curves.iter().flat_map(|c| c.2.iter().flatten()).filter(shown);
@@ -150,7 +150,7 @@ impl Chart {
         mesh.draw()?;
         for (_, colour, pieces) in &self.curves {
             let colour = *colour;
-            // Nothing cuts a line off at the axes: what is beyond them lies on them.
+            // plotters does not clip lines at the bounds, so values outside are moved to them.
             let (low, high) = self.bounds.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
             let shown = |piece: &Vec<(f64, f64)>| {
                 let drawn = piece.iter().filter(|p| !self.log || p.1 > 0.0);
@@ -165,14 +165,15 @@ impl Chart {
         Ok(())
     }
 
-    /// Draws title and legend above the panel, where they cover no line, and returns what is left below; at least half of the area, so that of many curves
-    /// the last ones have no entry.
+    /// Draws title and legend above the panel, where they cover no line, and returns the area below.
+    ///
+    /// The legend takes at most half of the area; curves without room in it have no entry.
     fn legend<'a>(&self, area: &Area<'a>) -> Result<Area<'a>, Box<dyn std::error::Error>> {
         let (width, height) = area.dim_in_pixel();
         let style = ("sans-serif", 13).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
         let title = ("sans-serif", 18).into_text_style(area);
         area.draw_text(&self.title, &title, (LEGEND_MARGIN, 6))?;
-        // Right of the title while there is room, then line by line below it.
+        // Entries start right of the title and continue in rows below it.
         let mut x = 2 * LEGEND_MARGIN + area.estimate_text_size(&self.title, &title)?.0 as i32;
         let mut y = 17;
         for (name, colour, _) in self.curves.iter().filter(|(name, _, _)| !name.is_empty()) {
@@ -192,10 +193,11 @@ impl Chart {
     }
 }
 
-/// Keeps the lowest and the highest point of each stretch, so that no peak is lost; `of` is the whole curve's
-/// number of points.
+/// Thins a piece of a curve: keeps minimum and maximum of each stretch of points.
+///
+/// `of` is the number of points of the whole curve.
 fn thinned(points: &[(f64, f64)], of: usize) -> Vec<(f64, f64)> {
-    let stretch = (2 * of).div_ceil(POINTS).max(1);
+    let stretch = (2 * of).div_ceil(MAX_POINTS).max(1);
     if stretch <= 2 {
         return points.to_vec();
     }

@@ -1,4 +1,4 @@
-//! The device that an argument names, whichever kind it is.
+//! Devices of all kinds, as the argument `--daq` names them.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -15,14 +15,15 @@ use crate::input;
 
 /// A device of any kind.
 pub(crate) enum AnyDevice {
+    /// A simulated plant.
     Plant(Box<Plant>),
-    /// At the other end of a line.
+    /// A device at the other end of a line.
     Remote(Box<Remote<Box<dyn Line>>>),
-    /// Of the program that runs the command.
+    /// A device of the program that runs the command.
     Host(Box<dyn HostDaq>),
 }
 
-/// What any of them may say.
+/// Error of a device.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum DeviceError {
     #[error(transparent)]
@@ -50,50 +51,50 @@ impl Classified for DeviceError {
     }
 }
 
-/// What a run may be told beyond its drive.
+/// Options of a device; `None` selects its default.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Wishes {
-    /// Seed of a simulated plant's noise.
+pub(crate) struct DeviceOptions {
+    /// Seed of the noise of a simulated plant.
     pub(crate) noise: Option<u64>,
-    /// Lowest and highest voltage \[V\].
+    /// Minimum and maximum voltage \[V\].
     pub(crate) voltage: Option<(f64, f64)>,
-    /// Steepest slope \[V/s\].
+    /// Maximum slope \[V/s\].
     pub(crate) slew_v_per_s: Option<f64>,
     /// Whether the device estimates the external force.
     pub(crate) force: bool,
-    /// Silence of this computer after which the device comes to rest \[s\].
+    /// Timeout of the watchdog: the device ramps to rest after this time without a message \[s\].
     pub(crate) silence_s: Option<f64>,
-    /// Highest temperature \[°C\].
+    /// Maximum temperature \[°C\].
     pub(crate) hottest_degc: Option<f64>,
-    /// Greatest tracking error \[output unit\].
+    /// Maximum tracking error \[output unit\].
     pub(crate) error: Option<f64>,
 }
 
 impl AnyDevice {
-    /// Opens it. Nothing moves by that.
-    pub(crate) fn open(device: &Device, wishes: &Wishes) -> CommandResult<Self> {
-        if let Device::Simulated(described) = device {
-            return Ok(Self::Plant(Box::new(input::plant(described, wishes.noise)?)));
+    /// Opens a device. Nothing moves.
+    pub(crate) fn open(device: &Device, options: &DeviceOptions) -> CommandResult<Self> {
+        if let Device::Simulated(file) = device {
+            return Ok(Self::Plant(Box::new(input::plant(file, options.noise)?)));
         }
         if *device == Device::Host {
             return host::daq().map(Self::Host).ok_or_else(|| CommandError::bad_input(NO_HOST));
         }
         let lost = |error: RemoteError| CommandError::from(DeviceError::from(error));
         let (line, name) = line(device)?;
-        let remote = Remote::open(line, name, options(wishes)).map_err(lost)?;
+        let remote = Remote::open(line, name, remote_options(options)).map_err(lost)?;
         Ok(Self::Remote(Box::new(remote)))
     }
 
-    /// Clears the fault of an earlier run, and gives it.
+    /// Clears the fault of an earlier run and returns it.
     pub(crate) fn clear(&mut self) -> Result<Option<Fault>, DeviceError> {
         match self {
-            // It begins with the command that plays it.
+            // These devices start with the command and have no earlier fault.
             Self::Plant(_) | Self::Host(_) => Ok(None),
             Self::Remote(remote) => Ok(remote.clear()?),
         }
     }
 
-    /// The device at the other end of a line.
+    /// Returns the device if it is at the other end of a line.
     pub(crate) fn remote(&mut self) -> Option<&mut Remote<Box<dyn Line>>> {
         match self {
             Self::Plant(_) | Self::Host(_) => None,
@@ -101,41 +102,41 @@ impl AnyDevice {
         }
     }
 
-    /// Lets it come to rest and stay there, without a word before; gives its name and what it put out then \[V\].
+    /// Stops a device without opening a session; returns its name and the voltage at that time \[V\].
     pub(crate) fn emergency_stop(device: &Device) -> CommandResult<(String, f64)> {
         let (line, name) = line(device)?;
-        let status = Remote::stop_at(line, name.clone(), options(&Wishes::default()));
+        let status = Remote::stop_at(line, name.clone(), remote_options(&DeviceOptions::default()));
         Ok((name, f64::from(status.map_err(DeviceError::from)?.present_v)))
     }
 }
 
-/// How a device is talked to.
-fn options(wishes: &Wishes) -> RemoteOptions {
-    // No two runs have the same number, so that a late request of one does nothing to another.
+/// Returns the options of a remote device, with a new session number.
+fn remote_options(options: &DeviceOptions) -> RemoteOptions {
+    // Each run has its own number, so that a late request of one run does not act on another.
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
     let session = (clock ^ (clock >> 32)) as u32 ^ std::process::id().rotate_left(16);
-    let usual = RemoteOptions::with_session(session);
+    let defaults = RemoteOptions::with_session(session);
     RemoteOptions {
-        voltage: wishes.voltage,
-        slew_v_per_s: wishes.slew_v_per_s,
-        silence_s: wishes.silence_s.unwrap_or(usual.silence_s),
-        hottest_degc: wishes.hottest_degc.unwrap_or(f64::INFINITY),
-        error: wishes.error.unwrap_or(f64::INFINITY),
-        force: wishes.force,
-        ..usual
+        voltage: options.voltage,
+        slew_v_per_s: options.slew_v_per_s,
+        silence_s: options.silence_s.unwrap_or(defaults.silence_s),
+        hottest_degc: options.hottest_degc.unwrap_or(f64::INFINITY),
+        error: options.error.unwrap_or(f64::INFINITY),
+        force: options.force,
+        ..defaults
     }
 }
 
-const NO_HOST: &str = "the device of the program that runs the command can only be played, by one command at a time";
+const NO_HOST: &str = "the device of the calling program can only be played, and only by one command at a time";
 
-/// The line to a device, and what it is called.
+/// Opens the line to a device; returns it with the name of the device.
 fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
     let port = |port: &str, baud| Serial::open(port, baud).map_err(|error| CommandError::new(Exit::DeviceLost, error));
     let gone = |message: String| CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{message}"));
     let (line, name): (Box<dyn Line>, &String) = match device {
         Device::Simulated(_) => {
             return Err(CommandError::bad_input(
-                "a simulated plant runs in the command that plays it; press Ctrl-C there",
+                "a simulated plant runs inside the command that plays it; press Ctrl-C in that command",
             ));
         }
         Device::Host => return Err(CommandError::bad_input(NO_HOST)),
@@ -148,7 +149,7 @@ fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
         Device::Can { interface, fd } => (can(interface, *fd)?, interface),
         Device::Tcp(address) => {
             let line = Tcp::connect(address).map_err(|error| {
-                gone(format!("{address}: nobody answers: {error}; is the simulator or the bridge running?"))
+                gone(format!("{address}: no connection: {error}; check that the simulator or bridge is running"))
             })?;
             (Box::new(line), address)
         }
@@ -156,7 +157,7 @@ fn line(device: &Device) -> CommandResult<(Box<dyn Line>, String)> {
     Ok((line, name.clone()))
 }
 
-/// The device on the bus behind an interface.
+/// Opens the line to the device on the CAN bus of an interface.
 #[cfg(target_os = "linux")]
 fn can(interface: &str, fd: bool) -> CommandResult<Box<dyn Line>> {
     let bus = hyst_hw::SocketCan::open(interface, fd).map_err(|error| CommandError::new(Exit::DeviceLost, error))?;
@@ -164,44 +165,44 @@ fn can(interface: &str, fd: bool) -> CommandResult<Box<dyn Line>> {
     Ok(Box::new(CanLine::new(bus, TO_DEVICE, FROM_DEVICE, fd)))
 }
 
-/// Other systems have no interfaces for CAN.
+/// Refuses CAN interfaces, which only Linux has.
 #[cfg(not(target_os = "linux"))]
 fn can(interface: &str, _fd: bool) -> CommandResult<Box<dyn Line>> {
-    let advice = "can: devices need Linux; an adapter at a serial port works here too (slcan:PORT)";
+    let advice = "can: devices need Linux; on this system use an adapter at a serial port (slcan:PORT)";
     Err(CommandError::new(Exit::BadInput, anyhow::anyhow!("{interface}: {advice}")))
 }
 
 impl AnyDevice {
-    /// Lets the device only measure: what it is given is not put out.
+    /// Makes the device measure only; it ignores the drive.
     pub(crate) fn observe(&mut self) {
         match self {
-            // It is given the voltage at which it rests.
+            // The drive of these devices is their rest voltage.
             Self::Plant(_) | Self::Host(_) => {}
             Self::Remote(remote) => remote.observe(),
         }
     }
 
-    /// Lets the device come to rest no steeper than this \[V/s\], where no slew was wished for.
+    /// Limits the slope of the ramp to rest \[V/s\], unless the options of the device have a slope.
     pub(crate) fn gentle(&mut self, slew_v_per_s: f64) {
         match self {
-            // It is gone with the command that plays it.
+            // The plant ends with the command.
             Self::Plant(_) => {}
             Self::Host(daq) => daq.gentle(slew_v_per_s),
             Self::Remote(remote) => remote.gentle(slew_v_per_s),
         }
     }
 
-    /// Lets the device follow references with this controller; drives are references from then on.
+    /// Loads a controller into the device; the drives of later calls are references.
     pub(crate) fn follow(&mut self, recipe: &[u8], range: (f64, f64)) -> Result<(), CommandError> {
         match self {
-            // They have no controller, and need none: what they measure comes at once.
+            // These devices need no controller: their measurements arrive without delay.
             Self::Plant(_) | Self::Host(_) => Ok(()),
             Self::Remote(remote) => Ok(remote.follow(recipe, range).map_err(DeviceError::from)?),
         }
     }
 }
 
-/// The same call on whichever it is.
+/// Makes the same call on each kind of device.
 macro_rules! each {
     ($device:expr, $it:ident => $call:expr) => {
         match $device {

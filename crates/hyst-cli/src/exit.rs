@@ -1,4 +1,4 @@
-//! How a command ends: its exit code, and what it says on stderr.
+//! Exit codes and errors of commands.
 
 use std::error::Error;
 use std::fmt;
@@ -17,12 +17,12 @@ use hyst_ident::record::{MapError, RecordError, WriteError};
 
 use crate::log::LogError;
 
-/// What the exit code tells a script.
+/// Exit code of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// The command did what it was asked for.
+    /// The command succeeded.
     Done = 0,
-    /// It could not, though nothing was wrong with what it was given.
+    /// The command failed with valid arguments and inputs.
     Failed = 1,
     /// The arguments or an input file are wrong.
     BadInput = 2,
@@ -30,45 +30,45 @@ pub(crate) enum Exit {
     DeviceLost = 3,
 }
 
-/// Why a command ended before its time.
+/// Error of a command, with its exit code.
 #[derive(Debug)]
 pub(crate) struct CommandError {
     exit: Exit,
     cause: anyhow::Error,
 }
 
-/// What a command returns.
+/// Result of a command.
 pub(crate) type CommandResult<T = ()> = Result<T, CommandError>;
 
 impl CommandError {
-    /// An error with its causes.
+    /// Creates an error from its cause.
     pub(crate) fn new(exit: Exit, cause: impl Into<anyhow::Error>) -> Self {
         Self { exit, cause: cause.into() }
     }
 
-    /// The arguments do not make sense.
+    /// Creates an error of the arguments or inputs.
     pub(crate) fn bad_input(message: impl fmt::Display) -> Self {
         Self { exit: Exit::BadInput, cause: anyhow::anyhow!("{message}") }
     }
 
-    /// Something failed that is nobody's fault.
+    /// Creates an error of a command with valid arguments and inputs.
     pub(crate) fn failed(message: impl fmt::Display) -> Self {
         Self { exit: Exit::Failed, cause: anyhow::anyhow!("{message}") }
     }
 
-    /// The exit code.
+    /// Returns the exit code.
     pub(crate) fn exit(&self) -> Exit {
         self.exit
     }
 
-    /// Says on stderr what happened, and returns the exit code.
+    /// Prints the error to stderr and returns the exit code.
     pub(crate) fn print(&self) -> Exit {
-        // Where stderr is closed there is nobody to tell.
+        // A closed stderr is no error.
         let _ = writeln!(io::stderr().lock(), "error: {}", self.text());
         self.exit
     }
 
-    /// The message and below it every cause that it does not contain already.
+    /// Returns the message, followed by each cause that it does not contain.
     pub(crate) fn text(&self) -> String {
         let mut text = self.cause.to_string();
         for cause in self.cause.chain().skip(1) {
@@ -82,9 +82,9 @@ impl CommandError {
     }
 }
 
-/// Which exit code an error of the libraries has.
+/// An error of the libraries with an exit code.
 pub(crate) trait Classified: Error + Send + Sync + 'static {
-    /// The exit code.
+    /// Returns the exit code.
     fn exit(&self) -> Exit;
 }
 
@@ -152,26 +152,26 @@ mod tests {
 
     #[derive(Debug, thiserror::Error)]
     #[error("the outer thing: {inner}")]
-    struct Told {
+    struct WithCause {
         #[source]
         inner: io::Error,
     }
 
     #[derive(Debug, thiserror::Error)]
     #[error("the outer thing")]
-    struct Untold(#[source] io::Error);
+    struct WithoutCause(#[source] io::Error);
 
     #[test]
-    fn causes_are_told_once() {
-        let told = CommandError::new(Exit::Failed, Told { inner: io::Error::other("disk full") });
-        assert_eq!(told.text(), "the outer thing: disk full");
-        let untold = CommandError::new(Exit::DeviceLost, Untold(io::Error::other("disk full")));
-        assert_eq!(untold.text(), "the outer thing\n  because: disk full");
-        assert_eq!(untold.print(), Exit::DeviceLost);
+    fn each_cause_is_printed_once() {
+        let with_cause = CommandError::new(Exit::Failed, WithCause { inner: io::Error::other("disk full") });
+        assert_eq!(with_cause.text(), "the outer thing: disk full");
+        let without_cause = CommandError::new(Exit::DeviceLost, WithoutCause(io::Error::other("disk full")));
+        assert_eq!(without_cause.text(), "the outer thing\n  because: disk full");
+        assert_eq!(without_cause.print(), Exit::DeviceLost);
     }
 
     #[test]
-    fn what_the_user_can_mend_is_bad_input() {
+    fn errors_that_the_user_can_fix_are_bad_input() {
         assert_eq!(CommandError::from(RecordError::Nothing).exit, Exit::BadInput);
         assert_eq!(CommandError::from(FitError::Unsolvable { record: "a.csv".into() }).exit, Exit::Failed);
         assert_eq!(CommandError::from(CompensateError::Inverse(hyst_core::Error::NonFinite("x"))).exit, Exit::BadInput);

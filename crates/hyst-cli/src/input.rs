@@ -1,4 +1,4 @@
-//! Reading what commands are given: records, models, plants.
+//! Reads the inputs of commands: records, models and plants.
 
 use std::fs;
 use std::io::{self, Read};
@@ -20,15 +20,15 @@ use crate::output::say;
 use crate::progress::Progress;
 use crate::text;
 
-/// The records of all files, joined to one.
+/// Reads the records of all files and joins them.
 pub(crate) fn training(paths: &[PathBuf], map: &MapArg) -> CommandResult<Record> {
     let read = |path: &PathBuf| read(path, map, Need::InputAndOutput);
     let records: Vec<Record> = paths.iter().map(read).collect::<CommandResult<_>>()?;
-    records.iter().for_each(tell_oddities);
+    records.iter().for_each(print_notes);
     Ok(Record::join(records)?)
 }
 
-/// A file, or what comes on stdin for `-`.
+/// Reads a record from a file, or from stdin for `-`.
 fn read(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
     let how = Reading { map: ColumnMap::parse(&map.map)?, rate: map.rate };
     if path != Path::new("-") {
@@ -36,50 +36,51 @@ fn read(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
         return Ok(Record::read_watched(path, how, need, &mut |share| bar.at((1000.0 * share) as usize))?);
     }
     let mut bytes = Vec::new();
-    let came = io::stdin().lock().read_to_end(&mut bytes);
-    came.map_err(|error| CommandError::bad_input(format!("stdin: cannot be read: {error}")))?;
+    let outcome = io::stdin().lock().read_to_end(&mut bytes);
+    outcome.map_err(|error| CommandError::bad_input(format!("stdin: cannot be read: {error}")))?;
     Ok(Record::parse("stdin", &bytes, how, need)?)
 }
 
-/// One record.
+/// Reads one record and prints notes about it.
 pub(crate) fn record(path: &Path, map: &MapArg, need: Need) -> CommandResult<Record> {
     let record = read(path, map, need)?;
-    tell_oddities(&record);
-    if falls(&record) {
+    print_notes(&record);
+    if has_negative_gain(&record) {
         let column = record.output_unit().map_or("", |unit| unit.column());
         say(&format!(
-            "note: {}: the output falls where the input rises; if that of the model does not, read it with --map {column}=-COLUMN",
+            "note: {}: the output falls while the input rises; if the model's output rises, change the sign with \
+             --map {column}=-COLUMN",
             record.name()
         ));
     }
     Ok(record)
 }
 
-/// A record with what the file has: input and output, or one of them.
+/// Reads a record with input, output or both.
 pub(crate) fn any(path: &Path, map: &MapArg) -> CommandResult<Record> {
     let how = Reading { map: ColumnMap::parse(&map.map)?, rate: map.rate };
     let record = Record::read_any(path, &how)?;
-    tell_oddities(&record);
+    print_notes(&record);
     Ok(record)
 }
 
-/// Whether the output goes against the input.
-fn falls(record: &Record) -> bool {
-    opposed(record.input(), record.output().unwrap_or_default())
+/// Whether the output falls while the input rises.
+fn has_negative_gain(record: &Record) -> bool {
+    have_negative_covariance(record.input(), record.output().unwrap_or_default())
 }
 
-/// Whether one signal falls where the other rises.
-fn opposed(u: &[f64], y: &[f64]) -> bool {
+/// Whether the covariance of two signals is negative.
+fn have_negative_covariance(u: &[f64], y: &[f64]) -> bool {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (mean_u, mean_y) = (mean(u), mean(y));
     u.iter().zip(y).map(|(u, y)| (u - mean_u) * (y - mean_y)).sum::<f64>() < 0.0
 }
 
-/// Share of a whole loop's box from which on a loop is open.
-const OPEN: f64 = 0.003;
+/// Minimum area of an open loop, as a share of its bounding box.
+const MIN_LOOP_AREA_SHARE: f64 = 0.003;
 
-/// Whether loops are passed the other way round than hysteresis makes them: with a falling branch below the rising one.
-fn leads(record: &Record) -> bool {
+/// Whether the loops have the opposite direction of hysteresis (falling branch below rising one).
+fn output_leads(record: &Record) -> bool {
     let (u, Some(y)) = (record.input(), record.output()) else { return false };
     let mut y = y.to_vec();
     for run in frozen_of(record) {
@@ -92,7 +93,7 @@ fn leads(record: &Record) -> bool {
     for rows in record.segments() {
         let (Some(u), Some(y)) = (u.get(rows.clone()), y.get(rows.clone())) else { return false };
         let (&[u0, .., u1], &[y0, .., y1]) = (u, y) else { continue };
-        // What comes back, nearly, to where it began is closed by a straight line.
+        // A segment that ends near its start is closed by a straight line.
         if (u1 - u0).abs() > 0.1 * wide {
             continue;
         }
@@ -102,42 +103,38 @@ fn leads(record: &Record) -> bool {
             path += (u[1] - u[0]).abs();
         }
     }
-    // Of an output whose sign is turned a loop is passed the other way, and nothing is exchanged.
-    let area = if opposed(u, y) { -area } else { area };
+    // A negative gain reverses the direction of the loop; the columns are not exchanged then.
+    let area = if have_negative_covariance(u, y) { -area } else { area };
     let loops = path / (2.0 * wide);
-    loops >= 1.0 && area > OPEN * loops * wide * high
+    loops >= 1.0 && area > MIN_LOOP_AREA_SHARE * loops * wide * high
 }
 
-/// Largest value less the smallest.
+/// Maximum minus minimum.
 fn span(x: &[f64]) -> f64 {
     let (low, high) = range(x.iter().copied());
     high - low
 }
 
-/// Sample rates that actuators are measured at \[Hz\].
-const ORDINARY_RATES: Range<f64> = 5.0..2e5;
+/// Usual sample rates of actuator records \[Hz\].
+const USUAL_RATES: Range<f64> = 5.0..2e5;
 
-/// Says what was done to read a record.
-fn tell_notes(record: &Record) {
+/// Prints what was done to read a record, and its possible problems.
+fn print_notes(record: &Record) {
     record.notes().iter().for_each(|note| say(&format!("note: {}: {note}", record.name())));
+    warnings(record).iter().for_each(|warning| say(&format!("note: {}: {warning}", record.name())));
 }
 
-/// Says what was done to read a record, and what is legal in it but seldom meant.
-pub(crate) fn tell_oddities(record: &Record) {
-    tell_notes(record);
-    oddities(record).iter().for_each(|odd| say(&format!("note: {}: {odd}", record.name())));
-}
-
-/// Refuses a record of which input or output never moves.
-pub(crate) fn refuse_still(record: &Record) -> CommandResult {
-    let still = |x: &[f64]| record.rows() > 1 && !x.is_empty() && span(x) == 0.0;
+/// Refuses a record with a constant input or output.
+pub(crate) fn refuse_constant(record: &Record) -> CommandResult {
+    let constant = |x: &[f64]| record.rows() > 1 && !x.is_empty() && span(x) == 0.0;
     let output = record.output().unwrap_or_default();
     for (column, x) in
         [(record.input_column(), record.input()), (record.output_unit().map_or("", |unit| unit.column()), output)]
     {
-        if still(x) {
+        if constant(x) {
             let message = format!(
-                "{}, column \"{column}\": the value is {} in every row. A record needs an input and an output that move; choose another column with --map",
+                "{}, column \"{column}\": the value is {} in every row. A record needs an input and an output that \
+                 change; choose another column with --map",
                 record.name(),
                 text::short(x[0])
             );
@@ -147,32 +144,38 @@ pub(crate) fn refuse_still(record: &Record) -> CommandResult {
     Ok(())
 }
 
-/// Intervals of rows that a sentence lists.
+/// Maximum number of row intervals in a warning.
 const MAX_INTERVALS: usize = 4;
 
-/// What is legal in a record but seldom meant, a sentence each.
-pub(crate) fn oddities(record: &Record) -> Vec<String> {
-    let mut odd = Vec::new();
+/// Returns the possible problems of a record, one sentence each.
+pub(crate) fn warnings(record: &Record) -> Vec<String> {
+    let mut warnings = Vec::new();
     let rate = 1.0 / record.sample_period();
-    if !ORDINARY_RATES.contains(&rate) {
-        odd.push(format!(
-            "{} samples per second; if its times are in another unit than their column says, name that, as with --map {}=COLUMN",
+    if !USUAL_RATES.contains(&rate) {
+        warnings.push(format!(
+            "{} samples per second are unusual; if the times have another unit than their column says, read them with \
+             --map {}=COLUMN",
             text::short(rate),
-            if rate < ORDINARY_RATES.start { "time_ms" } else { "time_s" }
+            if rate < USUAL_RATES.start { "time_ms" } else { "time_s" }
         ));
     }
-    odd.extend(losses(record.lost()));
-    if leads(record) {
-        odd.push("the output runs ahead of the input in its loops, where hysteresis makes it follow; are the columns of input and output exchanged?".to_owned());
+    warnings.extend(losses(record.lost()));
+    if output_leads(record) {
+        warnings.push(
+            "the loops have the opposite direction of hysteresis: the output leads the input; check whether the columns \
+             of input and output are exchanged"
+                .to_owned(),
+        );
     }
     let unit = record.output_unit().map_or("", |unit| unit.symbol());
-    // A reference may stand where it likes.
+    // A reference may be constant at its ends; only a measured output can be clipped.
     let measured = record.output().filter(|_| !record.input().is_empty());
     let frozen = frozen_of(record);
     if let Some(longest) = frozen.iter().max_by_key(|run| run.rows) {
         let rows = frozen.iter().map(|run| run.rows).sum();
-        odd.push(format!(
-            "the sensor repeats one value: {}, the most from row {} at {} s ({} of {} {unit}). A fit leaves these rows out. Look for dropouts or a stopped data stream",
+        warnings.push(format!(
+            "the sensor repeats one value in {}; the longest run starts in row {} at {} s ({} rows of {} {unit}). A fit \
+             leaves these rows out. Look for dropouts or a stopped data stream",
             text::count(rows, "row"),
             longest.first + 1,
             text::short(record.time()[longest.first]),
@@ -192,8 +195,9 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
             intervals.iter().take(MAX_INTERVALS).map(|i| format!("{} to {}", i.start + 1, i.end)).collect();
         let more = intervals.len().saturating_sub(MAX_INTERVALS);
         let more = if more > 0 { format!(" and {more} more intervals") } else { String::new() };
-        odd.push(format!(
-            "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). A fit leaves these rows out. Lower the drive or widen the range to see them",
+        warnings.push(format!(
+            "the sensor is at the end of its range, {} {unit}, in {} ({}{more}). A fit leaves these rows out. Reduce the \
+             drive or widen the range of the sensor to measure them",
             text::short(end.at),
             text::count(rows, "row"),
             shown.join(", ")
@@ -202,60 +206,66 @@ pub(crate) fn oddities(record: &Record) -> Vec<String> {
     let spikes = spikes_of(record);
     if let Some(largest) = spikes.first() {
         let largest_is = if spikes.len() == 1 { "it" } else { "the largest" };
-        odd.push(format!(
-            "{} of the output not fitted: {largest_is} is in row {} at {} s and is {} times the output span away from its neighbours",
+        warnings.push(format!(
+            "{} of the output not fitted: {largest_is} is in row {} at {} s, {} times the output span away from its \
+             neighbours",
             text::count(spikes.len(), "spike"),
             largest.row + 1,
             text::short(record.time()[largest.row]),
             text::short(largest.spans)
         ));
     }
-    odd
+    warnings
 }
 
-/// What a log lost of its run, a sentence each.
+/// Returns what a log lost of its run, one sentence each.
 pub(crate) fn losses(lost: Losses) -> Vec<String> {
-    let cut = lost.cut_off.then(|| "the log was cut off: what came after its last whole part is missing (of a log of hystctl run half a second at most); copy the file again if it should be longer".to_owned());
-    cut.into_iter().chain(damage(lost.damaged)).chain(holes(lost.holes)).collect()
+    let cut_off = "the log was cut off: the samples after its last complete part are missing (at most 0.5 s in a log of \
+                   hystctl run); if the run was longer, copy the file again";
+    let cut = lost.cut_off.then(|| cut_off.to_owned());
+    cut.into_iter().chain(damage(lost.damaged)).chain(gaps(lost.holes)).collect()
 }
 
-/// What to say about pieces of a log that are damaged, if there are any.
+/// Returns a sentence about the damaged pieces (chunks of samples) of a log, if there are any.
 pub(crate) fn damage(pieces: usize) -> Option<String> {
     let many = text::count(pieces, "damaged piece");
-    (pieces > 0).then(|| format!("{many} of the log left out; their samples, up to half a second each, are lost"))
+    (pieces > 0).then(|| format!("{many} of the log left out; each holds up to 0.5 s of samples, which are lost"))
 }
 
-/// What to say about samples that are missing within a segment.
-pub(crate) fn holes(holes: usize) -> Option<String> {
-    let many = text::count(holes, "hole");
-    (holes > 0).then(|| format!("{many} in time, behind each of which another segment begins: what an actuator remembers from before is not known there"))
+/// Returns a sentence about the gaps within the segments of a log, if there are any.
+pub(crate) fn gaps(gaps: usize) -> Option<String> {
+    let many = text::count(gaps, "gap");
+    (gaps > 0).then(|| {
+        format!("{many} in time; after each a new segment begins, at whose start the drive history is unknown")
+    })
 }
 
-/// Options with which records are read, as the command line takes them.
+/// Returns the options that records were read with, as arguments of a command.
 pub(crate) fn reading(map: &MapArg, zero: &ZeroArg) -> Vec<String> {
     let zero = (zero.get() == Zero::PerRecord).then(|| ["--zero".to_owned(), "per-record".to_owned()]);
     columns(map).into_iter().chain(zero.into_iter().flatten()).collect()
 }
 
-/// Those of them that say which columns are read.
+/// Returns the options that select columns and sample rate, as arguments of a command.
 pub(crate) fn columns(map: &MapArg) -> Vec<String> {
     let rate = map.rate.into_iter().flat_map(|rate| ["--rate".to_owned(), rate.to_string()]);
     map.map.iter().flat_map(|entry| ["--map".to_owned(), entry.clone()]).chain(rate).collect()
 }
 
-/// Says how much of a test record repeats the training's drive, if any of it does.
-pub(crate) fn tell_repeated(test: &Record, train: &Record) {
+/// Prints a note if rows of a test record repeat the drive of the training records.
+pub(crate) fn print_repeated(test: &Record, train: &Record) {
     let repeated = repeated_rows(test, train);
     if repeated > 0 {
         say(&format!(
-            "note: {}: {} of its rows repeat a segment of the training's drive, and the errors say less about new drives there; `hystctl excite identification --test` makes a drive that differs throughout",
+            "note: {}: {} of its rows repeat a segment of the training drive; the errors there do not hold for new \
+             drives; `hystctl excite identification --test` makes a drive that differs in all segments",
             test.name(),
             text::percent(100.0 * repeated as f64 / test.rows() as f64)
         ));
     }
 }
 
-/// Rows of those whole segments whose drive is, but for noise, that of a segment of the training.
+/// Counts the rows of the segments whose drive equals that of a training segment within noise.
 fn repeated_rows(test: &Record, train: &Record) -> usize {
     let (new, old) = (test.input(), train.input());
     let alike = |a: &[f64], b: &[f64]| {
@@ -272,29 +282,29 @@ pub(crate) fn is_trained_on(test: &Record, train: &Record) -> bool {
     sums(test).iter().any(|sum| sums(train).contains(sum))
 }
 
-/// What is said of such a test record.
+/// Note about a test record that was fitted.
 pub(crate) const TRAINED_ON: &str =
-    "note: the test record is one of those that were fitted; its errors say nothing about new data";
+    "note: the test record was fitted, too; its errors do not hold for new data; give another record with --test";
 
-/// A model and the text of its file.
+/// Reads a model; returns it with the text of its file.
 pub(crate) fn model(path: &Path) -> CommandResult<(Model, String)> {
     let name = path.display().to_string();
     let text = fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
     Ok((Model::parse(&name, &text)?, text))
 }
 
-/// The unit of a model's output.
+/// Returns the unit of a model's output.
 pub(crate) fn output_unit(model: &Model) -> CommandResult<OutputUnit> {
     OutputUnit::of_column(&model.output.column).ok_or_else(|| {
         let message = format!(
-            "the model's output column is {:?}, which is none of this version; fit the model anew",
+            "the model's output column {:?} is unknown to this version of hystctl; fit the model again",
             model.output.column
         );
         CommandError::bad_input(message)
     })
 }
 
-/// The constant temperature of the command line \[°C\]; says so where it has no effect.
+/// Returns the constant temperature of the command line \[°C\]; prints a note if it has no effect.
 pub(crate) fn temperature(given: TemperatureArg, model: &Model, record: &Record) -> Option<f64> {
     let degc = given.degc?;
     if !model.needs_temperature() {
@@ -305,21 +315,21 @@ pub(crate) fn temperature(given: TemperatureArg, model: &Model, record: &Record)
     Some(degc)
 }
 
-/// The simulated plant that a file describes, with its noise from another seed if one is given.
+/// Reads the simulated plant that a file describes; `noise` replaces the seed of its noise.
 pub(crate) fn plant(path: &Path, noise: Option<u64>) -> CommandResult<Plant> {
     let wrong = |error: anyhow::Error, advice: &str| {
         let message = format!("{}: {}; {advice}", path.display(), format!("{error:#}").trim_end());
         CommandError::new(Exit::BadInput, anyhow::anyhow!("{message}"))
     };
-    let named = |error: anyhow::Error| wrong(error, "correct the plant's file");
+    let named = |error: anyhow::Error| wrong(error, "correct the plant file");
     let text = fs::read_to_string(path)
-        .map_err(|error| wrong(error.into(), "`hystctl run --help` shows what such a file holds"))?;
+        .map_err(|error| wrong(error.into(), "`hystctl run --help` shows an example of a plant file"))?;
     let mut config = PlantConfig::from_toml(&text).map_err(|error| named(error.into()))?;
     config.noise_seed = noise.or(config.noise_seed);
     Plant::new(config).map_err(|error| named(error.into()))
 }
 
-/// Those of `names` that a file has as columns already.
+/// Returns those of `names` that are columns of a file.
 pub(crate) fn present<'a>(path: &Path, names: &[&'a str]) -> CommandResult<Vec<&'a str>> {
     let bytes = fs::read(path)?;
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));

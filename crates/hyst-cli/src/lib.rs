@@ -1,8 +1,9 @@
-//! `hystctl`, the command line, as a library: [`main`] is the program, [`host::command`] runs one command within another program (as the
-//! Python package does). Beside them what other programs use too: the log of a run, the page of a diagnosis.
+//! The command line `hystctl` as a library.
+//! [`main`] is the program; [`host::command`] runs one command inside another program, as the Python package does.
+//! Other programs also use the [`log`] of a run and the [`report`] of a diagnosis.
 //!
-//! Every command is thin: it reads files, calls the library, writes files and says what happened. Results go to
-//! stdout or to the file of `-o`, everything else to stderr; the exit code tells scripts how it ended.
+//! Each command reads files, calls the libraries, writes files and prints a report. Results go to stdout or to the file
+//! of `-o`, all other text goes to stderr. The exit code reports success or the kind of failure.
 //!
 //! ```
 //! use hyst_cli::log::{LoggedSample, RunInfo, RunLog};
@@ -43,19 +44,19 @@ use clap::Parser;
 
 use exit::Exit;
 
-/// The program `hystctl` with these arguments, the first of which is its own name.
+/// Runs `hystctl` with these arguments; the first one is the name of the program.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     run(arguments).into()
 }
 
-/// As [`main`]; the exit code as a number.
+/// Runs `hystctl` as [`main`] does and returns the exit code as a number.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let exit = match cli::Cli::try_parse_from(arguments) {
         Ok(cli) => commands::dispatch(cli.command).map_or_else(|error| error.print(), |()| Exit::Done),
-        Err(asked) => {
-            // Help and versions come this way too; where the terminal is closed there is nobody to tell.
-            let _ = asked.print();
-            if asked.use_stderr() { Exit::BadInput } else { Exit::Done }
+        Err(message) => {
+            // Help and version come this way, too. A closed terminal is no error.
+            let _ = message.print();
+            if message.use_stderr() { Exit::BadInput } else { Exit::Done }
         }
     };
     exit as u8

@@ -1,9 +1,8 @@
-//! The log of a run: an MCAP file that is written while the device runs.
+//! The log of a run: an MCAP file that is written during the run.
 //!
-//! One channel, `/actuator/sample`, holds every sample as JSON; schema and channel metadata name the units. Another one,
-//! `/actuator/event`, says what happened on the way. Chunks are
-//! closed twice a second, so that what was measured can be read even if the program dies. A metadata record
-//! says what ran, and the model is attached as the file that it was.
+//! The channel `/actuator/sample` holds each sample as JSON; schema and channel metadata name the units. The channel
+//! `/actuator/event` holds events. Chunks are closed twice a second, so that the samples can be read even if the program
+//! dies. A metadata record describes the run, and the model file is attached.
 
 mod contents;
 mod recover;
@@ -25,74 +24,75 @@ use tempfile::TempPath;
 pub use contents::{LoggedEvent, LoggedModel, LoggedSample, RunInfo};
 use contents::{event_schema, event_units, metadata, schema, units};
 pub use recover::recovered;
-use sink::{Open, Sink, said};
+use sink::{Open, Sink, into_io_error};
 pub use stream::{RunStream, StreamError};
 
 const SAMPLE_SCHEMA: &str = "hyst.actuator.Sample";
 const EVENT_SCHEMA: &str = "hyst.actuator.Event";
 
-/// The log cannot be written.
+/// Error of a log that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {}: {source}; {}", path.display(), self.what(), self.advice())]
 pub struct LogError {
     path: PathBuf,
-    /// Samples that can be read all the same, at least; none before there was one.
+    /// Number of samples that are in the file at least; `None` before the log was opened.
     saved: Option<u32>,
     source: io::Error,
 }
 
 impl LogError {
     fn what(&self) -> &'static str {
-        if self.saved.is_some() { "the log cannot be written any further" } else { "the log cannot be written" }
+        if self.saved.is_some() { "the log cannot be continued" } else { "the log cannot be written" }
     }
 
     fn advice(&self) -> String {
         let path = self.path.display();
-        let make_room = "free space there, or log to a file on another disk";
+        let make_room = "free space on the disk or log to another disk";
         match self.saved {
-            None => "give a file in a folder that can be written and has space".to_owned(),
+            None => "give a file in a writable folder with free space".to_owned(),
             Some(0) => format!("{make_room}, and run again"),
             Some(saved) => format!(
-                "{make_room}, and run again; at least the first {saved} samples are safe in it: `hystctl log recover {path} -o whole.mcap` makes a closed log of them"
+                "{make_room}, and run again; the file holds at least the first {saved} samples: `hystctl log recover \
+                 {path} -o whole.mcap` makes a closed log of them"
             ),
         }
     }
 }
 
-/// A log while it is written.
+/// A log that is being written.
 ///
-/// It takes its name with the first sample: a run that is refused before anything moves leaves an older log as it was.
-/// Dropped without [`finish`](Self::finish), it is still closed as well as it can be.
+/// The file gets its name with the first sample, so a run that is refused before anything moves does not touch an existing
+/// log. A log that is dropped without [`finish`](Self::finish) is closed if that is possible.
 pub struct RunLog {
     path: PathBuf,
     sink: Sink,
     channel_id: u16,
-    /// A sample as text.
+    /// Buffer for a sample as JSON.
     text: Vec<u8>,
-    /// Whether an older file of this name is set aside.
+    /// Whether an existing file is renamed instead of replaced.
     keeps_older: bool,
-    /// The name that it has got.
+    /// New name of the file that existed.
     older: Option<PathBuf>,
-    /// None while nothing has happened.
+    /// `None` before the first event.
     event_channel: Option<u16>,
     events: u32,
-    /// The temporary name, until the first sample.
+    /// Temporary name of the file; `None` after the first sample.
     unnamed: Option<TempPath>,
 }
 
 impl RunLog {
-    /// Opens a log that will be called `path`.
+    /// Opens a log that gets the name `path` with its first sample; it replaces an existing file.
     ///
     /// # Errors
     /// When the folder cannot be written.
     pub fn create(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
         let failed = |source| LogError { path: path.to_owned(), saved: None, source };
         let (file, unnamed) = temporary(path).map_err(failed)?.into_parts();
-        // Elsewhere a lock keeps readers away; where there are none, two runs have to take care of themselves.
+        // Only on Unix: on Windows a lock also blocks readers. Two runs with one log name are not detected there.
         #[cfg(unix)]
         let _ = file.try_lock();
         let same = file.try_clone().map_err(failed)?;
-        let (writer, channel_id) = begin(file, info).map_err(said).map_err(failed)?;
+        let (writer, channel_id) = begin(file, info).map_err(into_io_error).map_err(failed)?;
         Ok(Self {
             path: path.to_owned(),
             sink: Sink::new(writer, same).map_err(failed)?,
@@ -106,19 +106,19 @@ impl RunLog {
         })
     }
 
-    /// As [`create`](Self::create); an older file is set aside instead of replaced.
+    /// Opens a log as [`create`](Self::create) does, but renames an existing file instead of replacing it.
     ///
     /// # Errors
-    /// When the folder cannot be written, or another run writes the older file.
+    /// When the folder cannot be written, or another run writes the existing file.
     pub fn beside_older(path: &Path, info: &RunInfo<'_>) -> Result<Self, LogError> {
-        left_alone(&behind_links(path)).map_err(|source| LogError { path: path.to_owned(), saved: None, source })?;
+        refuse_busy(&link_target(path)).map_err(|source| LogError { path: path.to_owned(), saved: None, source })?;
         Ok(Self { keeps_older: true, ..Self::create(path, info)? })
     }
 
-    /// Appends one sample. It reaches its file within half a second, also if none follows.
+    /// Appends one sample. It is in the file within 0.5 s, even if no sample follows.
     ///
     /// # Errors
-    /// When the disk refuses, or has refused one before.
+    /// When this write or an earlier one fails.
     pub fn sample(&mut self, sample: &LoggedSample) -> Result<(), LogError> {
         self.append(sample).map_err(|source| self.failed(source))
     }
@@ -134,7 +134,7 @@ impl RunLog {
         LogError { path: self.path.clone(), saved: Some(self.sink.saved()), source }
     }
 
-    /// Appends what has happened, and brings it to the file.
+    /// Appends an event and flushes the file.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
@@ -147,7 +147,7 @@ impl RunLog {
         let data = serde_json::to_vec(event)?;
         let log_time = (event.time_s * 1e9).round() as u64;
         let (known, sequence) = (self.event_channel, self.events);
-        let channel_id = self.sink.aside(|writer| {
+        let channel_id = self.sink.write_with(|writer| {
             let channel_id = match known {
                 Some(id) => id,
                 None => {
@@ -164,34 +164,34 @@ impl RunLog {
         Ok(())
     }
 
-    /// Adds a metadata record: what was asked for, or what is known only at the end of a run.
+    /// Adds a metadata record, for example the arguments of a run or its results.
     ///
     /// # Errors
     /// As [`sample`](Self::sample).
     pub fn note(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<(), LogError> {
         let metadata = Metadata { name: name.to_owned(), metadata: entries };
-        self.sink.aside(|writer| writer.write_metadata(&metadata)).map_err(|source| self.failed(source))
+        self.sink.write_with(|writer| writer.write_metadata(&metadata)).map_err(|source| self.failed(source))
     }
 
-    /// What it is called, or will be.
+    /// Returns the path of the log, which the file gets with its first sample.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The name that an older file has got.
+    /// Returns the new name of a file that existed.
     pub fn older(&self) -> Option<&Path> {
         self.older.as_deref()
     }
 
-    /// Samples so far.
+    /// Returns the number of samples so far.
     pub fn samples(&self) -> u32 {
         self.sink.written()
     }
 
-    /// Writes summary and footer, and waits for the disk.
+    /// Writes summary and footer, and syncs the file to the disk.
     ///
     /// # Errors
-    /// When the disk refuses.
+    /// When the file cannot be written.
     pub fn finish(mut self) -> Result<(), LogError> {
         self.take_name().map_err(|source| self.failed(source))?;
         let (path, saved) = (self.path, Some(self.sink.saved()));
@@ -200,35 +200,36 @@ impl RunLog {
 
     fn take_name(&mut self) -> io::Result<()> {
         let Some(temporary) = self.unnamed.take() else { return Ok(()) };
-        let target = behind_links(&self.path);
+        let target = link_target(&self.path);
         if self.keeps_older && target.is_file() {
-            // One may have begun since this was asked for.
-            left_alone(&target)?;
+            // Another run may have started since this log was opened.
+            refuse_busy(&target)?;
             self.older = Some(set_aside(&target)?);
         }
         temporary.persist(&target).map_err(|error| error.error)
     }
 }
 
-/// Refuses a log that another run is writing: its readers would take it for this one.
-fn left_alone(target: &Path) -> io::Result<()> {
+/// Refuses a log that another run is writing.
+fn refuse_busy(target: &Path) -> io::Result<()> {
     let busy = |older: File| matches!(older.try_lock_shared(), Err(TryLockError::WouldBlock));
     if target.is_file() && File::open(target).is_ok_and(busy) {
-        return Err(io::Error::other("another run is writing it: give this one another name"));
+        return Err(io::Error::other("another run is writing this file; give this run another log"));
     }
     Ok(())
 }
 
-/// The file that `path` leads to: a link stays one.
-fn behind_links(path: &Path) -> PathBuf {
+/// Returns the file that `path` names, after links, so that a link is kept.
+fn link_target(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-/// A file beside what `path` leads to, readable for whom the process lets.
+/// Creates a temporary file in the folder of the target of `path`.
+/// Its permissions are those of the process's umask.
 fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let path = behind_links(path);
+    let path = link_target(path);
     if path.exists() && !path.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no regular file"));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hyst-").suffix(".part");
@@ -241,7 +242,8 @@ fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// Header, metadata, attachment, schema and channel, all of them in the file: a log that is cut off later says what ran.
+/// Writes and flushes header, metadata, attachment, schema and channel.
+/// A log that is cut off later still describes the run.
 fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
     let mut writer = options().create(BufWriter::new(file))?;
     writer.write_metadata(&Metadata { name: "run".to_owned(), metadata: metadata(info) })?;
@@ -265,9 +267,9 @@ fn begin(file: File, info: &RunInfo<'_>) -> Result<(Open, u16), McapError> {
 fn options() -> WriteOptions {
     WriteOptions::new()
         .library(concat!("hystctl ", env!("CARGO_PKG_VERSION")))
-        // Chunks of half a second are small: threads would only cost.
+        // Chunks of half a second are small: threads cost more than they save.
         .compression_threads(0)
-        // A chunk goes out in one piece, so that what stands before it is whole whenever the program dies.
+        // Each chunk is written in one piece, so that all chunks before it are complete if the program dies.
         .disable_seeking(true)
 }
 
@@ -296,12 +298,12 @@ mod tests {
         let bytes = std::fs::read(path).unwrap();
         let messages =
             mcap::MessageStream::new_with_options(&bytes, mcap::read::Options::IgnoreEndMagic.into()).unwrap();
-        // What is not whole at the end is what a crash takes.
+        // A crash loses the incomplete part at the end.
         messages.map_while(Result::ok).map(|message| serde_json::from_slice(&message.data).unwrap()).collect()
     }
 
     #[test]
-    fn samples_come_back() {
+    fn a_closed_log_holds_all_samples() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut log = RunLog::create(&path, &info()).unwrap();
@@ -319,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn all_but_the_last_second_is_on_the_disk_while_it_runs() {
+    fn all_but_the_last_half_second_is_in_the_file_during_a_run() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut log = RunLog::create(&path, &info()).unwrap();
@@ -329,13 +331,13 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_none_follows_reaches_the_disk() {
+    fn a_last_sample_is_written_within_half_a_second() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut log = RunLog::create(&path, &info()).unwrap();
         for (k, all) in [(0, 1), (1, 2), (2, 3)] {
             log.sample(&sample(k)).unwrap();
-            // It takes half a second; a busy machine is given a minute.
+            // Half a second is enough; the limit of a minute is for a busy machine.
             let began = std::time::Instant::now();
             while read(&path).len() < all && began.elapsed().as_secs() < 60 {
                 std::thread::sleep(std::time::Duration::from_millis(10));
@@ -348,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_has_no_sample_on_the_disk_says_what_runs() {
+    fn a_log_without_a_sample_in_its_file_describes_the_run() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut log = RunLog::create(&path, &info()).unwrap();
@@ -359,18 +361,18 @@ mod tests {
     }
 
     #[test]
-    fn a_log_of_a_ramp_alone_is_no_record() {
+    fn a_log_with_only_ramp_samples_is_refused_as_a_record() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let mut log = RunLog::create(&path, &info()).unwrap();
         (0..9).for_each(|k| log.sample(&sample_of(Phase::Approach, k)).unwrap());
         log.finish().unwrap();
         let refused = || Record::read(&path, &ColumnMap::default(), Need::InputAndOutput).unwrap_err().to_string();
-        assert!(refused().contains("its samples, 9 in all, are of the ramps"), "{}", refused());
+        assert!(refused().contains("all 9 samples belong to the ramps"), "{}", refused());
     }
 
     #[test]
-    fn an_older_log_is_set_aside() {
+    fn an_existing_log_is_renamed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         std::fs::write(&path, "older").unwrap();
@@ -379,7 +381,9 @@ mod tests {
         log.sample(&sample(0)).unwrap();
         assert_eq!(std::fs::read(log.older().unwrap()).unwrap(), b"older");
         #[cfg(unix)]
-        assert!(RunLog::beside_older(&path, &info()).err().unwrap().to_string().contains("another run is writing it"));
+        assert!(
+            RunLog::beside_older(&path, &info()).err().unwrap().to_string().contains("another run is writing this")
+        );
         log.finish().unwrap();
         RunLog::beside_older(&path, &info()).unwrap();
         assert_eq!(read(&path).len(), 1);
@@ -387,23 +391,23 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_is_no_file_is_refused_and_two_runs_do_not_share_a_name() {
+    fn a_pipe_is_refused_and_two_runs_cannot_write_one_log() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe.mcap");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        assert!(RunLog::beside_older(&pipe, &info()).err().unwrap().to_string().contains("no regular file"));
-        // Both began before either had a sample.
+        assert!(RunLog::beside_older(&pipe, &info()).err().unwrap().to_string().contains("not a regular file"));
+        // Both logs are opened before the first sample.
         let path = folder.path().join("run.mcap");
         let mut first = RunLog::beside_older(&path, &info()).unwrap();
         let mut second = RunLog::beside_older(&path, &info()).unwrap();
         first.sample(&sample(0)).unwrap();
-        assert!(second.sample(&sample(0)).unwrap_err().to_string().contains("another run is writing it"));
+        assert!(second.sample(&sample(0)).unwrap_err().to_string().contains("another run is writing this"));
         first.finish().unwrap();
         assert_eq!(read(&path).len(), 1);
     }
 
     #[test]
-    fn a_log_without_samples_leaves_the_older_one() {
+    fn a_log_without_samples_does_not_replace_an_existing_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         std::fs::write(&path, "older").unwrap();

@@ -1,4 +1,4 @@
-//! `hystctl`: identify, diagnose and compensate actuators with hysteresis from the command line.
+//! `hystctl`: command line to identify, diagnose and compensate actuators with hysteresis.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! Where results go: files that are written whole or not at all, stdout, and what is said about them.
+//! Targets of results (files that are written completely or not at all, stdout) and reports about them.
 
 use std::convert::Infallible;
 use std::ffi::OsStr;
@@ -48,22 +48,23 @@ impl Target {
         }
     }
 
-    /// As [`write`](Self::write); an older file is set aside first.
+    /// Writes as [`write`](Self::write) does, but renames an existing file first.
     pub(crate) fn write_beside_older(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         let Self::File(path) = self else { return self.write(content) };
         if let Some(older) = write_beside_older(path, content)? {
-            tell_set_aside(path, &older);
+            print_renamed(path, &older);
         }
         Ok(())
     }
 
-    /// As [`write_beside_older`](Self::write_beside_older), of what cannot be had again: where its folder refuses it, it goes to the folder for
-    /// temporary files.
+    /// Writes measured data as [`write_beside_older`](Self::write_beside_older) does.
+    /// If the folder refuses the file, it goes to the folder for temporary files, because a measurement cannot be
+    /// repeated.
     pub(crate) fn write_measured(&self, content: impl Fn(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         let Err(refused) = self.write_beside_older(&content) else { return Ok(()) };
         let stem = self.file().and_then(Path::file_stem).unwrap_or(OsStr::new("record")).to_string_lossy();
-        // In a folder of everybody: a file of its own, that nobody can have put there.
-        let refuge = || -> io::Result<PathBuf> {
+        // The temporary folder is shared: `tempfile` creates a new file and never opens an existing one.
+        let fallback = || -> io::Result<PathBuf> {
             let mut file = tempfile::Builder::new().prefix(&format!("{stem}-")).suffix(".csv").tempfile()?;
             {
                 let mut buffered = io::BufWriter::new(&mut file);
@@ -73,23 +74,24 @@ impl Target {
             file.as_file().sync_all()?;
             Ok(file.into_temp_path().keep()?)
         };
-        let what = match refuge() {
-            Ok(path) => format!("what was measured is kept in {}: take it from there", path.display()),
-            Err(_) => "what was measured is in no record".to_owned(),
+        let what = match fallback() {
+            Ok(path) => format!("the measured data are saved in {}; copy that file", path.display()),
+            Err(_) => "the measured data are in no record".to_owned(),
         };
         Err(CommandError::new(Exit::DeviceLost, anyhow::anyhow!("{}; {what}", refused.text())))
     }
 
-    /// Writes what `content` writes. An older file that is something else, as a record where a drive is written, keeps its content under another name.
+    /// Writes `content` to the target.
+    /// An existing file with other content (for example a record where a drive is written) is renamed first.
     pub(crate) fn write(&self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> CommandResult {
         match self {
             Self::File(path) => {
                 if let Some(older) = write_over_alike(path, content)? {
-                    tell_set_aside(path, &older);
+                    print_renamed(path, &older);
                 }
                 Ok(())
             }
-            Self::Stdout if host::is_lent() => {
+            Self::Stdout if host::has_host() => {
                 let mut bytes = Vec::new();
                 content(&mut bytes)?;
                 host::take_stdout(&bytes);
@@ -104,7 +106,7 @@ impl Target {
     }
 }
 
-/// A writer that swallows what nobody reads any more: a reader that has seen enough is no error.
+/// A writer that ignores a broken pipe: a reader that closes early (`head`) is no error.
 struct Pipe<W>(W);
 
 impl<W: Write> Write for Pipe<W> {
@@ -123,7 +125,7 @@ impl<W: Write> Write for Pipe<W> {
     }
 }
 
-/// The error of a record's writer, for [`Target::write`].
+/// Converts the error of a record's writer, for [`Target::write`].
 pub(crate) fn io_error(error: WriteError) -> io::Error {
     match error {
         WriteError::Io(error) => error,
@@ -131,7 +133,8 @@ pub(crate) fn io_error(error: WriteError) -> io::Error {
     }
 }
 
-/// Refuses targets that cannot be written, or that would destroy what the command reads; before any work is done.
+/// Refuses targets that cannot be written or that would overwrite an input of the command.
+/// Called before any work.
 pub(crate) fn check(read: &[&Path], written: &[&Target]) -> CommandResult {
     if written.iter().filter(|target| ***target == Target::Stdout).count() > 1 {
         return Err(CommandError::bad_input("two results cannot both go to stdout; give one of them a file"));
@@ -140,18 +143,18 @@ pub(crate) fn check(read: &[&Path], written: &[&Target]) -> CommandResult {
     for (k, path) in files.iter().enumerate() {
         let shown = path.display();
         if read.iter().any(|other| same(path, other)) {
-            let message = format!("{shown}: this file is read by the same command; give the output another name");
+            let message = format!("{shown}: the same command reads this file; give the output another name");
             return Err(CommandError::bad_input(message));
         }
         if files[..k].iter().any(|other| same(path, other)) {
-            return Err(CommandError::bad_input(format!("{shown}: two outputs have this name; give them two")));
+            return Err(CommandError::bad_input(format!("{shown}: two outputs have this name; rename one of them")));
         }
         if path.is_dir() {
-            return Err(CommandError::bad_input(format!("{shown}: this is a folder; give a file in it")));
+            return Err(CommandError::bad_input(format!("{shown}: the output is a folder; give a file in it")));
         }
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
-            let message = format!("{shown}: the folder {} does not exist; make it first", folder.display());
+            let message = format!("{shown}: the folder {} does not exist; create it first", folder.display());
             return Err(CommandError::bad_input(message));
         }
         check_writable(path)?;
@@ -159,15 +162,15 @@ pub(crate) fn check(read: &[&Path], written: &[&Target]) -> CommandResult {
     Ok(())
 }
 
-/// Says that an older file has another name now.
-pub(crate) fn tell_set_aside(path: &Path, older: &Path) {
-    // Behind a link it lies in another folder; else it is named as the path was given.
-    let link = path.symlink_metadata().is_ok_and(|there| there.is_symlink());
+/// Prints that an existing file was renamed.
+pub(crate) fn print_renamed(path: &Path, older: &Path) {
+    // The target of a link is in another folder; any other file is shown with the path as it was given.
+    let link = path.symlink_metadata().is_ok_and(|metadata| metadata.is_symlink());
     let older = older.file_name().filter(|_| !link).map_or_else(|| older.to_owned(), |name| path.with_file_name(name));
-    say(&format!("note: {} was there already; it is {} now", path.display(), older.display()));
+    say(&format!("note: {} existed and was renamed to {}", path.display(), older.display()));
 }
 
-/// Whether two paths lead to the same file, be it there already or not.
+/// Whether two paths name the same file, which may not exist yet.
 fn same(a: &Path, b: &Path) -> bool {
     let real = |path: &Path| {
         path.canonicalize().ok().or_else(|| {
@@ -178,7 +181,7 @@ fn same(a: &Path, b: &Path) -> bool {
     a == b || real(a).is_some_and(|a| Some(a) == real(b))
 }
 
-/// What a command says about its results: as text, or with `--json` as JSON on stdout.
+/// The report of a command: text, or with `--json` JSON on stdout.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Report {
     json: bool,
@@ -186,22 +189,25 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// A report that keeps out of the way of results on stdout.
+    /// Creates a report; its text goes to stderr if a result goes to stdout.
+    ///
+    /// # Errors
+    /// When JSON and a result would both go to stdout.
     pub(crate) fn new(json: bool, written: &[&Target]) -> CommandResult<Self> {
-        let taken = written.contains(&&Target::Stdout);
-        if json && taken {
-            let message = "--json prints the report to stdout, where a result goes already; give the result a file";
+        let has_result = written.contains(&&Target::Stdout);
+        if json && has_result {
+            let message = "--json prints the report to stdout, but a result goes there, too; give the result a file";
             return Err(CommandError::bad_input(message));
         }
-        Ok(Self { json, text_to_stderr: taken })
+        Ok(Self { json, text_to_stderr: has_result })
     }
 
-    /// The same report with its text on stderr in any case.
+    /// Returns the same report with its text always on stderr.
     pub(crate) fn on_stderr(self) -> Self {
         Self { text_to_stderr: true, ..self }
     }
 
-    /// Prints one of the two.
+    /// Prints the text or the JSON.
     pub(crate) fn print(self, text: &str, json: &impl Serialize) -> CommandResult {
         if host::take_report(text, json)? {
             Ok(())
@@ -216,7 +222,7 @@ impl Report {
     }
 }
 
-/// JSON as files and reports hold it.
+/// Formats a value as JSON for files and reports, with a newline at the end.
 pub(crate) fn json(value: &impl Serialize) -> CommandResult<String> {
     let mut text = serde_json::to_string_pretty(value).map_err(io::Error::other)?;
     text.push('\n');
@@ -229,17 +235,17 @@ pub(crate) fn print_json(value: &impl Serialize) -> CommandResult {
     Target::Stdout.write(|out| out.write_all(text.as_bytes()))
 }
 
-/// Prints a line (or more) to stdout.
+/// Prints one or more lines to stdout.
 pub(crate) fn print(text: &str) -> CommandResult {
     Target::Stdout.write(|out| writeln!(out, "{}", text.trim_end()))
 }
 
-/// Prints a line (or more) to stderr.
+/// Prints one or more lines to stderr.
 pub(crate) fn say(text: &str) {
-    if host::take_said(text.trim_end()) {
+    if host::take_line(text.trim_end()) {
         return;
     }
-    // Where stderr is closed there is nobody to tell.
+    // A closed stderr is no error.
     let _ = writeln!(io::stderr().lock(), "{}", text.trim_end());
 }
 
@@ -248,15 +254,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_read_is_never_written() {
+    fn inputs_folders_and_repeated_targets_are_refused_as_outputs() {
         let folder = tempfile::tempdir().unwrap();
         let record = folder.path().join("a.csv");
         std::fs::write(&record, "x").unwrap();
-        let round_about = folder.path().join(".").join("a.csv");
+        let same_file = folder.path().join(".").join("a.csv");
         let target = |path: &Path| Target::File(path.to_owned());
         let refused = |target: &Target| check(&[&record], &[target]).unwrap_err();
         refused(&target(&record));
-        refused(&target(&round_about));
+        refused(&target(&same_file));
         refused(&target(folder.path()));
         refused(&target(&folder.path().join("absent").join("b.csv")));
         let fresh = target(&folder.path().join("b.csv"));

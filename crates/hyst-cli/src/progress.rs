@@ -1,16 +1,16 @@
-//! What a person sees while a command works: on stderr, and only where that is a terminal.
+//! Progress of a command: a line on stderr, only if stderr is a terminal.
 
 use std::io::{IsTerminal, stderr};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A line that says what is being done. It vanishes when dropped.
+/// A progress line. It is removed when dropped.
 #[derive(Debug)]
 pub(crate) struct Progress(ProgressBar);
 
 impl Progress {
-    /// A spinner beside `message`, for work of unknown length.
+    /// Creates a spinner with a message, for work of unknown length.
     pub(crate) fn spinner(message: &str) -> Self {
         let bar = Self::on_terminal(ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]");
         bar.0.set_message(message.to_owned());
@@ -20,14 +20,14 @@ impl Progress {
         bar
     }
 
-    /// A bar of `total` steps.
+    /// Creates a bar of `total` steps with the estimated remaining time.
     pub(crate) fn bar(message: &str, total: usize) -> Self {
         let bar = Self::on_terminal(ProgressBar::new(total as u64), "{msg} {wide_bar} {percent} % [{eta} left]");
         bar.0.set_message(message.to_owned());
         bar
     }
 
-    /// A bar of `total` steps of work that keeps its own pace.
+    /// Creates a bar of `total` steps with the elapsed time, for work with a fixed duration.
     pub(crate) fn steady(message: &str, total: usize) -> Self {
         let bar = Self::on_terminal(ProgressBar::new(total as u64), "{msg} {wide_bar} {percent} % [{elapsed}]");
         bar.0.set_message(message.to_owned());
@@ -41,17 +41,17 @@ impl Progress {
         Self(bar.with_style(style))
     }
 
-    /// Says what is being done now.
-    pub(crate) fn say(&self, message: &str) {
+    /// Replaces the message.
+    pub(crate) fn set_message(&self, message: &str) {
         self.0.set_message(message.to_owned());
     }
 
-    /// Prints a line above it.
-    pub(crate) fn tell(&self, line: &str) {
+    /// Prints a line above the progress line.
+    pub(crate) fn print_above(&self, line: &str) {
         self.0.suspend(|| crate::output::say(line));
     }
 
-    /// Moves the bar.
+    /// Moves the bar to `done` steps.
     pub(crate) fn at(&self, done: usize) {
         self.0.set_position(done as u64);
     }

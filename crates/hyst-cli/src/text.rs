@@ -1,4 +1,4 @@
-//! Numbers and tables as reports print them.
+//! Formats of numbers, sentences and tables in reports.
 
 use std::fmt::Write;
 
@@ -10,7 +10,9 @@ use hyst_ident::model::Channel;
 use hyst_ident::record::{OutputUnit, Record};
 use hyst_ident::simulate::Extrapolated;
 
-/// `value ± std_error`, both to the second significant digit of the standard error; the value alone without one.
+/// Formats `value ± std_error` to the second significant digit of the error.
+///
+/// Without an error it formats only the value.
 pub fn with_error(value: f64, std_error: Option<f64>) -> String {
     match std_error.filter(|error| *error > 0.0 && error.is_finite()) {
         Some(error) => {
@@ -21,19 +23,20 @@ pub fn with_error(value: f64, std_error: Option<f64>) -> String {
     }
 }
 
-/// `2.31 %`, or what stands for a span of zero.
+/// Formats a percentage, for example `2.31 %`; `no span` for a value relative to a span of zero.
 pub fn percent(x: f64) -> String {
     if x.is_finite() { format!("{} %", rounded(x, decimals_for(x, 3).clamp(0, 4))) } else { "no span".to_owned() }
 }
 
-/// How much a record says of a table of weights.
+/// Returns a sentence about how well a record determines a table of weights.
 pub fn known(table: &TableEstimate) -> String {
     let (what, mean) = match table.of {
         TableOf::Cells => ("cells", "cell"),
         TableOf::Nodes => ("nodes", "node"),
     };
     format!(
-        "the record determines {} of {} {what} (error below half of the mean {mean}), {} too little, {} not at all; {} at a bound",
+        "the record determines {} of {} {what} (standard error below half of the mean {mean}); uncertain: {}, undetermined: {}, \
+         at a bound: {}",
         table.determined,
         table.elements,
         table.vague(),
@@ -42,12 +45,12 @@ pub fn known(table: &TableEstimate) -> String {
     )
 }
 
-/// `1 row`, `2 rows`.
+/// Formats a count, for example `1 row` or `2 rows`.
 pub fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-/// `a`, `a and b`, `a, b and c`.
+/// Formats a list: `a`, `a and b`, `a, b and c`.
 pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
     match names {
         [] => String::new(),
@@ -59,12 +62,12 @@ pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
     }
 }
 
-/// The unit of an output as a person reads it, from the ending of its column.
+/// Returns the symbol of an output unit from the ending of its column.
 pub fn symbol(suffix: &str) -> &str {
     OutputUnit::of_suffix(suffix).map_or(suffix, |unit| unit.symbol())
 }
 
-/// The unit that a column's name ends in, as a person reads it: `V` of `voltage_v`.
+/// Returns the symbol of the unit that the name of a column ends in: `V` for `voltage_v`.
 pub fn column_unit(column: &str) -> String {
     match column.rsplit('_').next().unwrap_or(column) {
         "v" => "V".to_owned(),
@@ -72,13 +75,13 @@ pub fn column_unit(column: &str) -> String {
     }
 }
 
-/// The unit of a record's gain, as `µm/V`.
+/// Returns the unit of a record's gain, for example `µm/V`.
 pub fn gain_unit(record: &Record) -> String {
     let output = record.output_unit().map_or("", OutputUnit::symbol);
     format!("{output}/{}", column_unit(record.input_column()))
 }
 
-/// The errors of a prediction in one line.
+/// Formats the errors of a prediction in one line.
 pub fn errors(e: &Errors, unit: &str) -> String {
     format!(
         "RMSE {} {unit} ({} of span), largest {} {unit}, RMSE over all rows {} {unit}",
@@ -89,16 +92,16 @@ pub fn errors(e: &Errors, unit: &str) -> String {
     )
 }
 
-/// With the row counted from 1, as people and JSON do.
+/// Counts the row from 1, as reports and JSON do.
 pub fn from_one(found: Extrapolated) -> Extrapolated {
     Extrapolated { row: found.row + usize::from(found.rows > 0), ..found }
 }
 
-/// Where `what` leaves the range that a model was fitted to; rows count from 1.
+/// Returns a sentence about rows in which `what` is outside the range of a model; rows count from 1.
 pub fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -> String {
     let Channel { low, high, unit, .. } = input;
     format!(
-        "in {} the {what} lies beyond {} to {} {unit}, the range that the model was identified on, by {} {unit} at most (row {})",
+        "in {} the {what} is outside {} to {} {unit}, the range that the model was fitted to, by at most {} {unit} (row {})",
         count(found.rows, "row"),
         short(*low),
         short(*high),
@@ -107,13 +110,13 @@ pub fn extrapolation(what: &str, found: &Extrapolated, input: &Channel) -> Strin
     )
 }
 
-/// The mean relative error in one line, and what it leaves out.
+/// Formats the mean relative error and the number of rows that it leaves out.
 pub fn mape(m: &Mape) -> String {
     let ratio = m.ratio.map_or_else(|| "none".to_owned(), |ratio| percent(100.0 * ratio));
     format!("MAPE {ratio} ({} below 1 % of span left out)", count(m.left_out, "row"))
 }
 
-/// A table: the first column flush left, the others flush right.
+/// Formats a table: the first column is left-aligned, the others are right-aligned.
 pub fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let length = |cell: &String| cell.chars().count();
@@ -136,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_show_what_is_known_of_them() {
+    fn numbers_show_their_significant_digits() {
         assert_eq!(with_error(0.123_456, Some(0.001_234)), "0.1235 ± 0.0012");
         assert_eq!(with_error(1234.5, Some(56.0)), "1234 ± 56");
         assert_eq!(with_error(2.0, None), "2.000");
@@ -146,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_line_up() {
+    fn columns_of_tables_are_aligned() {
         let rows = [vec!["a", "b", ""], vec!["long", "1", "2.5"]].map(|r| r.iter().map(ToString::to_string).collect());
         assert_eq!(table(&rows), "a     b\nlong  1  2.5\n");
     }

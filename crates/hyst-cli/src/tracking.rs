@@ -1,4 +1,4 @@
-//! A travel that asks for everything, followed on a device: by a plain gain, or through a model's inverse.
+//! Tracking of a demanding reference on a device, with a plain gain or with a model's inverse.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,49 +16,51 @@ use crate::output;
 /// Length of the reference \[s\].
 const SECONDS: f64 = 12.0;
 
-/// Ramps to where the reference begins and back \[V/s\].
+/// Slope of the ramps to the start of the reference and back to rest \[V/s\].
 const RAMP_V_PER_S: f64 = 1000.0;
 
-/// One tracking run.
+/// Errors of a tracking run.
 pub(crate) struct Run {
-    /// Measured motion minus reference \[output unit\].
+    /// Measured motion minus reference, without drift and interference of the sensor \[output unit\].
     pub(crate) error: Vec<f64>,
+    /// RMS of `error` \[output unit\].
     pub(crate) rmse: f64,
-    /// The same of what the sensor showed, with the drift and the tone that a model has found in it.
+    /// RMS error with drift and interference of the sensor \[output unit\].
     pub(crate) shown_rmse: f64,
+    /// Maximum of `error` \[output unit\].
     pub(crate) max_abs: f64,
 }
 
-/// What is followed.
+/// A reference to follow.
 pub(crate) struct Task {
-    /// Samples per second.
+    /// Sample rate \[Hz\].
     rate_hz: f64,
-    /// What the sensor showed before the actuator first moved \[output unit\]: the same for all that follow it, whatever a model
-    /// takes for its zero.
+    /// Sensor value before the first motion \[output unit\].
+    /// All models follow the reference from this value, whatever their own zero is.
     rest: f64,
     /// Wanted displacement from rest \[output unit\].
     pub(crate) travel: Vec<f64>,
 }
 
-/// Where the log and the drive of a run go.
+/// Files of a run: its log and its drive.
 pub(crate) struct Files<'a> {
     pub(crate) log: &'a Path,
     pub(crate) drive: &'a Path,
 }
 
 impl Task {
-    /// For the stroke that a model knows, from where the record of its training began.
+    /// Creates the reference for the stroke of a model, from the rest value of its training record.
     pub(crate) fn of(model: &Model, train: &Record, rate_hz: f64) -> Self {
         let rest = rest(train, model);
         Self { rate_hz, rest, travel: travel(model.output.high - rest, rate_hz) }
     }
 
-    /// Times of the samples \[s\].
+    /// Returns the times of the samples \[s\].
     pub(crate) fn time(&self) -> Vec<f64> {
         (0..self.travel.len()).map(|k| k as f64 / self.rate_hz).collect()
     }
 
-    /// By a gain alone: what somebody without a model would use.
+    /// Follows the reference with a constant gain, without a model.
     pub(crate) fn by_gain<D: Daq>(&self, daq: &mut D, train: &Record, model: &Model) -> CommandResult<Vec<Sample>> {
         let gain = mean_gain(train, self.rest);
         let (low, high) = (model.input.low, model.input.high);
@@ -66,8 +68,10 @@ impl Task {
         self.play(daq, &drive, |_| {}, |_| Ok(()))
     }
 
-    /// Through a model's inverse. What its gain needs to know of temperature and load is only known while the device runs: the
-    /// plan is made for the reference temperature, and revised with every measured one.
+    /// Follows the reference with a model's inverse.
+    ///
+    /// The temperature is only known during the run: the plan is made for the reference temperature and revised with each
+    /// measured one.
     pub(crate) fn through<D: Daq>(
         &self,
         daq: &mut D,
@@ -110,7 +114,8 @@ impl Task {
         Ok(followed)
     }
 
-    /// Error of the motion: drift and tone that a model has found in the sensor are taken out of what it showed.
+    /// Computes the errors.
+    /// Drift and interference of the sensor, as the model has them, are removed from the motion.
     pub(crate) fn judge(&self, samples: &[Sample], model: &Model) -> Run {
         let shown: Vec<f64> = samples.iter().zip(&self.travel).map(|(s, y)| s.output - self.rest - y).collect();
         let error: Vec<f64> = shown.iter().zip(samples).map(|(e, s)| e - in_the_sensor(model, s.time_s)).collect();
@@ -123,14 +128,14 @@ impl Task {
         }
     }
 
-    /// The travel in the sensor's coordinates.
+    /// Returns the reference in the coordinates of the sensor.
     fn reference(&self, model: &Model) -> CommandResult<Record> {
         let unit = OutputUnit::of_column(&model.output.column).unwrap_or(OutputUnit::Micrometre);
         let columns = Columns {
             name: "reference".into(),
             time: self.time(),
             output: Some((unit, self.travel.iter().map(|y| self.rest + y).collect())),
-            // Nobody knows it beforehand.
+            // The load is unknown before the run.
             load: model.effects.load.map(|_| vec![0.0; self.travel.len()]),
             ..Columns::default()
         };
@@ -144,7 +149,7 @@ impl Task {
         revise: impl FnMut(&mut hyst_hw::Revision<'_>),
         mut each: impl FnMut(&Sample) -> CommandResult,
     ) -> CommandResult<Vec<Sample>> {
-        // Small blocks, so that a revision is not stale.
+        // Small blocks, so that a revision uses a recent measurement.
         let options = RecordOptions { block: 50, slew_v_per_s: RAMP_V_PER_S, ..RecordOptions::at(self.rate_hz) };
         let mut failed = None;
         let recording = hyst_hw::record_with(daq, &[drive], &options, revise, |news| {
@@ -161,14 +166,14 @@ impl Task {
     }
 }
 
-/// What a model has found in the sensor, not in the motion: drift and tone \[output unit\].
+/// Returns drift and interference of the sensor at a time, as a model has them \[output unit\].
 fn in_the_sensor(model: &Model, time_s: f64) -> f64 {
     let drift = model.effects.drift.map_or(0.0, |drift| drift.at(time_s));
     let tone = model.effects.interference.map_or(0.0, |tone| tone.at(time_s));
     drift + tone
 }
 
-/// Mean output of the rows before the drive has first gone a thousandth of its range \[output unit\].
+/// Returns the mean output before the drive first moves by 0.1 % of its range \[output unit\].
 fn rest(train: &Record, model: &Model) -> f64 {
     let (time, u, y) = (train.time(), train.input(), train.output().unwrap_or_default());
     let (start, range) = (u.first().copied().unwrap_or(0.0), model.input.high - model.input.low);
@@ -177,13 +182,13 @@ fn rest(train: &Record, model: &Model) -> f64 {
     sum / still.max(1) as f64
 }
 
-/// A travel from rest that asks for everything: slow and fast motion, nested loops, a hold; within 85 % of
-/// the stroke \[output unit\].
+/// Returns a displacement within 85 % of the stroke \[output unit\].
+/// It has slow and fast motion, nested loops and a hold.
 fn travel(stroke: f64, rate_hz: f64) -> Vec<f64> {
     let smooth = |x: f64| 0.5 - 0.5 * (std::f64::consts::PI * x.clamp(0.0, 1.0)).cos();
     let shape = |t: f64| {
         let wave = |hz: f64, amplitude: f64| amplitude * (2.0 * std::f64::consts::PI * hz * t).sin();
-        // Moving from the second second to the ninth, then a hold at two thirds.
+        // Moves between 1 s and 9 s, then holds two thirds of the stroke.
         let moving = smooth((t - 1.0) / 0.5) * (1.0 - smooth((t - 8.5) / 0.5));
         0.48 * smooth(t)
             + moving * (wave(0.7, 0.19) + wave(4.0, 0.1) + wave(11.0, 0.06))
@@ -192,7 +197,7 @@ fn travel(stroke: f64, rate_hz: f64) -> Vec<f64> {
     (0..(SECONDS * rate_hz) as usize).map(|k| stroke * shape(k as f64 / rate_hz)).collect()
 }
 
-/// Slope through the rest point, by least squares: what somebody without a model would use.
+/// Returns the slope of the line through the rest point, by least squares \[output unit/V\].
 fn mean_gain(record: &Record, zero: f64) -> f64 {
     let (u, y) = (record.input(), record.output().unwrap_or_default());
     let (cross, own) = u.iter().zip(y).fold((0.0, 0.0), |(c, o), (u, y)| (c + u * (y - zero), o + u * u));

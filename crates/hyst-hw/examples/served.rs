@@ -1,5 +1,7 @@
-//! The simulated plant as a device at a socket: `cargo run -p hyst-hw --example served -- plant.toml 127.0.0.1:4000 [RATE]`, then
-//! `hystctl run --daq tcp:127.0.0.1:4000 …`.
+//! Serves the simulated plant as a device on a TCP port.
+//!
+//! Start it with `cargo run -p hyst-hw --example served -- plant.toml 127.0.0.1:4000 [RATE]`, then run
+//! `hystctl run --daq tcp:127.0.0.1:4000 …`. The default rate is 1000 Hz.
 
 use std::net::TcpListener;
 
@@ -9,7 +11,7 @@ use hyst_hw::{Plant, PlantBoard, PlantConfig, serve_at};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let (Some(file), Some(address)) = (arguments.next(), arguments.next()) else {
-        return Err("give the plant's file and an address, as plant.toml 127.0.0.1:4000".into());
+        return Err("expected a plant file and an address, for example: plant.toml 127.0.0.1:4000".into());
     };
     let rate_hz = arguments.next().map_or(Ok(1000.0), |rate| rate.parse())?;
     let config = std::fs::read_to_string(&file)

@@ -1,13 +1,13 @@
-//! Data acquisition: one trait for everything that drives an actuator and measures it, a runner
-//! that is generic over the trait, a simulated actuator and devices at lines that implement it.
+//! Data acquisition: a trait for devices that drive an actuator and measure it, a runner that is
+//! generic over the trait, a simulated actuator, and devices on serial, CAN and TCP lines.
 //!
-//! - [`Daq`]: start a sample clock, exchange drive for measurements, let the device rest, stop.
-//! - [`record`]: plays drive segments on any [`Daq`] and returns what was measured.
-//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file), with any of eleven [`EFFECTS`] and with
-//!   [`Disturbance`]s that are none of them.
-//! - [`Remote`]: a device at the other end of a [`Line`]: a serial port, a CAN bus, a socket.
-//! - [`serve()`]: a device made of software behind a line, with the plant as its actuator.
-//! - [`wire`]: what host and device say to each other, and the device's side of it, `no_std` and without heap, for firmware.
+//! - [`Daq`]: starts a sample clock, exchanges drive samples for measurements, rests and stops.
+//! - [`record`]: plays drive segments on any [`Daq`] and returns the measured samples.
+//! - [`Plant`]: the simulated actuator, described by a [`PlantConfig`] (a TOML file). It has any of the eleven [`EFFECTS`]
+//!   and any [`Disturbance`], which is not an effect.
+//! - [`Remote`]: a device at the other end of a [`Line`]: a serial port, a CAN bus or a socket.
+//! - [`serve()`]: a device in software behind a line, with the plant as its actuator.
+//! - [`wire`]: the protocol between host and device, and the device's side of it; `no_std` and without heap, for firmware.
 //!
 //! ```
 //! use hyst_hw::{record, Plant, PlantConfig, RecordOptions};

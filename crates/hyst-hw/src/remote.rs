@@ -1,4 +1,4 @@
-//! A device at the other end of a line, as a [`Daq`].
+//! A device at the other end of a line, with the interface [`Daq`].
 
 mod can;
 mod clock;
@@ -29,37 +29,41 @@ pub use slcan::Slcan;
 #[cfg(target_os = "linux")]
 pub use socketcan::{SocketCan, SocketCanError};
 
-/// How long a device may take to come to rest, its ramp not counted.
-const LONGEST_REST: Duration = Duration::from_secs(20);
-/// How far drives are sent ahead \[s\]: long enough for a host that is kept busy for a moment, short enough for a stop.
+/// Time in which a device must come to rest, in addition to its ramp.
+const REST_TIMEOUT: Duration = Duration::from_secs(20);
+/// Time by which drives are sent ahead \[s\].
+///
+/// It bridges short delays of the host, and is short enough for a quick stop.
 const LOOKAHEAD_S: f64 = 0.25;
-/// By how many times the first wait for an answer the last ones may be longer.
-const MOST_REPEATS: u32 = 8;
-/// Requests in the time that a device's watchdog waits, at least; on a line that is slower than that, as many as go through.
-const TRIES: u32 = 8;
-/// Room for noise at the ends of a range of references, as a share of it.
-const MARGIN: f64 = 0.05;
+/// Longest wait for an answer, as a multiple of the first wait.
+const MAX_BACKOFF: u32 = 8;
+/// Minimum number of requests within the device's watchdog time.
+///
+/// A slower line sends as many as it can carry.
+const MIN_REQUESTS_PER_SILENCE: u32 = 8;
+/// Margin for sensor noise at both ends of the reference range, as a share of the range.
+const REFERENCE_MARGIN: f64 = 0.05;
 
-/// A line that carries bytes both ways: a serial port, a socket, frames of a bus put together.
+/// A line that carries bytes in both directions: a serial port, a socket, or the frames of a bus.
 pub trait Line {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// When the line is gone.
+    /// If the connection is lost.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits for at most `patience`, and gives how many bytes came; none is no error.
+    /// Waits for bytes for at most `patience` and returns how many were received; 0 is not an error.
     ///
     /// # Errors
-    /// When the line is gone.
+    /// If the connection is lost.
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize>;
 
-    /// What time it is at this line. A line that is simulated may have a clock of its own.
+    /// Returns the present time on this line. A simulated line may have its own clock.
     fn now(&mut self) -> Instant {
         Instant::now()
     }
 
-    /// Lets some time pass.
+    /// Waits for `time`.
     fn pause(&mut self, time: Duration) {
         std::thread::sleep(time);
     }
@@ -83,116 +87,122 @@ impl<L: Line + ?Sized> Line for Box<L> {
     }
 }
 
-/// What can go wrong with a device at the other end of a line.
+/// Errors of a device at the other end of a line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RemoteError {
-    /// The line is gone.
+    /// The connection is lost.
     #[error(
-        "{line}: the line is gone: {source}; look at the cable and whether the device is powered, then start again"
+        "{line}: the connection is lost: {source}; a running device ramps to rest by its watchdog; \
+         check the cable and the power supply, then run again"
     )]
     Line {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Nothing, or nothing whole, came back.
-    #[error("{line}: no answer within {seconds} s ({broken} broken frames came): {advice}")]
+    /// No answer, or only damaged ones, arrived in time.
+    #[error("{line}: no answer within {seconds} s ({broken} damaged frames received): {advice}")]
     Silent {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// How long was waited \[s\].
+        /// Waiting time \[s\].
         seconds: f64,
-        /// Frames that came but were broken.
+        /// Number of damaged frames that arrived.
         broken: u32,
         /// What to do.
         advice: &'static str,
     },
-    /// Host and device speak different versions.
+    /// Host and device use different versions of the protocol.
     #[error(
         "{line}: the device speaks version {device} of the protocol, this program version {PROTOCOL}; update the older one"
     )]
     Version {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// The device's version.
+        /// Version of the device.
         device: u16,
     },
-    /// The device does not do what was asked.
+    /// The device refuses the request.
     #[error("{line}: {refusal}")]
     Refused {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// Why.
+        /// Reason.
         refusal: Refusal,
     },
-    /// The device ended an earlier run by itself, and nobody has looked at it since.
+    /// The device ended an earlier run with a fault that is not yet cleared.
     #[error(
-        "{line}: the device stands with a fault ({}) of an earlier run: {fault}; when that is mended, clear it (hystctl stop --clear, or run --clear)",
+        "{line}: fault {} of an earlier run is not cleared ({fault}): the device does not start; \
+         fix the cause, then type hystctl stop --clear (or give --clear to run)",
         fault.code()
     )]
     Standing {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// Why.
+        /// The fault.
         fault: Fault,
     },
-    /// The device ended the run by itself.
-    #[error("{line}: the device ended the run (fault {}): {fault}", fault.code())]
+    /// The device ended the run with a fault.
+    #[error("{line}: the device ended the run and ramps to rest (fault {}): {fault}", fault.code())]
     Fault {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// Why.
+        /// The fault.
         fault: Fault,
     },
-    /// The run is over, and nobody here has ended it.
-    #[error("{line}: the device was told to stop, and not by this program; does another one talk to it?")]
+    /// The run was stopped, but not by this program.
+    #[error(
+        "{line}: another program stopped the device; it ramps to rest; find out which program uses the device, then run again"
+    )]
     Stopped {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
     },
-    /// The device does not know the run any more.
-    #[error("{line}: the device has left the run: {refusal}; was it switched off and on?")]
+    /// The device no longer knows the run.
+    #[error("{line}: the device no longer knows this run: {refusal}; check whether it was switched off and on")]
     Left {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// What it said.
+        /// Refusal of the device.
         refusal: Refusal,
     },
     /// The device does not come to rest.
-    #[error("{line}: the device does not come to rest within {seconds} s; switch its amplifier off")]
+    #[error("{line}: the device is not at rest after {seconds} s and may still be driven; switch its amplifier off")]
     Restless {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// How long was waited \[s\].
+        /// Waiting time \[s\].
         seconds: f64,
     },
-    /// The device answers and does nothing.
+    /// The device answers, but its clock has stopped.
     #[error(
-        "{line}: the device answers and has neither played nor measured anything for {seconds} s: its clock stands, and with it its watchdog; switch its amplifier off"
+        "{line}: the device answers, but has played and measured nothing for {seconds} s: \
+         its clock has stopped, and its watchdog with it; switch its amplifier off"
     )]
     Stands {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// How long was waited \[s\].
+        /// Waiting time \[s\].
         seconds: f64,
     },
-    /// A rate that the device does not run at.
+    /// The device does not support the sample rate.
     #[error(
-        "{line}: {asked_hz} Hz; the device runs at {low_hz} to {high_hz} Hz: bring the record to such a rate (excite, record and references like sine: take --rate)"
+        "{line}: {asked_hz} Hz is outside the device's {low_hz} to {high_hz} Hz; \
+         give --rate (excite, record, references such as sine:), or resample the file"
     )]
     Rate {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
-        /// What was asked for \[Hz\].
+        /// Requested rate \[Hz\].
         asked_hz: f64,
-        /// Slowest \[Hz\].
+        /// Slowest rate \[Hz\].
         low_hz: f64,
-        /// Fastest \[Hz\].
+        /// Fastest rate \[Hz\].
         high_hz: f64,
     },
-    /// A value that cannot be asked for.
+    /// A value is out of range.
     #[error("{what} = {value}: {advice}")]
     Value {
         /// Name of the value.
@@ -202,44 +212,48 @@ pub enum RemoteError {
         /// What to give instead.
         advice: &'static str,
     },
-    /// The device answers what was not asked.
-    #[error("{line}: the device answers something else than what was asked; is it hystctl's protocol?")]
+    /// The answer does not match the request.
+    #[error(
+        "{line}: the device's answer does not match the request; check that its firmware speaks hystctl's protocol"
+    )]
     Answer {
-        /// What the line is called.
+        /// Name of the line.
         line: String,
     },
-    /// Out of order.
-    #[error("the device runs already, or does not run: start it first, stop it last")]
+    /// The calls are out of order.
+    #[error("calls out of order: start the device before exchange, and stop it before the next start")]
     Order,
 }
 
-/// How a device is talked to.
+/// Options of the connection to a device, and limits of its runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemoteOptions {
-    /// How long to wait for an answer before the request is sent again.
+    /// Time to wait for an answer before the request is sent again.
     pub repeat: Duration,
-    /// How long to go without any answer before the device counts as lost.
+    /// Time without any answer after which the device counts as lost.
     pub lost: Duration,
-    /// Silence of this host after which the device comes to rest \[s\].
+    /// Watchdog time: silence of this host after which the device ramps to rest \[s\].
     pub silence_s: f64,
-    /// Lowest and highest voltage of a run \[V\]; the device's own if not given.
+    /// Lowest and highest voltage of a run \[V\]; by default those of the device.
     pub voltage: Option<(f64, f64)>,
-    /// Steepest slope \[V/s\]; the device's own if not given.
+    /// Slew limit \[V/s\]; by default that of the device.
     pub slew_v_per_s: Option<f64>,
-    /// Highest temperature \[°C\].
+    /// Highest permitted temperature \[°C\].
     pub hottest_degc: f64,
-    /// Whether voltages are driven, or references followed.
+    /// Meaning of the drive samples: voltages or references.
     pub mode: Mode,
-    /// Greatest tracking error \[output unit\].
+    /// Largest permitted tracking error \[output unit\].
     pub error: f64,
-    /// Whether the device estimates the external force, with the observer that was handed over.
+    /// Whether the device estimates the external force with the uploaded observer.
     pub force: bool,
-    /// Number of the run: another one for each. Drawn by the caller, so that two programs do not meet in one.
+    /// Number of the run, different for each run.
+    ///
+    /// The caller chooses it at random, so that two programs do not use the same number.
     pub session: u32,
 }
 
 impl RemoteOptions {
-    /// Voltages within the device's own limits; half a second of silence; run number `session`.
+    /// Returns options for run number `session`: the limits of the device, and a watchdog time of 0.5 s.
     #[must_use]
     pub const fn with_session(session: u32) -> Self {
         Self {
@@ -268,60 +282,60 @@ pub struct Remote<L> {
     identity: Identity,
     capabilities: Capabilities,
     run: Option<Run>,
-    /// Of the run, or of the last one.
+    /// Clock comparison of the present or the last run.
     clock: Option<Clock>,
-    /// When the last request was sent and its answer came, if that is known.
+    /// Times at which the last request was sent and its answer arrived; `None` if ambiguous.
     round_trip: Option<(Instant, Instant)>,
-    /// How long answers take on this line.
+    /// Answer times on this line.
     retransmit: Retransmit,
     present_v: f64,
-    /// Slope that the next run needs \[V/s\].
+    /// Slew rate of the next run, set by [`gentle`](Remote::gentle) \[V/s\].
     gentle: f64,
     broken: u32,
-    /// What the system said when the line went: what it says of a line that is gone tells less.
+    /// First error of the operating system on a lost connection. Later errors contain less information.
     gone: Option<(io::ErrorKind, String)>,
 }
 
-/// What is known of a run.
+/// State of a run on the host.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     session: u32,
     rate_hz: f64,
-    /// Drives that the device has had.
+    /// Number of drives that the device has received.
     sent: u32,
-    /// Samples that have come.
+    /// Number of samples that have arrived.
     heard: u32,
-    /// Number of the first drive that it has no room for.
+    /// Number of the first drive for which the device has no room.
     room: u32,
-    /// Most drives that wait on the device: what is decided here acts no later than that.
+    /// Maximum number of drives that wait on the device. It bounds the delay of a change of the drive.
     lookahead: u32,
-    /// Periods since the run began, as many as there are: the device's count begins anew after 2³².
+    /// Periods since the run began. The device's own count wraps at 2³².
     ticks: u64,
 }
 
 impl<L: Line> Remote<L> {
-    /// Greets the device at the other end of `line`, which messages call `name`.
+    /// Opens the device at the other end of `line`; messages call the line `name`.
     ///
     /// # Errors
-    /// When nobody answers, or in another version.
+    /// If there is no answer, or if the device uses another version of the protocol.
     pub fn open(line: L, name: impl Into<String>, options: RemoteOptions) -> Result<Self, RemoteError> {
-        let mut remote = Self::unknown(line, name.into(), options);
+        let mut remote = Self::unconnected(line, name.into(), options);
         match remote.ask(Ask::Hello)? {
             Tell::Version(PROTOCOL) => {}
             Tell::Version(device) => return Err(RemoteError::Version { line: remote.name, device }),
-            _ => return Err(remote.odd()),
+            _ => return Err(remote.unexpected_answer()),
         }
-        let Tell::Identity(identity) = remote.ask(Ask::Describe)? else { return Err(remote.odd()) };
+        let Tell::Identity(identity) = remote.ask(Ask::Describe)? else { return Err(remote.unexpected_answer()) };
         remote.capabilities = capabilities(&identity, &remote.name);
         remote.identity = identity;
-        // Where it stands, which need not be where it rests.
+        // The present output may differ from the rest voltage.
         remote.status()?;
         Ok(remote)
     }
 
-    /// Before anything was said.
-    fn unknown(line: L, name: String, options: RemoteOptions) -> Self {
-        let nobody = Identity {
+    /// Returns the connection before the first request.
+    fn unconnected(line: L, name: String, options: RemoteOptions) -> Self {
+        let no_device = Identity {
             name: heapless::Vec::new(),
             min_v: 0.0,
             max_v: 0.0,
@@ -341,10 +355,10 @@ impl<L: Line> Remote<L> {
             name,
             options,
             deframer: Deframer::new(),
-            // An answer to an earlier program's request is told from one to this one's.
+            // Answers to requests of an earlier program have other numbers.
             number: options.session.rotate_left(16),
-            capabilities: capabilities(&nobody, "nobody"),
-            identity: nobody,
+            capabilities: capabilities(&no_device, "nobody"),
+            identity: no_device,
             run: None,
             clock: None,
             round_trip: None,
@@ -356,24 +370,24 @@ impl<L: Line> Remote<L> {
         }
     }
 
-    /// What the device is.
+    /// Returns name, ranges and abilities of the device.
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// The line.
+    /// Returns the line.
     pub fn line_mut(&mut self) -> &mut L {
         &mut self.line
     }
 
-    /// Hands over a model, with which the device follows references.
+    /// Uploads a model, with which the device follows references.
     ///
     /// # Errors
-    /// When the device has no room for it or cannot run it, or is lost.
+    /// If the device has no room for the model, cannot run it, or is lost.
     pub fn upload(&mut self, block: &[u8]) -> Result<(), RemoteError> {
         let (total, sum) = (block.len() as u32, model_sum(block));
         let mut offset = 0;
-        // Each part brings it on; parts that do not are those of a device that is none.
+        // Every part makes progress on a sound device. The bound ends the upload on a faulty one.
         for _ in 0..=2 * block.len().div_ceil(MOST_CHUNK) {
             let end = block.len().min(offset as usize + MOST_CHUNK);
             let bytes = block[offset as usize..end].iter().copied().collect();
@@ -382,76 +396,79 @@ impl<L: Line> Remote<L> {
                 Tell::ModelBytes(have) => offset = have,
                 Tell::Refused(Refusal::ModelGap, _) => offset = 0,
                 Tell::Refused(refusal, _) => return Err(self.refused(refusal)),
-                _ => return Err(self.odd()),
+                _ => return Err(self.unexpected_answer()),
             }
         }
-        Err(self.odd())
+        Err(self.unexpected_answer())
     }
 
-    /// How the device stands. Nothing changes by that, and for the watchdog of a run it is no sign of life.
+    /// Asks the device for its state. This changes nothing and does not reset the watchdog of a run.
     ///
     /// # Errors
-    /// When the device is lost.
+    /// If the device is lost.
     pub fn status(&mut self) -> Result<Status, RemoteError> {
-        self.stated(Ask::Status)
+        self.ask_status(Ask::Status)
     }
 
-    /// Lets the device only measure in its next runs: what it is given is not put out.
+    /// Makes the device only measure in the following runs: it ignores the drives and holds its output.
     pub fn observe(&mut self) {
         self.options.mode = Mode::Nothing;
     }
 
-    /// Drives and ramps of the next run are no steeper than this \[V/s\], unless the options say something else: a fault then ramps to rest as gently
-    /// as the run itself went.
+    /// Limits drives and ramps of the next run to this slew rate \[V/s\].
+    ///
+    /// The ramp to rest after a fault has the same limit. A slew limit in the options has priority.
     pub fn gentle(&mut self, slew_v_per_s: f64) {
         self.gentle = slew_v_per_s;
     }
 
-    /// Steepest slope of a run \[V/s\].
+    /// Returns the slew limit of a run \[V/s\].
     fn slew(&self) -> f64 {
         let most = f64::from(self.identity.max_slew_v_per_s);
         self.options.slew_v_per_s.unwrap_or(most.min(self.gentle))
     }
 
-    /// Hands over what [`recipe_head`](crate::wire::recipe_head) and a model's block make, and from then on drives are references \[output unit\] between
-    /// `low` and `high`, which the device follows: the ramps before and after a run begin and end where the output is now.
+    /// Uploads a controller; from then on, drives are references \[output unit\] that the device follows.
+    ///
+    /// `recipe` is a [`recipe_head`](crate::wire::recipe_head), followed by the block of a model. References are between `low`
+    /// and `high`. The ramps before and after a run begin and end at the present output.
     ///
     /// # Errors
-    /// When the device follows no references, has no room for the model or cannot run it, or is lost.
+    /// If the device cannot follow references, has no room for the model, cannot run it, or is lost.
     pub fn follow(&mut self, recipe: &[u8], (low, high): (f64, f64)) -> Result<(), RemoteError> {
         if self.run.is_some() {
             return Err(RemoteError::Order);
         }
         self.upload(recipe)?;
         self.options.mode = Mode::Reference;
-        // It stands: told to stop, it says where.
-        let output = f64::from(self.stated(Ask::Stop)?.output);
+        // The device is at rest; the answer to a stop request contains its output.
+        let output = f64::from(self.ask_status(Ask::Stop)?.output);
         self.capabilities.voltage = VoltageRange { min_v: low.min(output), max_v: high.max(output), rest_v: output };
         Ok(())
     }
 
-    /// An emergency stop of the device at the other end of `line`, whatever it does: nothing is asked before.
+    /// Sends an emergency stop to the device at the other end of `line`, without opening it first.
     ///
     /// # Errors
-    /// When nobody answers.
+    /// If there is no answer.
     pub fn stop_at(line: L, name: impl Into<String>, options: RemoteOptions) -> Result<Status, RemoteError> {
-        Self::unknown(line, name.into(), options).stated(Ask::Emergency)
+        Self::unconnected(line, name.into(), options).ask_status(Ask::Emergency)
     }
 
-    /// Ends whatever the device does and keeps it from starting again before [`clear`](Self::clear).
+    /// Stops the device; it does not start again before [`clear`](Self::clear).
     ///
     /// # Errors
-    /// When the device is lost.
+    /// If the device is lost.
     pub fn emergency_stop(&mut self) -> Result<(), RemoteError> {
         self.run = None;
-        self.stated(Ask::Emergency).map(|_| ())
+        self.ask_status(Ask::Emergency).map(|_| ())
     }
 
-    /// Clears the fault that the device has now, if there is one, once it is at rest; on its way there it is waited for. Gives the fault.
+    /// Clears the present fault of the device and returns it; waits until the device is at rest.
     ///
     /// # Errors
-    /// When the device runs, does not come to rest, is lost, or has another fault meanwhile: an emergency stop, say, which is none of those
-    /// that this was asked to clear.
+    /// If the device runs, does not come to rest, is lost, or gets another fault meanwhile (for example an emergency stop).
+    /// The new fault is not cleared.
     pub fn clear(&mut self) -> Result<Option<Fault>, RemoteError> {
         let first = self.status()?;
         let fault = if let State::Fault(fault) = first.state { Some(fault) } else { None };
@@ -463,12 +480,12 @@ impl<L: Line> Remote<L> {
                 (State::Fault(now), seen) if seen != Some(now) => {
                     return Err(RemoteError::Standing { line: self.name.clone(), fault: now });
                 }
-                // The ramp is as steep as the run that has ended was to be, which nobody here knows.
-                _ if self.since(moved) > LONGEST_REST => {
-                    return Err(RemoteError::Restless { line: self.name.clone(), seconds: LONGEST_REST.as_secs_f64() });
+                // The slew limit of the ended run is unknown here, so only a standstill counts.
+                _ if self.since(moved) > REST_TIMEOUT => {
+                    return Err(RemoteError::Restless { line: self.name.clone(), seconds: REST_TIMEOUT.as_secs_f64() });
                 }
                 (State::Fault(now), _) if status.present_v == self.identity.rest_v => {
-                    return self.stated(Ask::Clear(now)).map(|_| fault);
+                    return self.ask_status(Ask::Clear(now)).map(|_| fault);
                 }
                 (State::Fault(_) | State::Stopping, _) => self.line.pause(Duration::from_millis(20)),
             }
@@ -479,33 +496,35 @@ impl<L: Line> Remote<L> {
         }
     }
 
-    /// That a device which answers has done something at last: one whose clock has stopped has no watchdog either.
-    fn goes_on(&self, taken: usize, measured: &[Sample]) -> Result<(), RemoteError> {
+    /// Refuses an exchange without progress: the clock of the device has stopped, and its watchdog with it.
+    fn require_progress(&self, taken: usize, measured: &[Sample]) -> Result<(), RemoteError> {
         if taken > 0 || !measured.is_empty() {
             return Ok(());
         }
-        Err(RemoteError::Stands { line: self.name.clone(), seconds: self.lost().as_secs_f64() })
+        Err(RemoteError::Stands { line: self.name.clone(), seconds: self.answer_timeout().as_secs_f64() })
     }
 
-    /// How long to go without an answer: a slow clock gives no news for a while.
-    fn lost(&self) -> Duration {
+    /// Returns the time without an answer after which the device counts as lost.
+    ///
+    /// At least four sample periods.
+    fn answer_timeout(&self) -> Duration {
         let periods = self.run.map_or(0.0, |run| 4.0 / run.rate_hz);
         self.options.lost.max(Duration::from_secs_f64(periods.min(1e4)))
     }
 
-    /// How long the device may take to come to rest at its slew.
-    fn longest_rest(&self) -> Duration {
+    /// Returns the time in which the device must come to rest at its slew limit.
+    fn rest_timeout(&self) -> Duration {
         let slew = self.slew();
         let ramp = f64::from(self.identity.max_v - self.identity.min_v) / slew.max(f64::MIN_POSITIVE);
-        LONGEST_REST + Duration::from_secs_f64(ramp.clamp(0.0, 1e6))
+        REST_TIMEOUT + Duration::from_secs_f64(ramp.clamp(0.0, 1e6))
     }
 
-    /// Time since `then`, on the line's clock.
+    /// Returns the time since `then`, on the line's clock.
     fn since(&mut self, then: Instant) -> Duration {
         self.line.now().saturating_duration_since(then)
     }
 
-    fn odd(&self) -> RemoteError {
+    fn unexpected_answer(&self) -> RemoteError {
         RemoteError::Answer { line: self.name.clone() }
     }
 
@@ -518,8 +537,8 @@ impl<L: Line> Remote<L> {
         RemoteError::Line { line: self.name.clone(), source: io::Error::new(*kind, said.clone()) }
     }
 
-    /// Asks for something that is answered by a status.
-    fn stated(&mut self, ask: Ask) -> Result<Status, RemoteError> {
+    /// Sends a request whose answer is a status.
+    fn ask_status(&mut self, ask: Ask) -> Result<Status, RemoteError> {
         match self.ask(ask)? {
             Tell::Status(status) => {
                 self.present_v = f64::from(match self.options.mode {
@@ -532,24 +551,25 @@ impl<L: Line> Remote<L> {
                 Err(RemoteError::Standing { line: self.name.clone(), fault })
             }
             Tell::Refused(refusal, _) => Err(self.refused(refusal)),
-            _ => Err(self.odd()),
+            _ => Err(self.unexpected_answer()),
         }
     }
 
-    /// Asks until there is an answer.
+    /// Sends a request, repeatedly if necessary, and returns the answer.
     fn ask(&mut self, ask: Ask) -> Result<Tell, RemoteError> {
         self.number = self.number.wrapping_add(1);
         let request = Request { number: self.number, ask };
         let mut buffer = [0; MAX_FRAME];
-        let frame = encode(&request, &mut buffer).map_err(|_| self.odd())?;
+        let frame = encode(&request, &mut buffer).map_err(|_| self.unexpected_answer())?;
         let began = self.line.now();
         let mut bytes = [0; 4096];
         let silence = Duration::from_secs_f64(self.options.silence_s);
-        let (mut repeat, mut asked) = (self.retransmit.first(self.options.repeat, silence.min(self.lost()) / 2), 0);
-        // A watchdog that hears one of so many requests is content.
-        let longest = (MOST_REPEATS * repeat).min(silence / TRIES).max(repeat);
-        while self.since(began) < self.lost() {
-            // A zero ends what a line may have left of an earlier frame.
+        let (mut repeat, mut asked) =
+            (self.retransmit.first(self.options.repeat, silence.min(self.answer_timeout()) / 2), 0);
+        // One request within the watchdog time is enough, so several are tried.
+        let longest = (MAX_BACKOFF * repeat).min(silence / MIN_REQUESTS_PER_SILENCE).max(repeat);
+        while self.since(began) < self.answer_timeout() {
+            // A zero ends an incomplete earlier frame.
             self.line.send(&[0]).and_then(|()| self.line.send(frame)).map_err(|source| self.gone(source))?;
             let sent = self.line.now();
             asked += 1;
@@ -559,40 +579,45 @@ impl<L: Line> Remote<L> {
                 while let Some(reply) = self.deframer.next::<Reply>(&mut fresh) {
                     match reply {
                         Ok(reply) if reply.number == self.number => {
-                            // Asked twice, it is not known which one was answered.
+                            // If the request was sent twice, it is unknown which one was answered.
                             self.round_trip = (asked == 1).then(|| (sent, self.line.now()));
                             let took = self.since(began);
                             self.retransmit.answered(self.number, asked, took);
                             return Ok(reply.tell);
                         }
-                        // Of a request that was sent twice.
+                        // A second answer to a request that was sent twice.
                         Ok(reply) => self.retransmit.answered_again(reply.number),
-                        Err(FrameError::Message) if matches!(request.ask, Ask::Hello) => return Err(self.odd()),
+                        Err(FrameError::Message) if matches!(request.ask, Ask::Hello) => {
+                            return Err(self.unexpected_answer());
+                        }
                         Err(_) => self.broken += 1,
                     }
                 }
             }
-            // A line that is slow, and not deaf, would only be filled.
+            // Wait longer each time, so that a slow line does not fill with requests.
             repeat = (2 * repeat).min(longest);
         }
         let advice = match request.ask {
             Ask::Hello if self.broken > 0 => {
-                "something else speaks there: is this the right port, its speed the device's, its firmware one that speaks this protocol?"
+                "other data arrives there: check the port, the baud rate and that the firmware speaks this protocol"
             }
-            Ask::Hello => {
-                "is this the right port, its speed the device's, the device powered, and no other program talking to it?"
-            }
+            Ask::Hello => "check the port, the baud rate, that the device is powered and that no other program uses it",
             Ask::Emergency => {
-                "TAKE IT THAT NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C where the run goes on; hystctl status tells"
+                "ASSUME THAT NOTHING WAS STOPPED: switch the amplifier off, or press Ctrl-C in the terminal of the run; then check hystctl status"
             }
-            _ => "look at the cable; its watchdog brings a device that still runs to rest",
+            _ => "a device that still runs ramps to rest by its watchdog; check the cable, then hystctl status",
         };
-        let seconds = self.lost().as_secs_f64();
+        let seconds = self.answer_timeout().as_secs_f64();
         Err(RemoteError::Silent { line: self.name.clone(), seconds, broken: self.broken, advice })
     }
 
-    /// One request of a run: gives how many drives were taken.
-    fn trade(&mut self, run: &mut Run, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
+    /// Sends one exchange request of a run and returns the number of accepted drives.
+    fn exchange_once(
+        &mut self,
+        run: &mut Run,
+        drive_v: &[f64],
+        measured: &mut Vec<Sample>,
+    ) -> Result<usize, RemoteError> {
         let ahead = run.lookahead.saturating_sub(run.sent.wrapping_sub(run.heard));
         let free = run.room.saturating_sub(run.sent).min(ahead) as usize;
         let drives = drive_v.iter().take(free.min(MOST_DRIVES)).map(|v| *v as f32).collect();
@@ -600,15 +625,15 @@ impl<L: Line> Remote<L> {
         match self.ask(Ask::Exchange(exchange))? {
             Tell::Samples { status, first, samples } => {
                 if let (Some(clock), Some((asked, answered))) = (&mut self.clock, self.round_trip) {
-                    // The device's count, from the periods that are known of.
+                    // The full period count, from the known periods and the device's 32-bit count.
                     let periods = run.ticks + u64::from(status.tick.wrapping_sub(run.ticks as u32));
-                    clock.tell(asked, answered, periods);
+                    clock.add_reading(asked, answered, periods);
                 }
                 if status.state != State::Running {
-                    // What led to it is what one wants to see.
-                    let mut whole = self.hear(run, first, &samples, measured);
+                    // Fetch the remaining samples: they show what led to the end of the run.
+                    let mut whole = self.append_samples(run, first, &samples, measured);
                     for _ in 0..status.measured.wrapping_sub(run.heard) {
-                        whole = whole && run.heard != status.measured && self.hear_more(run, measured);
+                        whole = whole && run.heard != status.measured && self.fetch_samples(run, measured);
                     }
                     let line = self.name.clone();
                     return Err(match status.state {
@@ -617,8 +642,8 @@ impl<L: Line> Remote<L> {
                     });
                 }
                 let taken = status.received.wrapping_sub(run.sent) as usize;
-                if taken > drive_v.len() || !self.hear(run, first, &samples, measured) {
-                    return Err(self.odd());
+                if taken > drive_v.len() || !self.append_samples(run, first, &samples, measured) {
+                    return Err(self.unexpected_answer());
                 }
                 (run.sent, run.room) = (status.received, status.room);
                 self.present_v = match drive_v[..taken].last() {
@@ -632,24 +657,24 @@ impl<L: Line> Remote<L> {
                 (_, Refusal::Drive(_)) => Err(self.refused(refusal)),
                 _ => Err(RemoteError::Left { line: self.name.clone(), refusal }),
             },
-            _ => Err(self.odd()),
+            _ => Err(self.unexpected_answer()),
         }
     }
 
-    /// Asks for samples of a run that is over; whether some came.
-    fn hear_more(&mut self, run: &mut Run, measured: &mut Vec<Sample>) -> bool {
+    /// Fetches samples of a run that has ended; returns whether any arrived.
+    fn fetch_samples(&mut self, run: &mut Run, measured: &mut Vec<Sample>) -> bool {
         let drives = heapless::Vec::new();
         let exchange = Exchange { session: run.session, heard: run.heard, first: run.sent, drives };
         match self.ask(Ask::Exchange(exchange)) {
             Ok(Tell::Samples { first, samples, .. }) => {
-                !samples.is_empty() && self.hear(run, first, &samples, measured)
+                !samples.is_empty() && self.append_samples(run, first, &samples, measured)
             }
             _ => false,
         }
     }
 
-    /// Takes samples that follow those that have come; whether they do.
-    fn hear(&self, run: &mut Run, first: u32, samples: &[Measured], measured: &mut Vec<Sample>) -> bool {
+    /// Appends samples that follow the last one; returns whether there is no gap.
+    fn append_samples(&self, run: &mut Run, first: u32, samples: &[Measured], measured: &mut Vec<Sample>) -> bool {
         let Some(known) = run.heard.checked_sub(first) else { return samples.is_empty() };
         for sample in samples.iter().skip(known as usize) {
             run.heard = run.heard.wrapping_add(1);
@@ -667,20 +692,20 @@ impl<L: Line> Remote<L> {
         true
     }
 
-    /// Waits until the device has done something more.
-    fn trade_until_news(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
+    /// Exchanges until the device has accepted a drive or measured a sample.
+    fn exchange_until_progress(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, RemoteError> {
         let mut run = self.run.ok_or(RemoteError::Order)?;
         let (before, began) = (measured.len(), self.line.now());
         loop {
-            let outcome = self.trade(&mut run, drive_v, measured);
+            let outcome = self.exchange_once(&mut run, drive_v, measured);
             self.run = Some(run);
             let taken = outcome?;
             let outstanding = run.sent != run.heard;
             if taken > 0 || measured.len() > before || !outstanding && drive_v.is_empty() {
                 return Ok(taken);
             }
-            if self.since(began) > self.lost() {
-                // The runner calls that a stalled device.
+            if self.since(began) > self.answer_timeout() {
+                // The runner reports this as a stalled device.
                 return Ok(0);
             }
             self.line.pause(Duration::from_micros(200));
@@ -746,9 +771,9 @@ impl<L: Line> Daq for Remote<L> {
             silence_s: o.silence_s as f32,
             force: o.force,
         };
-        let status = match self.stated(Ask::Start(start)) {
+        let status = match self.ask_status(Ask::Start(start)) {
             Err(error @ (RemoteError::Silent { .. } | RemoteError::Answer { .. })) => {
-                // It may have begun all the same.
+                // The run may have begun although the answer was lost.
                 let _ = self.ask(Ask::Stop);
                 return Err(error);
             }
@@ -759,14 +784,14 @@ impl<L: Line> Daq for Remote<L> {
         let lookahead = (LOOKAHEAD_S * rate_hz).ceil().clamp(8.0, 1e6) as u32;
         self.run = Some(Run { session: o.session, rate_hz, sent: 0, heard: 0, room: status.room, lookahead, ticks: 0 });
         if o.mode == Mode::Reference {
-            // Ramps begin and end where the output is now, wherever its sensor's noise puts it.
+            // Ramps begin and end at the present output. The margin allows for the sensor's noise.
             let (range, output) = (&mut self.capabilities.voltage, f64::from(status.output));
-            let margin = MARGIN * (range.max_v - range.min_v);
+            let margin = REFERENCE_MARGIN * (range.max_v - range.min_v);
             range.min_v = range.min_v.min(output - margin);
             range.max_v = range.max_v.max(output + margin);
             range.rest_v = output;
         }
-        // The next run of this program is another one.
+        // The next run of this program has another number.
         self.options.session = o.session.wrapping_add(1);
         Ok(rate_hz)
     }
@@ -778,13 +803,11 @@ impl<L: Line> Daq for Remote<L> {
                 Mode::Voltage | Mode::Nothing => {
                     "give voltages within the device's range; nothing of the block was applied"
                 }
-                Mode::Reference => {
-                    "give references within the range that was agreed on; nothing of the block was applied"
-                }
+                Mode::Reference => "give references within the range of the run; nothing of the block was applied",
             };
             return Err(RemoteError::Value { what: "drive", value: *bad, advice });
         }
-        self.trade_until_news(drive_v, measured)
+        self.exchange_until_progress(drive_v, measured)
     }
 
     fn rest(&mut self, seconds: f64) -> Result<(), RemoteError> {
@@ -792,29 +815,29 @@ impl<L: Line> Daq for Remote<L> {
             return Err(RemoteError::Value { what: "rest", value: seconds, advice: "give a time from 0 to 1e6 s" });
         }
         let Some(run) = self.run else { return Ok(()) };
-        // Its samples are nobody's: the device is only kept from missing its host.
+        // The samples are discarded; the exchange only resets the watchdog.
         let VoltageRange { min_v, max_v, rest_v: rest } = self.capabilities.voltage;
         let slew = match self.options.mode {
             Mode::Voltage | Mode::Nothing => self.slew(),
-            // From one end to the other in a second.
+            // The whole range in one second.
             Mode::Reference => (max_v - min_v).max(f64::MIN_POSITIVE),
         };
         let step = slew / run.rate_hz;
         let (from, ramp) = (self.present_v, ((self.present_v - rest).abs() / step).ceil() as usize);
         let total = ramp + (seconds * run.rate_hz).round() as usize;
         let volts = |k: usize| if k + 1 >= ramp { rest } else { from + (rest - from) * (k + 1) as f64 / ramp as f64 };
-        let (mut sent, mut nobody) = (0, Vec::new());
+        let (mut sent, mut discarded) = (0, Vec::new());
         while sent < total {
-            nobody.clear();
+            discarded.clear();
             let block: Vec<f64> = (sent..total.min(sent + MOST_DRIVES)).map(volts).collect();
-            let taken = self.trade_until_news(&block, &mut nobody)?;
-            self.goes_on(taken, &nobody)?;
+            let taken = self.exchange_until_progress(&block, &mut discarded)?;
+            self.require_progress(taken, &discarded)?;
             sent += taken;
         }
         while self.run.is_some_and(|run| run.heard != run.sent) {
-            nobody.clear();
-            let taken = self.trade_until_news(&[], &mut nobody)?;
-            self.goes_on(taken, &nobody)?;
+            discarded.clear();
+            let taken = self.exchange_until_progress(&[], &mut discarded)?;
+            self.require_progress(taken, &discarded)?;
         }
         Ok(())
     }
@@ -827,9 +850,9 @@ impl<L: Line> Daq for Remote<L> {
         if self.run.is_none() {
             return Ok(());
         }
-        let (began, longest) = (self.line.now(), self.longest_rest());
+        let (began, longest) = (self.line.now(), self.rest_timeout());
         loop {
-            let status = self.stated(Ask::Stop)?;
+            let status = self.ask_status(Ask::Stop)?;
             let at_rest = matches!(status.state, State::Fault(_)) && status.present_v == self.identity.rest_v;
             if status.state == State::Idle || at_rest {
                 self.run = None;

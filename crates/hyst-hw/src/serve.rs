@@ -1,4 +1,4 @@
-//! A device made of software, behind a line: for trying and testing what runs on hosts.
+//! A device in software behind a line, for trying and testing the host side.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -12,14 +12,18 @@ use crate::plant::error::PlantError;
 use crate::remote::Line;
 use crate::wire::{Board, Control, Deframer, Device, Identity, MAX_FRAME, MOST_NAME, Request, Shown, Unit, encode};
 
-/// Periods that are made up for when this computer was late; more than that the device's clock loses.
-const MOST_LATE: u32 = 1000;
-/// Of them, those that are made up for before the line is heard again: a host would seem silent that was not.
-const AT_ONCE: u32 = 20;
-/// Hosts at a time; another is hung up on.
-const MOST_HOSTS: usize = 8;
+/// Maximum number of late periods that are caught up.
+///
+/// If this computer is later than that, the device skips periods.
+const MAX_LATE_PERIODS: u32 = 1000;
+/// Maximum number of periods that are caught up before the line is read again.
+///
+/// Otherwise the watchdog could count a host as silent although its requests wait in the line.
+const MAX_PERIODS_AT_ONCE: u32 = 20;
+/// Maximum number of connected hosts; further connections are closed.
+const MAX_HOSTS: usize = 8;
 
-/// The host's clock as the device's.
+/// The clock of the device, driven by the clock of this computer.
 struct Pace {
     due: Instant,
 }
@@ -29,26 +33,26 @@ impl Pace {
         Self { due: Instant::now() }
     }
 
-    /// Makes up for what has passed, and gives how long there is until the next period.
-    fn follow<C: Control, const Q: usize, const M: usize>(
+    /// Runs the periods that are due and returns the time until the next one.
+    fn run_due_periods<C: Control, const Q: usize, const M: usize>(
         &mut self,
         device: &mut Device<C, Q, M>,
         board: &mut impl Board,
     ) -> Duration {
         let period = Duration::from_secs_f64(1.0 / f64::from(device.rate_hz().max(1.0)));
         let mut late = 0;
-        while late < AT_ONCE && self.due <= Instant::now() {
+        while late < MAX_PERIODS_AT_ONCE && self.due <= Instant::now() {
             device.tick(board);
             self.due += period;
             late += 1;
         }
-        if Instant::now().saturating_duration_since(self.due) > period * MOST_LATE {
+        if Instant::now().saturating_duration_since(self.due) > period * MAX_LATE_PERIODS {
             self.due = Instant::now();
         }
         self.due.saturating_duration_since(Instant::now())
     }
 
-    /// Answers what has come.
+    /// Answers the received requests.
     fn answer<C: Control, const Q: usize, const M: usize>(
         &mut self,
         device: &mut Device<C, Q, M>,
@@ -57,7 +61,7 @@ impl Pace {
         mut send: impl FnMut(&[u8]) -> io::Result<()>,
     ) -> io::Result<()> {
         while let Some(request) = deframer.next::<Request>(&mut fresh) {
-            // What was changed on the way is asked again.
+            // The host repeats a damaged request.
             let Ok(request) = request else { continue };
             let before = device.rate_hz();
             let reply = device.answer(&request);
@@ -70,10 +74,10 @@ impl Pace {
     }
 }
 
-/// Serves a device at `line` on the host's clock, until `stop` says so or the line is gone.
+/// Serves a device on `line`, on the clock of this computer, until `stop` returns true.
 ///
 /// # Errors
-/// When the line is gone.
+/// If the connection is lost.
 pub fn serve<C: Control, const Q: usize, const M: usize>(
     device: &mut Device<C, Q, M>,
     board: &mut impl Board,
@@ -82,17 +86,19 @@ pub fn serve<C: Control, const Q: usize, const M: usize>(
 ) -> io::Result<()> {
     let (mut deframer, mut bytes, mut pace) = (Deframer::new(), [0; 4096], Pace::new());
     while !stop() {
-        let patience = pace.follow(device, board);
+        let patience = pace.run_due_periods(device, board);
         let came = line.receive(&mut bytes, patience)?;
         pace.answer(device, &mut deframer, &bytes[..came], |frame| line.send(frame))?;
     }
     Ok(())
 }
 
-/// What a host's socket has to say: its number, and what came, or nothing when it is gone.
-type Heard = (usize, Option<Vec<u8>>);
+/// Message from the reader of a connection: number of the host, and the received bytes.
+///
+/// `None` instead of bytes is the end of the connection.
+type Received = (usize, Option<Vec<u8>>);
 
-/// A host at a socket.
+/// A connected host.
 struct Host {
     number: usize,
     stream: TcpStream,
@@ -101,14 +107,19 @@ struct Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        // Who reads from it hears the end.
+        // Ends the reader thread.
         let _ = self.stream.shutdown(Shutdown::Both);
     }
 }
 
 impl Host {
-    /// With a thread that reads from it.
-    fn new<'s>(threads: &'s Scope<'s, '_>, number: usize, stream: TcpStream, heard: Sender<Heard>) -> io::Result<Self> {
+    /// Starts a thread that reads from the connection.
+    fn new<'s>(
+        threads: &'s Scope<'s, '_>,
+        number: usize,
+        stream: TcpStream,
+        heard: Sender<Received>,
+    ) -> io::Result<Self> {
         stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;
         let mut reader = stream.try_clone()?;
@@ -125,11 +136,12 @@ impl Host {
     }
 }
 
-/// Serves a device to all who come to `listener` until `stop` says so: as on a bus, one may stop what another has started. Its clock goes on
-/// without any of them, and with it its watchdog.
+/// Serves a device to all hosts that connect to `listener`, until `stop` returns true.
+///
+/// As on a bus, one host may stop the run of another. The clock of the device, and with it the watchdog, also runs without hosts.
 ///
 /// # Errors
-/// When the listener cannot be asked without waiting.
+/// If the listener cannot be set to non-blocking mode.
 pub fn serve_at<C: Control, const Q: usize, const M: usize>(
     listener: &TcpListener,
     device: &mut Device<C, Q, M>,
@@ -137,15 +149,15 @@ pub fn serve_at<C: Control, const Q: usize, const M: usize>(
     mut stop: impl FnMut() -> bool,
 ) -> io::Result<()> {
     listener.set_nonblocking(true)?;
-    let (heard, inbox): (Sender<Heard>, Receiver<Heard>) = channel();
+    let (heard, inbox): (Sender<Received>, Receiver<Received>) = channel();
     std::thread::scope(|threads| {
         let (mut hosts, mut next, mut pace) = (Vec::<Host>::new(), 0, Pace::new());
         while !stop() {
-            let patience = pace.follow(device, board);
+            let patience = pace.run_due_periods(device, board);
             if let Ok((stream, _)) = listener.accept()
-                && hosts.len() < MOST_HOSTS
+                && hosts.len() < MAX_HOSTS
             {
-                // A host that is gone already is no end.
+                // A host that has already disconnected is ignored.
                 hosts.extend(Host::new(threads, next, stream, heard.clone()));
                 next += 1;
             }
@@ -167,7 +179,7 @@ pub fn serve_at<C: Control, const Q: usize, const M: usize>(
     })
 }
 
-/// The simulated plant as amplifier and sensors.
+/// The simulated plant as the amplifier and the sensors of a device.
 #[derive(Debug)]
 pub struct PlantBoard {
     plant: Plant,
@@ -177,17 +189,17 @@ pub struct PlantBoard {
 }
 
 impl PlantBoard {
-    /// With the plant's clock at `rate_hz`.
+    /// Starts the plant at `rate_hz`.
     ///
     /// # Errors
-    /// When the plant cannot run at that rate.
+    /// If the plant cannot run at this rate.
     pub fn new(mut plant: Plant, rate_hz: f64) -> Result<Self, PlantError> {
         plant.start(rate_hz)?;
         let volts = plant.present_v();
         Ok(Self { plant, volts, samples: Vec::new(), last: Shown::default() })
     }
 
-    /// What a device with this plant says of itself; `follows`: that it has a controller.
+    /// Returns the identity of a device with this plant; `follows`: the device has a controller.
     pub fn identity(&self, rate_hz: f64, follows: bool) -> Identity {
         let can = self.plant.capabilities();
         let name = "simulated plant behind a line".bytes().take(MOST_NAME).collect();
@@ -212,7 +224,7 @@ impl PlantBoard {
 impl Board for PlantBoard {
     fn measure(&mut self) -> Shown {
         self.samples.clear();
-        // What the plant cannot do shows as a sensor without a number: the device stops by itself.
+        // An error of the plant becomes a sensor reading that is not a number, which stops the device.
         let played = self.plant.exchange(&[self.volts], &mut self.samples);
         self.last = match (played, self.samples.last()) {
             (Ok(_), Some(sample)) => Shown {

@@ -1,4 +1,4 @@
-//! A device as firmware builds it, on the traits of `embedded-io` and `embedded-can`, with a host at the other end.
+//! A device as in firmware, with drivers of `embedded-io` and `embedded-can`, and its host.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -48,7 +48,7 @@ fn echo() -> Echo {
     Device::new(identity, Open)
 }
 
-/// A UART that has room for a byte every third time it is asked, and both ends of its line.
+/// A UART, ready to write only at every third query, and both ends of its line.
 #[derive(Default)]
 struct Uart {
     to_device: VecDeque<u8>,
@@ -85,7 +85,7 @@ impl Write for Uart {
     }
 }
 
-/// The main loop of a firmware with a serial line; the clock goes on with each look of the host.
+/// The main loop of a firmware with a serial line; each `receive` of the host advances the clock.
 struct SerialBoard {
     device: Echo,
     amplifier: Amplifier,
@@ -107,7 +107,7 @@ impl Line for SerialBoard {
     }
 }
 
-fn all_is_played(line: impl Line) {
+fn check_complete_run(line: impl Line) {
     let options = RemoteOptions { silence_s: 30.0, ..RemoteOptions::with_session(5) };
     let mut remote = Remote::open(line, "board", options).unwrap();
     let drive: Vec<f64> = (0..500).map(|k| 50.0 - 50.0 * (f64::from(k) * 0.02).cos()).collect();
@@ -123,8 +123,8 @@ fn all_is_played(line: impl Line) {
 }
 
 #[test]
-fn a_run_over_a_serial_driver_that_is_seldom_ready() {
-    all_is_played(SerialBoard {
+fn a_run_over_a_rarely_ready_serial_driver_is_complete() {
+    check_complete_run(SerialBoard {
         device: echo(),
         amplifier: Amplifier::default(),
         server: SerialServer::new(),
@@ -168,7 +168,9 @@ impl embedded_can::Error for Never {
     }
 }
 
-/// A controller with one place for a frame to send, which a frame that waits there loses to the next one now and then.
+/// A CAN controller with one transmit mailbox.
+///
+/// Sometimes the next frame replaces the frame that waits there.
 #[derive(Default)]
 struct Controller {
     to_device: VecDeque<Classic>,
@@ -206,7 +208,7 @@ struct CanBoard {
 
 impl Bus for CanBoard {
     fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()> {
-        // Others speak on the bus, too.
+        // Another node also sends on the bus.
         let other = Id::Extended(ExtendedId::new(0x18da_f100).unwrap());
         let frames = [(other, &[0x10, 0x20, 1, 2, 3, 4, 5, 6][..]), (StandardId::new(id as u16).unwrap().into(), data)];
         self.controller.to_device.extend(frames.map(|(id, data)| Classic::new(id, data).unwrap()));
@@ -224,17 +226,17 @@ impl Bus for CanBoard {
 }
 
 #[test]
-fn a_run_over_a_can_driver_on_a_bus_with_others() {
+fn a_run_over_a_can_driver_on_a_shared_bus_is_complete() {
     let board = CanBoard {
         device: echo(),
         amplifier: Amplifier::default(),
         server: CanServer::new(TO_DEVICE, FROM_DEVICE),
         controller: Controller::default(),
     };
-    all_is_played(CanLine::new(board, TO_DEVICE, FROM_DEVICE, false));
+    check_complete_run(CanLine::new(board, TO_DEVICE, FROM_DEVICE, false));
 }
 
-/// The most that a device may have to say in one answer fits in a frame, and so does the most that it may be asked.
+/// The largest answer and the largest request fit in a frame.
 #[test]
 fn the_largest_messages_fit_in_a_frame() {
     let status = Status {

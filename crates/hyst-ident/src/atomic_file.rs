@@ -1,29 +1,29 @@
-//! Files that are written whole or not at all.
+//! Atomic writing of files.
 //!
-//! The content goes to a temporary file in the target's folder, which takes the target's name only when everything is
-//! on the disk. A command that fails half-way leaves an older file as it was, and no fragment.
+//! The content is written to a temporary file in the folder of the target. The temporary file is renamed to the target
+//! when everything is on the disk. A command that fails leaves an older file unchanged, and no fragment.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// A file could not be written; whatever stood at the path is unchanged.
+/// A file could not be written. An older file at the path is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot be written: {source}", path.display())]
 pub struct AtomicFileError {
-    /// The path as it was given.
+    /// The path as given by the caller.
     pub path: PathBuf,
-    /// What went wrong.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
-/// Writes what `content` writes to the file at `path`, replacing an older one.
+/// Writes the file at `path` with `content`, and replaces an older file.
 ///
-/// A symbolic link stays one: the file behind it is replaced. What is no regular file (as `/dev/stdout`) cannot be
-/// replaced and is written directly.
+/// A symbolic link is kept, and its target is replaced. A path that is not a regular file (such as `/dev/stdout`) is
+/// written directly.
 ///
 /// # Errors
-/// When the folder is missing or not writable, `path` is a folder, or `content` fails; nothing has changed then.
+/// If the folder is missing or not writable, `path` is a folder, or `content` fails. Nothing is changed then.
 pub fn write_atomic(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -31,10 +31,10 @@ pub fn write_atomic(
     put(path.as_ref(), Older::Replaced, content).map(|_| ())
 }
 
-/// As [`write_atomic`], but nothing that is there already is replaced.
+/// Writes a new file as [`write_atomic`] does; an existing file is not replaced.
 ///
 /// # Errors
-/// As [`write_atomic`], and with [`AlreadyExists`](io::ErrorKind::AlreadyExists) when there is something at `path`.
+/// Those of [`write_atomic`], and [`AlreadyExists`](io::ErrorKind::AlreadyExists) if `path` exists.
 pub fn create_atomic(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -42,10 +42,12 @@ pub fn create_atomic(
     put(path.as_ref(), Older::Kept, content).map(|_| ())
 }
 
-/// As [`write_atomic`], but an older file keeps its content under the name that is returned: `path.~1~` or the next free number.
+/// Writes a file as [`write_atomic`] does, but keeps an older file under another name.
+///
+/// Returns this name: `path.~1~` or the next free number.
 ///
 /// # Errors
-/// As [`write_atomic`], and when the older file cannot have another name; nothing has changed then.
+/// Those of [`write_atomic`], and if the older file cannot be renamed. Nothing is changed then.
 pub fn write_beside_older(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -53,11 +55,13 @@ pub fn write_beside_older(
     put(path.as_ref(), Older::SetAside, content)
 }
 
-/// As [`write_beside_older`], but an older file of the same kind is replaced: one that begins as the new one does, with the same line of a text, or as
-/// JSON, markup or binary data do. What was computed is computed anew; what is something else is kept.
+/// Writes a file as [`write_beside_older`] does; an older file of the same kind is replaced.
+///
+/// Files are of the same kind if their first lines are equal, or if both begin as JSON, as markup, or with the same binary header. A computed
+/// file thus replaces an earlier result, but not another file.
 ///
 /// # Errors
-/// As [`write_beside_older`].
+/// Those of [`write_beside_older`].
 pub fn write_over_alike(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -65,22 +69,23 @@ pub fn write_over_alike(
     put(path.as_ref(), Older::SetAsideIfOther, content)
 }
 
-/// Whether a file could be written at `path`: before work is done whose result would be lost.
+/// Checks that a file can be written at `path`, before a long computation.
 ///
 /// # Errors
-/// When the folder is missing or not writable, or there is a file that is protected.
+/// If the folder is missing or not writable, or the file is read-only.
 pub fn check_writable(path: impl AsRef<Path>) -> Result<(), AtomicFileError> {
     let path = path.as_ref();
     let check = || place(path)?.map_or(Ok(()), |place| in_folder(&place.folder).map(drop));
     check().map_err(|source| AtomicFileError { path: path.to_owned(), source })
 }
 
-/// Gives the regular file `target` a second name, `target.~1~` or the next free number, under which it stays when `target` is
-/// replaced. Where the file system knows no second names, the file is renamed; what fails between taking the new name and that may leave
-/// an empty file there.
+/// Gives the regular file `target` a second name and returns it.
+///
+/// The name is `target.~1~` or the next free number. The file keeps this name when `target` is replaced. If the file system has no hard links, the file is renamed. A failure between the
+/// reservation of the name and the renaming may leave an empty file.
 ///
 /// # Errors
-/// When the folder refuses.
+/// If the operating system refuses the new name.
 pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
     let mut number = 1_u64;
     loop {
@@ -89,11 +94,11 @@ pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
         let name = PathBuf::from(name);
         match fs::hard_link(target, &name) {
             Ok(()) => return Ok(name),
-            // Somebody's, perhaps of this very moment.
+            // The name exists, perhaps created by another program at this moment.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            // Perhaps there are no second names here.
+            // The file system may have no hard links.
             Err(_) => match File::options().write(true).create_new(true).open(&name) {
-                // The name is taken by an empty file first: of two programs only one can make it.
+                // An empty file reserves the name: only one of two programs can create it.
                 Ok(_) => {
                     return fs::rename(target, &name).map(|()| name.clone()).inspect_err(|_| {
                         let _ = fs::remove_file(&name);
@@ -106,7 +111,7 @@ pub fn set_aside(target: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// What becomes of an older file.
+/// What happens to an older file.
 #[derive(Clone, Copy, PartialEq)]
 enum Older {
     Replaced,
@@ -115,16 +120,16 @@ enum Older {
     SetAsideIfOther,
 }
 
-/// Where a file goes: under a name in a folder, perhaps instead of an older one.
+/// The place of a file: its path, its folder, and the metadata of an older file.
 struct Place {
     target: PathBuf,
     folder: PathBuf,
     existing: Option<fs::Metadata>,
 }
 
-/// Where the file at `path` goes; `None` where something stands that is no regular file.
+/// Returns the place of the file at `path`; `None` if `path` exists and is not a regular file.
 fn place(path: &Path) -> io::Result<Option<Place>> {
-    // Of the target, if there is one: the temporary file has to lie beside what it replaces.
+    // Links are resolved, because the temporary file must be in the folder of the file that it replaces.
     let target = match path.canonicalize() {
         Ok(target) => target,
         Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_owned(),
@@ -134,7 +139,7 @@ fn place(path: &Path) -> io::Result<Option<Place>> {
     match &existing {
         Some(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Some(metadata) if !metadata.is_file() => return Ok(None),
-        // Renaming would replace a file that its owner protects.
+        // Renaming would replace a read-only file.
         Some(metadata) if metadata.permissions().readonly() => {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is read-only"));
         }
@@ -151,7 +156,7 @@ fn place(path: &Path) -> io::Result<Option<Place>> {
     Ok(Some(Place { target, folder, existing }))
 }
 
-/// How files of one kind begin.
+/// Returns the bytes with which files of the same kind begin.
 fn kind(mut file: File) -> io::Result<Vec<u8>> {
     file.rewind()?;
     let mut head = Vec::new();
@@ -165,7 +170,7 @@ fn kind(mut file: File) -> io::Result<Vec<u8>> {
     Ok(first[..most.min(first.len())].to_vec())
 }
 
-/// Writes a file, and gives the name that an older one has then.
+/// Writes a file, and returns the new name of an older file.
 fn put(
     path: &Path,
     older: Older,
@@ -179,7 +184,7 @@ fn try_put(
     older: Older,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<Option<PathBuf>> {
-    // A link that leads nowhere is something, too.
+    // A dangling link counts as existing.
     if older == Older::Kept && path.symlink_metadata().is_ok() {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
@@ -200,7 +205,7 @@ fn try_put(
     let keeps = replaces
         && match older {
             Older::SetAside => true,
-            // One that cannot be read may be anything.
+            // A file that cannot be read counts as another kind.
             Older::SetAsideIfOther => {
                 File::open(&target).and_then(kind).ok() != Some(kind(temporary.as_file().try_clone()?)?)
             }
@@ -209,7 +214,7 @@ fn try_put(
     let aside = if keeps { Some(set_aside(&target)?) } else { None };
     let named = match older {
         Older::Replaced | Older::SetAside | Older::SetAsideIfOther => temporary.persist(&target),
-        // Somebody else may have made one meanwhile.
+        // Another program may have created the file in the meantime.
         Older::Kept => temporary.persist_noclobber(&target),
     };
     named.map_err(|error| error.error)?;
@@ -222,14 +227,14 @@ fn write_through(file: File, content: impl FnOnce(&mut dyn Write) -> io::Result<
     buffered.flush()
 }
 
-/// A temporary file that everybody may read whom the process lets, not its owner alone.
+/// Creates a temporary file with the default permissions of the process, instead of owner-only permissions.
 fn in_folder(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".hyst-").suffix(".part");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // The process's umask applies.
+        // The umask of the process applies.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder)
@@ -258,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_leaves_the_older_file_and_no_fragment() {
+    fn a_failure_keeps_the_older_file_and_leaves_no_fragment() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.csv");
         fs::write(&path, "older").unwrap();
@@ -274,14 +279,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_created_replaces_nothing() {
+    fn create_atomic_does_not_replace_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.json");
         create_atomic(&path, |out| out.write_all(b"first")).unwrap();
         let refused = |path: &Path| create_atomic(path, |out| out.write_all(b"second")).unwrap_err().source.kind();
         assert_eq!(refused(&path), io::ErrorKind::AlreadyExists);
         assert_eq!(refused(folder.path()), io::ErrorKind::AlreadyExists);
-        // One that appears while the content is written is kept as well.
+        // A file that appears while the content is written is kept too.
         let late = folder.path().join("late.json");
         let error = create_atomic(&late, |_| fs::write(&late, "theirs")).unwrap_err();
         assert_eq!(error.source.kind(), io::ErrorKind::AlreadyExists);
@@ -291,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_set_aside_stays() {
+    fn older_files_are_kept_under_numbered_names() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         let write = |text: &str| write_beside_older(&path, |out| out.write_all(text.as_bytes())).unwrap();
@@ -305,13 +310,13 @@ mod tests {
             ["a.csv", "a.csv.~1~", "a.csv.~2~", "a.csv.~3~"].map(read),
             ["third", "somebody's", "first", "second"]
         );
-        // A failure leaves all names as they were.
+        // A failure changes no names.
         write_beside_older(&path, |_| Err(io::Error::other("no"))).unwrap_err();
         assert_eq!(names(folder.path()).len(), 4);
     }
 
     #[test]
-    fn what_is_of_another_kind_is_set_aside_and_what_is_alike_is_replaced() {
+    fn files_of_another_kind_are_kept_and_files_of_the_same_kind_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         let write = |bytes: &[u8]| {
@@ -335,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn whether_a_file_could_be_written_is_known_before() {
+    fn check_writable_creates_no_file() {
         let folder = tempfile::tempdir().unwrap();
         check_writable(folder.path().join("new.csv")).unwrap();
         assert!(names(folder.path()).is_empty());
@@ -344,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_are_no_targets_and_have_to_exist() {
+    fn a_folder_is_refused_as_target_and_must_exist() {
         let folder = tempfile::tempdir().unwrap();
         let write = |path: &Path| write_atomic(path, |_| Ok(())).unwrap_err().to_string();
         assert!(write(folder.path()).contains("directory"));
@@ -354,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_read_only_file_stays_as_it_is() {
+    fn a_read_only_file_is_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.json");
         fs::write(&path, "older").unwrap();

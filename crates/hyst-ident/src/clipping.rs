@@ -1,63 +1,64 @@
-//! Rows in which the sensor stands at the end of its range.
+//! Rows in which the sensor is at the end of its range (clipping).
 //!
-//! There it shows the same figure again and again, to the last digit, while elsewhere the last digits move: of the motion such
-//! a row says only that it lies beyond. A mechanical stop or a held drive still has the sensor's noise on it.
+//! There the sensor repeats one value to the last digit, while the last digits change in all other rows. The motion in such a row is only
+//! known to be outside the range. At a mechanical stop or with a held drive, the sensor noise still changes the last digits.
 
 use std::ops::Range;
 
 use crate::samples::range;
 
-/// Rows of the same figure that make the output stand.
-const STANDS: usize = 10;
-/// Share of the other rows that may stand too, if the last digits are said to move.
-const STILL: f64 = 0.01;
-/// Share of the other rows in which the third difference turns: three quarters in noise, few in a smooth motion without it.
-const TURNS: f64 = 0.3;
+/// Fewest equal rows in sequence that count as constant.
+const MIN_CONSTANT_ROWS: usize = 10;
+/// Largest share of constant rows inside the range. With more, an output without noise is assumed.
+const MAX_CONSTANT_SHARE: f64 = 0.01;
+/// Smallest share of rows in which the third difference changes its sign, for an output with noise. Noise has about 75 %, a smooth motion
+/// without noise has few.
+const MIN_SIGN_CHANGE_SHARE: f64 = 0.3;
 
-/// Rows at an end of the sensor's range.
+/// Rows at one end of the sensor range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clipped {
-    /// What the sensor shows there \[output unit\].
+    /// The value of the sensor at this end \[output unit\].
     pub at: f64,
-    /// The rows, from 0, in uninterrupted intervals.
+    /// The rows, counted from 0, in contiguous intervals.
     pub intervals: Vec<Range<usize>>,
 }
 
 /// Marks the clipped rows of an output.
 pub(crate) fn clipped_rows(output: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
     let (low, high) = range(output.iter().copied());
-    let (mut clipped, mut stands) = (vec![false; output.len()], 0);
+    let (mut clipped, mut constant) = (vec![false; output.len()], 0);
     for s in segments {
         let mut end = s.start;
         for run in output[s.clone()].chunk_by(|a, b| a == b) {
             end += run.len();
-            if run.len() >= STANDS {
+            if run.len() >= MIN_CONSTANT_ROWS {
                 if run[0] == low || run[0] == high {
                     clipped[end - run.len()..end].fill(true);
                 } else {
-                    stands += run.len();
+                    constant += run.len();
                 }
             }
         }
     }
-    // A play without noise stands at every turn, and so do digits that are coarser than the noise: that is no end of a range.
+    // A play operator without noise is constant after every turn, and so are digits coarser than the noise. This is not clipping.
     let rows = segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !clipped[*k]).count();
-    if stands as f64 > STILL * rows as f64 || !last_digits_move(output, segments, &clipped) {
+    if constant as f64 > MAX_CONSTANT_SHARE * rows as f64 || !last_digits_move(output, segments, &clipped) {
         clipped.fill(false);
     }
     clipped
 }
 
-/// Whether the last digits of an output move from row to row, in the rows that are not left out: it has noise beyond its digits.
+/// Returns whether the last digits of an output change from row to row, except in the rows `left_out`: the noise exceeds the resolution.
 pub(crate) fn last_digits_move(output: &[f64], segments: &[Range<usize>], left_out: &[bool]) -> bool {
     let inner = || segments.iter().flat_map(|s| s.start + 4..s.end).filter(|k| !left_out[*k]);
     let third = |k: usize| output[k] - 3.0 * output[k - 1] + 3.0 * output[k - 2] - output[k - 3];
-    let turns = inner().filter(|k| third(*k) * third(k - 1) < 0.0).count();
+    let sign_changes = inner().filter(|k| third(*k) * third(k - 1) < 0.0).count();
     let rows = inner().count();
-    rows > 0 && turns as f64 >= TURNS * rows as f64
+    rows > 0 && sign_changes as f64 >= MIN_SIGN_CHANGE_SHARE * rows as f64
 }
 
-/// The lower and the upper end of the sensor's range, where rows of an output lie at them.
+/// Finds the rows of an output at the lower and the upper end of the sensor range.
 pub fn clipped(output: &[f64], segments: &[Range<usize>]) -> Vec<Clipped> {
     let marked = clipped_rows(output, segments);
     let (low, high) = range(output.iter().copied());
@@ -78,12 +79,12 @@ pub fn clipped(output: &[f64], segments: &[Range<usize>]) -> Vec<Clipped> {
 mod tests {
     use super::*;
 
-    /// What is found in one segment.
+    /// Returns the clipped rows of one segment.
     fn found_in(output: &[f64]) -> Vec<Clipped> {
         clipped(output, &[Range { start: 0, end: output.len() }])
     }
 
-    /// A sine with moving last digits.
+    /// A sine with changing last digits.
     fn sine(rows: usize) -> Vec<f64> {
         (0..rows).map(|k| (0.01 * k as f64).sin() + 1e-4 * (1e4 * (k as f64).sqrt()).sin()).collect()
     }
@@ -106,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn plays_without_noise_stand_where_they_turn() {
+    fn a_play_operator_without_noise_is_not_clipped() {
         let mut p = 0.0;
         let y: Vec<f64> = (0..2000)
             .map(|k| (0.01 * f64::from(k)).sin())
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_output_is_another_fault() {
+    fn a_constant_output_is_not_clipped() {
         assert_eq!(found_in(&[1.0; 100]), []);
     }
 }

@@ -1,7 +1,7 @@
-//! `compare`: every model that can be fitted to a record, side by side.
+//! Fits all models to a record and compares them.
 //!
-//! Each is fitted to the training record alone and simulated on it and on the test record. All are judged by the same rows:
-//! those that are a start-up transient for any of them count for none.
+//! Each model is fitted to the training record only and simulated on it and on the test record. All are judged on the
+//! same rows: rows that are start-up rows for any of them do not count.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -16,32 +16,32 @@ use crate::model::{Base, Kind};
 use crate::record::Record;
 use crate::simulate::{Simulation, Zero, simulate};
 
-/// What the models are sorted by.
+/// Key by which the models are sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SortedBy {
-    /// RMSE on the training record: a model with more parameters has less of it, whatever it is worth.
+    /// RMSE on the training record. A model with more parameters has a smaller one, whatever its value.
     TrainRmse,
     /// RMSE on the test record, which no model has seen.
     TestRmse,
 }
 
-/// How far a model's prediction is from a record.
+/// Errors of a model's prediction of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// RMSE, its share of the span, largest error.
+    /// RMSE, its share of the span, maximum error.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Mean absolute error relative to the measurement, rows near zero left out.
+    /// Mean absolute error relative to the measurement, without rows near zero.
     pub mape: Mape,
     /// Symmetric mean absolute error, a ratio between 0 and 2.
     pub smape: f64,
-    /// Largest error minus smallest, signs included \[output unit\].
+    /// Maximum minus minimum of the signed error \[output unit\].
     pub peak_to_valley: f64,
 }
 
 impl Figures {
-    /// Compares; `settling` flags the rows that do not count.
+    /// Computes the errors; `settling` flags the rows that do not count.
     ///
     /// # Errors
     /// As [`Errors::of`].
@@ -58,81 +58,82 @@ impl Figures {
 /// One model on the records.
 #[derive(Clone, Debug, Serialize)]
 pub struct Compared {
-    /// Its kind.
+    /// Kind.
     #[serde(rename = "model", serialize_with = "as_name")]
     pub kind: Kind,
-    /// Numbers that were identified; the sensor's zero is not among them.
+    /// Number of identified parameters, without the sensor's zero.
     pub parameters: usize,
-    /// Those that the record does not determine, or only together with others; `None` where they are elements of `tables`.
+    /// Parameters that the record does not determine, or only together with others; `None` if the parameters are
+    /// elements of `tables`.
     pub undetermined: Option<Vec<String>>,
-    /// How much the record says of each element of a table of weights: cells, nodes.
+    /// What the record says about each element of a table of weights: cells, nodes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<TableEstimate>,
     /// On the training record.
     pub train: Figures,
     /// On the test record, if there is one.
     pub test: Option<Figures>,
-    /// In words, how it was fitted.
+    /// Description of the fit.
     pub how: String,
     /// Evaluations of the model.
     pub evaluations: u64,
-    /// Time that the fit took \[s\]: the only field that differs between two runs.
+    /// Duration of the fit \[s\]: the only field that differs between two runs.
     pub fit_seconds: f64,
     /// The fit.
     #[serde(skip)]
     pub fit: Fit,
-    /// What it predicts of the training record, row by row \[output unit\].
+    /// Prediction for each row of the training record \[output unit\].
     #[serde(skip)]
     pub train_predicted: Vec<f64>,
-    /// What it predicts of the test record.
+    /// Prediction for each row of the test record \[output unit\].
     #[serde(skip)]
     pub test_predicted: Vec<f64>,
 }
 
 impl Compared {
-    /// What it is sorted by.
+    /// Returns the RMSE by which the model is sorted.
     fn rmse(&self) -> f64 {
         self.test.unwrap_or(self.train).errors.rmse
     }
 }
 
-/// A model that does not suit the records.
+/// A model that was not fitted.
 #[derive(Clone, Debug, Serialize)]
 pub struct Skipped {
-    /// Its kind.
+    /// Kind.
     #[serde(rename = "model", serialize_with = "as_name")]
     pub kind: Kind,
-    /// Why it was left out, and what it takes.
+    /// Why it was not fitted, and what it requires.
     pub reason: String,
 }
 
-/// Models side by side.
+/// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// What the models are sorted by.
+    /// Key by which the models are sorted.
     pub sorted_by: SortedBy,
     /// The models, best first.
     pub models: Vec<Compared>,
-    /// Models that were left out, with the reason.
+    /// Models that were not fitted, with the reason.
     pub skipped: Vec<Skipped>,
-    /// Rows of the training record that count for no model.
+    /// Rows of the training record that do not count.
     #[serde(skip)]
     pub train_settling: Vec<bool>,
-    /// Rows of the test record that count for no model.
+    /// Rows of the test record that do not count.
     #[serde(skip)]
     pub test_settling: Vec<bool>,
 }
 
-/// How far a comparison is.
+/// Progress of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// The model that is being fitted.
     pub kind: Kind,
-    /// Models that are done.
+    /// Number of finished models.
     pub done: usize,
-    /// Models in all.
+    /// Number of models.
     pub of: usize,
-    /// Evaluations of its present search, and the most that there will be; 0 of 0 before it begins.
+    /// Evaluations of the current search and their maximum; 0 of 0 before it starts.
     pub evaluations: (u64, u64),
 }
 
@@ -140,7 +141,7 @@ fn as_name<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error>
     serializer.serialize_str(kind.name())
 }
 
-/// A model that was fitted and simulated, not yet judged.
+/// A model that was fitted and simulated but not yet judged.
 struct Run {
     kind: Kind,
     fit: Fit,
@@ -149,12 +150,13 @@ struct Run {
     test: Option<Simulation>,
 }
 
-/// Fits each of `kinds` to `train` with the same options and simulates it on both records. One that the records do not suit is skipped
-/// with the reason. `watch` is told of every step and may end it; a search that is under way then ends with its best so far,
-/// and no other is begun.
+/// Fits each of `kinds` to `train` with the same options and simulates it on both records.
+///
+/// A model that cannot be fitted is skipped with the reason. `watch` is called at every step and may end the
+/// comparison; a running search then ends with its best result so far, and no other model is fitted.
 ///
 /// # Errors
-/// If none can be fitted: the reason of the first.
+/// If no model can be fitted: the reason of the first.
 pub fn compare(
     train: &Record,
     test: Option<&Record>,
@@ -219,7 +221,7 @@ pub fn compare(
     Ok(Comparison { sorted_by, models, skipped, train_settling, test_settling })
 }
 
-/// Rows that are a start-up transient for any of the models.
+/// Returns the rows that are start-up rows for any of the models.
 fn for_any<'a>(rows: usize, simulated: impl Iterator<Item = &'a Simulation>) -> Vec<bool> {
     let mut settling = vec![false; rows];
     for own in simulated {
@@ -228,12 +230,13 @@ fn for_any<'a>(rows: usize, simulated: impl Iterator<Item = &'a Simulation>) -> 
     settling
 }
 
-/// Numbers that a fit chose: those that its estimate counts, or the cells and nodes of a convex fit, whose grid is given.
+/// Returns the number of fitted parameters: those of the estimate, or the cells and nodes of a convex fit, whose grid
+/// is given.
 fn identified(fit: &Fit) -> usize {
     if let Some(estimate) = &fit.estimate {
         return estimate.fitted;
     }
-    // Relays that never switch back are identified only where there are such.
+    // Relays that never switch back are counted only if there are any.
     let cells = |p: &PreisachParams<Vec<f64>>| {
         p.density.len() + if p.once.iter().any(|w| *w != 0.0) { p.once.len() } else { 0 }
     };

@@ -1,4 +1,4 @@
-//! The drive as a model sees it: at the rows, and between them.
+//! The drive of a model: at the rows of a record, and interpolated between them.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -11,27 +11,30 @@ use serde::{Deserialize, Serialize};
 use crate::Samples;
 use crate::samples::PerSegment;
 
-/// Steps from one row to the next on a band-limited drive, linear within each. Through the samples themselves straight lines lose
-/// `(π f / rate)² / 3` of a frequency, 12 % at a fifth of the rate; these values make that up: 1e-4 is left up to 0.43 of the rate.
+/// Linear steps per row of a band-limited drive.
+///
+/// Linear interpolation of the samples reduces a frequency by `(π f / rate)² / 3` (12 % at a fifth of the rate). With these steps the error is
+/// 1e-4 up to 0.43 of the rate.
 const STEPS: usize = 8;
-/// Rows on either side that a value between two rows is made of.
+/// Rows on either side that an interpolated value depends on.
 const REACH: isize = 32;
 
-/// How a drive goes on between its samples.
+/// The interpolation of a drive between its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BetweenSamples {
-    /// On straight lines: a drive that is slow for its sample rate, and what firmware can know of any.
+    /// Linear: for a drive that is slow compared with its sample rate, and for firmware.
     #[default]
     Linear,
-    /// As the one signal through the samples without frequencies above half the rate: a drive from a filter, or one that was made of
-    /// sines. A model runs through eight values of it a sample; it has to know what comes, so whole records only.
+    /// Band-limited: the signal through the samples without frequencies above half the rate, for a filtered drive or a sum of sines.
+    ///
+    /// A model runs through eight values per sample. The interpolation needs future samples, so it applies to whole records only.
     BandLimited,
 }
 
-/// No way of going on between samples has this name.
+/// The name of an interpolation is unknown.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no way to go on between samples; there are linear and band-limited")]
+#[error("unknown interpolation between samples {0:?}; type linear or band-limited")]
 pub struct UnknownBetweenSamples(String);
 
 impl FromStr for BetweenSamples {
@@ -44,7 +47,7 @@ impl FromStr for BetweenSamples {
 }
 
 impl BetweenSamples {
-    /// Steps from one row to the next.
+    /// Returns the number of steps per row.
     pub(crate) fn steps(self) -> usize {
         match self {
             Self::Linear => 1,
@@ -52,7 +55,7 @@ impl BetweenSamples {
         }
     }
 
-    /// Its name in files and options.
+    /// Returns the name in files and options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -71,26 +74,26 @@ impl fmt::Display for BetweenSamples {
     }
 }
 
-/// How often a record is passed through a model.
+/// The number of passes of a record through a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Passes {
-    /// Once, from rest.
+    /// One pass, from rest.
     #[default]
     Once,
-    /// Twice, the second time from the state in which the first has ended: each segment is one period of a steady state.
+    /// Two passes, the second from the final state of the first. Each segment is then one period of a steady state.
     Periodic,
 }
 
-/// The drive of a record in as many steps a row as a model shall take.
+/// The drive of a record, with one or several steps per row.
 pub(crate) struct Drive<'a> {
     samples: &'a Samples,
     /// The drive at the rows.
     rows: &'a [f64],
     steps: usize,
-    /// `steps` values for each row: those that lead to it, and its own.
+    /// `steps` values for each row: the interpolated values before it, and its own value.
     values: Cow<'a, [f64]>,
     passes: Passes,
-    /// Rows of each segment that pass before it begins; none where it begins at rest.
+    /// Number of rows of each segment that the model runs through before the segment begins; 0 if it begins at rest.
     history: Vec<usize>,
 }
 
@@ -99,7 +102,7 @@ impl<'a> Drive<'a> {
         Self::of(samples, &samples.input, between, passes)
     }
 
-    /// Another drive over the segments and in the surroundings of a record.
+    /// Makes another drive with the segments, temperature and load of a record.
     pub(crate) fn of(samples: &'a Samples, rows: &'a [f64], between: BetweenSamples, passes: Passes) -> Self {
         let values = match between {
             BetweenSamples::Linear => Cow::Borrowed(rows),
@@ -110,23 +113,24 @@ impl<'a> Drive<'a> {
         Self { samples, rows, steps: between.steps(), values, passes, history: vec![0; samples.segments.len()] }
     }
 
-    /// The same where the first rows of each segment, as many as `history` says, have passed before it begins: what came before a record that
-    /// begins in mid-cycle is taken for what comes after.
+    /// Sets the number of first rows of each segment that the model runs through before the segment begins.
+    ///
+    /// This approximates the unknown history of a record that begins within a cycle by its first rows.
     pub(crate) fn after(self, history: Vec<usize>) -> Self {
         Self { history, ..self }
     }
 
-    /// A stage for each segment, as `build` makes it for a sample period.
+    /// Builds a stage for the sample period of each segment.
     pub(crate) fn stages<S, E>(&self, build: impl Fn(&Sampling) -> Result<S, E>) -> Result<PerSegment<S>, E> {
         PerSegment::new(self.samples, |period| build(&Sampling { period: period / self.steps as f64 }))
     }
 
-    /// Output of a stage over the rows, one segment after the other, each from rest under its first input or after its history.
+    /// Computes the output of a stage for all rows. Each segment begins at rest under its first input, or after its history.
     pub(crate) fn run<S: Stage<f64>>(&self, stages: &PerSegment<S>, out: &mut [f64]) {
         self.run_from(stages, |state, i, env, u0| stages.of(i).reset(state, env, u0), out);
     }
 
-    /// The same where `begin` says in what state each segment, by its number, begins under its first input.
+    /// Runs as [`run`](Self::run) does; `begin` sets the initial state of each segment, by its number, under its first input.
     pub(crate) fn run_from<S: Stage<f64>>(
         &self,
         stages: &PerSegment<S>,
@@ -158,7 +162,7 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// The first `rows` of one segment, which `begin` begins.
+    /// Computes the output for the first `rows` of one segment. `begin` sets the initial state.
     pub(crate) fn beginning<S: Stage<f64>>(
         &self,
         segment: usize,
@@ -178,8 +182,9 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// Values whose straight lines are the band-limited signal through the rows of a segment, [`STEPS`] a row: those that lead to it, and
-/// its own.
+/// Returns [`STEPS`] values per row whose linear interpolation is the band-limited signal through the rows of a segment.
+///
+/// The last value of each row belongs to the row itself, the others are before it.
 fn band_limited(rows: &[f64], passes: Passes) -> Vec<f64> {
     let kernels: Vec<Vec<f64>> = (1..=STEPS).map(|step| kernel(step as f64 / STEPS as f64)).collect();
     let mut around = Vec::new();
@@ -192,29 +197,30 @@ fn band_limited(rows: &[f64], passes: Passes) -> Vec<f64> {
     values
 }
 
-/// Weights of the rows from `REACH` before to `REACH − 1` after a row for the value `share` of a sample after the row before it.
+/// Returns the weights of the rows from `REACH` before to `REACH − 1` after a row, for the value `share` of a sample after the previous row.
 fn kernel(share: f64) -> Vec<f64> {
     let step = 1.0 / STEPS as f64;
     let weight = |i: isize| {
         let x = share - 1.0 - i as f64;
-        // Straight lines lie on the inner side of a bend by, on average, a twelfth of its second difference.
+        // Linear interpolation of a curve has a mean error of 1/12 of the second difference, which is corrected here.
         cardinal(x) - (cardinal(x - step) - 2.0 * cardinal(x) + cardinal(x + step)) / 12.0
     };
     let weights: Vec<f64> = (-REACH..REACH).map(weight).collect();
-    // A constant stays what it is.
+    // The weights are normalised so that a constant is reproduced exactly.
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|w| w / sum).collect()
 }
 
-/// The signal through a one among zeros, `x` samples from the one: sin πx / πx under a Blackman-Harris window.
+/// Returns the interpolation kernel at `x` samples: sin πx / πx with a Blackman-Harris window.
 fn cardinal(x: f64) -> f64 {
     let t = PI * x / REACH as f64;
     let window = 0.35875 + 0.48829 * t.cos() + 0.14128 * (2.0 * t).cos() + 0.01168 * (3.0 * t).cos();
     if x == 0.0 { 1.0 } else { window * (PI * x).sin() / (PI * x) }
 }
 
-/// The value in a row that may lie beyond an end. A period goes on with itself; any other segment is taken as turned about its end
-/// point, which keeps value and slope there.
+/// Returns the value of a row that may be beyond an end of the segment.
+///
+/// A period is repeated. Any other segment is point-reflected at its end, which keeps value and slope there.
 fn beyond(rows: &[f64], k: isize, passes: Passes) -> f64 {
     let last = rows.len() as isize - 1;
     let at = |k: isize| rows[k.clamp(0, last) as usize];
@@ -231,7 +237,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// What straight lines between values at multiples of `step` have of a sine of `cycles` a sample: its share, over rows 40 to 160.
+    /// Returns the relative amplitude of a sine of `cycles` per sample after linear interpolation at multiples of `step`, over rows 40 to 160.
     fn share(values: &[f64], step: f64, cycles: f64) -> f64 {
         let wave = |x: f64| (TAU * cycles * x + 0.3).sin();
         let line = |x: f64| {
@@ -244,11 +250,11 @@ mod tests {
     }
 
     #[test]
-    fn sines_keep_their_size_between_their_samples() {
+    fn band_limited_interpolation_keeps_the_amplitude_of_sines() {
         for cycles in [0.01, 0.1, 0.2, 0.3, 0.43] {
             let rows: Vec<f64> = (0..201).map(|k| (TAU * cycles * f64::from(k) + 0.3).sin()).collect();
             let fine = band_limited(&rows, Passes::Once);
-            // The first value that leads to a row lies an eighth after the row before it.
+            // The first value of a row is 1/8 sample after the previous row.
             let fine = share(&fine[STEPS - 1..], 1.0 / STEPS as f64, cycles);
             assert!((fine - 1.0).abs() < 2e-4, "{cycles} of the rate: {fine}");
             let lines = share(&rows, 1.0, cycles);
@@ -256,7 +262,7 @@ mod tests {
         }
     }
 
-    /// Largest distance of the values from those of `signal`, a function of rows, in the rows of `kept`.
+    /// Returns the largest deviation of the values from `signal`, a function of the row, in the rows `kept`.
     fn off(signal: impl Fn(f64) -> f64, rows: usize, kept: std::ops::Range<usize>, passes: Passes) -> f64 {
         let samples: Vec<f64> = (0..rows).map(|k| signal(k as f64)).collect();
         let values = band_limited(&samples, passes);
@@ -266,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_period_has_no_ends() {
+    fn a_period_is_interpolated_across_its_ends() {
         let period: Vec<f64> =
             (0..64).map(|k| (TAU * 7.0 * f64::from(k) / 64.0).sin() + f64::from(k * k % 5)).collect();
         let middle = STEPS * 64..STEPS * 128;
@@ -275,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_and_slopes_stay_up_to_the_ends() {
+    fn constants_and_slopes_are_exact_up_to_the_ends() {
         for rows in [1, 2, 5, 100] {
             assert!(off(|_| -3.0, rows, 0..rows, Passes::Once) < 1e-14);
             assert!(off(|_| -3.0, rows, 0..rows, Passes::Periodic) < 1e-14);

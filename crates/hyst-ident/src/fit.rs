@@ -1,4 +1,4 @@
-//! `fit`: a base model from a record.
+//! Fits a base model to a record.
 
 pub(crate) mod convex;
 mod options;
@@ -23,54 +23,56 @@ use crate::samples::Samples;
 use crate::settle::{start_up_rows, started, windows, without_beginnings};
 use crate::simulate::{Zero, simulate};
 
-/// A fit, and what it leaves in some rows or in every row \[y\].
-type Left = (Fitted, Vec<f64>);
-/// The past of each segment, as a fit with what it leaves in every row calls for it where it is asked for, and where it is no surprise.
-type Recalls<'a> = dyn Fn(&Samples, &Left, &[bool], &[bool]) -> Result<Vec<Vec<f64>>, FitError> + 'a;
+/// A fit, and its residual in some rows or in every row \[y\].
+type FitAndResidual = (Fitted, Vec<f64>);
+/// Estimates the drive history of each segment from a fit and its residual in every row. The first flags mark the
+/// segments to estimate, the second ones those in which a memory other than rest is expected.
+type Recalls<'a> = dyn Fn(&Samples, &FitAndResidual, &[bool], &[bool]) -> Result<Vec<Vec<f64>>, FitError> + 'a;
 
-/// How often the past of a record is asked for, each time with what was fitted to the rows that the last one explains.
+/// Maximum number of estimates of the drive history, each from the fit with the previous one.
 const RECALLS: usize = 2;
 /// Cells along one edge of the Preisach triangle.
 pub(crate) const CELLS: usize = 24;
-/// And of the coarsest, for a short record.
+/// Minimum number of cells along an edge, for a short record.
 const MIN_CELLS: usize = 8;
-/// Rows for each unknown that a fit needs.
-pub(crate) const ROWS_EACH: usize = 3;
-/// Blocks of a record.
+/// Minimum number of rows for each unknown.
+pub(crate) const ROWS_PER_UNKNOWN: usize = 3;
+/// Number of blocks of a record.
 pub(crate) const BLOCKS: usize = 64;
-/// Rows that one fit uses at most; longer records are thinned evenly after filtering.
+/// Maximum number of rows of a fit; longer records are thinned evenly after filtering.
 pub(crate) const ROWS: usize = 40_000;
 
-/// Why a fit is impossible.
+/// Reason why a fit is impossible.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
     /// The record cannot be used as it is.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// It was ended from outside.
-    #[error("{record}: stopped before it was done")]
+    /// The fit was stopped by the caller.
+    #[error("{record}: stopped before the result was complete")]
     Stopped {
         /// The record.
         record: String,
     },
     /// Not enough rows.
     #[error(
-        "{record}: {rows} settled rows are too few for {unknowns} unknowns; record at least {needed}, or fit a smaller model"
+        "{record}: {rows} rows (without start-up rows) are too few for {unknowns} unknowns; record at least {needed} rows or fit a smaller model"
     )]
     TooShort {
         /// The record.
         record: String,
-        /// Rows that it has.
+        /// Number of rows without start-up rows.
         rows: usize,
-        /// Unknowns of the model.
+        /// Number of unknowns of the model.
         unknowns: usize,
-        /// Rows that would do.
+        /// Minimum number of rows.
         needed: usize,
     },
-    /// The input does not move.
+    /// The input is constant.
     #[error(
-        "{record}: column {column}: the input is constant ({value}), so the record shows no hysteresis; drive the actuator, e.g. with `hystctl excite identification`"
+        "{record}: column {column}: the input is constant ({value}), so the record shows no hysteresis; drive the actuator, e.g. with \
+         `hystctl excite identification`"
     )]
     ConstantInput {
         /// The record.
@@ -80,7 +82,7 @@ pub enum FitError {
         /// Its value.
         value: f64,
     },
-    /// The output does not move.
+    /// The output is constant.
     #[error(
         "{record}: column {column}: the output is constant ({value}) while the input moves; check the sensor and `--map`"
     )]
@@ -92,9 +94,10 @@ pub enum FitError {
         /// Its value.
         value: f64,
     },
-    /// The output falls where that of the model rises, or the other way round.
+    /// The output has the opposite sign to that of the model.
     #[error(
-        "{record}: the output has the other sign than the model's; turn it with --map {column}=-COLUMN, where COLUMN is its name in the file, take out the minus that a --map has already, or fit the model anew to this record"
+        "{record}: the output has the opposite sign to the model's; invert it with --map {column}=-COLUMN (COLUMN is its name in the file), \
+         remove the minus sign of an existing --map, or refit the model to this record"
     )]
     Falling {
         /// The record.
@@ -102,7 +105,7 @@ pub enum FitError {
         /// The output's name in the record format.
         column: &'static str,
     },
-    /// A column is needed.
+    /// A required column is missing.
     #[error("{record}: column {column} is missing; {advice}")]
     Missing {
         /// The record.
@@ -113,7 +116,7 @@ pub enum FitError {
         advice: String,
     },
     /// The equations could not be solved.
-    #[error("{record}: the equations of the fit could not be solved; look for rows that are far off the others")]
+    #[error("{record}: the equations of the fit could not be solved; look for outliers in the record")]
     Unsolvable {
         /// The record.
         record: String,
@@ -123,7 +126,7 @@ pub enum FitError {
     Stage {
         /// The record.
         record: String,
-        /// Why.
+        /// Reason.
         source: hyst_core::Error,
     },
     /// Prediction and measurement cannot be compared.
@@ -131,77 +134,77 @@ pub enum FitError {
     Compare {
         /// The record.
         record: String,
-        /// Why.
+        /// Reason.
         source: crate::metrics::MetricsError,
     },
-    /// Bounds that are no box.
+    /// Invalid bounds.
     #[error("{record}: {source}")]
     Space {
         /// The record.
         record: String,
-        /// What is wrong.
+        /// Reason.
         source: crate::optimize::SpaceError,
     },
-    /// A search that cannot be run or finds nothing.
+    /// A search that cannot be run or that finds nothing.
     #[error("{record}: {source}")]
     Search {
         /// The record.
         record: String,
-        /// Why.
+        /// Reason.
         source: crate::optimize::SearchError,
     },
-    /// Bounds of what is not searched.
+    /// Bounds for a variable that is not searched.
     #[error("bounds of {name}: {kind} has no such variable; it searches {names}")]
     UnknownBounds {
         /// The name given.
         name: String,
         /// The kind of model.
         kind: &'static str,
-        /// What it searches.
+        /// The searched variables.
         names: String,
     },
-    /// A way to optimise that the model does not have.
-    #[error("{kind}: {optimizer} does not fit it; {advice}")]
+    /// An optimizer that the model does not support.
+    #[error("{kind} does not support {optimizer}; {advice}")]
     Optimizer {
         /// The kind of model.
         kind: &'static str,
-        /// The way that was asked for.
+        /// The requested optimizer.
         optimizer: String,
-        /// Which there are.
+        /// Available optimizers.
         advice: &'static str,
     },
-    /// A drive that is band-limited between samples, for a model that does not look there.
+    /// A drive that is band-limited between samples, for a model that does not support it.
     #[error(
-        "{kind}: a drive that is band-limited between samples is for bouc-wen-oscillator in this version; take it as linear"
+        "{kind}: only bouc-wen-oscillator supports a drive that is band-limited between samples; use --between-samples linear"
     )]
     BandLimited {
         /// The kind of model.
         kind: &'static str,
     },
-    /// Thresholds chosen where there are none to choose.
-    #[error("{kind}: a number of thresholds is for the convex fit of pi; {advice}")]
+    /// A number of thresholds for a model without selectable thresholds.
+    #[error("{kind}: a number of thresholds applies only to the convex fit of pi; {advice}")]
     Thresholds {
         /// The kind of model.
         kind: &'static str,
         /// What to do.
         advice: &'static str,
     },
-    /// More elements than a model can have, or none.
-    #[error("{elements} elements: a model has 1 to {most}")]
+    /// A number of elements outside of the allowed range.
+    #[error("{elements} elements; expected 1 to {most}")]
     Elements {
-        /// What was asked for.
+        /// The requested number.
         elements: usize,
-        /// The most.
+        /// The maximum.
         most: usize,
     },
-    /// First-order descent curves that give no surface.
+    /// First-order descent curves without a valid surface.
     #[error(transparent)]
     Everett(#[from] crate::everett::EverettError),
-    /// A model does not suit the record.
+    /// A model that does not suit the record.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A base that is not linear in its weights.
-    #[error("{kind} is no sum of columns with weights: its parameters are searched")]
+    #[error("{kind} is not linear in its weights: its parameters are searched")]
     NoBasis {
         /// The kind of model.
         kind: &'static str,
@@ -210,35 +213,35 @@ pub enum FitError {
 
 pub use options::{FitOptions, Optimizer, VariableBounds};
 
-/// A model, and how it was found.
+/// A model and the details of its fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The model.
     pub model: Model,
-    /// In words: what was searched, what was solved for, and why so.
+    /// Description of the fit: what was searched, what was solved for, and why.
     pub how: String,
-    /// What the record says about each parameter; `None` where they are elements of a table, which are too many.
+    /// What the record says about each parameter; `None` if the parameters are elements of a table.
     pub estimate: Option<Estimate>,
-    /// How much the record says of the cells of a Preisach triangle, of the nodes of a mirror function.
+    /// What the record says about the cells of a Preisach triangle and the nodes of a mirror function.
     pub tables: Vec<TableEstimate>,
-    /// The searches, if there was something to search.
+    /// The searches; `None` if nothing was searched.
     pub trials: Option<Trials>,
     /// Evaluations of the model.
     pub evaluations: u64,
-    /// Where several ways of the drive between samples were tried: what each leaves of the training record \[y\] when it is fitted to
-    /// all rows, counted over those that are a start-up transient for none. The model is the better one.
+    /// RMS residual for each interpolation of the drive between samples that was tried \[y\]. Each is fitted to all
+    /// rows; rows that are start-up for any of them do not count. The model uses the better one.
     pub between_samples: Vec<(BetweenSamples, f64)>,
 }
 
 impl Fit {
-    /// A fit in which nothing was searched.
+    /// Returns a fit without a search.
     pub fn at_once(model: Model, how: &str) -> Self {
         let (estimate, tables, trials, between_samples) = (None, Vec::new(), None, Vec::new());
         Self { model, how: how.into(), estimate, tables, trials, evaluations: 1, between_samples }
     }
 }
 
-/// Fits a base model; the rows of a start-up transient are left out.
+/// Fits a base model to a record; start-up rows are left out.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -246,8 +249,10 @@ pub fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Model, F
     fit_with(record, kind, options, &mut |_| ControlFlow::Continue(())).map(|fit| fit.model)
 }
 
-/// [`fit`] that says how it went. `watch` is told of every generation of a search and may end it; the best so far is
-/// then polished and returned.
+/// Fits as [`fit`] does and returns the details.
+///
+/// `watch` is called after every generation of a search and may end it. The best result so far is then polished and
+/// returned.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -272,18 +277,18 @@ pub fn fit_with(
     Ok(fit)
 }
 
-/// Models that rise and fall with their input, or against it.
+/// Returns whether the sign of the output is a property of the model.
 pub(crate) fn sign_matters(kind: Kind) -> bool {
-    // The oscillator lags by up to half a turn.
+    // The phase of an oscillator lags by up to 180°.
     kind != Kind::BoucWenOscillator
 }
 
-/// A base of a kind, with the grid or thresholds that the record calls for.
+/// A basis of a kind, with the grid or the thresholds for a record.
 #[derive(Clone)]
 pub(crate) enum BasisOf {
     Pi(PiBasis),
     Preisach(PreisachBasis),
-    /// An operator of another kind, near its parameters.
+    /// A linearised operator of another kind.
     Linearised(Box<LinearisedBasis>),
 }
 
@@ -300,7 +305,7 @@ impl BasisOf {
         self.as_ref().len()
     }
 
-    /// The operator with these weights. What the solver leaves below a billionth of the sum is zero.
+    /// Returns the operator with these weights. Weights below 1e-9 of their sum are solver residue and set to zero.
     pub(crate) fn operator(&self, weights: &[f64]) -> Base {
         let smallest = 1e-9 * weights.iter().map(|w| w.abs()).sum::<f64>();
         let clean: Vec<f64> = weights.iter().map(|w| if w.abs() < smallest { 0.0 } else { *w }).collect();
@@ -319,7 +324,7 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitErr
         Kind::Pi => BasisOf::Pi(PiBasis::for_samples(samples)),
         Kind::Preisach => {
             // A short record determines a coarser triangle.
-            let most = samples.len() / ROWS_EACH;
+            let most = samples.len() / ROWS_PER_UNKNOWN;
             let finest = |cells: &usize| PreisachBasis::for_samples(samples, *cells).len() <= most;
             let cells = (MIN_CELLS..=CELLS).rev().find(finest).unwrap_or(MIN_CELLS);
             BasisOf::Preisach(PreisachBasis::for_samples(samples, cells))
@@ -328,7 +333,7 @@ pub(crate) fn basis_for(kind: Kind, samples: &Samples) -> Result<BasisOf, FitErr
     })
 }
 
-/// The base that a model has, for a record that it was fitted to: its own thresholds or grid.
+/// Returns the basis of a model's base for a record that it was fitted to, with its own thresholds or grid.
 pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst_core::Error> {
     Ok(match &model.base {
         Base::Pi(PiParams { thresholds, .. })
@@ -352,7 +357,7 @@ pub(crate) fn basis_of(model: &Model, samples: &Samples) -> Result<BasisOf, hyst
     })
 }
 
-/// Whether a record can be fitted; `wrong_sign` if its output falls where the model's rises, or rises where that falls.
+/// Checks whether a record can be fitted; `wrong_sign` means that its output has the opposite sign to the model's.
 pub(crate) fn check(record: &Record, samples: &Samples, wrong_sign: bool) -> Result<(), FitError> {
     let name = record.name();
     let Some(unit) = record.output_unit() else {
@@ -383,14 +388,14 @@ pub(crate) fn check(record: &Record, samples: &Samples, wrong_sign: bool) -> Res
     Ok(())
 }
 
-/// Fits the base and finds the start-up rows while it does, and what the actuator remembered when each segment began: sets `samples.settling` and
-/// `samples.pasts`. Gives the fit and what it has left in the rows that it used.
+/// Fits the basis and finds the start-up rows and the drive history of each segment. Sets `samples.settling` and
+/// `samples.pasts`. Returns the fit and its residual in the rows that it used.
 pub(crate) fn fit_settled(
     samples: &mut Samples,
     basis: &dyn Basis,
     options: &FitOptions,
     name: &dyn Fn() -> String,
-) -> Result<Left, FitError> {
+) -> Result<FitAndResidual, FitError> {
     let run = |samples: &Samples, basis: &dyn Basis| everywhere(samples, basis, options.zero_per_record, name);
     let mut all = run(samples, basis)?;
     if samples.mark_spikes(&all.1) {
@@ -398,10 +403,10 @@ pub(crate) fn fit_settled(
     }
     let (mut found, late) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
     if memory::standing_out(samples, &late.1).contains(&true) {
-        // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
+        // The drive history is estimated with play operators for every base: their few unknowns need few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
-        let recalls = |samples: &Samples, (fitted, residual): &Left, asked: &[bool], surely: &[bool]| {
+        let recalls = |samples: &Samples, (fitted, residual): &FitAndResidual, asked: &[bool], surely: &[bool]| {
             let blocks = Blocks::new(samples, BLOCKS, ROWS);
             let problem = Problem::new(samples, &plays, &blocks, options.zero_per_record);
             memory::recalled(&problem, fitted, residual, asked, surely)
@@ -415,10 +420,11 @@ pub(crate) fn fit_settled(
     Ok(within(samples, found))
 }
 
-/// Finds what the actuator remembered when each segment began, as plays follow it: sets `samples.pasts`. Gives what they miss of each row.
+/// Estimates the drive history of each segment with play operators and sets `samples.pasts`. Returns their residual in
+/// each row.
 fn recalled(
     samples: &mut Samples,
-    run: impl Fn(&Samples) -> Result<Left, FitError>,
+    run: impl Fn(&Samples) -> Result<FitAndResidual, FitError>,
     recalls: &Recalls<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
@@ -426,8 +432,8 @@ fn recalled(
     if !asked.contains(&true) {
         return Ok(found.1);
     }
-    // A part of what came before is seen all through the record. Where no start-up shows, or near 0 V, where one may be a transient of the sensor, the turns
-    // alone are asked for.
+    // A part of the history shows in the whole record. Without a start-up, or near 0 V where a sensor transient may be
+    // the cause, only the last reversals are estimated.
     let rest = without_beginnings(samples);
     let starts = started(samples, &samples.settling);
     let surely: Vec<bool> = memory::away(samples).iter().zip(starts).map(|(away, starts)| *away && starts).collect();
@@ -448,7 +454,7 @@ fn recalled(
         let all = run(&recalled)?;
         let with_past = start_up_found(&mut recalled, all, None, &run)?;
         let count = |samples: &Samples| samples.settling.iter().filter(|s| **s).count();
-        // It leaves fewer rows to a start-up, or as many and clearly less of all.
+        // The history must leave fewer start-up rows, or as many and a clearly smaller error.
         let (now, then) = (count(samples), count(&recalled));
         let errs_less = with_past.0.0.rmse() <= (1.0 - MIN_RMSE_DROP) * found.0.rmse();
         if then > now || (then == now && !errs_less) {
@@ -460,14 +466,14 @@ fn recalled(
     Ok(found.1)
 }
 
-/// Finds the start-up rows, given a fit to all: sets `samples.settling`. Gives the fit to the rows that count, and one to those that are a start-up
-/// for none. `beside` is what another base misses of each row.
+/// Finds the start-up rows, given a fit to all rows, and sets `samples.settling`. Returns the fit to the rows that
+/// count and the fit without the start-up windows. `beside` is the residual of another basis in each row.
 fn start_up_found(
     samples: &mut Samples,
-    all: Left,
+    all: FitAndResidual,
     beside: Option<&[f64]>,
-    run: impl Fn(&Samples) -> Result<Left, FitError>,
-) -> Result<(Left, Left), FitError> {
+    run: impl Fn(&Samples) -> Result<FitAndResidual, FitError>,
+) -> Result<(FitAndResidual, FitAndResidual), FitError> {
     let windows = windows(samples);
     let without = without_beginnings(samples);
     let late = run(&without)?;
@@ -476,14 +482,15 @@ fn start_up_found(
         let (sum, n) = kept.fold((0.0, 0usize), |(sum, n), (r, _)| (sum + r * r, n + 1));
         (sum / n.max(1) as f64).sqrt()
     };
-    // If leaving the beginnings out improves the rest a lot, they disagree with the rest: judge them
-    // by a fit that has not seen them. So too where a record begins away from 0 V: its memory there is
-    // nobody's guess. If neither, they belong to the record (and hold its virgin curve).
+    // If the fit without the start-up windows is much better on the rest, the windows disagree with the rest and are
+    // judged by that fit. The same applies if a record starts away from 0 V, because its memory is unknown. Otherwise
+    // they belong to the record and contain its virgin curve.
     let (low, high) = samples.input_range();
     let away = samples.segments.iter().any(|s| samples.input[s.start].abs() > MINOR_SHARE * low.abs().max(high.abs()));
     let judged_late = away || rms_late(&all.1) > 1.5 * rms_late(&late.1);
     let mut residual = if judged_late { late.1.clone() } else { all.1.clone() };
-    // What has not seen them need not have all weights that they call for. What another base follows there is no start-up.
+    // A fit without these rows may lack weights that only they determine. Rows that the other basis follows are no
+    // start-up rows.
     if let Some(beside) = beside.filter(|_| judged_late) {
         for (s, w) in samples.segments.iter().zip(&windows) {
             let rows = s.start..s.start + w;
@@ -498,13 +505,13 @@ fn start_up_found(
     Ok((found, late))
 }
 
-/// A fit to the rows that count, and what it leaves in every row.
+/// Fits the rows that count. Returns the fit and its residual in every row.
 fn everywhere(
     samples: &Samples,
     basis: &dyn Basis,
     zero_per_file: bool,
     name: &dyn Fn() -> String,
-) -> Result<Left, FitError> {
+) -> Result<FitAndResidual, FitError> {
     let blocks = Blocks::new(samples, BLOCKS, ROWS);
     let problem = Problem::new(samples, basis, &blocks, zero_per_file);
     let stage = |source| FitError::Stage { record: name(), source };
@@ -514,23 +521,23 @@ fn everywhere(
     Ok((fitted, residual))
 }
 
-/// A fit and what it leaves in the rows that it used.
-fn within(samples: &Samples, (fitted, residual): Left) -> Left {
+/// Reduces the residual of a fit to the rows that the fit used.
+fn within(samples: &Samples, (fitted, residual): FitAndResidual) -> FitAndResidual {
     let left = Blocks::new(samples, BLOCKS, ROWS).all_used(samples).map(|k| residual[k]).collect();
     (fitted, left)
 }
 
-/// A fit to the rows that count, and what it leaves in the rows that it used.
+/// Fits the rows that count. Returns the fit and its residual in the rows that it used.
 fn solved(
     samples: &Samples,
     basis: &dyn Basis,
     zero_per_file: bool,
     name: &dyn Fn() -> String,
-) -> Result<Left, FitError> {
+) -> Result<FitAndResidual, FitError> {
     Ok(within(samples, everywhere(samples, basis, zero_per_file, name)?))
 }
 
-/// A model with standard errors, and with the names of what its record does not determine.
+/// Adds the standard errors to a model, and the names of the parameters that the record does not determine.
 fn with_errors(mut model: Model, estimate: &Estimate) -> Model {
     let stage = model.base.kind().name();
     // The sensor's zero belongs to no stage.
@@ -541,7 +548,7 @@ fn with_errors(mut model: Model, estimate: &Estimate) -> Model {
     model
 }
 
-/// Puts a fit into a model.
+/// Builds a model from a fit.
 pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitted: &Fitted, seed: u64) -> Model {
     let zero = fitted.zeros.iter().sum::<f64>() / fitted.zeros.len().max(1) as f64;
     let base = match (basis.operator(&fitted.weights), fitted.hypothesis.drag) {
@@ -553,7 +560,7 @@ pub(crate) fn to_model(record: &Record, samples: &Samples, basis: &BasisOf, fitt
     Model { effects: fitted.hypothesis.effects.clone(), ..model_of(record, samples, base, zero, seed) }
 }
 
-/// A model without effects, fitted to the settled rows of a record.
+/// Builds a model without effects that was fitted to the settled rows of a record.
 pub(crate) fn model_of(record: &Record, samples: &Samples, base: Base, zero: f64, seed: u64) -> Model {
     let unit = record.output_unit();
     let (low, high) = samples.input_range();
@@ -596,7 +603,7 @@ fn fitted_on(record: &Record, samples: &Samples) -> Vec<FittedOn> {
     record.sources().iter().zip(record.rows_of_files()).map(of_file).collect()
 }
 
-/// The unit at the end of a column's name, as a person writes it.
+/// Returns the unit from the suffix of a column's name.
 pub(crate) fn unit_of(column: &str) -> String {
     match column.rsplit('_').next() {
         Some("v") => "V".into(),

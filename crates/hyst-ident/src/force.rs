@@ -1,5 +1,7 @@
-//! An external force without a force sensor: what a model of the free actuator does not explain of the measured displacement is a
-//! force on the output's stiffness, `f̂ = k_out (x − (κ x̂₀ + χ))` ([`hyst_core::ForceObserver`]).
+//! Estimates an external force without a force sensor.
+//!
+//! The difference between the measured displacement and the prediction of a model of the free actuator is a force on
+//! the output's stiffness, `f̂ = k_out (x − (κ x̂₀ + χ))` ([`hyst_core::ForceObserver`]).
 
 use hyst_core::{AffineFit, Build, ForceObservation, ForceParams};
 
@@ -9,74 +11,77 @@ use crate::model::{Effect, Model};
 use crate::record::Record;
 use crate::simulate::{Extrapolated, SimulateOptions, simulate_with};
 
-/// Where nothing but the drive acts: κ and χ follow from that by least squares.
+/// Rows without an external force, from which κ and χ are estimated by least squares.
 #[derive(Clone, Copy, Debug)]
 pub enum Free<'a> {
-    /// Nowhere known: κ = 1 and χ = 0.
+    /// Unknown: κ = 1 and χ = 0.
     Unknown,
-    /// In all of another record.
+    /// All rows of another record.
     Record(&'a Record),
-    /// In the record itself, up to this time \[s\].
+    /// The rows of the record itself up to this time \[s\].
     Until(f64),
 }
 
-/// What an estimation may be told.
+/// Options of an estimation.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceOptions<'a> {
     /// Output stiffness k_out \[N/output unit\].
     pub stiffness: f64,
-    /// Where nothing but the drive acts.
+    /// Rows without an external force.
     pub free: Free<'a>,
-    /// Temperature \[°C\] where the record has no column of it.
+    /// Temperature \[°C\] for a record without a temperature column.
     pub temperature: Option<f64>,
 }
 
-/// A force over a record.
+/// Estimated force over a record.
 #[derive(Clone, Debug)]
 pub struct EstimatedForce {
-    /// At each row \[N\].
+    /// Force in each row \[N\].
     pub force: Vec<f64>,
-    /// Stiffness, κ and χ as they were used.
+    /// Stiffness, κ and χ.
     pub params: ForceParams,
-    /// Rows that κ and χ follow from.
+    /// Number of rows from which κ and χ were estimated.
     pub free_rows: usize,
-    /// Against the column `load_n`, where the record has it.
+    /// Errors against the column `load_n`, if the record has it.
     pub errors: Option<Errors>,
-    /// Inputs beyond the model's own range.
+    /// Inputs outside of the model's range.
     pub extrapolated: Extrapolated,
 }
 
-/// Why there is no estimate.
+/// Reason why the force cannot be estimated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ForceError {
-    /// The model cannot be run over the record.
+    /// The model cannot be simulated over the record.
     #[error(transparent)]
     Simulate(#[from] FitError),
-    /// No displacement.
-    #[error("{record}: column {column} is missing: the force is what the model does not explain of it")]
+    /// The displacement is missing.
+    #[error("{record}: column {column} is missing; the force is estimated from this measured output")]
     NoOutput {
         /// The record.
         record: String,
         /// The column.
         column: String,
     },
-    /// κ and χ cannot be told.
+    /// κ and χ cannot be estimated.
     #[error(
-        "{record}: {rows} rows without a force, over which the model says the actuator stands still: κ cannot be told; give rows in which the drive moves, or leave κ and χ away"
+        "{record}: the prediction is constant over the {rows} rows without a force, so κ cannot be estimated; give rows in which the drive \
+         moves, or omit the rows without a force"
     )]
     Still {
         /// The record with these rows.
         record: String,
-        /// How many they are.
+        /// Number of rows.
         rows: usize,
     },
-    /// The stiffness is no stiffness.
+    /// Invalid stiffness.
     #[error(transparent)]
     Params(#[from] hyst_core::Error),
 }
 
-/// Estimates the force over a record with a model of the free actuator. A compliance in the model is left out: what it explains is what is looked for.
+/// Estimates the force over a record with a model of the free actuator.
+///
+/// A compliance in the model is ignored, because the force would otherwise be part of the prediction.
 ///
 /// # Errors
 /// See [`ForceError`].
@@ -132,7 +137,7 @@ mod tests {
     use std::f64::consts::TAU;
     use std::ops::ControlFlow;
 
-    /// A straight actuator of 0.2 µm/V, from 3 s on under a force of 4 N on 0.8 N/µm.
+    /// A linear actuator with 0.2 µm/V, from 3 s under a force of up to 4 N on 0.8 N/µm.
     fn record(gain: f64, zero: f64, name: &str) -> Record {
         let time: Vec<f64> = (0..6000).map(|k| f64::from(k) * 1e-3).collect();
         let input: Vec<f64> = time.iter().map(|t| 40.0 - 40.0 * (TAU * 0.7 * t).cos()).collect();
@@ -166,22 +171,26 @@ mod tests {
     }
 
     #[test]
-    fn a_force_is_found_behind_a_gain_and_a_zero_that_have_changed() {
+    fn a_force_is_estimated_with_a_changed_gain_and_zero() {
         let (model, loaded) = (model(), record(0.21, 1.5, "loaded"));
         let estimate =
             |free| estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None }).unwrap();
-        let told = estimate(Free::Until(3.0));
-        assert!((told.params.kappa - 1.05).abs() < 1e-3 && (told.params.chi - 1.5).abs() < 1e-2, "{:?}", told.params);
-        assert_eq!(told.free_rows, 3001);
-        assert!(told.errors.unwrap().max_abs < 0.02, "{:?}", told.errors);
-        // Gain and zero of another day show as a force.
-        let untold = estimate(Free::Unknown);
-        assert!(untold.errors.unwrap().max_abs > 1.0, "{:?}", untold.errors);
-        assert_eq!((untold.params.kappa, untold.params.chi), (1.0, 0.0));
+        let corrected = estimate(Free::Until(3.0));
+        assert!(
+            (corrected.params.kappa - 1.05).abs() < 1e-3 && (corrected.params.chi - 1.5).abs() < 1e-2,
+            "{:?}",
+            corrected.params
+        );
+        assert_eq!(corrected.free_rows, 3001);
+        assert!(corrected.errors.unwrap().max_abs < 0.02, "{:?}", corrected.errors);
+        // Uncorrected, the changes of gain and zero look like a force.
+        let uncorrected = estimate(Free::Unknown);
+        assert!(uncorrected.errors.unwrap().max_abs > 1.0, "{:?}", uncorrected.errors);
+        assert_eq!((uncorrected.params.kappa, uncorrected.params.chi), (1.0, 0.0));
     }
 
     #[test]
-    fn rows_that_stand_still_tell_no_kappa() {
+    fn kappa_cannot_be_estimated_from_a_constant_prediction() {
         let (model, loaded) = (model(), record(0.2, 0.0, "loaded"));
         let free = Free::Until(0.0);
         let refused = estimate_force(&model, &loaded, &ForceOptions { stiffness: 0.8, free, temperature: None });

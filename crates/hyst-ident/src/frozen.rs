@@ -1,8 +1,8 @@
-//! Rows in which the sensor is frozen: it repeats one value to the last digit, as in a dropout (0 or a full-scale code for some rows) or a stopped
-//! data stream (the last value is repeated).
+//! Rows in which the sensor is frozen: it repeats one value to the last digit, for example in a dropout (0 or a full-scale code for some rows) or
+//! after a stopped data stream (the last value is repeated).
 //!
-//! An actuator at rest repeats values too, where the sensor has no noise beyond its digits. Then a run counts only with a jump before or after it that the
-//! drive does not explain. Where the last digits move in all other rows, a long run counts by itself.
+//! An actuator at rest also repeats values, if the sensor noise is below its resolution. A run of equal values is therefore frozen only with a
+//! jump before or after it that the drive does not explain. If the last digits change in all other rows, a long run is frozen without a jump.
 
 use std::ops::Range;
 
@@ -11,19 +11,19 @@ use crate::record::Record;
 use crate::samples::range;
 use crate::spikes::quantile;
 
-/// Least number of rows with one value; fewer are spikes.
+/// Fewest rows with one value. Shorter runs are spikes.
 const MIN_ROWS: usize = 4;
-/// Least number of rows that count without a jump.
+/// Fewest rows of a run without a jump.
 const MIN_ROWS_ALONE: usize = 10;
-/// Share of the steps from row to row that are usual.
-const USUAL: f64 = 0.99;
-/// How many usual steps, and how many digits of the sensor, a jump is at least.
+/// Quantile of the steps from row to row that is the usual step.
+const STEP_QUANTILE: f64 = 0.99;
+/// Smallest jump, as a multiple of the usual step and of the resolution of the sensor.
 const MIN_STEPS: f64 = 5.0;
-/// A jump is more than this many times what a step of the drive explains, each as a share of its own span.
-const MORE_THAN_THE_DRIVE: f64 = 2.0;
+/// Smallest ratio of a jump to the largest step of the drive before it, each relative to its own span.
+const MIN_DRIVE_RATIO: f64 = 2.0;
 /// Rows before a jump in which a step of the drive may have caused it.
-const BEFORE: usize = 64;
-/// Largest share of the rows that may be frozen; beyond that it is how the output moves.
+const DRIVE_ROWS: usize = 64;
+/// Largest share of frozen rows. With more, the output itself has constant stretches.
 const MAX_SHARE: f64 = 0.3;
 
 /// A run of rows with one value.
@@ -31,13 +31,13 @@ const MAX_SHARE: f64 = 0.3;
 pub struct Frozen {
     /// The value \[output unit\].
     pub at: f64,
-    /// The first row, from 0.
+    /// The first row, counted from 0.
     pub first: usize,
-    /// How many rows.
+    /// The number of rows.
     pub rows: usize,
 }
 
-/// Where the output of a record is frozen; nowhere without an input.
+/// Finds the frozen runs of the output of a record; none without an input.
 pub fn frozen_of(record: &Record) -> Vec<Frozen> {
     let Some(y) = record.output().filter(|y| y.len() == record.input().len()) else { return Vec::new() };
     frozen(record.input(), y, record.segments())
@@ -61,8 +61,8 @@ fn frozen(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<Froze
     let mut steps: Vec<f64> =
         segments.iter().flat_map(|s| output[s.clone()].windows(2)).map(|y| (y[1] - y[0]).abs()).collect();
     let digit = crate::noise::quantisation(output) * 12f64.sqrt();
-    let least = MIN_STEPS * quantile(&mut steps, USUAL).max(digit);
-    // Jumps at the ends of runs, from the rows beside them.
+    let min_jump = MIN_STEPS * quantile(&mut steps, STEP_QUANTILE).max(digit);
+    // The larger jump at the ends of a run.
     let jump = |run: &Range<usize>, s: &Range<usize>| {
         let before = if run.start > s.start { (output[run.start] - output[run.start - 1]).abs() } else { 0.0 };
         let after = if run.end < s.end { (output[run.end] - output[run.end - 1]).abs() } else { 0.0 };
@@ -73,32 +73,31 @@ fn frozen(input: &[f64], output: &[f64], segments: &[Range<usize>]) -> Vec<Froze
     let mut repeats = vec![false; output.len()];
     runs.iter().for_each(|(run, _, _)| repeats[run.clone()].fill(true));
     let noisy = last_digits_move(output, segments, &repeats);
-    // A dropout widens the output's span itself.
+    // The span is computed without the runs with a jump, because a dropout enlarges it.
     let mut moves = vec![true; output.len()];
-    runs.iter().filter(|(_, _, jump)| *jump > least).for_each(|(run, _, _)| moves[run.clone()].fill(false));
+    runs.iter().filter(|(_, _, jump)| *jump > min_jump).for_each(|(run, _, _)| moves[run.clone()].fill(false));
     let span = |(low, high): (f64, f64)| (high - low).max(f64::MIN_POSITIVE);
-    let per_input = MORE_THAN_THE_DRIVE
-        * span(range((0..output.len()).filter(|row| moves[*row]).map(|row| output[row])))
+    let per_input = MIN_DRIVE_RATIO * span(range((0..output.len()).filter(|row| moves[*row]).map(|row| output[row])))
         / span(range(input.iter().copied()));
     let explained = |run: &Range<usize>, s: &Range<usize>, jump: f64| {
-        let near = run.start.saturating_sub(BEFORE).max(s.start)..(run.end + 1).min(s.end);
+        let near = run.start.saturating_sub(DRIVE_ROWS).max(s.start)..(run.end + 1).min(s.end);
         let driven = input[near].windows(2).fold(0.0, |most: f64, u| most.max((u[1] - u[0]).abs()));
         jump <= per_input * driven
     };
-    // At an end of the output's range the sensor may be at the end of its own: another fault.
+    // Runs at an end of the output range may be clipping, which is another fault.
     let (low, high) = range(output.iter().copied());
     let is_inside = |run: &Range<usize>| output[run.start] > low && output[run.start] < high;
     let alone = |run: &Range<usize>| noisy && run.len() >= MIN_ROWS_ALONE && is_inside(run);
     let found: Vec<Frozen> = runs
         .into_iter()
-        .filter(|(run, s, jump)| alone(run) || *jump > least && !explained(run, s, *jump))
+        .filter(|(run, s, jump)| alone(run) || *jump > min_jump && !explained(run, s, *jump))
         .map(|(run, _, _)| Frozen { at: output[run.start], first: run.start, rows: run.len() })
         .collect();
     let rows: usize = found.iter().map(|run| run.rows).sum();
     if rows as f64 > MAX_SHARE * output.len() as f64 { Vec::new() } else { found }
 }
 
-/// Runs of equal values in a segment, as long as they have to be.
+/// Returns the runs of at least [`MIN_ROWS`] equal values in a segment.
 fn runs_in<'a>(output: &'a [f64], s: &Range<usize>) -> impl Iterator<Item = Range<usize>> + 'a {
     let mut end = s.start;
     output[s.clone()].chunk_by(|a, b| a == b).filter_map(move |run| {
@@ -115,7 +114,7 @@ mod tests {
         50.0 - 50.0 * (0.01 * k as f64).cos()
     }
 
-    /// An output with noise, changed by `change`.
+    /// Returns the frozen runs of an output with noise that `change` has modified.
     fn found(drive: impl Fn(usize) -> f64, change: impl Fn(&mut [f64])) -> Vec<Frozen> {
         let input: Vec<f64> = (0..3000).map(drive).collect();
         let mut output: Vec<f64> =
@@ -132,20 +131,20 @@ mod tests {
             let last = y[1399];
             y[1400..1480].fill(last);
         });
-        // The row before has the value that is repeated.
+        // The run includes the row before, whose value is repeated.
         assert_eq!((stopped.len(), stopped[0].first, stopped[0].rows), (1, 1399, 81));
     }
 
     #[test]
-    fn rests_steps_and_coarse_digits_are_not() {
+    fn rests_steps_and_coarse_digits_are_not_frozen() {
         assert_eq!(found(drive, |_| {}), []);
         assert_eq!(found(drive, |y| y.iter_mut().for_each(|y| *y = (20.0 * *y).round() / 20.0)), []);
-        // A stairs drive, followed without noise.
+        // A staircase drive and an output without noise.
         assert_eq!(
             found(|k| 10.0 * (k / 300) as f64, |y| y.iter_mut().for_each(|y| *y = (10.0 * *y).round() / 10.0)),
             []
         );
-        // A play stands after each turn.
+        // A play operator is constant after each turn.
         assert_eq!(
             found(drive, |y| {
                 let mut p = 0.0;
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clipped_peak_is_another_fault() {
+    fn a_clipped_peak_is_not_frozen() {
         assert_eq!(found(drive, |y| y.iter_mut().for_each(|y| *y = y.min(8.0))), []);
     }
 }

@@ -1,14 +1,13 @@
-//! Fractional models with all of their memory, over a whole record at once.
+//! Fractional models with full memory, over a whole record at once.
 //!
-//! Offline the Grünwald-Letnikov sums need not be cut: LFDM and IFM are linear, so their outputs are convolutions
-//! with an impulse response, and that is a quotient of two power series. Both cost O(N log N) by FFT, where the sums
-//! themselves cost O(N²). This is the reference for the memories of [`hyst_core::Memory`], which run sample by
-//! sample.
+//! Offline the Grünwald-Letnikov sums need not be truncated. LFDM and IFM are linear, so their outputs are convolutions
+//! with an impulse response, which is a quotient of two power series. Both cost O(N log N) by FFT; the sums cost O(N²).
+//! This is the reference for the memories of [`hyst_core::Memory`], which run sample by sample.
 
 use hyst_core::{Build, Error, Exponentials, GlWeights, Ifm, IfmParams, Lfdm, LfdmParams, Sampling};
 use realfft::RealFftPlanner;
 
-/// The sum of Eq. 15 as a power series in z⁻¹, `gain + weight · Σ ωₖ z⁻ᵏ`, divided by `by`.
+/// Returns one side of Eq. 15 as a power series in z⁻¹: `gain + weight · Σ ωₖ z⁻ᵏ`, divided by `by`.
 fn side(gain: f64, weight: f64, weights: GlWeights, by: f64, n: usize) -> Vec<f64> {
     let mut series: Vec<f64> = weights.take(n).map(|w| weight * w / by).collect();
     if let Some(first) = series.first_mut() {
@@ -17,7 +16,7 @@ fn side(gain: f64, weight: f64, weights: GlWeights, by: f64, n: usize) -> Vec<f6
     series
 }
 
-/// The first `n` terms of the product of two power series.
+/// Returns the first `n` terms of the product of two power series.
 fn product(planner: &mut RealFftPlanner<f64>, a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
     let (a, b) = (&a[..a.len().min(n)], &b[..b.len().min(n)]);
     if a.is_empty() || b.is_empty() {
@@ -29,7 +28,7 @@ fn product(planner: &mut RealFftPlanner<f64>, a: &[f64], b: &[f64], n: usize) ->
         let mut padded = forward.make_input_vec();
         padded[..x.len()].copy_from_slice(x);
         let mut spectrum = forward.make_output_vec();
-        // Lengths are the planner's own.
+        // Cannot fail: the lengths come from the planner.
         let _ = forward.process(&mut padded, &mut spectrum);
         spectrum
     };
@@ -42,14 +41,14 @@ fn product(planner: &mut RealFftPlanner<f64>, a: &[f64], b: &[f64], n: usize) ->
     out
 }
 
-/// The first `n` terms of 1/b, b₀ = 1, by Newton's iteration `r ← r − r (b r − 1)`, which doubles the number of right
-/// terms.
+/// Returns the first `n` terms of 1/b, with b₀ = 1, by Newton's iteration `r ← r − r (b r − 1)`, which doubles the
+/// number of correct terms.
 fn reciprocal(planner: &mut RealFftPlanner<f64>, b: &[f64], n: usize) -> Vec<f64> {
     let mut r = vec![1.0];
     while r.len() < n {
         let next = (2 * r.len()).min(n);
         let mut excess = product(planner, b, &r, next);
-        // Right so far: what is left there is rounding.
+        // These terms are already correct; the excess is rounding.
         excess[..r.len()].fill(0.0);
         let correction = product(planner, &r, &excess, next);
         r.resize(next, 0.0);
@@ -59,7 +58,8 @@ fn reciprocal(planner: &mut RealFftPlanner<f64>, b: &[f64], n: usize) -> Vec<f64
     r
 }
 
-/// The first `n` samples of the LFDM's impulse response \[y/u\], from rest: the quotient of the two sides of Eq. 15.
+/// Returns the first `n` samples of the LFDM's impulse response from rest \[y/u\]: the quotient of the two sides of Eq.
+/// 15.
 ///
 /// # Errors
 /// Those of the model's [`build`](hyst_core::Build::build).
@@ -74,7 +74,7 @@ pub fn impulse_response(params: &LfdmParams, sampling: &Sampling, n: usize) -> R
     Ok(product(&mut planner, &side(a, b, wa, first, n), &inverse, n))
 }
 
-/// The last finite value where one is not finite, as the models do.
+/// Replaces values that are not finite by the last finite value, as the models do.
 fn held(u: &[f64]) -> Vec<f64> {
     let mut last = 0.0;
     u.iter()
@@ -85,8 +85,9 @@ fn held(u: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Output of the LFDM (Zhu et al. 2018, eq. 6, 15) \[y\] to the input `u` \[u\], settled at its first value, with
-/// full memory.
+/// Returns the output of the LFDM with full memory \[y\] for the input `u` \[u\], settled at its first value.
+///
+/// Zhu et al. 2018, eq. 6, 15.
 ///
 /// # Errors
 /// Those of the model's [`build`](hyst_core::Build::build).
@@ -109,13 +110,14 @@ pub fn lfdm(params: &LfdmParams, sampling: &Sampling, u: &[f64]) -> Result<Vec<f
     Ok(x)
 }
 
-/// Output of the IFM (Zhu et al. 2018, eq. 10, 11, 15) \[y\] to the input `u` \[u\], settled at its first value, with
-/// full memory.
+/// Returns the output of the IFM with full memory \[y\] for the input `u` \[u\], settled at its first value.
+///
+/// Zhu et al. 2018, eq. 10, 11, 15.
 ///
 /// # Errors
-/// Those of the model's [`build`](hyst_core::Build::build); any delay will do.
+/// Those of the model's [`build`](hyst_core::Build::build); the delay is not limited.
 pub fn ifm(params: &IfmParams, sampling: &Sampling, u: &[f64]) -> Result<Vec<f64>, Error> {
-    // The delay is taken from the record here, without the room that the model's ring has.
+    // The delay is applied to the record here, so the limit of the model's ring buffer does not apply.
     let tau = if params.tau.is_finite() && params.tau > 0.0 { 0.0 } else { params.tau };
     let _checked: Ifm<f64, Exponentials<f64, 8>, 2> = IfmParams { tau, ..*params }.build(sampling)?;
     let u = held(u);
@@ -127,9 +129,9 @@ pub fn ifm(params: &IfmParams, sampling: &Sampling, u: &[f64]) -> Result<Vec<f64
     Ok(x)
 }
 
-/// `u` some samples late, linear between them; before the first sample, the first sample.
+/// Delays `u` by a number of samples, linear between them; before the first sample, the first sample.
 fn delayed(u: &[f64], samples: f64) -> Vec<f64> {
-    // As hyst_core::Delay: whole samples up to rounding are whole samples.
+    // As hyst_core::Delay: integers up to rounding are integers.
     let nearest = samples.round();
     let samples = if (samples - nearest).abs() <= 1e-9 * nearest { nearest } else { samples };
     let (whole, fraction) = (samples.floor() as usize, samples.fract());
@@ -147,7 +149,7 @@ mod tests {
     const TEN_KHZ: Sampling = Sampling { period: 1e-4 };
     const BOTH: [GlOrder; 2] = [GlOrder::First, GlOrder::Second];
 
-    /// The paper's five sines around an offset that is reached in a second.
+    /// The paper's five sines with an offset that is reached within a second.
     fn drive(n: usize, h: f64) -> Vec<f64> {
         (0..n)
             .map(|k| {
@@ -165,7 +167,7 @@ mod tests {
         std::iter::once(first).chain(u[1..].iter().map(|u| stage.step(&mut s, &e, *u))).collect()
     }
 
-    /// Largest distance over the span of `exact`.
+    /// Returns the maximum distance, relative to the span of `exact`.
     fn apart(x: &[f64], exact: &[f64]) -> f64 {
         let (low, high) = crate::samples::range(exact.iter().copied());
         let distance = x.iter().zip(exact).fold(0.0, |d: f64, (x, y)| d.max((x - y).abs()));
@@ -173,7 +175,7 @@ mod tests {
         distance / (high - low)
     }
 
-    /// Eq. 15 as it stands: O(N²).
+    /// Eq. 15 as printed: O(N²).
     fn recursion(p: &LfdmParams, h: f64, u: &[f64]) -> Vec<f64> {
         let weights = |mu| GlWeights::new(mu, p.order).take(u.len()).collect::<Vec<f64>>();
         let (wa, wb) = (weights(p.alpha), weights(p.beta));
@@ -188,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn the_convolution_is_the_recursion() {
+    fn the_convolution_equals_the_recursion() {
         for order in BOTH {
             for h in [1e-4, 1e-2] {
                 for n in [1, 2, 3, 1000, 2047, 2048] {
@@ -220,7 +222,7 @@ mod tests {
         LfdmParams { a: p.a, b: p.b, c: p.c, alpha: p.alpha, beta: p.beta, order: p.order }
     }
 
-    /// Error of a memory over 1e5 samples at 10 kHz, in parts of the output's span: LFDM, IFM.
+    /// Returns the errors of a memory over 1e5 samples at 10 kHz, relative to the output's span: LFDM, IFM.
     fn errors<W: Memory<f64>>(order: GlOrder) -> (f64, f64) {
         let u = drive(100_000, 1e-4);
         let (l, i) = (LfdmParams { order, ..LFDM }, IfmParams { order, ..IFM });
@@ -232,7 +234,7 @@ mod tests {
         )
     }
 
-    /// The figures that the documentation of the memories states.
+    /// Checks the errors stated in the documentation of the memories.
     #[test]
     fn errors_of_the_memories_against_full_memory() {
         for order in BOTH {
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_held_and_bad_parameters_are_named() {
+    fn invalid_inputs_are_held_and_invalid_parameters_are_refused() {
         let mut u = drive(500, 1e-4);
         let model: Ifm<f64, Exponentials<f64, 40>, 32> = IFM.build(&TEN_KHZ).unwrap();
         (u[70], u[200]) = (f64::NAN, f64::INFINITY);

@@ -1,11 +1,11 @@
 //! Records, fits, simulation, diagnosis and experiment design for actuators with hysteresis.
 //!
-//! The way of a record: [`record::Record`] (read and checked) → [`fit::fit`] (a base model) →
-//! [`diagnose::diagnose`] (what the model lacks, named and added) → [`compensate::compensate`] (the
-//! drive that makes the actuator follow a reference). [`simulate::simulate`] says what a model
-//! predicts, [`excite`] designs the drive of an identification experiment, [`learn`] improves the drive of a reference that repeats.
+//! Processing steps: [`record::Record`] (read and checked) → [`fit::fit`] (a base model) → [`diagnose::diagnose`]
+//! (missing effects, named and added) → [`compensate::compensate`] (the drive that makes the actuator follow a
+//! reference). [`simulate::simulate`] computes the prediction of a model, [`excite`] designs the drive of an
+//! identification experiment, [`learn`] improves the drive for a periodic reference.
 //!
-//! Knows nothing of devices and terminals: progress is told to closures, results are returned.
+//! This crate is independent of devices and terminals: it reports progress to closures and returns results.
 
 pub mod atomic_file;
 mod base;

@@ -1,4 +1,4 @@
-//! Gains of a PID from a model: how fast a loop around the actuator may be.
+//! PID gains from a model, and the bandwidth of the loop.
 
 use std::f64::consts::{FRAC_PI_6, TAU};
 
@@ -6,32 +6,34 @@ use hyst_core::PidParams;
 
 use crate::model::Model;
 
-/// A loop, and why it is no faster.
+/// PID gains, and the limit of the loop's speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopGains {
     /// The gains, with the limits of the drive.
     pub pid: PidParams,
-    /// Where the loop's gain falls below one \[Hz\]: about its bandwidth.
+    /// Crossover frequency of the open loop \[Hz\]: about the bandwidth.
     pub crossover_hz: f64,
-    /// Frequency of the mode that keeps it slow \[Hz\]; `None` where dead time does.
+    /// Frequency of the mode that limits the loop \[Hz\]; `None` if the dead time limits it.
     pub mode_hz: Option<f64>,
 }
 
-/// Sample periods from a measurement to the middle of what it leads to: one to compute, half of the one that the drive is held.
-const PERIODS: f64 = 1.5;
+/// Dead time of the loop in sample periods: one to compute, half of one to hold the drive.
+const DEAD_TIME_PERIODS: f64 = 1.5;
 
-/// Gains of `C(s) = kᵢ (1 + T s) / s` around an actuator of a mean gain g, lag T, dead time and modes, at a sample period \[s\].
+/// Computes the gains of `C(s) = kᵢ (1 + T s) / s` for an actuator with mean gain g, lag T, dead time and modes.
 ///
-/// The zero takes the lag out; what is left is an integrator `ω/s` with `ω = kᵢ g`. A phase margin of 60° allows `ω = π / (6 τ)`, τ being dead time
-/// and one and a half sample periods; a gain margin of two at a mode of f and ζ that carries the share s of the output allows `ω = 2π f ζ / s` (its peak
-/// is `s/(2ζ)`). The lower one is taken. Local slopes of a hysteresis loop are within a third of its mean gain, which is within both margins.
+/// The zero cancels the lag, so the open loop is an integrator `ω/s` with `ω = kᵢ g`. A phase margin of 60° allows `ω =
+/// π / (6 τ)`, with τ the dead time plus one and a half sample periods. A gain margin of two at a mode with frequency f
+/// and damping ratio ζ that carries the share s of the output allows `ω = 2π f ζ / s` (its peak is `s/(2ζ)`). The
+/// smaller ω is used. Local slopes of a hysteresis loop differ from its mean gain by at most a third, which is within
+/// both margins. `period` is the sample period \[s\]; the last argument is the range of the drive.
 ///
 /// # Errors
-/// If the model cannot be run.
+/// If the model cannot be built.
 pub fn loop_gains(model: &Model, period: f64, (low, high): (f64, f64)) -> Result<LoopGains, hyst_core::Error> {
     let (gain, _) = model.straight_line()?;
     let lag = model.effects.lag.as_ref().map_or(0.0, |l| l.seconds);
-    let dead = model.effects.delay.as_ref().map_or(0.0, |d| d.seconds) + PERIODS * period;
+    let dead = model.effects.delay.as_ref().map_or(0.0, |d| d.seconds) + DEAD_TIME_PERIODS * period;
     let mode = model
         .effects
         .resonances
@@ -67,7 +69,7 @@ mod tests {
 
     const PERIOD: f64 = 1e-3;
 
-    /// A straight actuator of 0.2 µm/V with these effects.
+    /// A linear actuator with 0.2 µm/V and these effects.
     fn model(effects: Effects) -> Model {
         let base = Base::Pi(PiParams { gain: 0.2, thresholds: vec![1.0], weights: vec![0.0] });
         let ends = Ends {
@@ -80,7 +82,8 @@ mod tests {
         Model::from_parameters(base, effects, &ends).unwrap()
     }
 
-    /// Gain of the open loop, and its phase \[rad\], at a frequency, from parts that the gains were not computed with: sample and hold included.
+    /// Returns gain and phase \[rad\] of the open loop at a frequency, computed independently, sampling and hold
+    /// included.
     fn open_loop(effects: &Effects, pid: &PidParams, hz: f64) -> (f64, f64) {
         let w = TAU * hz;
         let controller =
@@ -90,7 +93,7 @@ mod tests {
         let (mut gain, mut phase) =
             (0.2 * controller.0 / (1.0 + (w * lag).powi(2)).sqrt(), controller.1 - (w * lag).atan() - w * dead);
         for mode in &effects.resonances {
-            // 1 − s + s ω₀² / (ω₀² − ω² + 2 i ζ ω₀ ω), s being its share.
+            // 1 − s + s ω₀² / (ω₀² − ω² + 2 i ζ ω₀ ω), with s its share.
             let (r, z, s) = (hz / mode.hz, mode.damping, mode.gain);
             let (re, im) = (1.0 - r * r, 2.0 * z * r);
             let norm = re * re + im * im;
@@ -115,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn dead_time_leaves_a_phase_margin_of_sixty_degrees() {
+    fn the_phase_margin_is_sixty_degrees_with_dead_time() {
         let lag = Some(LagParams { seconds: 0.004 });
         for seconds in [0.0, 0.002, 0.01] {
             let delay = (seconds > 0.0).then_some(DelayParams { seconds });
@@ -126,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sharp_mode_leaves_a_gain_margin_of_two() {
+    fn the_gain_margin_is_two_with_a_lightly_damped_mode() {
         let mode = ResonanceParams { hz: 180.0, damping: 0.01, gain: 0.3 };
         let effects = Effects { resonances: vec![mode], ..Effects::default() };
         let (gains, _) = margins(effects.clone());

@@ -1,9 +1,9 @@
-//! Where the drive was before a segment began.
+//! The drive history before a segment.
 //!
-//! A model's memory is virgin at the start of a segment. An actuator that was cycled before the record began, or that rests away from 0 V, remembers
-//! something else. Of all that happened, a memory that wipes out keeps only the extremes that are in force (Mayergoyz, Mathematical Models of Hysteresis,
-//! 1991), so few turns of the drive describe it. They are the initial condition of the record, and are estimated from its first rows, like that of any
-//! dynamic system.
+//! A model's memory is virgin at the start of a segment. An actuator that was cycled before the record, or that rests
+//! away from 0 V, has another memory. A memory that wipes out keeps only the extremes in force (Mayergoyz, Mathematical
+//! Models of Hysteresis, 1991), so a few reversals of the drive describe it. They are the initial condition of the
+//! record and are estimated from its first rows.
 
 use std::ops::Range;
 
@@ -16,42 +16,43 @@ use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
 use crate::settle::{centre, first_cycles, windows};
 
-/// Levels at which the drive may have turned, over the range of the record.
+/// Number of reversal levels that are tried over the range of the record.
 const LEVELS: usize = 13;
-/// And on either side of it.
-const BEYOND: usize = 6;
-/// Turns of a decaying drive, as one that demagnetises.
-const DECAY: usize = 16;
-/// Amplitudes of such a drive.
-const AMPLITUDES: usize = 6;
-/// Rows from one turn to the next.
-const ROWS: usize = 16;
+/// Number of further levels on either side of the range.
+const LEVELS_BEYOND: usize = 6;
+/// Number of reversals of a decaying drive (demagnetisation).
+const DECAY_REVERSALS: usize = 16;
+/// Number of amplitudes of such a drive.
+const DECAY_AMPLITUDES: usize = 6;
+/// Rows from one reversal to the next.
+const ROWS_PER_REVERSAL: usize = 16;
 
-/// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
+/// Returns candidate drive histories of a segment that starts at `u0` \[V\]: drives from 0 V that end just before `u0`.
 pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
     let (span, inside) = (high - low, LEVELS - 1);
-    let level = |i: usize| low + span * (i as f64 - BEYOND as f64) / inside as f64;
-    // Beyond the range, too: a device that is driven to one side is poled to it, and wide plays come to rest about any voltage.
-    let levels = || (0..LEVELS + 2 * BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
+    let level = |i: usize| low + span * (i as f64 - LEVELS_BEYOND as f64) / inside as f64;
+    // Levels outside of the range too: a device driven to one side is poled there, and wide play operators come to rest
+    // at any voltage.
+    let levels = || (0..LEVELS + 2 * LEVELS_BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
     let mut turns: Vec<Vec<f64>> = levels().map(|u| vec![u]).collect();
-    // Two turns on one side of where the record begins wipe each other out.
+    // Two reversals on the same side of `u0` wipe each other out.
     for first in levels() {
         turns.extend(levels().filter(|second| (second - u0) * (first - u0) < 0.0).map(|second| vec![first, second]));
     }
-    let decays = (1..=AMPLITUDES).map(|i| decay(u0, span * i as f64 / AMPLITUDES as f64));
+    let decays = (1..=DECAY_AMPLITUDES).map(|i| decay(u0, span * i as f64 / DECAY_AMPLITUDES as f64));
     turns.iter().map(|turns| path(turns, u0)).chain(decays).collect()
 }
 
-/// How a device may have come to where a segment begins.
+/// How a device may have reached the start of a segment.
 #[derive(Clone, Copy)]
 enum History {
-    /// It was demagnetised there, or has rested there from the start: wide plays stand at the first voltage.
+    /// Demagnetised at `u0`, or at rest there from the start: wide play operators are at the first voltage.
     Demagnetised,
-    /// It went on as it does afterwards.
+    /// Cycled before as in the segment itself.
     Cycled,
-    /// It rested where the segment before had ended, and was driven on from there.
+    /// At rest since the end of the previous segment, and driven on from there.
     Continued,
-    /// It was driven to the upper or to the lower end of the range.
+    /// Driven to the upper or the lower end of the range.
     FromAbove,
     FromBelow,
 }
@@ -59,7 +60,7 @@ enum History {
 impl History {
     const ALL: [Self; 5] = [Self::Demagnetised, Self::Cycled, Self::Continued, Self::FromAbove, Self::FromBelow];
 
-    /// The drive before a segment; none where there can be none.
+    /// Returns the drive before a segment; `None` if this history is impossible.
     fn past(self, samples: &Samples, segment: usize) -> Option<Vec<f64>> {
         let rows = samples.segments[segment].clone();
         let (u0, (low, high)) = (samples.input[rows.start], samples.input_range());
@@ -73,8 +74,8 @@ impl History {
     }
 }
 
-/// The record after the histories that leave least of it: one for its first segment and one for all others, of those that are `asked` for. `squares` is
-/// what a fit leaves of the record.
+/// Returns the record with the histories that minimise `squares`, the Σ residual² of a fit. One history is chosen for
+/// the first segment and one for all others, among the segments in `asked`.
 pub(crate) fn with_histories<E>(
     samples: &Samples,
     asked: &[bool],
@@ -104,7 +105,7 @@ pub(crate) fn with_histories<E>(
     Ok(best)
 }
 
-/// The drive before a segment that continues the one before, of the same file; none for the first.
+/// Returns the drive before a segment that continues the previous one of the same file; `None` for the first.
 pub(crate) fn continued(samples: &Samples, segment: usize) -> Option<Vec<f64>> {
     let last = segment.checked_sub(1)?;
     let of_one_file = samples.file_of_segment[last] == samples.file_of_segment[segment];
@@ -113,16 +114,17 @@ pub(crate) fn continued(samples: &Samples, segment: usize) -> Option<Vec<f64>> {
     of_one_file.then(|| path(&in_force(drive), samples.input[samples.segments[segment].start]))
 }
 
-/// The turns of a drive from 0 V that a memory which wipes out still holds at its end.
+/// Returns the reversals of a drive from 0 V that a memory with wiping-out still contains at its end.
 fn in_force<'a>(drive: impl Iterator<Item = &'a f64>) -> Vec<f64> {
     let mut turns: Vec<f64> = vec![0.0];
     for u in drive.copied() {
-        // What goes on in one direction is no turn, and what goes beyond an earlier turn wipes out that and the one after it.
+        // A continued motion is no reversal. A motion beyond an earlier reversal wipes out that one and the one after
+        // it.
         while let [.., a, b] = turns[..]
             && ((u - b) * (b - a) >= 0.0 || (turns.len() > 2 && (u - a) * (b - a) <= 0.0))
         {
-            let goes_on = (u - b) * (b - a) >= 0.0;
-            turns.truncate(turns.len() - if goes_on { 1 } else { 2 });
+            let continues = (u - b) * (b - a) >= 0.0;
+            turns.truncate(turns.len() - if continues { 1 } else { 2 });
         }
         turns.push(u);
     }
@@ -130,35 +132,36 @@ fn in_force<'a>(drive: impl Iterator<Item = &'a f64>) -> Vec<f64> {
     turns
 }
 
-/// A drive that swings about `u0` with less and less amplitude, as one that demagnetises \[V\].
+/// Returns a drive that oscillates about `u0` with decreasing amplitude, as in demagnetisation \[V\].
 fn decay(u0: f64, amplitude: f64) -> Vec<f64> {
     let turn = |k: usize| {
-        let size = amplitude * (1.0 - k as f64 / DECAY as f64);
+        let size = amplitude * (1.0 - k as f64 / DECAY_REVERSALS as f64);
         u0 + if k.is_multiple_of(2) { size } else { -size }
     };
-    path(&(0..DECAY).map(turn).collect::<Vec<f64>>(), u0)
+    path(&(0..DECAY_REVERSALS).map(turn).collect::<Vec<f64>>(), u0)
 }
 
-/// From 0 V from turn to turn, and on to `u0` without reaching it.
+/// Returns a drive from 0 V from reversal to reversal and towards `u0`, without `u0` itself.
 fn path(turns: &[f64], u0: f64) -> Vec<f64> {
     let mut from = 0.0;
     let mut path = vec![from];
     for to in turns.iter().copied().chain([u0]) {
-        path.extend((1..=ROWS).map(|i| from + (to - from) * i as f64 / ROWS as f64));
+        path.extend((1..=ROWS_PER_REVERSAL).map(|i| from + (to - from) * i as f64 / ROWS_PER_REVERSAL as f64));
         from = to;
     }
     path.pop();
     path
 }
 
-/// Segments that do not begin near 0 V, where the memory is that of a rest.
+/// Returns which segments start away from 0 V. Near 0 V the memory is that of rest.
 pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     let (low, high) = samples.input_range();
     let reach = low.abs().max(high.abs());
     samples.segments.iter().map(|s| samples.input[s.start].abs() > MINOR_SHARE * reach).collect()
 }
 
-/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows.
+/// Returns which segments have a larger error in their first rows than in other rows. `residual` is that of a fit
+/// without those rows.
 pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let windows = windows(samples);
     let centred = centre(samples, residual, &windows, &samples.blind);
@@ -171,11 +174,11 @@ pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     (0..samples.segments.len()).map(stands_out).collect()
 }
 
-/// A drive with the past of each segment before it.
+/// A drive with the history of each segment before it.
 pub(crate) struct WithPast {
     pub(crate) drive: Vec<f64>,
     pub(crate) segments: Vec<Range<usize>>,
-    /// Rows of it that are the record's.
+    /// The rows that belong to the record.
     own: Vec<Range<usize>>,
 }
 
@@ -193,13 +196,13 @@ impl WithPast {
         all
     }
 
-    /// The rows of the record, of a column over all rows.
+    /// Returns the rows of the record from a column over all rows.
     pub(crate) fn own(&self, column: &[f64]) -> Vec<f64> {
         self.own.iter().flat_map(|rows| column[rows.clone()].iter().copied()).collect()
     }
 }
 
-/// The columns `of` a base over a drive, each segment after its past.
+/// Returns the columns with the indices `of` of a basis over a drive, each segment after its history.
 pub(crate) fn columns(
     basis: &dyn Basis,
     of: Range<usize>,
@@ -216,7 +219,7 @@ pub(crate) fn columns(
     columns.iter().map(|column| all.own(column)).collect()
 }
 
-/// `Σᵢ wᵢ φᵢ` over a drive, each segment after its past, where that is less work than the columns are.
+/// Returns `Σᵢ wᵢ φᵢ` over a drive, each segment after its history, if that takes less work than the columns.
 pub(crate) fn combined(
     basis: &dyn Basis,
     weights: &[f64],
@@ -232,9 +235,11 @@ pub(crate) fn combined(
     basis.combined(weights, &all.drive, &all.segments, drag).map(|v| all.own(&v))
 }
 
-/// The past of each segment after which a fit follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
-/// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment. `residual` is what the fit has
-/// left in all rows; `surely` are the segments in which a memory of something else than rest is no surprise.
+/// Returns the drive history of each segment after which a fit follows its first rows [`best`]; empty for segments that
+/// are not in `asked`. About 340 combinations of reversals are tried over the start-up window, at most half of the
+/// segment.
+/// `residual` is that of the fit in all rows; `surely` marks the segments in which a memory other than rest is
+/// expected.
 ///
 /// # Errors
 /// If a stage of the fit cannot be built.
@@ -254,7 +259,7 @@ pub(crate) fn recalled(
             return Ok(Vec::new());
         }
         let beginning = samples.beginning(i, window);
-        // What does not move leaves the same.
+        // The residual changes only by the change of the motion.
         let motion = |past: &Vec<f64>| {
             let after = Samples { pasts: vec![past.clone()], ..beginning.clone() };
             problem.motion_in(fitted, &after)
@@ -267,7 +272,7 @@ pub(crate) fn recalled(
             Some(left.filter(|(_, blind)| !**blind).map(|(((now, then), r), _)| (r + now - then).powi(2)).sum::<f64>())
         };
         let mut pasts = pasts(samples.input[start], samples.input_range());
-        // Or it went on as it does afterwards.
+        // Or the device was cycled before as in the segment itself.
         pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
         pasts.extend(continued(samples, i));
         pasts.extend(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned());
@@ -276,15 +281,16 @@ pub(crate) fn recalled(
     (0..asked.len()).map(of_segment).collect()
 }
 
-/// The `new` past of each segment, or the old one where there is none.
+/// Returns the `new` history of each segment, or the old one where that is empty.
 pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     new.into_iter().zip(old).map(|(new, old)| if new.is_empty() { old.clone() } else { new }).collect()
 }
 
-/// The past after which least is left of the first rows. None unless their error above the `level` of as many other rows falls by [`MIN_PAST_RATIO`] (`level`
-/// and `squares` are Σ residual²). Near 0 V, where a memory may be that of a rest and what stands out a transient of the sensor, it has to explain all but a
-/// [`NEGLIGIBLE_SHARE`] of that, or nothing may stand out any more: an actuator that was cycled before keeps a remanence at 0 V, and no transient of a
-/// sensor has the course of a loop.
+/// Returns the drive history with the smallest Σ residual² of the first rows (`squares`); empty if none explains them.
+/// The error above `level`, the Σ residual² of as many other rows, must fall by [`MIN_PAST_RATIO`]. Near 0 V a memory
+/// of rest and a sensor transient are plausible too. There the history must explain all but a [`NEGLIGIBLE_SHARE`] of
+/// the error, or the error must fall to that of other rows: a cycled actuator keeps a remanence at 0 V, and no sensor
+/// transient has the shape of a loop.
 pub(crate) fn best(
     pasts: Vec<Vec<f64>>,
     level: f64,
@@ -304,8 +310,8 @@ pub(crate) fn best(
     found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }
 
-/// Σ residual² of as many rows as a segment has at its beginning, at the level of those of the record in which no start-up can lie; `centred` is without
-/// a sensor's zero.
+/// Returns the Σ residual² that the start-up window of a segment would have with the mean square of the rows outside of
+/// all windows. `centred` is the residual without the sensor's zero.
 pub(crate) fn level(samples: &Samples, centred: &[f64], windows: &[usize], segment: usize) -> f64 {
     let others = samples.segments.iter().zip(windows).flat_map(|(s, w)| s.start + w..s.end);
     let others = others.filter(|k| !samples.blind[*k]).map(|k| centred[k] * centred[k]);
@@ -323,7 +329,8 @@ mod tests {
 
     const PAST: [f64; 3] = [0.0, 95.0, 20.0];
 
-    /// An actuator of few plays that was driven up and back before its record begins at 45 V; its drive goes over the range later.
+    /// A record of a few play operators that were driven up and back before the record starts at 45 V; later the drive
+    /// covers the whole range.
     fn samples() -> Samples {
         let turns = [45.0, 70.0, 30.0, 60.0, 5.0, 100.0, 0.0, 90.0, 10.0, 100.0, 0.0, 60.0];
         let leg = |pair: &[f64]| {
@@ -345,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_past_leaves_what_the_same_drive_leaves_in_a_record() {
+    fn a_drive_history_acts_like_the_same_drive_in_a_record() {
         let samples = samples();
         let past = path(&PAST[1..], 45.0);
         assert!(past[0] == 0.0 && past.last().is_some_and(|u| (20.0..45.0).contains(u)), "{past:?}");
@@ -360,7 +367,7 @@ mod tests {
         }
     }
 
-    /// No row is lost to a start-up, on either base, once it is known where the drive has been.
+    /// With the drive history, no row is a start-up row on either base.
     #[test]
     fn a_record_that_begins_in_mid_cycle_is_followed_from_its_first_row() {
         for kind in 0..2 {
@@ -370,25 +377,25 @@ mod tests {
             let (fitted, left) =
                 fit_settled(&mut samples, bases[kind].as_ref(), &FitOptions::default(), &String::new).unwrap();
             assert!(!samples.pasts[0].is_empty() && samples.settling.iter().all(|s| !s), "{kind}: {:?}", samples.pasts);
-            // Noise of 5 nm at most; the plays of the base are not those of the actuator.
+            // The noise is at most 5 nm; the thresholds of the base differ from those of the actuator.
             let largest = left.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
             assert!(largest < 0.1, "{kind}: {largest}, RMSE {}", fitted.rmse());
         }
     }
 
     #[test]
-    fn a_memory_keeps_the_turns_that_nothing_later_went_beyond() {
+    fn a_memory_keeps_the_reversals_that_were_not_exceeded_later() {
         let kept = |drive: &[f64]| in_force(drive.iter());
         assert_eq!(kept(&[1.0, 2.0, 5.0, 3.0, 4.0]), [5.0, 3.0, 4.0]);
-        // A loop that closes leaves nothing, wherever it stands in the drive.
+        // A closed loop is wiped out, wherever it is in the drive.
         assert_eq!(kept(&[5.0, 3.0, 4.0, 2.0, 4.5]), [5.0, 2.0, 4.5]);
         assert_eq!(kept(&[5.0, 3.0, 4.0, 2.0, 6.0]), [6.0]);
         assert_eq!(kept(&[]), [0.0; 0]);
     }
 
-    /// What such a drive leaves is what the whole of it leaves.
+    /// The reversals in force have the same effect as the whole drive.
     #[test]
-    fn the_turns_in_force_stand_for_the_whole_drive() {
+    fn the_reversals_in_force_replace_the_whole_drive() {
         let drive: Vec<f64> =
             (0..900).map(|k| 50.0 + 45.0 * (0.05 * f64::from(k)).sin() * (0.011 * f64::from(k)).cos()).collect();
         let (u0, after) = (drive[899], [70.0, 30.0, 60.0]);
@@ -403,9 +410,9 @@ mod tests {
         assert_eq!(last(&whole), last(&short));
     }
 
-    /// Two segments of one drive, the second from where the first has ended: that history is found among the others.
+    /// Two segments of one drive, the second starting where the first ends. This history is found among the others.
     #[test]
-    fn a_segment_that_continues_the_one_before_is_told_from_one_after_a_rest() {
+    fn a_segment_that_continues_the_previous_one_is_recognised() {
         let u = |k: usize| 50.0 + 45.0 * (0.02 * k as f64).sin() * (1.0 - k as f64 / 1600.0);
         let input: Vec<f64> = (0..1200).map(u).collect();
         let whole = std::slice::from_ref(&(0..1200)).to_vec();
@@ -429,7 +436,7 @@ mod tests {
         let best = with_histories(&samples, &[false, true], &mut |samples| Ok::<_, ()>(squares(samples))).unwrap();
         assert_eq!(best.pasts, [Vec::new(), continued(&samples, 1).unwrap()]);
         assert!(squares(&best) < 1e-3 * squares(&samples));
-        // Of another file nothing is continued.
+        // A segment of another file is not continued.
         assert!(continued(&Samples { file_of_segment: vec![0, 1], ..samples }, 1).is_none());
     }
 
@@ -438,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn a_past_near_rest_has_to_explain_all_that_stands_out() {
+    fn a_drive_history_near_rest_has_to_explain_the_whole_error() {
         let pasts = || vec![vec![1.0], vec![2.0]];
         let squares = |past: &Vec<f64>| match past.first() {
             None => 100.0,
@@ -448,10 +455,11 @@ mod tests {
         assert_eq!(best(pasts(), 1.0, true, squares), [1.0]);
         assert!(best(pasts(), 1.0, false, squares).is_empty(), "nine times the level");
         assert_eq!(best(pasts(), 8.0, false, squares), [1.0]);
-        assert!(best(pasts(), 60.0, true, squares).is_empty(), "nothing stands out");
+        assert!(best(pasts(), 60.0, true, squares).is_empty(), "the first rows have no larger error");
     }
 
-    /// At 0 V, too, an actuator remembers that it was driven before; the amplitude fades, so that the first rise alone shows the lower half.
+    /// An actuator at 0 V also remembers an earlier drive. The amplitude falls, so only the first rise shows the lower
+    /// half.
     #[test]
     fn a_record_that_begins_at_0_v_after_use_is_followed_from_its_first_row() {
         let input: Vec<f64> =
@@ -472,7 +480,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_from_rest_needs_no_past() {
+    fn a_record_from_rest_needs_no_drive_history() {
         let input: Vec<f64> = (0..2000).map(|k| 50.0 - 50.0 * (f64::from(k) / 80.0).cos()).collect();
         let plays = PiBasis { thresholds: vec![8.0, 17.0, 31.0], floor: 0.0, virgin: f64::INFINITY, falls: false };
         let whole = std::slice::from_ref(&(0..input.len())).to_vec();

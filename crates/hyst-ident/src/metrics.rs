@@ -1,29 +1,29 @@
-//! How far a prediction is from the measurement.
+//! Error measures between prediction and measurement.
 //!
-//! Every figure takes the measured and the predicted output, in the same unit, and a flag per row that is `true` while
-//! the model still settles (the start-up rows that `simulate` marks). Settling rows count only in
-//! [`Errors::rmse_all_rows`]. Errors are predicted − measured.
+//! Every measure takes the measured and the predicted output in the same unit, and a flag per row that is `true` in the
+//! start-up rows (as marked by `simulate`). Start-up rows count only in [`Errors::rmse_all_rows`]. Errors are predicted
+//! − measured.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// Why no figure can be given.
+/// Reason why a measure cannot be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricsError {
     /// Columns of different length.
     #[error("{column} has {found} values, but the measurement has {expected}")]
     Lengths {
-        /// The column.
+        /// Name of the column.
         column: &'static str,
-        /// Its length.
+        /// Length of the column.
         found: usize,
-        /// The measurement's length.
+        /// Length of the measurement.
         expected: usize,
     },
-    /// There is no row, or all of them are start-up rows.
+    /// There is no row that counts.
     #[error("no row is left to compare: all {rows} rows are start-up rows of the model")]
     NoRows {
-        /// All rows.
+        /// Number of rows.
         rows: usize,
     },
     /// The measurement or the prediction is NaN or infinite.
@@ -38,18 +38,18 @@ pub enum MetricsError {
     },
 }
 
-/// The errors of one prediction, as reports print them.
+/// Errors of one prediction, as printed in reports.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
-    /// Root of the mean squared error over the rows that do not settle, in the output's unit.
+    /// Root mean square error over the rows that count, in the output's unit.
     pub rmse: f64,
     /// `rmse` in percent of the span (maximum − minimum) of the measured output over the same rows. For a constant
-    /// output it is 0 where `rmse` is, and else infinite, which JSON shows as `null`.
+    /// output it is 0 if `rmse` is 0, otherwise infinite (`null` in JSON).
     #[serde(deserialize_with = "null_as_infinity")]
     pub nrmse_percent: f64,
-    /// The largest error by magnitude over the rows that do not settle, in the output's unit.
+    /// Maximum magnitude of the error over the rows that count, in the output's unit.
     pub max_abs: f64,
-    /// Root of the mean squared error over all rows, in the output's unit.
+    /// Root mean square error over all rows, in the output's unit.
     pub rmse_all_rows: f64,
 }
 
@@ -58,10 +58,10 @@ fn null_as_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D
 }
 
 impl Errors {
-    /// Compares `predicted` with `measured`; `settling` flags the model's start-up rows.
+    /// Compares `predicted` with `measured`; `settling` flags the start-up rows.
     ///
     /// # Errors
-    /// When the lengths differ, no row is left, or a value is not finite.
+    /// If the lengths differ, no row counts, or a value is not finite.
     pub fn of(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Self, MetricsError> {
         check(measured, predicted, settling)?;
         let rmse = root_mean_square(settled(measured, predicted, settling).map(|(y, p)| p - y));
@@ -75,28 +75,28 @@ impl Errors {
     }
 }
 
-/// Share of the measured span below which an output is too near zero to relate an error to it.
-const NEAR_ZERO: f64 = 0.01;
+/// Minimum magnitude of an output that an error is related to, as a share of the measured span.
+const MIN_OUTPUT_SHARE: f64 = 0.01;
 
 /// Mean absolute error relative to the measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mape {
-    /// `mean |p − y| / |y|` as a ratio (1 = 100 %) over the rows that count; `None` when no row does.
+    /// `mean |p − y| / |y|` as a ratio (1 = 100 %) over the rows that count; `None` if there are none.
     pub ratio: Option<f64>,
-    /// Rows that are left out because |y| is below 1 % of the measured span.
+    /// Number of rows left out because |y| is below 1 % of the measured span.
     pub left_out: usize,
 }
 
-/// Mean absolute error relative to the measurement, `mean |p − y| / |y|`.
+/// Computes the mean absolute error relative to the measurement, `mean |p − y| / |y|`.
 ///
-/// Rows in which the measured output is zero or below 1 % of its span (maximum − minimum) are left out and counted: there
-/// the ratio says more about noise and the sensor's zero than about the model.
+/// Rows with a measured output of zero or below 1 % of its span (maximum − minimum) are left out and counted: there the
+/// ratio depends on the noise and the sensor's zero more than on the model.
 ///
 /// # Errors
 /// As [`Errors::of`].
 pub fn mape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Mape, MetricsError> {
     check(measured, predicted, settling)?;
-    let least = NEAR_ZERO * span(measured, predicted, settling);
+    let least = MIN_OUTPUT_SHARE * span(measured, predicted, settling);
     let counts = |y: f64| y != 0.0 && y.abs() >= least;
     let (mut sum, mut count, mut left_out) = (0.0, 0_usize, 0_usize);
     for (y, p) in settled(measured, predicted, settling) {
@@ -110,9 +110,9 @@ pub fn mape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<Ma
     Ok(Mape { ratio: (count > 0).then(|| sum / count as f64), left_out })
 }
 
-/// Symmetric mean absolute error, `mean |p − y| / ((|p| + |y|) / 2)`, as a ratio between 0 and 2.
+/// Computes the symmetric mean absolute error, `mean |p − y| / ((|p| + |y|) / 2)`, a ratio from 0 to 2.
 ///
-/// A row in which both are zero counts as no error.
+/// The ratio of a row is zero if both values are zero.
 ///
 /// # Errors
 /// As [`Errors::of`].
@@ -125,7 +125,7 @@ pub fn smape(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<f
     Ok(sum / count as f64)
 }
 
-/// Peak to valley: the largest error minus the smallest, signs included, in the output's unit.
+/// Computes the maximum minus the minimum of the signed error, in the output's unit.
 ///
 /// # Errors
 /// As [`Errors::of`].
@@ -153,7 +153,7 @@ fn check(measured: &[f64], predicted: &[f64], settling: &[bool]) -> Result<(), M
     Ok(())
 }
 
-/// Pairs of measured and predicted values in the rows that do not settle.
+/// Returns the pairs of measured and predicted values in the rows that count.
 fn settled<'a>(
     measured: &'a [f64],
     predicted: &'a [f64],
@@ -162,7 +162,7 @@ fn settled<'a>(
     measured.iter().zip(predicted).zip(settling).filter(|(_, settling)| !**settling).map(|((y, p), _)| (*y, *p))
 }
 
-/// Maximum − minimum of the measured output in the rows that do not settle.
+/// Returns maximum − minimum of the measured output in the rows that count.
 fn span(measured: &[f64], predicted: &[f64], settling: &[bool]) -> f64 {
     let (low, high) = settled(measured, predicted, settling)
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (y, _)| (low.min(y), high.max(y)));
@@ -174,7 +174,7 @@ fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-/// `sqrt(mean(x²))`; zero of no values.
+/// Returns `sqrt(mean(x²))`; zero for no values.
 pub(crate) fn rms(x: &[f64]) -> f64 {
     (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }
@@ -188,7 +188,7 @@ mod tests {
     const SETTLING: [bool; 4] = [true, false, false, false];
 
     #[test]
-    fn figures_by_hand() {
+    fn measures_equal_those_computed_by_hand() {
         let errors = Errors::of(&Y, &P, &SETTLING).unwrap();
         // Errors 0, 3, −4 over a span of 3, and 9 in the start-up row.
         let rmse = (25.0_f64 / 3.0).sqrt();
@@ -202,13 +202,13 @@ mod tests {
     }
 
     #[test]
-    fn json_has_the_keys_of_the_report() {
+    fn errors_have_the_json_keys_of_the_report() {
         let json = serde_json::to_string(&Errors::of(&Y, &Y, &SETTLING).unwrap()).unwrap();
         assert_eq!(json, r#"{"rmse":0.0,"nrmse_percent":0.0,"max_abs":0.0,"rmse_all_rows":0.0}"#);
     }
 
     #[test]
-    fn a_constant_output_has_no_span() {
+    fn a_constant_output_has_an_infinite_or_zero_nrmse() {
         let constant = Errors::of(&[1.0; 3], &[1.0; 3], &[false; 3]).unwrap();
         assert_eq!(constant.nrmse_percent, 0.0);
         let off = Errors::of(&[1.0; 3], &[2.0; 3], &[false; 3]).unwrap();
@@ -219,29 +219,29 @@ mod tests {
     }
 
     #[test]
-    fn zeros_have_no_ratio() {
+    fn rows_of_zeros_have_no_relative_error() {
         assert_eq!(mape(&[0.0], &[1.0], &[false]), Ok(Mape { ratio: None, left_out: 1 }));
         assert_eq!(smape(&[0.0], &[0.0], &[false]), Ok(0.0));
         assert_eq!(smape(&[0.0], &[1.0], &[false]), Ok(2.0));
     }
 
     #[test]
-    fn rows_near_zero_count_for_nothing_but_are_counted() {
-        // A span of 100: ±0.999 is left out, ±1 is not.
+    fn rows_near_zero_are_left_out_and_counted() {
+        // Span 100: ±0.999 is left out, ±1 is not.
         let y = [-50.0, 50.0, 0.999, -0.999, 1.0, -1.0];
         let p = [-50.0, 50.0, 9.0, 9.0, 1.5, -1.0];
         let expected = Mape { ratio: Some(0.5 / 4.0), left_out: 2 };
         assert_eq!(mape(&y, &p, &[false; 6]), Ok(expected));
-        // A start-up row is neither in the span nor in the count.
+        // A start-up row counts neither for the span nor for the rows left out.
         assert_eq!(
             mape(&y, &p, &[true, false, false, false, false, false]).map(|m| m.left_out),
             Ok(0),
-            "the span is 51: all rows lie above 1 % of it"
+            "the span is 51: all rows are above 1 % of it"
         );
     }
 
     #[test]
-    fn what_cannot_be_compared_is_an_error() {
+    fn invalid_columns_are_refused() {
         assert_eq!(Errors::of(&[], &[], &[]), Err(MetricsError::NoRows { rows: 0 }));
         assert_eq!(Errors::of(&[1.0], &[1.0], &[true]), Err(MetricsError::NoRows { rows: 1 }));
         assert!(matches!(Errors::of(&Y, &P[..3], &SETTLING), Err(MetricsError::Lengths { found: 3, expected: 4, .. })));

@@ -1,4 +1,4 @@
-//! The noise floor of a record, from the record itself.
+//! Noise floor of a record, estimated from the record.
 
 use std::ops::Range;
 
@@ -6,21 +6,22 @@ use realfft::RealFftPlanner;
 
 use crate::criteria::MIN_RMSE_RATIO;
 
-/// Rows of a segment that has lines to speak of.
-const SHORTEST: usize = 64;
+/// Minimum number of rows of a segment with a usable spectrum.
+const MIN_SEGMENT_ROWS: usize = 64;
 
-/// Standard deviation of the white part of a residual \[its unit\].
+/// Returns the standard deviation of the white part of a residual \[its unit\].
 ///
-/// What differences from row to row show of it. A tone near half the sample rate is more than that: where the spectrum between its lines is far lower, that
-/// counts.
+/// The estimate uses differences between rows. A tone near half the sample rate increases it. If the median level of
+/// the spectrum is far lower, that estimate is used instead.
 pub fn noise_floor(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let between_rows = between_rows(residual, segments);
     let between_lines = between_lines(residual, segments);
     if MIN_RMSE_RATIO * between_lines < between_rows { between_lines } else { between_rows }
 }
 
-/// The white part by fourth differences: they remove everything smooth, and their median magnitude ignores edges. White noise of deviation σ gives
-/// fourth differences of deviation √70 σ, and the median of |N(0, s²)| is 0.6745 s.
+/// Estimates the white part from fourth differences, which remove everything smooth; the median of their magnitudes
+/// ignores edges. White noise with standard deviation σ has fourth differences with standard deviation √70 σ, and the
+/// median of |N(0, s²)| is 0.6745 s.
 fn between_rows(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let mut magnitudes: Vec<f64> = segments
         .iter()
@@ -35,22 +36,23 @@ fn between_rows(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     *median / 0.6745 / 70f64.sqrt()
 }
 
-/// The white part by the median line of the spectrum from a quarter to half of the sample rate. The squared magnitude of a line of white noise is
-/// exponential, its median ln 2 of its mean σ² Σw² with w the window.
+/// Estimates the white part from the median line of the spectrum between a quarter and half of the sample rate. The
+/// squared magnitude of a line of white noise is exponentially distributed with mean σ² Σw², w being the window; its
+/// median is ln 2 times the mean.
 fn between_lines(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     let mut planner = RealFftPlanner::<f64>::new();
     let mut densities = Vec::new();
-    for rows in segments.iter().map(|s| &residual[s.clone()]).filter(|rows| rows.len() >= SHORTEST) {
+    for rows in segments.iter().map(|s| &residual[s.clone()]).filter(|rows| rows.len() >= MIN_SEGMENT_ROWS) {
         let fft = planner.plan_fft_forward(rows.len());
         let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
         let mut weight = 0.0;
         for (k, (x, r)) in input.iter_mut().zip(rows).enumerate() {
-            // Nothing of what is slow may spill over.
+            // A window with low side lobes, so that slow parts do not leak.
             let window = (std::f64::consts::PI * (k as f64 + 0.5) / rows.len() as f64).sin().powi(4);
             *x = window * r;
             weight += window * window;
         }
-        // Lengths are the planner's own.
+        // Cannot fail: the lengths come from the planner.
         if fft.process(&mut input, &mut output).is_ok() {
             let upper = output.len() / 2..output.len() - 1;
             densities.extend(output[upper].iter().map(|c| c.norm_sqr() / weight));
@@ -64,8 +66,9 @@ fn between_lines(residual: &[f64], segments: &[Range<usize>]) -> f64 {
     (*median / std::f64::consts::LN_2).sqrt()
 }
 
-/// Standard deviation that the output's own steps bring \[its unit\]: q/√12 with q the smallest gap between two of its
-/// values. Next to nothing where values are not quantised.
+/// Returns the standard deviation of the output's quantisation \[its unit\].
+///
+/// It is q/√12, with q the smallest gap between two of the values; next to zero if the values are not quantised.
 pub fn quantisation(output: &[f64]) -> f64 {
     let mut sorted = output.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -79,7 +82,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// White noise of deviation 0.05 on a sine of this frequency \[cycles a row\] and height.
+    /// White noise with standard deviation 0.05 on a sine of this frequency \[cycles per row\] and height.
     fn noisy(rows: u32, frequency: f64, height: f64) -> Vec<f64> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
@@ -98,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tone_near_half_the_rate_is_no_noise() {
+    fn a_tone_near_half_the_rate_does_not_raise_the_noise_floor() {
         for (rows, frequency) in [(4_000, 0.416_4), (900, 0.374_7)] {
             let x = noisy(rows, frequency, 0.5);
             let all = 0..x.len();

@@ -1,27 +1,27 @@
-//! Records that repeat one loop.
+//! Records whose drive repeats a single loop.
 //!
-//! Whatever answers such a drive, late, bent or ringing, gives one closed loop again, and a hysteresis of the right shape gives the same
-//! one. Only a second frequency or amplitude tells them apart.
+//! Delay, asymmetry or resonance answer such a drive with one closed loop, and a hysteresis of suitable shape gives the same loop. Only a second
+//! frequency or amplitude distinguishes them.
 
 use crate::Samples;
 
-/// A turn counts from this share of the drive's range on.
-const TURN: f64 = 0.05;
-/// Turns lie this near to each other, as a share of the range, and are this regular, as a share of the period.
-const SAME: f64 = 0.03;
-/// Share of the turns that has to be so.
-const NEARLY_ALL: f64 = 0.95;
-/// Turns that make a repetition.
-const LEAST: usize = 6;
+/// Smallest change of the drive between two turns, as a share of its range.
+const MIN_TURN: f64 = 0.05;
+/// Tolerance of equal turns, as a share of the range, and of equal periods, as a share of the period.
+const TOLERANCE: f64 = 0.03;
+/// Smallest share of turns and periods within the tolerance.
+const MIN_EQUAL_SHARE: f64 = 0.95;
+/// Fewest periods of a repeated loop.
+const MIN_PERIODS: usize = 6;
 
-/// Frequency \[Hz\] of the one loop that a record repeats; `None` if its drive does more than that.
+/// Returns the frequency \[Hz\] of the loop that a record repeats; `None` if the drive does more than repeat one loop.
 pub(crate) fn only_loop(samples: &Samples) -> Option<f64> {
     let (low, high) = samples.input_range();
     let range = high - low;
     let (mut tops, mut bottoms, mut periods) = (Vec::new(), Vec::new(), Vec::new());
     for (i, segment) in samples.segments.iter().enumerate() {
-        let turns = turns(&samples.input[segment.clone()], TURN * range);
-        // From rest and to rest is not the loop's.
+        let turns = turns(&samples.input[segment.clone()], MIN_TURN * range);
+        // The first and last turn belong to the way from rest and to rest.
         let inner = turns.get(1..turns.len().saturating_sub(1)).unwrap_or_default();
         for (row, top) in inner {
             let u = samples.input[segment.start + row];
@@ -30,21 +30,21 @@ pub(crate) fn only_loop(samples: &Samples) -> Option<f64> {
         periods.extend(inner.windows(3).map(|w| (w[2].0 - w[0].0) as f64 * samples.period_of(i) / samples.period));
     }
     let count = periods.len();
-    if count < LEAST {
+    if count < MIN_PERIODS {
         return None;
     }
     let (top, bottom, period) = (median(&tops)?, median(&bottoms)?, median(&periods)?);
     let near = |values: &[f64], middle: f64, tolerance: f64| {
         let same = values.iter().filter(|x| (*x - middle).abs() <= tolerance).count();
-        same as f64 >= NEARLY_ALL * values.len() as f64
+        same as f64 >= MIN_EQUAL_SHARE * values.len() as f64
     };
-    // A turn is found to within a few rows where the drive is noisy.
-    let regular = near(&periods, period, SAME * period + 4.0);
-    (regular && near(&tops, top, SAME * range) && near(&bottoms, bottom, SAME * range))
+    // With a noisy drive the place of a turn has an error of a few rows.
+    let regular = near(&periods, period, TOLERANCE * period + 4.0);
+    (regular && near(&tops, top, TOLERANCE * range) && near(&bottoms, bottom, TOLERANCE * range))
         .then(|| 1.0 / (period * samples.period))
 }
 
-/// Rows at which a drive turns by at least `least`, and whether from a top.
+/// Returns the rows at which a drive turns by at least `least`; true for a maximum, false for a minimum.
 pub(crate) fn turns(u: &[f64], least: f64) -> Vec<(usize, bool)> {
     let mut turns = Vec::new();
     let (mut top, mut bottom) = (0, 0);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn other_amplitudes_frequencies_and_holds_are_more_than_a_loop() {
+    fn other_amplitudes_frequencies_and_holds_are_not_a_single_loop() {
         let wave = |t: f64| 1.0 - (std::f64::consts::TAU * 7.0 * t).cos();
         assert_eq!(only_loop(&samples(|t| wave(t) * (1.0 - 0.1 * t))), None);
         assert_eq!(only_loop(&samples(|t| wave(if t < 2.5 { t } else { 2.0 * t }))), None);

@@ -1,4 +1,4 @@
-//! What a fit sees of a record: columns of numbers, segments, and which rows count.
+//! The data of a fit: columns of numbers, segments, and the rows that are fitted.
 
 use std::ops::Range;
 
@@ -16,36 +16,36 @@ use crate::stop::Stop;
 pub struct Samples {
     /// Shortest sample period \[s\].
     pub period: f64,
-    /// Sample period of each segment \[s\]; empty where all share the shortest.
+    /// Sample period of each segment \[s\]; empty if all segments have the same.
     pub(crate) periods: Vec<f64>,
-    /// Lab clock \[s\].
+    /// Time \[s\].
     pub time: Vec<f64>,
     /// Input \[V\].
     pub input: Vec<f64>,
     /// Measured output \[output unit\]; empty if there is none.
     pub output: Vec<f64>,
-    /// Temperature \[°C\], where it was recorded.
+    /// Temperature \[°C\], if it was recorded.
     pub temperature: Option<Vec<f64>>,
-    /// Load \[N\], where it was recorded.
+    /// Load \[N\], if it was recorded.
     pub load: Option<Vec<f64>>,
-    /// Whether the output falls where the input rises.
+    /// Whether the output falls when the input rises.
     pub(crate) falls: bool,
-    /// Stretches between which the device rests.
+    /// The rows of each segment.
     pub segments: Vec<Range<usize>>,
-    /// File that each segment came from.
+    /// The number of the file of each segment.
     pub file_of_segment: Vec<usize>,
-    /// Drive before each segment began, as far as the memory shows it \[V\]; nothing where it began at rest.
+    /// The estimated drive before each segment \[V\]; empty if the segment begins at rest.
     pub(crate) pasts: Vec<Vec<f64>>,
-    /// Rows that are left out of fits and of the settled error: those that show no motion, and a start-up transient once it is found.
+    /// True for rows that are not fitted and not part of the error: rows without a valid output, and start-up rows.
     pub settling: Vec<bool>,
-    /// Rows in which the sensor shows no motion: it stands at the end of its range, is frozen, or spikes.
+    /// True for rows without a valid output: missing, at the end of the sensor range, frozen, or spikes.
     pub(crate) blind: Vec<bool>,
-    /// Ends fits of them.
+    /// Stops a fit of these samples early.
     pub(crate) stop: Stop,
 }
 
 impl Samples {
-    /// The columns of a record; start-up rows are not looked for yet.
+    /// Makes samples of the columns of a record. Start-up rows are not detected yet.
     pub fn from_record(record: &Record) -> Self {
         let blind = record.output().map_or_else(|| vec![false; record.rows()], |y| blind_rows(record, y));
         Self {
@@ -66,7 +66,7 @@ impl Samples {
         }
     }
 
-    /// The same, at a constant temperature \[°C\] where none was recorded.
+    /// Sets a constant temperature \[°C\], if no temperature was recorded.
     pub fn at_temperature(mut self, degc: Option<f64>) -> Self {
         if let (None, Some(degc)) = (&self.temperature, degc) {
             self.temperature = Some(vec![degc; self.len()]);
@@ -74,7 +74,7 @@ impl Samples {
         self
     }
 
-    /// The beginnings of all segments, the same share of each, of at most about `rows` rows together.
+    /// Returns the beginnings of all segments, the same share of each, together about `rows` rows at most.
     pub(crate) fn beginnings(&self, rows: usize) -> Self {
         let share = (rows as f64 / self.len().max(1) as f64).min(1.0);
         let mut cut = self.clone();
@@ -85,7 +85,7 @@ impl Samples {
         cut.segments_only(&all)
     }
 
-    /// These segments alone, in their order.
+    /// Returns only these segments, in the given order.
     pub(crate) fn segments_only(&self, keep: &[usize]) -> Self {
         let column = |c: &[f64]| keep.iter().flat_map(|s| c[self.segments[*s].clone()].iter().copied()).collect();
         let mut end = 0;
@@ -112,7 +112,7 @@ impl Samples {
         }
     }
 
-    /// The first rows of a segment alone.
+    /// Returns only the first rows of a segment.
     pub(crate) fn beginning(&self, segment: usize, rows: usize) -> Self {
         let mut cut = self.clone();
         let own = &mut cut.segments[segment];
@@ -120,7 +120,7 @@ impl Samples {
         cut.segments_only(&[segment])
     }
 
-    /// One segment that begins at time 0, without surroundings, all of whose rows count: what unit tests change where they need more.
+    /// Makes one segment from time 0, without temperature and load, whose rows are all fitted. For unit tests.
     #[cfg(test)]
     pub(crate) fn of_columns(period: f64, input: Vec<f64>, output: Vec<f64>) -> Self {
         let rows = input.len();
@@ -142,7 +142,7 @@ impl Samples {
         }
     }
 
-    /// Marks the spikes that what a fit leaves of these rows shows; whether there are any that were not known.
+    /// Marks the spikes in the residual of a fit. Returns whether there are new ones.
     pub(crate) fn mark_spikes(&mut self, residual: &[f64]) -> bool {
         let spiked = spiked_residual(self, residual);
         let new = spiked.iter().zip(&self.blind).any(|(spiked, known)| *spiked && !known);
@@ -152,39 +152,39 @@ impl Samples {
         new
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.time.len()
     }
 
-    /// Whether there are no rows.
+    /// Returns whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
 
-    /// Surroundings at row `k`.
+    /// Returns time, temperature and load at row `k`.
     pub fn env(&self, k: usize) -> Env<f64> {
         let at = |column: &Option<Vec<f64>>| column.as_ref().and_then(|c| c.get(k)).copied().unwrap_or(0.0);
         Env { time: self.time[k], temperature: at(&self.temperature), load: at(&self.load) }
     }
 
-    /// Lowest and highest input.
+    /// Returns the minimum and maximum input.
     pub fn input_range(&self) -> (f64, f64) {
         range(self.input.iter().copied())
     }
 
-    /// Output in the rows that count \[output unit\].
+    /// Returns the output in the fitted rows \[output unit\].
     pub(crate) fn settled_output(&self) -> impl Iterator<Item = f64> + '_ {
         self.output.iter().zip(&self.settling).filter(|(_, settling)| !**settling).map(|(y, _)| *y)
     }
 
-    /// Highest minus lowest output over the settled rows \[output unit\].
+    /// Returns the span of the output (maximum minus minimum) over the fitted rows \[output unit\].
     pub fn output_span(&self) -> f64 {
         let (low, high) = range(self.settled_output());
         (high - low).max(0.0)
     }
 
-    /// The hysteresis: what the best cubic of the drive leaves of the output in each settled row, and these rows \[output unit\].
+    /// Returns the fitted rows and the hysteresis in them: the residual of the best cubic of the drive \[output unit\].
     pub(crate) fn hysteresis(&self) -> (Vec<usize>, Vec<f64>) {
         let (low, high) = self.input_range();
         let rows: Vec<usize> = (0..self.len()).filter(|k| !self.settling[*k]).collect();
@@ -192,32 +192,32 @@ impl Samples {
         let powers = DMatrix::from_fn(rows.len(), 4, |i, power| scaled(rows[i]).powi(power as i32));
         let output = DVector::from_iterator(rows.len(), rows.iter().map(|k| self.output[*k]));
         let curve = powers.tr_mul(&powers).cholesky().map(|c| c.solve(&powers.tr_mul(&output)));
-        let left = curve.map_or_else(|| vec![0.0; rows.len()], |c| (output - powers * c).iter().copied().collect());
-        (rows, left)
+        let residual = curve.map_or_else(|| vec![0.0; rows.len()], |c| (output - powers * c).iter().copied().collect());
+        (rows, residual)
     }
 
-    /// Number of files that the rows came from.
+    /// Returns the number of files that the rows come from.
     pub fn files(&self) -> usize {
         self.file_of_segment.iter().max().map_or(0, |m| m + 1)
     }
 
-    /// Length of the longest segment \[s\].
+    /// Returns the length of the longest segment \[s\].
     pub fn longest_segment(&self) -> f64 {
         let lengths = self.segments.iter().enumerate().map(|(i, rows)| rows.len() as f64 * self.period_of(i));
         lengths.fold(0.0, f64::max)
     }
 
-    /// Length of all segments together, without the rests between them \[s\].
+    /// Returns the length of all segments together, without the pauses between them \[s\].
     pub(crate) fn duration(&self) -> f64 {
         self.segments.iter().enumerate().map(|(i, rows)| rows.len() as f64 * self.period_of(i)).sum()
     }
 
-    /// Sample period of a segment \[s\].
+    /// Returns the sample period of a segment \[s\].
     pub(crate) fn period_of(&self, segment: usize) -> f64 {
         self.periods.get(segment).copied().unwrap_or(self.period)
     }
 
-    /// Sample period of a stretch of rows, by the segment in which it begins \[s\].
+    /// Returns the sample period of the segment that contains `row` \[s\].
     pub(crate) fn period_at(&self, row: usize) -> f64 {
         if self.periods.is_empty() {
             return self.period;
@@ -225,14 +225,14 @@ impl Samples {
         self.period_of(self.segments.iter().position(|rows| rows.contains(&row)).unwrap_or(0))
     }
 
-    /// The sample period that most rows have \[s\].
+    /// Returns the sample period of most rows \[s\].
     pub(crate) fn usual_period(&self) -> f64 {
         let of = |period: f64| (0..self.segments.len()).filter(move |i| self.period_of(*i) == period);
         let rows = |period: &f64| of(*period).map(|i| self.segments[i].len()).sum::<usize>();
         self.periods.iter().copied().max_by_key(rows).unwrap_or(self.period)
     }
 
-    /// The same, without the segments that have another sample period than most rows: all columns stay as they are.
+    /// Removes the segments that have another sample period than most rows. The columns are not changed.
     pub(crate) fn of_one_period(mut self) -> Self {
         let usual = self.usual_period();
         let other: Vec<bool> = (0..self.segments.len()).map(|i| self.period_of(i) != usual).collect();
@@ -248,12 +248,12 @@ impl Samples {
     }
 }
 
-/// What is built for a sample period, for each segment of a record.
+/// Objects that depend on the sample period, one per segment of a record.
 #[derive(Debug)]
 pub(crate) struct PerSegment<S>(Vec<S>);
 
 impl<S> PerSegment<S> {
-    /// As `build` makes it for the sample period of a segment \[s\]; once where all segments share it.
+    /// Builds one object per segment for its sample period \[s\], or a single one if all segments have the same period.
     pub(crate) fn new<E>(samples: &Samples, build: impl Fn(f64) -> Result<S, E>) -> Result<Self, E> {
         match samples.periods.as_slice() {
             [] => Ok(Self(vec![build(samples.period)?])),
@@ -261,21 +261,21 @@ impl<S> PerSegment<S> {
         }
     }
 
-    /// For this segment, by its number.
+    /// Returns the object of a segment.
     pub(crate) fn of(&self, segment: usize) -> &S {
         self.0.get(segment).unwrap_or(&self.0[0])
     }
 }
 
-/// Sample periods of segments; none where all are the same.
+/// Returns the sample periods of the segments; empty if all are equal.
 fn own_periods(periods: Vec<f64>) -> Vec<f64> {
     if periods.windows(2).all(|w| w[0] == w[1]) { Vec::new() } else { periods }
 }
 
-/// Rows in which the sensor stands at the end of its range, is frozen, or spikes.
+/// Marks rows without a valid output: missing, at the end of the sensor range, frozen, or spikes.
 fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
     let mut blind = clipped_rows(output, record.segments());
-    // A reference has no drive that a spike could be held against.
+    // Spikes and frozen rows are detected by comparison with the drive, which a reference does not have.
     if record.input().len() == output.len() {
         let spiked = spiked_rows(record.input(), output, record.segments());
         let frozen = frozen_rows(record.input(), output, record.segments());
@@ -285,20 +285,20 @@ fn blind_rows(record: &Record, output: &[f64]) -> Vec<bool> {
     blind
 }
 
-/// Whether an output falls where its input rises, in the rows that show its motion.
+/// Returns whether the output falls when the input rises, using only rows with a valid output.
 fn falls_where(input: &[f64], output: &[f64], blind: &[bool]) -> bool {
     let seen = |x: &[f64]| -> Vec<f64> { x.iter().zip(blind).filter(|(_, blind)| !**blind).map(|(x, _)| *x).collect() };
     falls(&seen(input), &seen(output))
 }
 
-/// Whether an output falls where its input rises.
+/// Returns whether the output falls when the input rises: the sign of their covariance.
 fn falls(input: &[f64], output: &[f64]) -> bool {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (u, y) = (mean(input), mean(output));
     input.iter().zip(output).map(|(a, b)| (a - u) * (b - y)).sum::<f64>() < 0.0
 }
 
-/// Smallest and largest value; (∞, −∞) of nothing.
+/// Returns minimum and maximum; (∞, −∞) if there are no values.
 pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }

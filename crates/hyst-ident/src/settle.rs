@@ -1,8 +1,9 @@
-//! Start-up rows: a transient left from before the record.
+//! Start-up rows: a transient from before the record.
 //!
-//! A model starts each segment at rest with virgin memory. A real record may start in another state: still ringing, or with an unknown memory. The
-//! transient decays, or is erased once the input has swept its range. Until then a misfit says nothing about the model. Rows that pass a part of the
-//! range for the only time stay in the fit and in the error.
+//! A model starts each segment at rest with virgin memory. A real record may start in another state: still ringing, or
+//! with an unknown memory. The transient decays, or is erased once the input has swept its range. Until then the
+//! residual says nothing about the model. Rows that are the only ones to pass a part of the range stay in the fit and
+//! in the error.
 
 use std::ops::Range;
 
@@ -11,11 +12,11 @@ use crate::criteria::{DOMINANT_SHARE, LARGE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE
 use crate::nested::Fitted;
 use crate::samples::range;
 
-/// Share of the output's span below which an RMSE is rounding.
-const EXACT: f64 = 1e-6;
+/// RMSE below which the residual is rounding, as a share of the output's span.
+const ROUNDING_SHARE: f64 = 1e-6;
 
-/// Rows of each segment in which a start-up transient can lie: until the input has swept its range,
-/// once more as long, and at most half of the segment.
+/// Returns the length of the start-up window of each segment: twice the rows until the input has swept its range, at
+/// most half of the segment.
 pub(crate) fn windows(samples: &Samples) -> Vec<usize> {
     let window = |s: &Range<usize>| {
         let u = &samples.input[s.clone()];
@@ -40,13 +41,13 @@ struct Levels([bool; LEVELS]);
 impl Levels {
     const NONE: Self = Self([false; LEVELS]);
 
-    /// The level of an input, of those between `low` and `high`.
+    /// Returns the level of an input between `low` and `high`.
     fn index(u: f64, (low, high): (f64, f64)) -> usize {
-        // A conversion from float saturates, and takes what is no number for 0.
+        // The conversion from float saturates and maps NaN to 0.
         (((u - low) / (high - low) * LEVELS as f64) as usize).min(LEVELS - 1)
     }
 
-    /// Adds all levels between two.
+    /// Adds all levels between two levels.
     fn pass(&mut self, from: usize, to: usize) {
         self.0[from.min(to)..=from.max(to)].fill(true);
     }
@@ -55,7 +56,7 @@ impl Levels {
         Self(std::array::from_fn(|i| self.0[i] || other.0[i]))
     }
 
-    /// Share of the levels `of` a segment that are among these.
+    /// Returns the share of the levels in `of` that these contain.
     fn share(&self, of: &Self) -> f64 {
         let all = of.0.iter().filter(|l| **l).count();
         let both = of.0.iter().zip(&self.0).filter(|(of, own)| **of && **own).count();
@@ -63,11 +64,11 @@ impl Levels {
     }
 }
 
-/// The last row of each segment from which the rest of it, together with the rows of the other segments that cannot be a start-up, still passes
-/// [`WHOLE_SHARE`] of its levels.
+/// Returns the last row of each segment from which the rest of it still passes [`WHOLE_SHARE`] of its levels, together
+/// with the rows outside of the start-up windows of the other segments.
 fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     let span = samples.input_range();
-    // Pairs of rows that the sensor shows, by the later one.
+    // Pairs of successive rows that the sensor shows, by the later one.
     let steps = |rows: Range<usize>| {
         let shown = rows.clone().skip(1).filter(|k| !samples.blind[*k] && !samples.blind[*k - 1]);
         shown.map(|k| (k, Levels::index(samples.input[k - 1], span), Levels::index(samples.input[k], span)))
@@ -98,7 +99,7 @@ fn seen_again(samples: &Samples, windows: &[usize]) -> Vec<usize> {
     before.zip(&after).zip(&samples.segments).map(rows).collect()
 }
 
-/// The same record without the rows in which a start-up can lie.
+/// Returns the record with all start-up windows marked as start-up rows.
 pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
     let mut rest = samples.clone();
     for (segment, rows) in samples.segments.iter().zip(windows(samples)) {
@@ -107,8 +108,8 @@ pub(crate) fn without_beginnings(samples: &Samples) -> Samples {
     rest
 }
 
-/// Rows of each segment after which its drive has swept its range and passes its first value in the direction in which it began: what came
-/// before a record that begins in mid-cycle. None where it never does.
+/// Returns the length of the first cycle of each segment: until its drive has swept its range and passes its first
+/// value in the initial direction. Returns `None` if it never does.
 pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
     let cycle = |s: &Range<usize>| {
         let u = &samples.input[s.clone()];
@@ -125,8 +126,8 @@ pub(crate) fn first_cycles(samples: &Samples) -> Vec<Option<usize>> {
     samples.segments.iter().map(|s| cycle(s).map(|before| before + 1)).collect()
 }
 
-/// Marks the start-up rows and those in which the sensor shows no motion, given measured minus predicted output. Rows that alone pass a part of the range
-/// are not marked.
+/// Marks the start-up rows and the rows without valid sensor values, given measured minus predicted output. Rows that
+/// are the only ones to pass a part of the range are not marked.
 pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let (windows, blind) = (windows(samples), &samples.blind);
     let mut needed_from: Option<Vec<usize>> = None;
@@ -146,15 +147,15 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
             continue;
         }
         let last = rows.iter().rposition(|r| r.abs() > largest.max(4.0 * rms)).unwrap_or(0);
-        // At rest the memory is known: beyond the first branches, which may be virgin, what is left from before can only ring or creep, and decays.
-        // What comes later, in a sweep that passes a mode, is the record's own.
+        // From rest the memory is known. After the first branches, which may be virgin, a transient can only ring or
+        // creep, and it decays. A later error, such as in a sweep through a mode, belongs to the record.
         let power = |rows: &[f64]| rows.iter().map(|r| r * r).sum::<f64>();
         let (first, second) = rows[..=last].split_at(last.div_ceil(2));
         let at_rest = samples.input[s.start].abs() < MINOR_SHARE * low.abs().max(high.abs());
         if at_rest && last > 2 * first_turn(&samples.input[s.clone()]) && power(first) < power(second) {
             continue;
         }
-        // What decays into the residual's level goes on below it for about half as long again.
+        // The transient continues below the level of the residual for about half of its visible duration.
         let needed_from = needed_from.get_or_insert_with(|| seen_again(samples, &windows))[i];
         let end = (last + last / 2 + 1).min(rows.len()).min(needed_from);
         settling[s.start..s.start + end].fill(true);
@@ -162,13 +163,13 @@ pub(crate) fn start_up_rows(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     settling
 }
 
-/// Segments in which rows are a start-up.
+/// Returns which segments have start-up rows.
 pub(crate) fn started(samples: &Samples, settling: &[bool]) -> Vec<bool> {
     let starts = |s: &Range<usize>| s.clone().any(|k| settling[k] && !samples.blind[k]);
     samples.segments.iter().map(starts).collect()
 }
 
-/// Rows until a drive that begins at rest turns for the first time.
+/// Returns the number of rows until a drive from rest reverses for the first time.
 fn first_turn(u: &[f64]) -> usize {
     let (low, high) = range(u.iter().copied());
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -179,17 +180,17 @@ fn first_turn(u: &[f64]) -> usize {
     turned.unwrap_or(u.len())
 }
 
-/// Fits without some rows, and says which are a start-up then; `None` if that cannot be solved.
+/// Fits without the marked rows, and returns the fit and its start-up rows; `None` if it cannot be solved.
 pub(crate) type Fits<'a, E> = dyn FnMut(&[bool]) -> Result<Option<(Fitted, Vec<bool>)>, E> + 'a;
 
-/// A fit and the rows that it did not see.
+/// A fit, and the rows that it left out.
 pub(crate) struct Settled {
     pub(crate) fit: Fitted,
     pub(crate) settling: Vec<bool>,
 }
 
 impl Settled {
-    /// A fit without these rows; once more without those that are a start-up for it, if they are others.
+    /// Fits without these rows, and again without the resulting start-up rows if they differ.
     pub(crate) fn from<E>(settling: Vec<bool>, fit: &mut Fits<'_, E>) -> Result<Option<Self>, E> {
         let Some((first, starting)) = fit(&settling)? else { return Ok(None) };
         if starting == settling {
@@ -199,22 +200,24 @@ impl Settled {
     }
 }
 
-/// What is known, or, if it takes rows for a start-up, a fit that begins with all of them: if at most half of those are a start-up then,
-/// and it errs no more. A model that misses what acts at the beginning takes that for a transient.
+/// Returns a fit that starts with all rows, or the `known` one. The new fit is used if at most half of the known
+/// start-up rows are start-up then and its error is not larger. A model without an effect that acts at the start
+/// mistakes it for a transient.
 pub(crate) fn unless_followed<E>(samples: &Samples, known: Settled, fit: &mut Fits<'_, E>) -> Result<Settled, E> {
     let blind = &samples.blind;
     let start_up = |rows: &[bool]| rows.iter().zip(blind).filter(|(starts, blind)| **starts && !**blind).count();
     if start_up(&known.settling) == 0 {
         return Ok(known);
     }
-    let floor = EXACT * samples.output_span();
+    let floor = ROUNDING_SHARE * samples.output_span();
     let errs_no_more = |all: &Settled| all.fit.rmse() <= RMSE_TOLERANCE * known.fit.rmse().max(floor);
     let Some(all) = Settled::from(blind.clone(), fit)? else { return Ok(known) };
     let followed = 2 * start_up(&all.settling) <= start_up(&known.settling);
     Ok(if followed && errs_no_more(&all) { all } else { known })
 }
 
-/// Residual minus each file's mean outside the windows: another sensor zero is no transient.
+/// Returns the residual minus the mean of each file outside of the start-up windows: another sensor zero is no
+/// transient.
 pub(crate) fn centre(samples: &Samples, residual: &[f64], windows: &[usize], blind: &[bool]) -> Vec<f64> {
     let mut centred = residual.to_vec();
     for file in 0..samples.files() {
@@ -245,7 +248,7 @@ mod tests {
     use crate::nested::Hypothesis;
     use crate::record::{Columns, OutputUnit, Record};
 
-    /// From rest: a drive of many cycles, and what is missed of its output.
+    /// Returns the number of start-up rows for a residual in a drive of many cycles from rest.
     fn missed(of: impl Fn(f64) -> f64) -> usize {
         let phase = |k: i32| std::f64::consts::TAU * f64::from(k) / 100.0;
         let input: Vec<f64> = (0..3000).map(|k| (1.0 - phase(k).cos()) * (0.2 + f64::from(k) / 3000.0)).collect();
@@ -255,15 +258,16 @@ mod tests {
     }
 
     #[test]
-    fn what_decays_from_the_first_row_is_a_start_up_and_what_comes_later_is_none() {
+    fn a_decay_from_the_first_row_is_start_up_and_a_later_error_is_not() {
         assert!((300..1000).contains(&missed(|k| (-k / 100.0).exp())), "{}", missed(|k| (-k / 100.0).exp()));
-        // A sweep that passes a mode.
+        // A sweep through a mode.
         assert_eq!(missed(|k| (-((k - 900.0) / 150.0).powi(2)).exp()), 0);
-        // The first branch alone, before the drive turns.
+        // On the first branch, before the drive reverses.
         assert!(missed(|k| (-((k - 30.0) / 10.0).powi(2)).exp()) > 30);
     }
 
-    /// Rows of each segment that may be left out where the drive goes through these corners, ten rows between two; `hidden` are blind.
+    /// Returns the number of rows of each segment that may be left out, for a drive through these corners with ten rows
+    /// between two; the sensor does not show the rows in `hidden`.
     fn needed_from(corners: &[&[f64]], hidden: Range<usize>) -> Vec<usize> {
         let line = |w: &[f64]| (0..10).map(|i| w[0] + (w[1] - w[0]) * f64::from(i) / 10.0).collect::<Vec<_>>();
         let mut segments = Vec::new();
@@ -283,23 +287,23 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_keeps_what_a_record_sweeps_once() {
+    fn rows_that_alone_pass_a_level_are_kept() {
         assert_eq!(needed_from(&[&[0.0, 1.0]], 0..0), [0], "one ramp");
         assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0, 0.0]], 0..0), [30], "the last fall is enough");
-        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0, 0.0]], 12..41), [0], "of what is seen again nothing shows");
-        // Each of two segments that sweep once is all start-up window but for its second half.
+        assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0, 0.0]], 12..41), [0], "the sensor hides the repetition");
+        // Each of two segments with a single sweep is start-up window in its first half.
         assert_eq!(needed_from(&[&[0.0, 1.0, 0.0], &[0.0, 1.0, 0.0]], 0..0), [19, 19], "either of two falls");
-        assert_eq!(needed_from(&[&[0.0, 1.0], &[0.0, 1.0]], 0..0), [0, 0], "of the lower halves nothing else shows");
+        assert_eq!(needed_from(&[&[0.0, 1.0], &[0.0, 1.0]], 0..0), [0, 0], "nothing else shows the lower halves");
         assert_eq!(needed_from(&[&[0.0, 1.0, 0.0, 1.0], &[4.0, 5.0, 4.0, 5.0]], 0..0), [20, 20], "apart");
         assert_eq!(needed_from(&[&[2.0, 2.0]], 0..0), [9], "a constant drive");
     }
 
     #[test]
-    fn a_cycle_ends_where_the_drive_comes_by_as_it_began() {
+    fn a_cycle_ends_at_the_first_value_in_the_initial_direction() {
         let cycle = |input: Vec<f64>| first_cycles(&Samples::of_columns(1e-3, input.clone(), input))[0];
         let sine =
             |phase: f64| (0..300).map(|k| (std::f64::consts::TAU * f64::from(k) / 100.0 + phase).sin()).collect();
-        // One period, whatever the phase.
+        // One period for any phase.
         for phase in [0.3, 1.0, 2.0, 4.0] {
             assert!(
                 cycle(sine(phase)).is_some_and(|rows| rows.abs_diff(100) <= 1),
@@ -311,7 +315,7 @@ mod tests {
         assert_eq!(cycle(vec![1.0; 100]), None);
     }
 
-    /// A hundred rows of a rising line; the sensor's range ends nowhere.
+    /// A hundred rows of a rising line, without clipping.
     fn samples() -> Samples {
         let rows = || (0..100).map(f64::from);
         let record = Record::from_samples(Columns {
@@ -323,7 +327,7 @@ mod tests {
         Samples::from_record(&record.unwrap())
     }
 
-    /// The first rows out of a hundred.
+    /// Flags the first rows of a hundred.
     fn first(rows: usize) -> Vec<bool> {
         (0..100).map(|k| k < rows).collect()
     }
@@ -346,8 +350,8 @@ mod tests {
         settling.iter().filter(|s| **s).count()
     }
 
-    /// What `unless_followed` makes of 40 known start-up rows and an RMSE of 1, where a fit to all rows has this RMSE and takes
-    /// the first `starting` for a start-up; and which rows each fit was without.
+    /// Runs `unless_followed` with 40 known start-up rows and an RMSE of 1, and a fit to all rows with this RMSE and
+    /// `starting` start-up rows. Returns the number of start-up rows, and the number of rows that each fit left out.
     fn followed(rmse: f64, starting: usize) -> (usize, Vec<usize>) {
         let asked = RefCell::new(Vec::new());
         let known = Settled { fit: fitted(1.0), settling: first(40) };
@@ -359,17 +363,17 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_a_fit_to_all_of_them_follows_are_no_start_up() {
+    fn rows_that_a_fit_to_all_rows_follows_are_no_start_up() {
         assert_eq!(followed(1.0, 0), (0, vec![0]));
-        // Some of them may be one still, and are left out in a second fit.
+        // Some of them may still be start-up rows; a second fit leaves them out.
         assert_eq!(followed(1.0, 20), (20, vec![0, 20]));
     }
 
     #[test]
-    fn rows_that_it_does_not_follow_stay_out() {
+    fn rows_that_it_does_not_follow_stay_start_up() {
         assert_eq!(followed(1.0, 21).0, 40, "most of them are a start-up for it too");
-        assert_eq!(followed(1.06, 0).0, 40, "it errs more");
-        assert_eq!(followed(1.04, 0).0, 0, "it errs as much, but for chance");
+        assert_eq!(followed(1.06, 0).0, 40, "its error is larger");
+        assert_eq!(followed(1.04, 0).0, 0, "its error is equal within the tolerance");
     }
 
     #[test]
@@ -383,11 +387,11 @@ mod tests {
         assert!(unless_followed(&samples(), known(), &mut |_: &[bool]| Err(())).is_err());
     }
 
-    /// Against a fit that leaves nothing, another that leaves only rounding errs no more.
+    /// If the known fit is exact, a fit with a rounding error is not worse.
     #[test]
-    fn rounding_is_no_error() {
+    fn a_rounding_error_counts_as_no_error() {
         let known = Settled { fit: fitted(0.0), settling: first(40) };
-        let rounding = EXACT * 99.0;
+        let rounding = ROUNDING_SHARE * 99.0;
         let all = |rmse| move |_: &[bool]| Ok::<_, ()>(Some((fitted(rmse), first(0))));
         let kept = unless_followed(&samples(), known, &mut all(rounding)).unwrap();
         assert_eq!(count(&kept.settling), 0);

@@ -1,4 +1,4 @@
-//! `simulate`: what a model says about a record.
+//! Simulates the prediction of a model for a record.
 
 use hyst_core::CreepParams;
 use serde::{Deserialize, Serialize};
@@ -15,43 +15,43 @@ use crate::samples::{PerSegment, Samples, range};
 use crate::settle::{centre, first_cycles, start_up_rows, started, windows};
 use crate::tone_phase;
 
-/// What is done with the sensor's zero.
+/// How the sensor's zero is treated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Zero {
-    /// The model's zero holds.
+    /// The model's zero is used.
     #[default]
     None,
-    /// One constant per file is taken from its measured output.
+    /// A constant per file is estimated and added to the prediction.
     PerRecord,
 }
 
-/// What a simulation may be told.
+/// Options of a simulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SimulateOptions {
-    /// What is done with the sensor's zero.
+    /// How the sensor's zero is treated.
     pub zero: Zero,
-    /// Temperature \[°C\] where the record has no column of it.
+    /// Temperature \[°C\] for a record without a temperature column.
     pub temperature: Option<f64>,
-    /// Whether each segment is one period of a steady state: it is passed twice through the model, and the second pass counts.
+    /// Whether each segment is one period of a steady state: it passes the model twice, and the second pass counts.
     pub periodic: bool,
-    /// Whether a creep begins at rest whatever the first rows show: where a force that the model is not told of moves the output too.
+    /// Whether a creep starts at rest regardless of the first rows: needed if an unknown force moves the output too.
     pub at_rest: bool,
 }
 
-/// Inputs beyond those that a model was fitted to: what it says of them, its record did not show.
+/// Inputs outside of the range that a model was fitted to. The prediction for them is an extrapolation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Extrapolated {
     /// Rows with such an input.
     pub rows: usize,
-    /// How far the farthest lies beyond \[input unit\].
+    /// Largest distance from the range \[input unit\].
     pub largest: f64,
-    /// Its row, from 0.
+    /// Row of the largest distance, from 0.
     pub row: usize,
 }
 
 impl Extrapolated {
-    /// Where `input` leaves the range that `model` was fitted to.
+    /// Finds the inputs outside of the range that `model` was fitted to.
     pub fn of(model: &Model, input: &[f64]) -> Self {
         let mut found = Self::default();
         for (row, u) in input.iter().enumerate() {
@@ -67,29 +67,30 @@ impl Extrapolated {
     }
 }
 
-/// What a model says about a record.
+/// Prediction of a model for a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulation {
     /// Output \[output unit\], per row.
     pub predicted: Vec<f64>,
-    /// Rows that do not count: start-up rows, and those in which the sensor is at the end of its range or spikes.
+    /// Rows that do not count: start-up rows, and rows in which the sensor is saturated or has a spike.
     pub settling: Vec<bool>,
-    /// Constant that was added per file; empty with [`Zero::None`].
+    /// Constant added per file; empty with [`Zero::None`].
     pub zeros: Vec<f64>,
-    /// Errors against the measured output, where there is one.
+    /// Errors against the measured output, if there is one.
     pub errors: Option<Errors>,
-    /// Angle \[rad\] per file by which a tone of the model is ahead of the model's clock, as the first rows of the file show it; 0 where the clock goes on.
+    /// Phase lead \[rad\] of the model's tone in each file, estimated from its first rows; 0 if the clock continues.
     pub tone_ahead: Vec<f64>,
-    /// Level at which the actuator rested before each segment minus the motion in its first row \[output unit\], where a creep of the model from
-    /// that level shows in the first rows; 0 where the segment begins at rest.
+    /// Initial deviation of the creep in each segment: the level of the earlier rest minus the motion in the first row
+    /// \[output unit\]; 0 if the segment starts at rest.
     pub creep_away: Vec<f64>,
-    /// Inputs beyond the model's own range.
+    /// Inputs outside of the model's range.
     pub extrapolated: Extrapolated,
-    /// Segments that do not begin at rest, but after turns of the drive that are not in the record, or as after their own first cycle.
+    /// Segments that do not start at rest, but after drive reversals from before the record or after a cycle like their
+    /// first one.
     pub(crate) in_mid_cycle: Vec<bool>,
 }
 
-/// Runs a model over a record at the temperatures that it holds, as [`simulate_with`].
+/// Simulates a model over a record at the recorded temperatures, as [`simulate_with`] does.
 ///
 /// # Errors
 /// As [`simulate_with`].
@@ -97,12 +98,15 @@ pub fn simulate(model: &Model, record: &Record, zero: Zero) -> Result<Simulation
     simulate_with(model, record, &SimulateOptions { zero, ..SimulateOptions::default() })
 }
 
-/// Runs a model over a record. The memory of each segment starts virgin. Where the first rows show another state and fewer rows are a start-up with it, the
-/// segment starts from that state: after the last turns of the drive, or after its own first cycle. The first rows of each file give the phase of a tone,
-/// those of each segment the rest of a creep. The model's file says how the drive runs between samples.
+/// Simulates a model over a record.
+///
+/// The memory of each segment starts virgin. If the first rows show another state, the segment starts from the state
+/// that leaves fewer start-up rows: after the last drive reversals, or after its own first cycle. The phase of a tone
+/// is estimated from the first rows of each file, the initial state of a creep from those of each segment. The model's
+/// file says how the drive is interpolated between samples.
 ///
 /// # Errors
-/// If the record lacks a column that the model uses, or its units are not the model's.
+/// If the record lacks a column that the model uses, or its units differ from the model's.
 pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) -> Result<Simulation, FitError> {
     let mut samples = Samples::from_record(record).at_temperature(options.temperature);
     check(model, record, &samples)?;
@@ -123,7 +127,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
         let tone = model.effects.interference.filter(|tone| tone.amplitude > 0.0);
         let files = record.rows_of_files();
         let less = |y: &[f64], p: &[f64]| -> Vec<f64> { y.iter().zip(p).map(|(y, p)| y - p).collect() };
-        // What a tone adds in a phase that is not that of the model's clock would hide how the memory begins.
+        // A tone with a wrong phase would hide the start of the memory.
         let in_phase = |samples: &Samples, predicted: &[f64], settling: &[bool], ahead: &mut Vec<f64>| {
             let Some(tone) = &tone else { return vec![0.0; output.len()] };
             *ahead = tone_phase::ahead(samples, tone, &less(output, predicted), settling, &files);
@@ -143,7 +147,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
             let from_rest = residual.clone();
             let drive = || Drive::new(&samples, model.between_samples, passes);
             let mut others = Vec::new();
-            // The drive may have turned before the record began, ...
+            // The drive may have reversed before the record started, ...
             let creep = model.effects.creep.as_ref().filter(|_| !options.at_rest);
             let beginnings = Beginnings { asked: &asked, starts: &starts };
             let pasts = recalled(&samples, &from_rest, &drive(), &chain, &beginnings, creep);
@@ -152,7 +156,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                 drive().run_from(&chain, |s, i, env, u0| chain.of(i).reset_after(s, env, u0, &pasts[i]), &mut turned);
                 others.push(turned);
             }
-            // ... or gone on as it does afterwards.
+            // ... or it was cycled as in the segment itself.
             let history = histories(&samples, &starts);
             if history.iter().any(|rows| *rows > 0) {
                 let mut cycled = vec![0.0; samples.len()];
@@ -164,7 +168,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
                 let after = start_up_rows(&samples, &left);
                 for (segment, in_mid_cycle) in samples.segments.iter().zip(&mut in_mid_cycle) {
                     let starting = |rows: &[bool]| rows[segment.clone()].iter().filter(|s| **s).count();
-                    // Nor may it miss more of what the model follows from rest.
+                    // The error of the rows that the model follows from rest must not grow.
                     let squares = |residual: &[f64]| {
                         segment.clone().filter(|k| !settling[*k]).map(|k| residual[k] * residual[k]).sum::<f64>()
                     };
@@ -212,7 +216,7 @@ pub fn simulate_with(model: &Model, record: &Record, options: &SimulateOptions) 
     Ok(Simulation { predicted, settling, zeros, errors, tone_ahead, creep_away, extrapolated, in_mid_cycle })
 }
 
-/// Rows that may have passed before each segment in which a start-up shows.
+/// Returns the number of rows of the first cycle of each segment with start-up rows.
 fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
     first_cycles(samples)
         .into_iter()
@@ -221,13 +225,14 @@ fn histories(samples: &Samples, starts: &[bool]) -> Vec<usize> {
         .collect()
 }
 
-/// Segments whose past is asked for, and those in which a start-up shows.
+/// Segments whose drive history is estimated, and segments with start-up rows.
 struct Beginnings<'a> {
     asked: &'a [bool],
     starts: &'a [bool],
 }
 
-/// The past of each segment that is asked for after which the model follows its first rows best; `residual` is that from rest.
+/// Returns the drive history after which the model follows the first rows of each segment best; `residual` is that from
+/// rest.
 fn recalled(
     samples: &Samples,
     residual: &[f64],
@@ -244,7 +249,7 @@ fn recalled(
             return Vec::new();
         }
         let zero = residual[rows.start] - centred[rows.start];
-        // A creep from before is another unknown of the same rows.
+        // The initial creep is a further unknown of the same rows.
         let nothing = || vec![0.0; windows[i]];
         let unit = creep.map_or_else(nothing, |creep| creep_rest::column(creep, 0.0, samples.period_of(i), windows[i]));
         let squares = |past: &Vec<f64>| -> f64 {
@@ -265,7 +270,7 @@ fn recalled(
     (0..of.asked.len()).map(past).collect()
 }
 
-/// What to do about a record whose output is in this unit, and not in the model's.
+/// Returns what to do if the output of a record is in this unit instead of the model's.
 pub(crate) fn other_unit(unit: OutputUnit) -> String {
     format!(
         "it has {} instead: convert its values and rename the column, or fit a model to records in that unit",

@@ -1,45 +1,45 @@
-//! Rows in which the sensor shows for a moment what no device does: spikes.
+//! Spikes: rows in which the sensor briefly shows an impossible value.
 //!
-//! A spike stands out of the rows on both sides of it by far more than the output goes from row to row around it, and by more than the drive has
-//! turned in a row shortly before. What turns, rings, or jumps and stays is none.
+//! A spike deviates from the rows on both sides by much more than the usual step from row to row, and by more than the second difference of the
+//! drive shortly before explains. Turns, ringing, and jumps that persist are not spikes.
 
 use std::ops::Range;
 
 use crate::Samples;
 use crate::record::Record;
 
-/// Rows to each side whose median a row is held against: a spike of up to three rows stands out of it, what rises or falls does not.
-const BESIDE: usize = 3;
-/// Rows to each side whose steps are the usual ones.
-const AROUND: usize = 32;
+/// Rows on each side of the median with which a row is compared. Spikes of up to three rows deviate from it, rising or falling outputs do not.
+const MEDIAN_ROWS: usize = 3;
+/// Rows on each side whose steps determine the usual step.
+const STEP_ROWS: usize = 32;
 /// Rows before a spike in which a step of the drive may have caused it.
-const BEFORE: usize = 64;
-/// Share of the steps that are usual: those into and out of spikes may be among the others.
-const USUAL: f64 = 0.7;
-/// How many usual steps a spike stands out: of white noise that is seven deviations.
-const STANDS_OUT: f64 = 5.0;
-/// By how many turns of the drive it stands out, each as a share of its own span: an output follows a drive that goes on evenly without a spike.
-const MORE_THAN_THE_DRIVE: f64 = 2.0;
-/// Share of the rows beyond which what stands out is no fault but the record.
-const MOST: f64 = 0.1;
+const DRIVE_ROWS: usize = 64;
+/// Quantile of the steps that is the usual step. Steps into and out of spikes are above it.
+const STEP_QUANTILE: f64 = 0.7;
+/// Smallest deviation of a spike, as a multiple of the usual step and of the resolution. In white noise this is seven standard deviations.
+const MIN_STEPS: f64 = 5.0;
+/// Smallest ratio of the deviation to the largest second difference of the drive, each relative to its own span. An even drive causes no spike.
+const MIN_DRIVE_RATIO: f64 = 2.0;
+/// Largest share of rows with spikes. With more, the deviations are a property of the output.
+const MAX_SHARE: f64 = 0.1;
 
-/// A row in which the sensor shows what no device does.
+/// A row in which the sensor shows an impossible value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spike {
-    /// The row, from 0.
+    /// The row, counted from 0.
     pub row: usize,
-    /// How far it is from the rows beside it, in spans of the output without spikes.
+    /// The deviation from the neighbouring rows, as a multiple of the span of the output without spikes.
     pub spans: f64,
 }
 
-/// The spikes of a record's output, the farthest first; none without an input.
+/// Finds the spikes of the output of a record, the largest first; none without an input.
 pub fn spikes_of(record: &Record) -> Vec<Spike> {
     let Some(y) = record.output().filter(|y| y.len() == record.input().len()) else { return Vec::new() };
     let marked = spiked_rows(record.input(), y, record.segments());
     let (low, high) = crate::samples::range((0..y.len()).filter(|k| !marked[*k]).map(|k| y[k]));
     let off = |row: usize| {
-        let mut beside = y[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(y.len())].to_vec();
-        (y[row] - quantile(&mut beside, 0.5)).abs() / (high - low).max(f64::MIN_POSITIVE)
+        let mut near = y[row.saturating_sub(MEDIAN_ROWS)..(row + MEDIAN_ROWS + 1).min(y.len())].to_vec();
+        (y[row] - quantile(&mut near, 0.5)).abs() / (high - low).max(f64::MIN_POSITIVE)
     };
     let mut found: Vec<Spike> = (0..y.len()).filter(|k| marked[*k]).map(|row| Spike { row, spans: off(row) }).collect();
     found.sort_by(|a, b| b.spans.total_cmp(&a.spans));
@@ -51,12 +51,12 @@ pub(crate) fn spiked_rows(input: &[f64], output: &[f64], segments: &[Range<usize
     spikes(input, output, output, segments)
 }
 
-/// Marks the spikes of an output that a fit of it shows: what it follows hides none in its `residual`.
+/// Marks the spikes of an output in the residual of its fit, where the motion does not hide them.
 pub(crate) fn spiked_residual(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     spikes(&samples.input, &samples.output, residual, &samples.segments)
 }
 
-/// Marks the spikes of `signal`, an output or what is known of it.
+/// Marks the spikes of `signal`, which is the output or its residual.
 fn spikes(input: &[f64], output: &[f64], signal: &[f64], segments: &[Range<usize>]) -> Vec<bool> {
     let mut spiked = vec![false; output.len()];
     let digit = crate::noise::quantisation(output) * 12f64.sqrt();
@@ -64,37 +64,37 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], segments: &[Range<usize
         let (low, high) = crate::samples::range(x.iter().copied());
         (high - low).max(f64::MIN_POSITIVE)
     };
-    // A spike itself widens the output's span.
-    let per_input = MORE_THAN_THE_DRIVE * span(output) / span(input);
-    let (mut beside, mut steps) = (Vec::new(), Vec::new());
+    // The span includes spikes, which makes the test stricter.
+    let per_input = MIN_DRIVE_RATIO * span(output) / span(input);
+    let (mut near, mut steps) = (Vec::new(), Vec::new());
     for s in segments {
-        // At an end of a segment what rises has no rows on the other side.
-        for k in s.start + BESIDE..s.end.saturating_sub(BESIDE).max(s.start + BESIDE) {
+        // The first and last rows of a segment do not have enough rows on both sides.
+        for k in s.start + MEDIAN_ROWS..s.end.saturating_sub(MEDIAN_ROWS).max(s.start + MEDIAN_ROWS) {
             let own = signal[k];
-            beside.clear();
-            beside.extend_from_slice(&signal[k - BESIDE..=k + BESIDE]);
-            let out = (own - quantile(&mut beside, 0.5)).abs();
-            if out <= STANDS_OUT * digit {
+            near.clear();
+            near.extend_from_slice(&signal[k - MEDIAN_ROWS..=k + MEDIAN_ROWS]);
+            let out = (own - quantile(&mut near, 0.5)).abs();
+            if out <= MIN_STEPS * digit {
                 continue;
             }
-            let before = k.saturating_sub(BEFORE).max(s.start)..=k + BESIDE;
+            let before = k.saturating_sub(DRIVE_ROWS).max(s.start)..=k + MEDIAN_ROWS;
             let turned = input[before].windows(3).fold(0.0, |m: f64, u| m.max((u[2] - 2.0 * u[1] + u[0]).abs()));
             if out <= per_input * turned {
                 continue;
             }
-            let around = k.saturating_sub(AROUND).max(s.start)..(k + AROUND + 1).min(s.end);
+            let around = k.saturating_sub(STEP_ROWS).max(s.start)..(k + STEP_ROWS + 1).min(s.end);
             steps.clear();
             steps.extend(signal[around].windows(2).map(|y| (y[1] - y[0]).abs()));
-            spiked[k] = out > STANDS_OUT * quantile(&mut steps, USUAL);
+            spiked[k] = out > MIN_STEPS * quantile(&mut steps, STEP_QUANTILE);
         }
     }
-    if spiked.iter().filter(|s| **s).count() as f64 > MOST * output.len() as f64 {
+    if spiked.iter().filter(|s| **s).count() as f64 > MAX_SHARE * output.len() as f64 {
         spiked.fill(false);
     }
     spiked
 }
 
-/// The number below which a share of some lies, whose order changes; zero of none.
+/// Returns the `share` quantile of `x`, which is reordered; 0 if `x` is empty.
 pub(crate) fn quantile(x: &mut [f64], share: f64) -> f64 {
     if x.is_empty() {
         return 0.0;
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Which rows of an output are spikes, where the drive is its smooth part.
+    /// Returns the rows of an output with spikes. The drive is its smooth part.
     fn found(rows: usize, drive: impl Fn(f64) -> f64, add: impl Fn(usize) -> f64) -> Vec<usize> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut noise = || 1e-3 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
@@ -124,23 +124,23 @@ mod tests {
     }
 
     #[test]
-    fn spikes_are_found_where_they_are() {
+    fn spikes_are_found_in_their_rows() {
         let at = |k: usize| k % 20 == 7;
         let found = found(4000, |t| (0.01 * t).sin(), |k| if at(k) { 0.3 } else { 0.0 });
         assert_eq!(found, (0..4000).filter(|k| at(*k)).collect::<Vec<_>>());
     }
 
     #[test]
-    fn turns_jumps_and_ringing_are_none() {
+    fn turns_jumps_and_ringing_are_not_spikes() {
         assert!(found(4000, triangle, |_| 0.0).is_empty());
         assert!(found(4000, |t| (0.01 * t).sin(), |k| if k > 1500 { 0.3 } else { 0.0 }).is_empty());
         let steps = |t: f64| (t / 100.0).floor() / 40.0;
         assert!(found(4000, steps, |k| 0.02 * (-((k % 100) as f64) / 20.0).exp() * (k as f64).sin()).is_empty());
     }
 
-    /// Three rows wide under a drive that goes further in a row: the output alone hides it, what a model leaves does not.
+    /// A spike of three rows that is smaller than the steps of the drive is visible in the residual only.
     #[test]
-    fn what_the_drive_hides_a_residual_shows() {
+    fn a_spike_hidden_by_the_motion_is_found_in_the_residual() {
         let rows = 1400;
         let input: Vec<f64> = (0..rows).map(|k| 50.0 * (1.0 - (0.0314 * k as f64).cos())).collect();
         let at = |k: usize| (650..653).contains(&k);
@@ -153,9 +153,9 @@ mod tests {
         assert!((0..rows).all(|k| found[k] == at(k)));
     }
 
-    /// A drive that goes far from row to row, evenly: it makes no spike.
+    /// A smooth drive with large steps does not hide a spike of the residual.
     #[test]
-    fn an_even_drive_hides_no_spike_of_a_residual() {
+    fn a_smooth_drive_does_not_hide_a_spike_of_the_residual() {
         let input: Vec<f64> = (0..2000).map(|k| 5.0 * (1.0 - (0.0251 * f64::from(k)).cos())).collect();
         let residual: Vec<f64> =
             (0..2000).map(|k| 0.01 * (2.0 * f64::from(k)).sin() + if k == 700 { 0.6 } else { 0.0 }).collect();
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_has_none() {
+    fn noise_has_no_spikes() {
         assert!(found(40_000, |_| 0.0, |_| 0.0).is_empty());
     }
 }

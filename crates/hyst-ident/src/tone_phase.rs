@@ -1,8 +1,9 @@
-//! The phase of a tone in a record with a clock of its own.
+//! Phase of a tone in a record with its own clock.
 //!
-//! A model holds a tone on the clock of the record that it was fitted to. Mains do not keep that phase until another record is made, and a clock that
-//! is started anew does not know it. The phase with which a record begins is an initial condition, as the memory of the hysteresis is: where the first rows
-//! show the tone with another phase, it is taken from them, and all later rows are predicted with it.
+//! A model stores a tone relative to the clock of the record that it was fitted to. The mains do not keep this phase
+//! until the next record, and a restarted clock does not know it. The phase at the start of a record is an initial
+//! condition, like the memory of the hysteresis. If the first rows show the tone with another phase, the phase is
+//! estimated from them, and all later rows are predicted with it.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -12,18 +13,18 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Samples;
 
-/// Share of a file's rows that its beginning is.
-const BEGINNING: usize = 10;
-/// Periods of the tone that a beginning has, where the file is long enough, and at least.
+/// The start of a file is this fraction (divisor) of its rows.
+const BEGINNING_DIVISOR: usize = 10;
+/// Number of periods of the tone in the start of a file, if the file is long enough, and the minimum.
 const USUAL_PERIODS: f64 = 20.0;
-const LEAST_PERIODS: f64 = 4.0;
-/// Amplitude that the first rows show over that of the model, for which they show its tone.
-const SAME_TONE: Range<f64> = 0.5..2.0;
-/// Phase \[rad\] by which they have to contradict the model: what a smaller one leaves is less than a third of the tone.
-const CONTRADICTS: f64 = 0.3;
+const MIN_PERIODS: f64 = 4.0;
+/// Ratio of the amplitude in the first rows to that of the model, within which they show the model's tone.
+const AMPLITUDE_RATIO: Range<f64> = 0.5..2.0;
+/// Minimum phase difference \[rad\] that is corrected; a smaller one leaves less than a third of the tone.
+const MIN_PHASE_DIFFERENCE: f64 = 0.3;
 
-/// Angle \[rad\] by which the tone of each file is ahead of that of a model; zero where the model's clock goes on, or where the first rows do not show it.
-/// `residual` is what the model with the tone leaves; rows that are `settling` do not count.
+/// Returns the phase lead \[rad\] of the tone in each file relative to the model's; zero if the model's clock continues
+/// or the first rows do not show the tone. `residual` is that of the model with its tone; `settling` rows do not count.
 pub(crate) fn ahead(
     samples: &Samples,
     tone: &InterferenceParams,
@@ -35,21 +36,21 @@ pub(crate) fn ahead(
         let first = samples.segments.iter().position(|s| s.start == rows.start)?;
         let segment = samples.segments[first].clone();
         let period = 1.0 / (tone.hz * samples.period_of(first));
-        let wanted = (rows.len() / BEGINNING).max((USUAL_PERIODS * period).ceil() as usize);
+        let wanted = (rows.len() / BEGINNING_DIVISOR).max((USUAL_PERIODS * period).ceil() as usize);
         let begins = segment.clone().find(|k| !settling[*k])?;
         let beginning = begins..segment.end.min(begins + wanted);
-        if (beginning.len() as f64) < LEAST_PERIODS * period {
+        if (beginning.len() as f64) < MIN_PERIODS * period {
             return None;
         }
         let (amplitude, phase) = shown(samples, tone, residual, beginning)?;
         let ahead = (phase - tone.phase + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
-        (SAME_TONE.contains(&(amplitude / tone.amplitude)) && ahead.abs() > CONTRADICTS).then_some(ahead)
+        (AMPLITUDE_RATIO.contains(&(amplitude / tone.amplitude)) && ahead.abs() > MIN_PHASE_DIFFERENCE).then_some(ahead)
     };
     files.iter().map(|rows| of_file(rows).unwrap_or(0.0)).collect()
 }
 
-/// Amplitude and phase \[rad\] of the fundamental over some rows of what the model without its tone leaves, beside a constant; under a Hann window, so that
-/// what is slow does not count.
+/// Estimates amplitude and phase \[rad\] of the fundamental over some rows, from the residual of the model without its
+/// tone, next to a constant. A Hann window suppresses slow parts.
 fn shown(samples: &Samples, tone: &InterferenceParams, residual: &[f64], rows: Range<usize>) -> Option<(f64, f64)> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     let length = rows.len() as f64;
@@ -65,7 +66,7 @@ fn shown(samples: &Samples, tone: &InterferenceParams, residual: &[f64], rows: R
     Some((found[1].hypot(found[2]), found[2].atan2(found[1])))
 }
 
-/// What a tone adds more where it is ahead by these angles, per row.
+/// Returns the change of the tone by these phase leads, per row.
 pub(crate) fn change(samples: &Samples, tone: &InterferenceParams, ahead: &[f64], files: &[Range<usize>]) -> Vec<f64> {
     let mut change = vec![0.0; samples.len()];
     for (rows, ahead) in files.iter().zip(ahead).filter(|(_, ahead)| **ahead != 0.0) {
@@ -82,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_rows_say_with_which_phase_a_record_begins() {
+    fn the_phase_of_a_tone_is_estimated_from_the_first_rows() {
         let tone = InterferenceParams {
             hz: 50.0,
             amplitude: 0.4,
@@ -99,7 +100,7 @@ mod tests {
                 .map(|t| slow(*t) + size * tone.at_angle(TAU * 50.0 * t + turned) - tone.at(*t))
                 .collect();
             let found = ahead(&samples, &tone, &residual, &settling, &files);
-            let expected = if size < 0.5 || f64::abs(turned) < CONTRADICTS { 0.0 } else { turned };
+            let expected = if size < 0.5 || f64::abs(turned) < MIN_PHASE_DIFFERENCE { 0.0 } else { turned };
             assert!((found[0] - expected).abs() < 0.02, "{turned} {size}: {found:?}");
             let change = change(&samples, &tone, &found, &files);
             let left = residual.iter().zip(&change).zip(&samples.time).map(|((r, c), t)| r - c - slow(*t));

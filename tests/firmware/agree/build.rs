@@ -1,4 +1,4 @@
-//! Hands cortex-m-rt's linker script and the memory map to the linker, whatever `RUSTFLAGS` says.
+//! Passes the linker script of cortex-m-rt and the memory map to the linker, for any `RUSTFLAGS`.
 
 fn main() {
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

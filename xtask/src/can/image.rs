@@ -1,4 +1,4 @@
-//! The machine's root: programs, their libraries, the modules, and what runs first.
+//! The root file system of the machine: programs, libraries, kernel modules and the init script.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,7 +10,7 @@ use super::machine::{PASSED, TESTS};
 use super::packages::Packages;
 use crate::command::{output, passes_quietly};
 
-/// Modules in the order in which they are loaded.
+/// Kernel modules, in the order in which they are loaded.
 const MODULES: &[&str] = &[
     "drivers/net/can/dev/can-dev.ko",
     "drivers/net/can/vcan.ko",
@@ -21,7 +21,7 @@ const MODULES: &[&str] = &[
 ];
 const UTILS: &[&str] = &["candump", "cansend", "slcand"];
 
-/// What the kernel starts. The tests find `hystctl` two folders above themselves.
+/// Returns the init script. The tests expect `hystctl` two folders above themselves.
 fn init() -> String {
     let mut script = String::from(
         "#!/bin/busybox sh
@@ -47,7 +47,7 @@ ip link set lo up
     script
 }
 
-/// Writes the image and says where it is.
+/// Writes the image and returns its path.
 pub(crate) fn build(
     packages: &Packages,
     tests: &[(&str, PathBuf)],
@@ -55,7 +55,7 @@ pub(crate) fn build(
     folder: &Path,
 ) -> Result<PathBuf, String> {
     let root = folder.join("machine");
-    // What was there before is of an older build.
+    // Remove the files of an earlier build.
     let _ = fs::remove_dir_all(&root);
     let mut files: Vec<(PathBuf, String)> =
         vec![(packages.busybox.clone(), "bin/busybox".to_owned()), (hystctl.to_owned(), "debug/hystctl".to_owned())];
@@ -80,16 +80,18 @@ pub(crate) fn build(
     Ok(image)
 }
 
-/// The libraries that the system loads with a program, by their paths.
+/// Returns the paths of the libraries that are loaded with a program.
 fn loaded(program: &Path) -> Result<Vec<String>, String> {
     let text = output(Command::new("ldd").arg(program));
-    let text = text.ok_or_else(|| format!("ldd cannot say what {} needs", program.display()))?;
+    let text = text.ok_or_else(|| format!("ldd failed for {}", program.display()))?;
     // "libc.so.6 => /lib/x86_64-linux-gnu/libc.so.6 (0x00007f…)", "/lib64/ld-linux-x86-64.so.2 (0x00007f…)"
     let path = |line: &str| line.split_whitespace().find(|word| word.starts_with('/')).map(str::to_owned);
     Ok(text.lines().filter_map(path).collect())
 }
 
-/// Copies a file; programs that were built here without what is for debuggers, where that can be done: the machine's memory is small.
+/// Copies a file.
+///
+/// Removes debug symbols of our programs if possible, because the machine has little memory.
 fn copy(from: &Path, to: &Path, ours: bool) -> io::Result<()> {
     if let Some(folder) = to.parent() {
         fs::create_dir_all(folder)?;
@@ -100,7 +102,7 @@ fn copy(from: &Path, to: &Path, ours: bool) -> io::Result<()> {
     fs::copy(from, to).map(|_| ())
 }
 
-/// Adds what runs first, and makes one file of all.
+/// Adds the init script and packs the root file system.
 fn finish(root: &Path, busybox: &Path, image: &Path) -> io::Result<()> {
     let tool = |arguments: &[&str]| {
         let mut command = Command::new(busybox);
@@ -115,5 +117,5 @@ fn finish(root: &Path, busybox: &Path, image: &Path) -> io::Result<()> {
     fs::write(&names, tool(&["find"]).output()?.stdout)?;
     let mut cpio = tool(&["cpio", "-o", "-H", "newc"]);
     let packed = cpio.stdin(fs::File::open(&names)?).stdout(fs::File::create(image)?).status()?.success();
-    if made && packed { Ok(()) } else { Err(io::Error::other("busybox cannot make it")) }
+    if made && packed { Ok(()) } else { Err(io::Error::other("busybox could not pack the image")) }
 }

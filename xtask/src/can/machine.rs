@@ -1,5 +1,7 @@
-//! A machine with CAN: QEMU starts it with the tests `can` of `hyst-hw` and `cli_can`, which make virtual interfaces and have the kernel
-//! itself as their peer.
+//! A virtual machine with CAN: QEMU runs the tests `can` of `hyst-hw` and `cli_can` in it.
+//!
+//! They create virtual interfaces and test
+//! against the kernel.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,18 +14,18 @@ use crate::command::{self, Outcome, cargo, install, output, target, wait, which}
 
 const EMULATOR: &str = "qemu-system-x86_64";
 const EMULATOR_PACKAGE: &str = "qemu-system-x86";
-/// The machine is emulated, and has one processor.
+/// Time limit; the machine is emulated and has one processor.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Tests that run in it, with their packages.
+/// Packages and names of the tests in the machine.
 pub(super) const TESTS: &[(&str, &str)] = &[("hyst-hw", "can"), ("hyst-tests", "cli_can")];
-/// What `tests` prints of one that came to its end.
+/// Start of the line that the init script prints after a passed test.
 pub(super) const PASSED: &str = "hyst-can: passed ";
 
-/// Runs the tests in it.
+/// Runs the tests in the machine.
 pub(crate) fn check() -> Outcome {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
-        return skipped("it needs Linux on x86-64");
+        return skipped("this needs Linux on x86-64");
     }
     if which(EMULATOR).is_none() && !install(&[EMULATOR_PACKAGE]) {
         return skipped(&format!("{EMULATOR} is missing (Debian: `apt-get install {EMULATOR_PACKAGE}`)"));
@@ -66,7 +68,7 @@ fn run(packages: &Packages, folder: &Path) -> Result<(), String> {
         .stdout(log);
     let child = machine.spawn().map_err(|error| format!("{EMULATOR} could not be started: {error}"))?;
     let ended = wait(child, LIMIT);
-    // The machine's exit code says nothing; what it printed does.
+    // The exit code of QEMU is not that of the tests; only the output has the results.
     let bytes = fs::read(&printed).map_err(|error| format!("{}: {error}", printed.display()))?;
     let text = String::from_utf8_lossy(&bytes).replace('\r', "");
     eprintln!("{}", text.trim());
@@ -76,7 +78,7 @@ fn run(packages: &Packages, folder: &Path) -> Result<(), String> {
     judge(&text)
 }
 
-/// Whether all tests ran and passed, by what the machine printed.
+/// Checks in the output of the machine that all tests ran and passed.
 fn judge(text: &str) -> Result<(), String> {
     if let Some(line) = text.lines().find(|line| line.contains(SKIPPED)) {
         return Err(format!("a test did not run in the machine: {line}"));
@@ -92,7 +94,7 @@ fn judge(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// The program of a package's integration test.
+/// Builds an integration test of a package and returns the path of its program.
 fn built(package: &str, test: &str) -> Result<PathBuf, String> {
     let arguments = ["test", "--no-run", "--message-format=json-render-diagnostics", "--workspace"];
     let text = output(cargo().args(arguments).args(["--test", test]).stderr(Stdio::inherit()));
@@ -100,10 +102,10 @@ fn built(package: &str, test: &str) -> Result<PathBuf, String> {
     let named = format!(r#""name":"{test}""#);
     let line = text.lines().filter(|line| line.contains(&named)).find_map(|line| line.split_once(r#""executable":""#));
     let program = line.and_then(|(_, rest)| rest.split_once('"')).map(|(program, _)| PathBuf::from(program));
-    program.ok_or_else(|| format!("cargo did not say where the tests {test} of {package} are"))
+    program.ok_or_else(|| format!("cargo printed no path for the tests {test} of {package}"))
 }
 
-/// The command line's program.
+/// Builds `hystctl` and returns its path.
 fn hystctl() -> Result<PathBuf, String> {
     match command::build() {
         Outcome::Passed => Ok(command::program()),
@@ -125,7 +127,7 @@ hyst-can: passed cli_can
 ";
 
     #[test]
-    fn only_what_ran_and_passed_is_good() {
+    fn only_tests_that_ran_and_passed_are_accepted() {
         assert_eq!(judge(GOOD), Ok(()));
         for (from, to) in [
             ("14 passed", "0 passed"),

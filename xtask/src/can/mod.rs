@@ -1,8 +1,8 @@
-//! The CAN check: what others have written at the other end of the bus.
+//! The CAN check: tests against other implementations.
 //!
 //! - `peers.rs`: slcan and ISO-TP against python-can and can-isotp, over a pseudo terminal.
-//! - `machine.rs`: the sockets of Linux, in a machine of their own, because few kernels that run checks have them.
-//! - `packages.rs`, `image.rs`: what that machine is made of.
+//! - `machine.rs`: the CAN sockets of Linux, in a virtual machine, because most kernels that run checks do not have them.
+//! - `packages.rs`, `image.rs`: the packages and the disk image of this machine.
 
 mod image;
 mod machine;
@@ -11,10 +11,10 @@ mod peers;
 
 use crate::command::Outcome;
 
-/// What stands in a test's output when it was not run.
+/// Text in the output of a test that was not run.
 const SKIPPED: &str = "skipped: ";
 
-/// Runs both; one that cannot run says why.
+/// Runs both parts; the result contains the reason if a part cannot run.
 pub(crate) fn check() -> Outcome {
     match (peers::check(), machine::check()) {
         (Outcome::Failed, _) | (_, Outcome::Failed) => Outcome::Failed,

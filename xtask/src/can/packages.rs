@@ -1,4 +1,4 @@
-//! Debian's packages that a machine with CAN is made of, unpacked and not installed.
+//! Debian packages for the machine with CAN; they are unpacked, not installed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,25 +6,25 @@ use std::process::Command;
 
 use crate::command::{as_root, output, passes_quietly};
 
-/// What is always the newest kernel; the cloud's has no CAN.
+/// Package that depends on the newest kernel. The cloud kernel has no CAN.
 const KERNEL: &str = "linux-image-amd64";
 const OTHERS: &[&str] = &["busybox-static", "can-utils"];
 
-/// What the machine is made of.
+/// Paths of the unpacked files.
 pub(crate) struct Packages {
     pub(crate) kernel: PathBuf,
-    /// The folder with the kernel's modules.
+    /// Folder with the kernel's modules.
     pub(crate) modules: PathBuf,
     pub(crate) busybox: PathBuf,
-    /// The folder with the programs of can-utils.
+    /// Folder with the programs of can-utils.
     pub(crate) utils: PathBuf,
 }
 
 impl Packages {
-    /// Those of an earlier run, or downloads them.
+    /// Returns the packages of an earlier run, or downloads them.
     ///
     /// # Errors
-    /// What is missing, and how to get it.
+    /// A message with the missing package and the command that installs it.
     pub(crate) fn get(folder: &Path) -> Result<Self, String> {
         let kept = folder.join("kernel.txt");
         if let Ok(kernel) = fs::read_to_string(&kept) {
@@ -34,16 +34,19 @@ impl Packages {
             }
         }
         let kernel = newest().or_else(|| if update() { newest() } else { None }).ok_or_else(|| {
-            format!("Debian's {KERNEL} is not known here: it needs apt, and lists of packages (`apt-get update`)")
+            format!("Debian's package {KERNEL} was not found; this needs apt with package lists (`apt-get update`)")
         })?;
         let wanted = [&[kernel.as_str()], OTHERS].concat();
         let there = download(&wanted, folder) || update() && download(&wanted, folder);
         if !there {
-            return Err(format!("packages could not be downloaded; `apt-get download {}` says why", wanted.join(" ")));
+            return Err(format!(
+                "packages could not be downloaded; `apt-get download {}` prints the reason",
+                wanted.join(" ")
+            ));
         }
         let packages = Self::of(folder, &kernel);
         if !packages.whole() {
-            return Err(format!("{} lack what is needed of them", wanted.join(", ")));
+            return Err(format!("files are missing in the packages {}", wanted.join(", ")));
         }
         fs::write(&kept, &kernel).map_err(|error| format!("{}: {error}", kept.display()))?;
         Ok(packages)
@@ -65,7 +68,7 @@ impl Packages {
     }
 }
 
-/// The package that the newest kernel is in.
+/// Returns the package of the newest kernel.
 fn newest() -> Option<String> {
     let text = output(Command::new("apt-cache").args(["depends", KERNEL]))?;
     let named = |line: &str| line.trim().strip_prefix("Depends: ").map(str::to_owned);
@@ -76,18 +79,18 @@ fn update() -> bool {
     as_root() && passes_quietly(Command::new("apt-get").args(["-qq", "update"]))
 }
 
-/// Downloads packages and unpacks them below `folder`; whether all of that went well.
+/// Downloads packages and unpacks them below `folder`; returns whether that succeeded.
 fn download(packages: &[&str], folder: &Path) -> bool {
     let (files, root) = (folder.join("packages"), folder.join("root"));
     for folder in [&files, &root] {
-        // What an earlier try left could be of another kernel.
+        // Files of an earlier attempt could belong to another kernel.
         let _ = fs::remove_dir_all(folder);
         if fs::create_dir_all(folder).is_err() {
             return false;
         }
     }
     eprintln!("apt-get download {}", packages.join(" "));
-    // As root it warns that it cannot become someone else for a folder that is root's; that is as it should be.
+    // As root, apt cannot download into this folder as its sandbox user; this option avoids the warning.
     let mut apt = Command::new("apt-get");
     apt.args(["-qq", "-o", "APT::Sandbox::User=root", "download"]).args(packages).current_dir(&files);
     if !passes_quietly(&mut apt) {
@@ -97,7 +100,7 @@ fn download(packages: &[&str], folder: &Path) -> bool {
     let unpacked = archives
         .map(|archive| passes_quietly(Command::new("dpkg-deb").arg("-x").arg(archive.path()).arg(&root)))
         .fold(0, |count, unpacked| count + usize::from(unpacked));
-    // They are as large again as what was in them.
+    // The archives are as large as their content and no longer needed.
     let _ = fs::remove_dir_all(&files);
     unpacked == packages.len()
 }

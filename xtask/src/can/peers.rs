@@ -1,4 +1,4 @@
-//! Python's stacks for CAN as the peer of ours.
+//! Tests of slcan and ISO-TP against CAN packages of Python.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,13 +8,13 @@ use crate::command::{Outcome, cargo, passes_quietly, target};
 use crate::python::{interpreter, program};
 
 const NEEDED: &[&str] = &["python-can==4.*", "can-isotp==2.*", "pyserial==3.*"];
-/// Succeeds where all of them are there.
-const THERE: &str = "import can, isotp, serial";
+/// Program that succeeds if all packages are installed.
+const IMPORTS: &str = "import can, isotp, serial";
 
 /// Runs the test `peers` of `hyst-hw`.
 pub(super) fn check() -> Outcome {
     if !cfg!(unix) {
-        return Outcome::Skipped("slcan was not tested against python-can: that needs pseudo terminals".to_owned());
+        return Outcome::Skipped("slcan was not tested against python-can: this needs pseudo terminals".to_owned());
     }
     let python = match environment(&target().join("can").join("python")) {
         Ok(python) => python,
@@ -31,10 +31,10 @@ pub(super) fn check() -> Outcome {
     if output.status.success() && ran { Outcome::Passed } else { Outcome::Failed }
 }
 
-/// A Python with all that is needed, that of an earlier run if it has it.
+/// Returns a Python with all packages; reuses that of an earlier run if possible.
 fn environment(own: &Path) -> Result<PathBuf, String> {
     let python = program(own);
-    let there = || passes_quietly(Command::new(&python).args(["-c", THERE]).stderr(Stdio::null()));
+    let there = || passes_quietly(Command::new(&python).args(["-c", IMPORTS]).stderr(Stdio::null()));
     if there() {
         return Ok(python);
     }
@@ -42,6 +42,6 @@ fn environment(own: &Path) -> Result<PathBuf, String> {
     let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
     let made = passes_quietly(Command::new(base).args(["-m", "venv", "--clear"]).arg(own))
         && passes_quietly(Command::new(&python).args(install).args(NEEDED));
-    let how = || format!("`pip install {}` failed; is this machine online?", NEEDED.join(" "));
+    let how = || format!("`pip install {}` failed; check the network connection", NEEDED.join(" "));
     if made && there() { Ok(python) } else { Err(how()) }
 }

@@ -1,38 +1,39 @@
-//! What every model costs, as `docs/firmware.md` states it.
+//! The costs of all models in `docs/firmware.md`.
 
 use super::link;
 use super::toolchain::Toolchain;
 use std::fs;
 use std::path::Path;
 
-/// A table row may be this much off before it has to be written anew.
+/// Relative deviation of a table row above which the table must be written again.
 const TOLERANCE: f64 = 0.1;
 
 const INTRODUCTION: &str = "\
 # What the models cost on a Cortex-M4F
 
-Measured by `cargo xtask firmware --table`: every model runs over the same 1000 samples in QEMU (machine mps2-an386), and
-its outputs are the host's in every bit, in `f32` and in `f64`.
+Measured by `cargo xtask firmware --table`. All models run over the same 1000 samples in QEMU (machine mps2-an386). Their
+outputs are bit-identical to those of the host, in `f32` and in `f64`.
 
-- **instructions**: of one `step` beyond a call that does nothing, on average and at most. They are instructions, not
-  cycles: slow memory, branches, divisions and roots take more than one cycle each. The Cortex-M4F computes `f32` in
-  hardware and `f64` in software.
-- **flash**, in bytes: `reset` and `step` with all they call, each model linked alone; what models have in common (`sinf`,
-  the arithmetic of `f64`) is there once in a firmware that has several. *opt-level s* is the same optimised for size, *with
-  build* adds the way from parameters to coefficients, which can be left to a host.
-- **RAM**, in bytes: coefficients (flash, if they never change) and state, one of each per actuator; no model has other data.
-- **stack**, in bytes: what a `step` reached at most, the call included (16 to 32), and what building and resetting did.
+- **instructions**: instructions of one `step` minus an empty call, mean and maximum. These are instructions, not cycles:
+  slow memory, branches, divisions and roots take more than one cycle each. The Cortex-M4F computes `f32` in hardware and
+  `f64` in software.
+- **flash**, in bytes: `reset` and `step` with all functions that they call, each model linked alone. A firmware with
+  several models contains shared functions (`sinf`, the arithmetic of `f64`) only once. *opt-level s* is optimised for
+  size. *with build* includes the conversion of parameters to coefficients, which a host can do instead.
+- **RAM**, in bytes: coefficients (in flash if they are constant) and state, one of each per actuator. Models have no other
+  data.
+- **stack**, in bytes: the maximum of a `step`, including the call (16 to 32), and that of building and resetting.
 
-The number in a name is that of plays, cells along an edge, elements, states or samples of memory. Temperature, load and time
-move at every sample. `pi_10_viscous` drags in proportion to the rate, `pi_10_root_viscous` with its root; `td_em_10` computes a
-matrix exponential whenever the temperature moves, `td_em_10_steady` has it constant. `chain` is delay, lag, 10 plays, temperature,
-4 creep elements, a resonance, drift and a tone, `compensator` its inverse with 129 taps.
+The number in a name is the number of plays, cells along an edge, elements, states or samples of memory. Temperature, load and
+time change at every sample. The drag of `pi_10_viscous` is proportional to the rate, that of `pi_10_root_viscous` to its root.
+`td_em_10` computes a matrix exponential at every change of the temperature; `td_em_10_steady` has a constant temperature. `chain`
+is delay, lag, 10 plays, temperature, 4 creep elements, a resonance, drift and a tone; `compensator` is its inverse with 129 taps.
 
-No function of any model can reach a panic, at opt-level 3 and s: they link with a panic handler that does not.
+No function of a model can panic, at opt-level 3 and s: all of them link although the panic handler cannot be linked.
 ";
 
 const HEADER: &str = "\
-| model | instructions | at most | flash | opt-level s | with build | coefficients | state | stack | to build |
+| model | instructions | maximum | flash | opt-level s | with build | coefficients | state | stack | to build |
 |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
@@ -72,14 +73,14 @@ impl Row {
     }
 }
 
-/// The figures of all cases.
+/// Figures of all cases.
 pub(crate) struct Figures {
     compiler: String,
     rows: Vec<Row>,
 }
 
 impl Figures {
-    /// From what the firmware printed, and from linking.
+    /// Collects the figures from the output of the firmware and from linking.
     pub(crate) fn collect(toolchain: &Toolchain, library: &Path, small: &Path, printed: &Path) -> Result<Self, String> {
         let text = fs::read_to_string(printed).map_err(|error| format!("{}: {error}", printed.display()))?;
         let mut rows = Vec::new();
@@ -88,7 +89,7 @@ impl Figures {
             let (precision, rest) = rest.split_once(' ').unwrap_or((rest, ""));
             let figure = |name: &str| {
                 let value = rest.split(' ').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='));
-                value.map(str::to_owned).ok_or_else(|| format!("the firmware told no {name} of {case}"))
+                value.map(str::to_owned).ok_or_else(|| format!("the firmware printed no {name} for {case}"))
             };
             let number =
                 |name: &str| figure(name)?.parse::<f64>().map_err(|error| format!("{name} of {case}: {error}"));
@@ -110,7 +111,7 @@ impl Figures {
         Ok(Self { compiler: format!("{}, opt-level 3, LTO", toolchain.version), rows })
     }
 
-    /// Writes the document.
+    /// Writes and prints the document.
     pub(crate) fn write(&self, document: &Path) -> Result<(), String> {
         let mut text = format!("{INTRODUCTION}\nCompiler: {}.\n", self.compiler);
         for precision in ["f32", "f64"] {
@@ -124,10 +125,11 @@ impl Figures {
         folder.and_then(|()| fs::write(document, text)).map_err(|error| format!("{}: {error}", document.display()))
     }
 
-    /// Refuses a document that lacks a model or, for the same compiler, states other figures.
+    /// Returns an error if the document has no row for a model or, for the same compiler, other figures.
     pub(crate) fn compare(&self, document: &Path) -> Result<(), String> {
-        const ANEW: &str = "`cargo xtask firmware --table` writes it anew";
-        let text = fs::read_to_string(document).map_err(|error| format!("{}: {error}; {ANEW}", document.display()))?;
+        const WRITE_AGAIN: &str = "type `cargo xtask firmware --table` to write it again";
+        let text =
+            fs::read_to_string(document).map_err(|error| format!("{}: {error}; {WRITE_AGAIN}", document.display()))?;
         let same_compiler = text.contains(&self.compiler);
         for precision in ["f32", "f64"] {
             let section = text.split("\n## ").find(|section| section.starts_with(precision)).unwrap_or_default();
@@ -140,7 +142,7 @@ impl Figures {
                     let Row { case, mean, .. } = row;
                     let is = document.display();
                     return Err(format!(
-                        "{is}: {case} takes {mean:.0} instructions in {precision}, not {stated:?}; {ANEW}"
+                        "{is}: {case} takes {mean:.0} instructions in {precision}, not {stated:?}; {WRITE_AGAIN}"
                     ));
                 }
             }

@@ -1,20 +1,20 @@
-//! Links single functions of the bare library: what they need in flash, and whether they can panic.
+//! Links single functions of the bare library: measures their size, and checks that they cannot panic.
 
 use super::toolchain::Toolchain;
 use std::fs;
 use std::path::Path;
 
-/// What the panic handler of `tests/firmware/bare` calls, and nobody has.
-const NOT_THERE: &str = "this_can_panic";
+/// Function that the panic handler of `tests/firmware/bare` calls, and that does not exist.
+const PANIC_SYMBOL: &str = "this_can_panic";
 
-/// The functions that the library offers, as `step.CASE.f32`: its archive's index, which comes first.
+/// Returns the functions of the library, such as `step.CASE.f32`, from the index of the archive.
 pub(crate) fn functions(library: &Path) -> Result<Vec<String>, String> {
     let bytes = fs::read(library).map_err(|error| format!("{}: {error}", library.display()))?;
     let index = || {
         let header = bytes.strip_prefix(b"!<arch>\n")?.get(..60)?;
         let size: usize = std::str::from_utf8(header.get(48..58)?).ok()?.trim().parse().ok()?;
         let index = bytes.get(68..)?.get(..size).filter(|_| header.starts_with(b"/ "))?;
-        // Count and one offset per name, all big-endian; then the names.
+        // The count and one offset per name, big-endian, then the names.
         let count = u32::from_be_bytes(index.get(..4)?.try_into().ok()?) as usize;
         index.get(4 + 4 * count..)
     };
@@ -28,30 +28,30 @@ pub(crate) fn functions(library: &Path) -> Result<Vec<String>, String> {
     Ok(ours)
 }
 
-/// Names every function that can panic; the linker must refuse nothing else.
+/// Returns the functions that can panic; any other linker error is an error.
 pub(crate) fn can_panic(toolchain: &Toolchain, library: &Path, functions: &[String]) -> Result<Vec<String>, String> {
     let mut found = Vec::new();
     let all: Vec<&str> = functions.iter().map(String::as_str).collect();
     match link(toolchain, library, &all) {
         Ok(_) => return Ok(found),
-        Err(error) if !error.contains(NOT_THERE) => return Err(error),
+        Err(error) if !error.contains(PANIC_SYMBOL) => return Err(error),
         Err(_) => {}
     }
     for function in functions {
         match link(toolchain, library, &[function]) {
             Ok(_) => {}
-            Err(error) if error.contains(NOT_THERE) => found.push(function.clone()),
+            Err(error) if error.contains(PANIC_SYMBOL) => found.push(function.clone()),
             Err(error) => return Err(error),
         }
     }
     Ok(found)
 }
 
-/// Bytes of flash that the functions take with all they call.
+/// Returns the flash size of functions, including all functions that they call (bytes).
 pub(crate) fn flash(toolchain: &Toolchain, library: &Path, functions: &[&str]) -> Result<u32, String> {
     let image = link(toolchain, library, functions)?;
     let (flash, ram) = sections(&image).ok_or("the linker wrote no ELF file")?;
-    // A model's data are its coefficients and its state, and those are the caller's.
+    // The caller stores coefficients and state, so a model has no static data.
     if ram == 0 { Ok(flash) } else { Err(format!("{} has {ram} bytes of static data", functions.join(", "))) }
 }
 
@@ -70,7 +70,7 @@ fn link(toolchain: &Toolchain, library: &Path, functions: &[&str]) -> Result<Vec
     }
 }
 
-/// Bytes that a 32-bit ELF file puts in flash, and in RAM.
+/// Returns the bytes of a 32-bit ELF file in flash and in RAM.
 fn sections(elf: &[u8]) -> Option<(u32, u32)> {
     const ALLOCATED: u32 = 2;
     const WRITABLE: u32 = 1;

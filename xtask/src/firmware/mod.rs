@@ -1,8 +1,10 @@
 //! The firmware check: the core on a Cortex-M4F.
 //!
-//! It depends on nothing that needs an operating system; every model builds for the target; nothing in it can panic; in
-//! QEMU it computes the same bits as on this machine, within a bounded stack; `docs/firmware.md` says what that costs; and the
-//! reference firmware talks to a host over a serial line.
+//! - The core has no dependency that needs an operating system.
+//! - All models build for the target, and no function of them can panic.
+//! - In QEMU they compute the same bits as on this machine, within a bounded stack.
+//! - `docs/firmware.md` contains their present costs.
+//! - The reference firmware passes the tests with a host over a serial line.
 
 mod figures;
 mod link;
@@ -15,7 +17,7 @@ use std::path::Path;
 use std::process::Command;
 use toolchain::{NotRun, TARGET, Toolchain};
 
-/// What the core may depend on: all of it is `no_std`. `libm` always, the others where a feature asks for them.
+/// Permitted dependencies of the core, all `no_std`: always, and those of optional features.
 const ALWAYS: &[&str] = &["hyst-core", "libm"];
 const ON_DEMAND: &[&str] = &[
     "byteorder",
@@ -31,7 +33,7 @@ const ON_DEMAND: &[&str] = &[
     "thiserror",
 ];
 
-/// Runs the check; with `write`, writes `docs/firmware.md` instead of comparing it.
+/// Runs the check; `write`: writes `docs/firmware.md` instead of comparing it.
 pub(crate) fn check(write: bool) -> Outcome {
     match steps(write) {
         Ok(()) => Outcome::Passed,
@@ -45,7 +47,7 @@ pub(crate) fn check(write: bool) -> Outcome {
     }
 }
 
-/// Why the check did not come to its end.
+/// Reason why the check did not pass.
 enum Ended {
     Failed(String),
     NotRun(String),
@@ -62,8 +64,9 @@ fn steps(write: bool) -> Result<(), Ended> {
     let firmware = root().join("tests/firmware");
     same_libm(&firmware)?;
     done(cargo().args(["fmt", "--all", "--check"]).current_dir(&firmware))?;
-    let toolchain = Toolchain::find()
-        .map_err(|how| Ended::NotRun(format!("no compiler for {TARGET}, only dependencies were checked; {how}")))?;
+    let toolchain = Toolchain::find().map_err(|how| {
+        Ended::NotRun(format!("no compiler for {TARGET}, so only dependencies were checked; type {how}"))
+    })?;
     eprintln!("{} for {TARGET}", toolchain.version);
 
     let target = target().join("firmware");
@@ -80,7 +83,7 @@ fn steps(write: bool) -> Result<(), Ended> {
     }
     done(toolchain.cargo("build", &target).args(["--release", "--locked"]).current_dir(&firmware))?;
 
-    // Optimised for speed, which is what is measured, and for size: other bounds checks are left.
+    // Optimised for speed (as measured) and for size, because the optimiser leaves different bounds checks.
     let library = built.join("libhyst_bare.a");
     let small = target.join("small");
     let for_size = ["--release", "--locked", "--package", "hyst-bare", "--config", "profile.release.opt-level='s'"];
@@ -95,7 +98,7 @@ fn steps(write: bool) -> Result<(), Ended> {
         Err(NotRun::Failed) => return Err(Ended::Failed(String::new())),
         Err(NotRun::Missing(what)) => {
             return Err(Ended::NotRun(format!(
-                "all of it builds and none of it can panic, but to run it needs {what}"
+                "the firmware builds and cannot panic, but was not run; this needs {what}"
             )));
         }
     }
@@ -106,11 +109,11 @@ fn steps(write: bool) -> Result<(), Ended> {
 
     let figures = Figures::collect(&toolchain, &library, &small, &printed)?;
     let document = root().join("docs/firmware.md");
-    let told = if write { figures.write(&document) } else { figures.compare(&document) };
-    Ok(told?)
+    let result = if write { figures.write(&document) } else { figures.compare(&document) };
+    Ok(result?)
 }
 
-/// No function of the library reaches a panic.
+/// Checks that no function of the library can panic.
 fn cannot_panic(toolchain: &Toolchain, library: &Path, level: &str) -> Result<(), String> {
     let functions = link::functions(library)?;
     let found = link::can_panic(toolchain, library, &functions)?;
@@ -122,7 +125,7 @@ fn cannot_panic(toolchain: &Toolchain, library: &Path, level: &str) -> Result<()
     Err(format!("{} of {all} functions can panic at opt-level {level}: {}", found.len(), found.join(" ")))
 }
 
-/// Host and firmware compute with the same `libm`.
+/// Checks that host and firmware use the same version of `libm`.
 fn same_libm(firmware: &Path) -> Result<(), String> {
     let version = |folder: &Path| {
         let lock = folder.join("Cargo.lock");
@@ -134,11 +137,14 @@ fn same_libm(firmware: &Path) -> Result<(), String> {
     if host == device {
         Ok(())
     } else {
-        Err(format!("libm's {host} in Cargo.lock, {device} in that of tests/firmware"))
+        Err(format!(
+            "different versions of libm: {host} in Cargo.lock, {device} in tests/firmware/Cargo.lock; \
+             type `cargo update -p libm` in one of the two folders"
+        ))
     }
 }
 
-/// Every package that the core is built from is a known one without a standard library.
+/// Checks that all dependencies of the core are on the list of `no_std` packages.
 fn depends_on_no_std() -> Result<(), String> {
     let tree = |features: &str| {
         let arguments =
@@ -151,13 +157,17 @@ fn depends_on_no_std() -> Result<(), String> {
     {
         if let Some(name) = tree(features)?.iter().find(|name| !name.is_empty() && !allowed.contains(&name.as_str())) {
             return Err(format!(
-                "hyst-core ({features}) depends on {name}, which is not on the list of xtask/src/firmware"
+                "hyst-core ({features}) depends on {name}; if it is no_std, add it to the list in xtask/src/firmware/mod.rs"
             ));
         }
     }
     let source = root().join("crates/hyst-core/src/lib.rs");
     let source = fs::read_to_string(&source).map_err(|error| format!("{}: {error}", source.display()))?;
-    if source.contains("#![no_std]") { Ok(()) } else { Err("hyst-core does not declare no_std".to_owned()) }
+    if source.contains("#![no_std]") {
+        Ok(())
+    } else {
+        Err("crates/hyst-core/src/lib.rs does not contain #![no_std]".to_owned())
+    }
 }
 
 fn done(command: &mut Command) -> Result<(), Ended> {

@@ -1,7 +1,7 @@
-//! A compiler and a linker for the Cortex-M4F, and an emulator of one.
+//! Compiler, linker and emulator for the Cortex-M4F.
 //!
-//! The usual way is rustup's target. Where that cannot be downloaded, Debian's packages have a compiler of their own with
-//! the sources of `core`, which is then built along.
+//! The usual compiler is rustup's, with an additional target. If the target cannot be downloaded, Debian's packages contain a compiler
+//! and the sources of `core`, which is then also built.
 
 use crate::command::{install, output, wait, which};
 use std::ffi::OsString;
@@ -10,17 +10,17 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 use std::{env, fs};
 
-/// Cortex-M4F: no operating system, so what builds for it links no standard library.
+/// Cortex-M4F without an operating system, and so without a standard library.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
 const EMULATOR: &str = "qemu-system-arm";
 const LINKER: &str = "arm-none-eabi-ld";
 const PACKAGES: &[&str] = &["rustc-web", "cargo-web", "rust-web-src", "binutils-arm-none-eabi", EMULATOR];
 
-/// Oldest compiler that the workspace accepts, 1.x.
+/// Minor version of the oldest accepted compiler, 1.x.
 const MINOR: u32 = 88;
 
-/// How firmware is built and linked.
+/// The programs that build and link firmware.
 pub(crate) struct Toolchain {
     /// `rustc 1.95.0 (59807616e 2026-04-14)`
     pub(crate) version: String,
@@ -28,16 +28,17 @@ pub(crate) struct Toolchain {
     arguments: &'static [&'static str],
     environment: Vec<(&'static str, OsString)>,
     linker: Vec<OsString>,
-    /// Whether clippy comes with it.
+    /// Whether the toolchain has clippy.
     pub(crate) lints: bool,
 }
 
 impl Toolchain {
-    /// Rustup's target, then Debian's packages; what of them is missing is installed if that can be done without asking.
-    /// `HYST_FIRMWARE_TOOLCHAIN` (`rustup` or `debian`) chooses one.
+    /// Returns rustup's toolchain or else Debian's, and installs missing parts if possible.
+    ///
+    /// `HYST_FIRMWARE_TOOLCHAIN` (`rustup` or `debian`) selects one.
     ///
     /// # Errors
-    /// Which commands would make it possible.
+    /// The commands that install a toolchain.
     pub(crate) fn find() -> Result<Self, String> {
         let wanted = env::var("HYST_FIRMWARE_TOOLCHAIN").unwrap_or_default();
         let rustup = || if wanted == "debian" { None } else { Self::rustup() };
@@ -94,9 +95,9 @@ impl Toolchain {
             cargo: cargo.into(),
             arguments: &["-Zbuild-std=core", "-Zbuild-std-features=compiler-builtins-mem"],
             environment: vec![
-                // Cargo would take rustup's compiler if there is one.
+                // Otherwise cargo uses rustup's compiler, if there is one.
                 ("RUSTC", rustc.into()),
-                // Building `core` along is not stable yet.
+                // Building `core` is not a stable feature yet.
                 ("RUSTC_BOOTSTRAP", "1".into()),
                 ("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker.clone().into()),
             ],
@@ -105,11 +106,11 @@ impl Toolchain {
         })
     }
 
-    /// What cargo does (`build`, `clippy`) for the target, into `target`.
+    /// Returns a cargo command (`build`, `clippy`) for the target, with the target folder `target`.
     pub(crate) fn cargo(&self, what: &str, target: &Path) -> Command {
         let mut command = Command::new(&self.cargo);
         command.args([what, "--target", TARGET, "--target-dir"]).arg(target).args(self.arguments);
-        // What the user sets for the host, or cargo for this program, is not meant for the target.
+        // These variables are for the host, not for the target.
         for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "LD_LIBRARY_PATH"] {
             command.env_remove(name);
         }
@@ -117,7 +118,7 @@ impl Toolchain {
         command
     }
 
-    /// The linker.
+    /// Returns the command of the linker.
     pub(crate) fn linker(&self) -> Command {
         let mut parts = self.linker.iter();
         let mut command = Command::new(parts.next().cloned().unwrap_or_default());
@@ -126,15 +127,15 @@ impl Toolchain {
     }
 }
 
-/// Why [`emulate`] gave nothing.
+/// Reason why [`emulate`] failed.
 pub(crate) enum NotRun {
-    /// There is no emulator; the command that would install it.
+    /// There is no emulator; contains its name and the command that installs it.
     Missing(String),
-    /// The firmware failed; it has said why.
+    /// The firmware failed and has printed the reason.
     Failed,
 }
 
-/// Runs the image on QEMU's mps2-an386 and keeps what it prints in `printed`.
+/// Runs the image on QEMU's mps2-an386 and writes its output to the file `printed`.
 pub(crate) fn emulate(image: &Path, printed: &Path) -> Result<(), NotRun> {
     if which(EMULATOR).is_none() && !install(&[EMULATOR]) {
         return Err(NotRun::Missing(format!("{EMULATOR} (Debian: `apt-get install {EMULATOR}`)")));
@@ -144,7 +145,7 @@ pub(crate) fn emulate(image: &Path, printed: &Path) -> Result<(), NotRun> {
         NotRun::Failed
     })?;
     let child = Command::new(EMULATOR)
-        // One instruction every 2⁶ ns of the machine's time, whatever the host is doing.
+        // One instruction takes 2⁶ ns of the machine's time, independent of the load of the host.
         .args(["-machine", "mps2-an386", "-icount", "shift=6"])
         .args(["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"])
         .arg("-kernel")

@@ -1,4 +1,4 @@
-// Draws the pictures of a report. Everything that they show stands in the page.
+// Draws the pictures of a report from the data in the page.
 (() => {
   "use strict";
   const root = document.documentElement;
@@ -6,7 +6,7 @@
   const colour = (name) => getComputedStyle(root).getPropertyValue("--" + name).trim();
   const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 
-  // Numbers as the rest of the page writes them, whatever the reader's language.
+  // Formats numbers as the rest of the page, independent of the language of the browser.
   const digits = (x, n) => {
     if (x === 0) return "0";
     const size = Math.abs(x);
@@ -21,10 +21,10 @@
     return element;
   };
 
-  // Values of x that never turn back make a function; others, as loops, a path.
+  // Whether a curve is a function (x never decreases); a loop is not.
   const isFunction = (curve) => curve.x.every((x, k) => k === 0 || x >= curve.x[k - 1]);
 
-  // A path in the order in which it was passed.
+  // Draws a curve that is not a function: its points are connected in their order.
   const path = (u, si) => {
     const [xs, ys] = u.data[si];
     const stroke = new Path2D();
@@ -38,7 +38,7 @@
     return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
   };
 
-  // The nearest value of a curve whose own points lie between those of others.
+  // Returns the index of the nearest value of a curve that has no value at idx.
   const nearest = (u, si, idx) => {
     const ys = u.data[si];
     for (let d = 0; d < 400; d++) {
@@ -47,7 +47,7 @@
     return null;
   };
 
-  // As wide as the longest number beside the axis.
+  // Width of an axis: that of its longest number.
   const room = (u, values, i, cycle) => {
     const axis = u.axes[i];
     if (cycle > 1) return axis._size;
@@ -60,7 +60,7 @@
     font: FONT, stroke: () => colour("soft"), grid: { stroke: () => colour("grid"), width: 1 },
     ticks: { stroke: () => colour("edge"), size: 5 }, gap: 4,
     values: (u, splits) => splits.map((v) => (v == null ? "" : digits(v, 6))),
-    // Of a logarithmic axis, the powers of ten; of a short one, others too.
+    // Labels of a logarithmic axis: powers of ten; an axis of few decades has more.
     filter: log ? (u, splits) => {
       const leading = splits.map((v) => v / 10 ** Math.floor(Math.log10(v) + 1e-9));
       const is = (m, k) => Math.abs(m - k) < 1e-6;
@@ -71,7 +71,7 @@
     ...more,
   });
 
-  // A line at zero, and those that have names.
+  // Draws a line at zero and the named marks.
   const lines = (picture) => (u) => {
     const { ctx, bbox } = u;
     const line = (x0, y0, x1, y1, stroke, dash) => {
@@ -108,7 +108,7 @@
     });
   };
 
-  // What stands under the cursor, in words.
+  // Shows the values at the cursor as text.
   const reading = (picture, functions) => (u) => {
     const { left, top, idxs } = u.cursor;
     if (left == null || left < 0) { u.readout.textContent = ""; return; }
@@ -121,7 +121,7 @@
     u.readout.textContent = `${x}: ${values.join(", ")}`;
   };
 
-  // Two fingers zoom, one moves what is zoomed; up and down the page scrolls. A double tap shows all again.
+  // Touch: two fingers zoom, one finger moves a zoomed plot, a vertical swipe scrolls the page. A double tap resets.
   const touch = (u, zoom) => {
     const fingers = new Map();
     let before = null;
@@ -164,7 +164,7 @@
     added(place, "p", "axis", spaced(picture.y.label, picture.y.unit));
     const frame = added(place, "div", "frame", "");
     added(place, "p", "axis across", spaced(picture.x.label, picture.x.unit));
-    const reset = added(place, "button", "reset", "whole picture");
+    const reset = added(place, "button", "reset", "reset zoom");
     reset.type = "button";
 
     const series = picture.curves.map((curve) => {
@@ -176,7 +176,7 @@
       return points ? { ...common, paths: () => null, points: shown } : { ...common, points: shown };
     });
     const scale = (log) => (log ? { time: false, distr: 3 } : { time: false });
-    // A little room, so that no point at the end is cut.
+    // A margin, so that points at the ends are drawn completely.
     const bound = (min, max) => (picture.x.log ? [min / (max / min) ** 0.015, max * (max / min) ** 0.015] : [min - 0.015 * (max - min), max + 0.015 * (max - min)]);
     const options = {
       width: frame.clientWidth, height: height(frame.clientWidth), mode: functions ? 1 : 2, legend: { show: false }, padding: [8, 22, 0, 0],
@@ -210,7 +210,7 @@
     reset.addEventListener("click", all);
     u.over.addEventListener("dblclick", all);
 
-    // Shifts what lay under `from` to `to` (shares of the plot) and widens the range by `factor`.
+    // Moves the point at `from` to `to` (shares of the plot) and scales the range by `factor`.
     const zoom = (from, to, factor) => {
       zoomed(u, true);
       (functions ? ["x"] : ["x", "y"]).forEach((key, c) => {
@@ -237,11 +237,11 @@
     if (!paper) plots.forEach((plot) => fit(plot, Math.floor(plot.frame.clientWidth)));
   };
   addEventListener("resize", fitAll);
-  // What else makes room or takes it; in the next frame, since a plot that grows moves others.
+  // Other changes of the width. In the next frame, because a plot that grows moves other plots.
   const widths = new ResizeObserver(() => requestAnimationFrame(fitAll));
   plots.forEach((plot) => widths.observe(plot.frame));
 
-  // On paper: half of the narrower of A4 and letter, less their margins.
+  // Width of a plot on paper: half of the printable width of the narrower of A4 and letter.
   const PAPER = 320;
   const onPaper = (is) => {
     if (is === paper) return;

@@ -11,33 +11,33 @@ use super::help::{COMPARE, RECORDS};
 use super::{JsonArg, MapArg, ZeroArg};
 use crate::output::Target;
 
-/// Fit every model to a record and show them side by side
+/// Fit all kinds of models to a record and compare their errors
 ///
-/// Models are fitted to the training records alone; the test record is only simulated. All are judged by the same rows:
-/// those that are a start-up transient for one of them count for none. A model that the records do not suit is
-/// listed with the reason.
+/// Models are fitted to the training records only; the test record is only simulated. All models are compared on the same
+/// rows: a start-up row of one model is left out for all. A model that cannot be fitted to the records is listed with
+/// the reason.
 #[derive(Debug, Args)]
 #[command(after_help = format!("{COMPARE}\n\n{RECORDS}"))]
 pub(crate) struct CompareArgs {
-    /// Records to fit, as one
+    /// Records to fit; several records are fitted together
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Record to judge and sort the models by, never fitted; without it they are sorted by what is left of the training record
+    /// Test record, never fitted; models are sorted by their error on it, or on the training records if not given
     #[arg(long)]
     pub(crate) test: Option<PathBuf>,
-    /// Kinds of models, with commas between them; all that there are if not given
+    /// Kinds of models, separated by commas; all kinds if not given
     #[arg(long, value_name = "all|KIND,KIND…", default_value = "all")]
     pub(crate) models: Kinds,
-    /// Seed of what is drawn at random
+    /// Seed of random draws
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// How often to repeat a search with other draws; the best is taken
+    /// Number of searches with different random draws; the best one is taken
     #[arg(long, default_value_t = 1)]
     pub(crate) trials: usize,
-    /// Most evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
+    /// Maximum evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
-    /// Picture to write, .svg or .png: errors of all models, and their residuals
+    /// Picture to write, .svg or .png: errors and residuals of all models
     #[arg(long, value_name = "PICTURE")]
     pub(crate) picture: Option<Target>,
     #[command(flatten)]
@@ -49,7 +49,7 @@ pub(crate) struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// As options of every fit.
+    /// Returns the options of each fit.
     pub(crate) fn options(&self, zero_per_record: bool) -> FitOptions {
         FitOptions {
             seed: self.seed,
@@ -76,7 +76,7 @@ impl FromStr for Kinds {
             let known = name.trim().parse::<Kind>().ok();
             let all = || Kind::ALL.map(Kind::name).join(", ");
             let kind =
-                known.ok_or_else(|| format!("{:?} is no kind of model: give all, or some of {}", name, all()))?;
+                known.ok_or_else(|| format!("{:?} is not a kind of model; give all, or some of {}", name, all()))?;
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }

@@ -14,9 +14,9 @@ Examples:
   hystctl excite separate lag delay --high 120 -o u.csv
   hystctl excite --help; hystctl excite stairs --help
 
-Every segment starts and ends at rest at the lowest voltage and stays within the limits.";
+Each segment starts and ends at rest at the lowest voltage and stays within the limits.";
 
-/// Make a drive with which to identify or test an actuator
+/// Make a drive to identify or test an actuator
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ExciteArgs {
@@ -24,13 +24,13 @@ pub(crate) struct ExciteArgs {
     pub(crate) kind: ExciteKind,
 }
 
-/// What all drives need.
+/// Arguments of all drives.
 #[derive(Debug, Args)]
 pub(crate) struct Common {
     /// Drive file to write (CSV); - for stdout
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Target,
-    /// Rows per second
+    /// Sample rate (rows per second)
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     pub(crate) rate: f64,
     /// Lowest voltage, at which the device rests
@@ -39,7 +39,7 @@ pub(crate) struct Common {
     /// Highest voltage
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(crate) high: f64,
-    /// Steepest slope that the amplifier stands; a steeper drive is refused, but what an identification is free in is slowed down
+    /// Maximum slope of the amplifier; a steeper drive is refused, but identification slows down where no option is given
     #[arg(long, value_name = "V_PER_S")]
     pub(crate) slew: Option<f64>,
     #[command(flatten)]
@@ -49,7 +49,7 @@ pub(crate) struct Common {
 /// The kinds of drives.
 #[derive(Debug, Subcommand)]
 pub(crate) enum ExciteKind {
-    /// The standard drive of an identification: it shows every effect that diagnose can name
+    /// Standard drive of an identification; it shows every effect that diagnose can name
     Identification {
         /// Duration, rests included
         #[arg(long, value_name = "S", default_value_t = 36.0)]
@@ -57,22 +57,22 @@ pub(crate) enum ExciteKind {
         /// Rest between segments
         #[arg(long, value_name = "S", default_value_t = 1.0)]
         rest: f64,
-        /// Frequency of the slow loops; chosen by the rate and --slew if not given
+        /// Frequency of the slow loops; from --rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         slow: Option<f64>,
-        /// Frequency of the fast loops; chosen by the rate and --slew if not given
+        /// Frequency of the fast loops; from --rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         fast: Option<f64>,
-        /// Highest frequency of the multisine; chosen by the rate and --slew if not given
+        /// Highest frequency of the multisine; from --rate and --slew if not given
         #[arg(long, value_name = "HZ")]
         band: Option<f64>,
-        /// How long levels are held
+        /// Hold time of each level
         #[arg(long, value_name = "S", default_value_t = 2.0)]
         hold: f64,
-        /// How long the ramps between levels take; chosen by the rate and --slew if not given
+        /// Duration of the ramps between levels; from --rate and --slew if not given
         #[arg(long, value_name = "S")]
         ramp: Option<f64>,
-        /// The drive for a test record: as the one without this option, but with other frequencies, levels and phases
+        /// Make the drive for a test record: the same kind of drive with other frequencies, levels and phases
         #[arg(long)]
         test: bool,
         /// Seed of levels and phases
@@ -88,7 +88,7 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
-    /// Sine around mid-span whose amplitude falls to nothing: nested loops
+    /// Sine around mid-span whose amplitude decays to zero: nested loops
     DecayingSine {
         /// Frequency
         #[arg(long, value_name = "HZ", default_value_t = 2.0)]
@@ -106,15 +106,15 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
-    /// Random levels, held, with smooth ramps in between
+    /// Random levels that are held, with smooth ramps between them
     Stairs {
-        /// How many levels
+        /// Number of levels
         #[arg(long, value_name = "N", default_value_t = 8)]
         levels: u32,
-        /// How long each is held
+        /// Hold time of each level
         #[arg(long, value_name = "S", default_value_t = 2.0)]
         hold: f64,
-        /// How long each ramp takes
+        /// Duration of each ramp
         #[arg(long, value_name = "S", default_value_t = 0.08)]
         ramp: f64,
         /// Seed of the levels
@@ -125,31 +125,31 @@ pub(crate) enum ExciteKind {
     },
     /// Sum of sines around mid-span
     Multisine {
-        /// Lowest line
+        /// Lowest frequency
         #[arg(long, value_name = "HZ", default_value_t = 1.0)]
         from: f64,
-        /// Highest line
+        /// Highest frequency
         #[arg(long, value_name = "HZ", default_value_t = 50.0)]
         to: f64,
-        /// How many lines
+        /// Number of sines
         #[arg(long, value_name = "N", default_value_t = 40)]
         lines: u32,
-        /// Duration, fades included
+        /// Duration, fade-in and fade-out included
         #[arg(long, value_name = "S", default_value_t = 5.0)]
         seconds: f64,
-        /// Duration of each fade; a tenth of the whole if not given
+        /// Duration of each fade; a tenth of --seconds if not given
         #[arg(long, value_name = "S")]
         fade: Option<f64>,
-        /// How often the sum repeats, for averages over periods (response --period)
+        /// Number of periods of the sum, for averages over periods (response --period)
         #[arg(long, value_name = "N", default_value_t = 1)]
         periods: u32,
-        /// Seed of random phases; phases of low crest factor if not given
+        /// Seed of random phases; phases with a low crest factor if not given
         #[arg(long)]
         seed: Option<u64>,
         #[command(flatten)]
         common: Common,
     },
-    /// Cosine wave of rising frequency over the whole span
+    /// Cosine wave over the whole span with rising frequency
     Sweep {
         /// Frequency at the start
         #[arg(long, value_name = "HZ", default_value_t = 1.0)]
@@ -157,7 +157,7 @@ pub(crate) enum ExciteKind {
         /// Frequency at the end
         #[arg(long, value_name = "HZ", default_value_t = 50.0)]
         to: f64,
-        /// Duration, adjusted to whole cycles
+        /// Duration; adjusted to whole cycles
         #[arg(long, value_name = "S", default_value_t = 5.0)]
         seconds: f64,
         #[command(flatten)]
@@ -165,24 +165,24 @@ pub(crate) enum ExciteKind {
     },
     /// Peaks of growing height: first-order reversal curves
     Forc {
-        /// How many peaks
+        /// Number of peaks
         #[arg(long, value_name = "N", default_value_t = 10)]
         curves: u32,
-        /// Duration of a peak; several make as many segments, over which an Everett surface is averaged
+        /// Duration of a peak; each further duration adds a segment, and the Everett surface is averaged over the segments
         #[arg(long, value_name = "S,…", value_delimiter = ',', default_value = "1")]
         seconds: Vec<f64>,
         /// Rest after each peak
         #[arg(long, value_name = "S", default_value_t = 0.5)]
         rest: f64,
-        /// Form of the peaks
+        /// Shape of the peaks
         #[arg(long, value_enum, default_value_t = PeakForm::HalfSine)]
         peak: PeakForm,
         #[command(flatten)]
         common: Common,
     },
-    /// Lines of a raster scan: constant speed there and back, with rounded turnings
+    /// Lines of a raster scan: constant speed in both directions, with rounded turning points
     Raster {
-        /// Share of the time that the turnings take; 0 = a triangle
+        /// Share of the time spent in turning points; 0 = a triangle
         #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
         turning: f64,
         #[command(flatten)]
@@ -192,7 +192,7 @@ pub(crate) enum ExciteKind {
     },
     /// One axis of a spiral scan: a sine around mid-span whose amplitude grows to the whole span
     Spiral {
-        /// Angle at which it begins, in degrees; the other axis has 90 more
+        /// Start angle; the other axis starts at 90 degrees more
         #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
         phase: f64,
         #[command(flatten)]
@@ -200,18 +200,18 @@ pub(crate) enum ExciteKind {
         #[command(flatten)]
         common: Common,
     },
-    /// Sine around mid-span whose amplitude swings: every amplitude at one frequency
+    /// Amplitude-modulated sine around mid-span: all amplitudes at one frequency
     AmSine {
         /// Frequency
         #[arg(long, value_name = "HZ", default_value_t = 10.0)]
         frequency: f64,
-        /// Frequency at which the amplitude swings
+        /// Modulation frequency
         #[arg(long, value_name = "HZ", default_value_t = 0.2)]
         modulation: f64,
-        /// How far the amplitude swings; 1 = down to nothing
+        /// Modulation depth; 1 = the amplitude falls to zero
         #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
         depth: f64,
-        /// Whole swings of the amplitude
+        /// Number of modulation periods
         #[arg(long, value_name = "N", default_value_t = 2)]
         cycles: u32,
         #[command(flatten)]
@@ -225,7 +225,7 @@ pub(crate) enum ExciteKind {
         /// Amplitudes as shares of half the span
         #[arg(long, value_name = "SHARE", value_delimiter = ',', default_value = "0.25,0.5,0.75,1")]
         amplitudes: Vec<f64>,
-        /// Cycles of each, without fades
+        /// Cycles of each sine, without fades
         #[arg(long, value_name = "N", default_value_t = 10)]
         cycles: u32,
         /// Rest between segments
@@ -237,7 +237,7 @@ pub(crate) enum ExciteKind {
     Separate(SeparateArgs),
     /// Small cosine waves at several levels: minor loops
     MinorLoops {
-        /// How many levels
+        /// Number of levels
         #[arg(long, value_name = "N", default_value_t = 5)]
         levels: u32,
         /// Height of the loops as a share of the span
@@ -250,18 +250,18 @@ pub(crate) enum ExciteKind {
     },
 }
 
-/// The drive that tells two effects apart, and why
+/// Drive that separates two effects best, with the reason
 ///
-/// For each drive of a family it is computed, with a typical actuator, how much of what one effect does the best-fitting other
-/// one cannot imitate; the drive that leaves most is written. Effects: delay, lag, asymmetry, rate-dependence, temperature,
-/// creep, load, resonance, saturation, drift, interference.
+/// Each candidate drive is simulated with a typical actuator. The residual of one effect after the best fit of the other
+/// effect is computed, and the drive with the largest residual is written. Effects: delay, lag, asymmetry,
+/// rate-dependence, temperature, creep, load, resonance, saturation, drift, interference.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl excite separate lag delay --high 120 --slew 20000 -o u.csv")]
 pub(crate) struct SeparateArgs {
-    /// One effect
+    /// First effect
     #[arg(value_name = "EFFECT")]
     pub(crate) first: Effect,
-    /// The other
+    /// Second effect
     #[arg(value_name = "OTHER")]
     pub(crate) second: Effect,
     /// Duration
@@ -270,32 +270,32 @@ pub(crate) struct SeparateArgs {
     /// Noise of the sensor as a share of the output's span
     #[arg(long, value_name = "SHARE", default_value_t = 0.001)]
     pub(crate) noise: f64,
-    /// The record will have temperature_degc
+    /// Temperature will be measured: the record will have temperature_degc
     #[arg(long)]
     pub(crate) thermometer: bool,
-    /// The record will have load_n
+    /// Load will be measured: the record will have load_n
     #[arg(long)]
     pub(crate) load_cell: bool,
     #[command(flatten)]
     pub(crate) common: Common,
 }
 
-/// Waves that repeat.
+/// Arguments of periodic waves.
 #[derive(Debug, Args)]
 pub(crate) struct Periodic {
     /// Frequency
     #[arg(long, value_name = "HZ", default_value_t = 1.0)]
     pub(crate) frequency: f64,
-    /// How many cycles
+    /// Number of cycles
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub(crate) cycles: u32,
 }
 
-/// Form of a reversal curve's peak.
+/// Shape of the peak of a reversal curve.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PeakForm {
-    /// Straight flanks; they excite the modes of a structure
+    /// Straight flanks; the corners excite modes of the structure
     Triangle,
-    /// Smooth at the reversal
+    /// Half sine, smooth at the reversal
     HalfSine,
 }

@@ -1,7 +1,7 @@
-//! Examples and explanations below the help of commands.
+//! Examples and explanations that follow the options in the help of a command.
 
 pub(super) const EXAMPLES: &str = "\
-Examples (a simulated actuator, from its first record to a drive that follows a reference):
+Examples (a simulated actuator, from the first record to the run that follows a reference):
   hystctl excite identification --high 120 -o u.csv
   hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
   hystctl fit train.csv --model pi -o model.json
@@ -53,8 +53,9 @@ Examples:
   hystctl fleet records/ -o results.parquet --page fleet.html --reports reports/
   hystctl fleet serials.csv -o results.parquet
 
-A list, as serials.csv: file,serial,date
-                        run0001.csv,P-1001,2026-05-02";
+A list, for example serials.csv:
+  file,serial,date
+  run0001.csv,P-1001,2026-05-02";
 
 pub(super) const COMPENSATE: &str = "\
 Example:
@@ -65,23 +66,23 @@ Examples:
   hystctl run --daq sim:plant.toml --drive u.csv --record train.csv
   hystctl run --daq sim:plant.toml --model extended.json --reference reference.csv --log run.mcap
 
-The record has a row for each of the drive's. Its time is the device's clock: each value is reached and measured one sample \
-period after it was sent, and ramps and rests take time too, so its first row stands at one period or later.";
+The record has one row for each row of the drive. Its time is that of the device's clock. Each value is reached and measured \
+one sample period after it was sent, and ramps and rests take time, too: the first row is at one period or later.";
 
 pub(super) const RUN_USAGE: &str = "\
 hystctl run [OPTIONS] --daq <DEVICE> --drive <DRIVE>
        hystctl run [OPTIONS] --daq <DEVICE> --model <MODEL> --reference <REFERENCE>";
 
 pub(super) const PLANT: &str = "\
-A simulated plant is a file like this; every section after [sensor] may be left out. All but the last are effects that a \
-diagnosis can name; a [[disturbance]] is what it cannot:
+A simulated plant is described by a file like this. All sections after [sensor] are optional. They are effects that diagnose \
+can name, except [[disturbance]], which diagnose cannot name:
   seed = 7
-  noise_seed = 8           # if left out: seed
+  noise_seed = 8           # default: seed
   [actuator]
   max_v = 120
   gain_um_per_v = 0.2
-  loop_share = 0.12        # opening of the hysteresis loop over its span
-  bed = \"relays\"           # random relays; or \"clumps\" of them, or \"plays\": symmetric loops
+  loop_share = 0.12        # width of the hysteresis loop over its span
+  bed = \"relays\"           # random relays; or \"clumps\" of relays; or \"plays\" (symmetric loops)
   [sensor]
   range_um = [-12, 43]
   noise_um = 0.007
@@ -90,10 +91,10 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   [lag]
   seconds = 0.003
   [asymmetry]
-  bend = 0.05              # slope at the upper end less that at the lower one
-  hook = 0.01              # slope at both ends less that in the middle
+  bend = 0.05              # slope at the upper end minus slope at the lower end
+  hook = 0.01              # slope at both ends minus slope in the middle
   [viscosity]              # the effect rate-dependence
-  volt_seconds = 0.002     # overdrive x time that turns a relay: loops widen with the rate
+  volt_seconds = 0.002     # overdrive x time that switches a relay: the loop widens with rate
   [temperature]
   per_k = 0.005
   reference_degc = 22
@@ -109,14 +110,14 @@ diagnosis can name; a [[disturbance]] is what it cannot:
   um_per_n = 0.05
   period_s = 8
   shape = \"steps\"          # or sine, wander
-  recorded = false         # true, or left out: the record has load_n
+  recorded = false         # default: true, the record has load_n
   [[mode]]                 # the effect resonance
   hz = 100
   damping = 0.02
   gain = 0.9
   [saturation]
-  high_um = 24             # counted from rest; or low_um, or both
-  knee_um = 0.5            # 0, or left out: a hard stop
+  high_um = 24             # relative to rest; or low_um, or both
+  knee_um = 0.5            # default: 0, a hard stop
   [drift]
   um_per_s = 0.01
   [interference]
@@ -129,6 +130,7 @@ diagnosis can name; a [[disturbance]] is what it cannot:
                            # slew-limit (v_per_s) of the amplifier";
 
 pub(super) const RECORDS: &str = "\
-Records are files with a row per sample: time, input, output, and where measured temperature and load. Columns are \
-recognised by headings that state their unit, as time_s, Voltage [mV] or \"Position (nm)\"; --map names others. An integer \
-column segment tells apart stretches between which the device rested. Tables of text in any dialect, MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files are read as they are.";
+A record is a file with one row per sample: time, input, output and, if measured, temperature and load. Columns are recognised \
+by headings that state their unit, for example time_s, Voltage [mV] or \"Position (nm)\"; --map names others. An integer column \
+segment numbers the segments, between which the device rested. Readable formats: text tables in any dialect, MATLAB, HDF5, \
+TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP.";

@@ -10,11 +10,12 @@ use super::{DEVICE, Device, JsonArg, LimitArgs, MapArg, RunArgs, TemperatureArg}
 use crate::cli::Control;
 use crate::output::Target;
 
-/// Improve the drive of a reference that repeats, pass by pass, by what is measured while it plays
+/// Improve the drive of a repeated reference pass by pass with the measured error (iterative learning)
 ///
-/// The first pass plays the drive of the model's inverse. Each further pass corrects it by the error that repeats; what differs between two plays of the
-/// same drive (noise, creep, drift) is not learned. It ends when the error is that of playing the same drive again, when passes bring
-/// nothing more or are worse, or after the last pass. The best drive is written. What the model had wrong is then diagnosed.
+/// The first pass plays the drive of the model's inverse. Each further pass corrects the drive by the error that repeats;
+/// what differs between two plays of the same drive (noise, creep, drift) is not learned. Learning ends when the error
+/// reaches the repeatability, when passes bring no gain or are worse, or after the last pass. The best drive is written.
+/// Then the error of the model is diagnosed.
 #[derive(Debug, Args)]
 #[command(after_help = LEARN)]
 pub(crate) struct LearnArgs {
@@ -24,50 +25,53 @@ pub(crate) struct LearnArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record of the wanted output, one segment, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle, steps, raster, spiral, spiral-y or lissajous
+    /// Reference: record of the wanted output with one segment, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, where FORM is
+    /// sine, triangle, steps, raster, spiral, spiral-y or lissajous
     #[arg(long)]
     pub(crate) reference: PathBuf,
-    /// Drive to write (CSV): the best one, with the reference held for a while before and behind it
+    /// Drive to write (CSV): the best one; the reference is held for a while before its start and after its end
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Target,
-    /// Most passes
+    /// Maximum number of passes
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=50))]
     pub(crate) passes: u32,
-    /// Plays of the same drive in a pass, besides a first one that is not looked at: the actuator still remembers other drives in it
+    /// Evaluated plays of the same drive in each pass; one more play comes first and is ignored, because it still depends on
+    /// earlier drives
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=20))]
     pub(crate) plays: u32,
     /// Folder for a log of each pass (MCAP), empty or new
     #[arg(long, value_name = "FOLDER")]
     pub(crate) logs: Option<PathBuf>,
-    /// Model file to write: with the effects that the passes show and the model lacks
+    /// Extended model to write, with the missing effects that the passes show
     #[arg(long, value_name = "MODEL")]
     pub(crate) extended: Option<Target>,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
-    /// End it and come to rest when the output is further than this from the reference for half a second, or a quarter of a reference that is shorter than two [output unit]
+    /// End and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a reference shorter than 2 s;
+    /// interruptions shorter than 0.1 s do not reset the timer [output unit]
     #[arg(long, value_name = "Y", value_parser = positive)]
     pub(crate) max_error: Option<f64>,
-    /// End it and come to rest above this temperature
+    /// End and ramp to rest above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// Silence of this computer after which a device comes to rest by itself; 0.5 if not given
+    /// Timeout of the device's watchdog: without a message for this long the device ramps to rest; 0.5 if not given
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(crate) silence: Option<f64>,
-    /// Clear the fault with which the device has ended an earlier run
+    /// Clear the fault of an earlier run before the first pass
     #[arg(long)]
     pub(crate) clear: bool,
-    /// Show a bar on a terminal instead of a picture of the last seconds
+    /// Show a progress bar in the terminal instead of a plot of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Hold at the first value of the drive before it begins; 2 if not given
+    /// Hold the first value of the drive this long before each play; 2 if not given
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) settle: Option<f64>,
-    /// Rest between two plays
+    /// Rest between plays
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) rest: f64,
-    /// Seed of a simulated plant's noise; that of its file if not given
+    /// Seed of the noise of a simulated plant; from its file if not given
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: Option<u64>,
     #[command(flatten)]
@@ -77,7 +81,7 @@ pub(crate) struct LearnArgs {
 }
 
 impl LearnArgs {
-    /// The run of the first pass.
+    /// Arguments of a `run` that plays the first pass.
     pub(crate) fn to_run(&self) -> RunArgs {
         RunArgs {
             daq: self.daq.clone(),

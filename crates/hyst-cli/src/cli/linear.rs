@@ -17,8 +17,8 @@ Examples:
   hystctl response noise.csv -o response.csv --picture response.svg
   hystctl response noise.csv --period 4 --at 10 --at 20
 
-Gain and phase are H1 estimates: Hann windows, half overlapped (or averages over whole periods with --period); their band is that \
-of 95 %. Modes are the poles of an ARMAX model, with standard errors that hold where its prediction errors are white.";
+Gain and phase are H1 estimates with Hann windows, half overlapped, or averages over whole periods with --period. Their band is \
+the 95 % confidence band. Modes are poles of an ARMAX model; their standard errors hold if its prediction errors are white.";
 
 const GAIN: &str = "\
 Examples:
@@ -26,7 +26,7 @@ Examples:
   hystctl run --daq sim:plant.toml --drive u.csv --record tones.csv
   hystctl gain tones.csv -o gain.csv
 
-Segments of constant amplitude are averaged over their cycles; of a decaying or modulated sine every cycle is a point.";
+A segment of constant amplitude gives one point, averaged over its cycles. A decaying or modulated sine gives one point per cycle.";
 
 const LOOP: &str = "\
 Examples:
@@ -34,30 +34,31 @@ Examples:
   hystctl loop sine.csv --phase -9.6
   hystctl loop inverse.csv --reference reference.csv --phase -9.6
 
-The phase has to be the structure's own: the lag of a large sine is for a part the very loop that is to be judged.";
+Give the phase of the linear structure, measured with a small drive. The lag of a large sine also contains hysteresis.";
 
-/// Frequency response with coherence, and the modes of the structure
+/// Estimate the frequency response with coherence, and the modes of the structure
 ///
-/// Where the drive reaches only a part of the band, rows are left out (after a low-pass) before the model is fitted.
+/// If the drive excites only the lower part of the band, the rows are low-pass filtered and decimated before the model is
+/// fitted.
 #[derive(Debug, Args)]
 #[command(after_help = RESPONSE)]
 pub(crate) struct ResponseArgs {
-    /// Records, as one
+    /// Records; several records are evaluated together
     #[arg(required = true)]
     pub(crate) records: Vec<PathBuf>,
-    /// Order of the ARMAX model: auto, or a number; two for each mode
+    /// Order of the ARMAX model: auto, or a number with two for each mode
     #[arg(long, value_name = "auto|N", default_value = "auto")]
     pub(crate) order: OrderArg,
-    /// Delay of the input in rows that the model is fitted to; estimated if not given
+    /// Delay of the input, in rows that the model is fitted to; estimated if not given
     #[arg(long, value_name = "ROWS")]
     pub(crate) delay: Option<usize>,
-    /// Highest frequency of the model; where the coherence ends if not given
+    /// Highest frequency of the model; the end of the coherent band if not given
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) to: Option<f64>,
-    /// Length of Welch's windows; chosen if not given
+    /// Length of the Welch windows; chosen from the record if not given
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true, conflicts_with = "period")]
     pub(crate) window: Option<f64>,
-    /// Period of a drive that repeats: average over periods instead
+    /// Period of a periodic drive: average over periods instead of Welch windows
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) period: Option<f64>,
     /// Print the model's gain and phase at this frequency; may be given several times
@@ -75,14 +76,14 @@ pub(crate) struct ResponseArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Gain and phase of sines over amplitude and frequency
+/// Measure gain and phase of sines over amplitude and frequency
 #[derive(Debug, Args)]
 #[command(after_help = GAIN)]
 pub(crate) struct GainArgs {
-    /// Records, as one
+    /// Records; several records are evaluated together
     #[arg(required = true)]
     pub(crate) records: Vec<PathBuf>,
-    /// Frequency of the drive; the strongest line of each segment if not given
+    /// Frequency of the drive; the strongest spectral line of each segment if not given
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) frequency: Option<f64>,
     /// Points to write (CSV); - for stdout
@@ -94,22 +95,22 @@ pub(crate) struct GainArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Width and straightness of a loop, before and after the structure's phase and gain are removed
+/// Measure width and linearity of a loop, before and after phase and gain of the structure are removed
 #[derive(Debug, Args)]
 #[command(after_help = LOOP)]
 pub(crate) struct LoopArgs {
     /// Record of one sine drive
     pub(crate) record: PathBuf,
-    /// Phase of the structure at the drive's frequency, negative for a lag
+    /// Phase of the structure at the frequency of the drive; negative for a lag
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     pub(crate) phase: f64,
-    /// Record of the wanted output, row by row; the drive itself if not given
+    /// Reference with the same rows as the record; the drive of the record if not given
     #[arg(long)]
     pub(crate) reference: Option<PathBuf>,
-    /// Frequency of the drive; its strongest line if not given
+    /// Frequency of the drive; its strongest spectral line if not given
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) frequency: Option<f64>,
-    /// Loop to write (CSV): wanted, measured, straightened; - for stdout
+    /// Loop to write (CSV) with columns wanted, measured and straightened; - for stdout
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Option<Target>,
     #[command(flatten)]
@@ -118,7 +119,7 @@ pub(crate) struct LoopArgs {
     pub(crate) json: JsonArg,
 }
 
-/// `auto` or a number.
+/// Order of a model: `auto` or a number.
 #[derive(Clone, Debug)]
 pub(crate) struct OrderArg(pub(crate) Order);
 
@@ -128,7 +129,7 @@ impl FromStr for OrderArg {
         match (text, text.parse()) {
             ("auto", _) => Ok(Self(Order::default())),
             (_, Ok(order)) => Ok(Self(Order::Fixed(order))),
-            _ => Err("give auto, or an order from 1 to 40".to_owned()),
+            _ => Err("expected auto or an integer; give auto, or an order from 1 to 40".to_owned()),
         }
     }
 }

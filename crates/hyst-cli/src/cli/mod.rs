@@ -1,4 +1,4 @@
-//! The command line: what clap parses, and nothing else.
+//! Arguments of all commands, as clap parses them.
 
 mod close_loop;
 mod compare;
@@ -31,7 +31,7 @@ pub(crate) use search::SearchArgs;
 pub(crate) use values::{Device, PidGains, VoltageLimits};
 use values::{celsius, positive, seconds};
 
-/// Identify, diagnose and compensate piezo actuators and others with hysteresis.
+/// Identify, diagnose and compensate piezo actuators and other actuators with hysteresis.
 #[derive(Debug, Parser)]
 #[command(name = "hystctl", version = env!("HYST_VERSION"), after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -68,52 +68,52 @@ pub(crate) enum Command {
     /// Print a completion script for a shell
     #[command(after_help = "Example:\n  hystctl completions bash > /etc/bash_completion.d/hystctl")]
     Completions {
-        /// The shell
+        /// Shell to complete for
         shell: Shell,
     },
 }
 
-/// See the whole way on a simulated actuator: experiment, fit, diagnosis, compensation
+/// Run all steps on a simulated actuator: experiment, fit, diagnosis, compensation
 ///
-/// The effect that the actuator has besides hysteresis is drawn from the seed and told to nobody. Writes records,
-/// models, findings, the drive, a log of the compensated run and a picture.
+/// The seed chooses the effect that the actuator has besides hysteresis; fit and diagnosis use only the records. Writes
+/// records, models, findings, the drive, a log of the compensated run and a picture.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl demo --seed 3 --out demo-out")]
 pub(crate) struct DemoArgs {
-    /// Which actuator
+    /// Seed that chooses the simulated actuator
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Folder to write into, empty or from an earlier demo, whose files are replaced
+    /// Folder to write into: new, empty, or of an earlier demo, whose files are replaced
     #[arg(long, value_name = "FOLDER", default_value = "demo-out")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }
 
-/// Fit a model of the hysteresis to one or more records
+/// Fit a hysteresis model to one or more records
 #[derive(Debug, Args)]
 #[command(after_help = format!("{FIT}\n\n{RECORDS}"))]
 pub(crate) struct FitArgs {
-    /// Records to fit, as one
+    /// Records to fit; several records are fitted together
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Kind of model; dpm takes records at several rates
+    /// Kind of model; for dpm give records of slow and of fast drives
     #[arg(long, value_name = "KIND", value_parser = kinds())]
     pub(crate) model: Kind,
-    /// What a preisach model is made of: all rows by least squares, or the Everett surface that first-order descent curves
-    /// measure (dpm finds such curves by itself)
+    /// Source of a preisach model: all rows by least squares (rows), or the Everett surface measured by first-order descent
+    /// curves (fod); dpm detects such curves without this option
     #[arg(long, value_name = "rows|fod", value_enum, hide_possible_values = true)]
     pub(crate) from: Option<FitFrom>,
-    /// Take the measured surface as it is or not at all; else one that is not monotone is moved to the nearest that is
+    /// Refuse a measured surface that is not monotone; without this option the nearest monotone surface replaces it
     #[arg(long, requires = "from")]
     pub(crate) as_measured: bool,
     /// Model file to write; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Target,
-    /// Table of how the search went, to write: every generation of every trial (CSV)
+    /// Table of the search to write (CSV): one row for each generation of each trial
     #[arg(long, value_name = "CSV")]
     pub(crate) trace: Option<Target>,
-    /// Picture of how the search went, to write, .svg or .png
+    /// Picture of the search to write, .svg or .png
     #[arg(long, value_name = "PICTURE")]
     pub(crate) picture: Option<Target>,
     #[command(flatten)]
@@ -126,7 +126,7 @@ pub(crate) struct FitArgs {
     pub(crate) json: JsonArg,
 }
 
-/// What a Preisach model is made of.
+/// Data that a Preisach model is identified from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum FitFrom {
     /// All rows, by least squares
@@ -135,21 +135,21 @@ pub(crate) enum FitFrom {
     Fod,
 }
 
-/// Write a model's parameters for a board
+/// Export a model's parameters for firmware
 ///
-/// postcard is a versioned, check-summed block of bytes that firmware loads without heap (`hyst_core::read_block`); rust
-/// is source with constants for `hyst-core`; c is a C99 header with the block and every parameter with its unit. None of
-/// them depends on a sample period.
+/// postcard is a versioned block of bytes with a checksum; firmware loads it without a heap (`hyst_core::read_block`).
+/// rust is source code with constants for `hyst-core`. c is a C99 header with the block and every parameter with its
+/// unit. No format depends on a sample period.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  hystctl export extended.json --format postcard -o model.bin\n  \
     hystctl export extended.json --format c --name x_axis -o x_axis.h")]
 pub(crate) struct ExportArgs {
     /// Model file
     pub(crate) model: PathBuf,
-    /// What to write
+    /// Format to write
     #[arg(long, value_enum)]
     pub(crate) format: ExportFormat,
-    /// What the symbols of a C header begin with, so that a program can have two models; hyst if not given
+    /// Prefix of the symbols in a C header; two models in one program need two prefixes; hyst if not given
     #[arg(long)]
     pub(crate) name: Option<CName>,
     /// File to write; stdout if not given
@@ -157,7 +157,7 @@ pub(crate) struct ExportArgs {
     pub(crate) output: Target,
 }
 
-/// Form of an exported model.
+/// Format of an exported model.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ExportFormat {
     /// A C99 header
@@ -170,17 +170,17 @@ pub(crate) enum ExportFormat {
 
 /// Predict the output of a record with a model
 ///
-/// Writes the record's own columns untouched, then predicted_um (or _nm, _mm, _n) and settling (1 marks a start-up row
-/// of the model). Where the record has the output too, the errors are printed to stderr.
+/// Writes the record's own columns unchanged, then predicted_um (or _nm, _mm, _n) and settling (1 marks a start-up row
+/// of the model). If the record has the output, the errors are printed to stderr.
 #[derive(Debug, Args)]
 #[command(after_help = format!("{SIMULATE}\n\n{RECORDS}"))]
 pub(crate) struct SimulateArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record with the input; its output is compared, if it has one
+    /// Record with the input; a measured output is compared with the prediction
     pub(crate) input: PathBuf,
-    /// Take each segment as one period of a steady state: it is passed twice through the model, and the second pass counts
+    /// Take each segment as one period of a steady state: the model runs through it twice, and the second pass counts
     #[arg(long)]
     pub(crate) periodic: bool,
     #[command(flatten)]
@@ -198,25 +198,25 @@ pub(crate) struct SimulateArgs {
 
 /// Estimate an external force without a force sensor
 ///
-/// What a model of the free actuator does not explain of the measured displacement, times the output's stiffness; the record's columns are kept,
-/// and estimated_force_n is added. Where the record has load_n, the estimate is compared with it.
+/// The force is the residual of a model of the free actuator times the stiffness of the output. The file has the
+/// record's columns and estimated_force_n. If the record has load_n, the estimate is compared with it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  hystctl force --model free.json record.csv --kout 1.08 --free-until 2 -o force.csv"
 )]
 pub(crate) struct ForceArgs {
-    /// Model of the actuator without a force
+    /// Model of the free actuator (no external force)
     #[arg(long)]
     pub(crate) model: PathBuf,
     /// Record with input and output
     pub(crate) record: PathBuf,
-    /// Stiffness of the output, in N per output unit; that of the model's compliance if not given
+    /// Stiffness of the output in N per output unit; from the model's compliance if not given
     #[arg(long, value_name = "N_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) kout: Option<f64>,
-    /// Record without a force, of the same day: gain and zero of the model are corrected by it
+    /// Record without a force, of the same day; it corrects gain and zero of the model
     #[arg(long, value_name = "RECORD", conflicts_with = "free_until")]
     pub(crate) free: Option<PathBuf>,
-    /// The same from the beginning of the record itself, as long as no force acts there
+    /// Correct gain and zero of the model by the first SECONDS of the record, in which no force acts
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) free_until: Option<f64>,
     #[command(flatten)]
@@ -230,31 +230,31 @@ pub(crate) struct ForceArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Find out which effects a model lacks, name them and add them
+/// Find the effects that are missing in a model, name them and add them
 ///
-/// Effects are searched on the training records alone; the test record is only simulated.
+/// Effects are searched on the training records only; the test record is only simulated.
 #[derive(Debug, Args)]
 #[command(after_help = DIAGNOSE)]
 pub(crate) struct DiagnoseArgs {
     /// Records that the model was fitted to
     #[arg(required = true)]
     pub(crate) train: Vec<PathBuf>,
-    /// Record to show the errors on, never fitted
+    /// Test record: its errors are reported, it is never fitted
     #[arg(long)]
     pub(crate) test: Option<PathBuf>,
-    /// Model file; `auto` fits pi or preisach to the records, whichever explains them better
+    /// Model file; `auto` fits pi to the records, or preisach if that predicts them better
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Model file to write, with the effects that were found; - for stdout
+    /// Extended model to write, with the effects that were named; - for stdout
     #[arg(short, long, value_name = "MODEL")]
     pub(crate) output: Option<Target>,
     /// Findings file to write (JSON); - for stdout
     #[arg(long, value_name = "JSON")]
     pub(crate) findings: Option<Target>,
-    /// Report to write: one page with the evidence in plots, to read, check and hand on (HTML); - for stdout
+    /// Report to write (HTML): one self-contained page with tables and plots of the evidence; - for stdout
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<Target>,
-    /// Seed of the bootstrap that judges effects
+    /// Seed of the bootstrap that tests the effects
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     #[command(flatten)]
@@ -265,33 +265,34 @@ pub(crate) struct DiagnoseArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Fit and diagnose many actuators: a row of results each, and a page that shows them together
+/// Fit and diagnose many actuators: one row of results for each, and one page
 ///
-/// Every record is one actuator, as a file of a folder or a line of a list. What is done is kept in a journal beside the results as it comes, so
-/// that the same command continues where it was ended, by whatever; files that have changed are done again. A record that
-/// cannot be read or fitted is a row with the reason.
+/// Each record is one actuator: a file of a folder or a line of a list. Finished actuators are kept in a journal next to
+/// the results. After an interruption the same command continues; it repeats actuators whose files have changed. A
+/// record that cannot be read or fitted gets a row with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = FLEET)]
 pub(crate) struct FleetArgs {
-    /// Folder of records, or a list of them: a path in each line, or a CSV table with the column file and, as it has them, test, serial and date
+    /// Folder of records, or a list: one path per line, or a CSV table with the column file and optionally test, serial and
+    /// date
     #[arg(value_name = "DIR|LIST")]
     pub(crate) records: PathBuf,
     /// Results to write (Parquet): errors, effects, probabilities, parameters with standard errors
     #[arg(short, long, value_name = "PARQUET")]
     pub(crate) output: PathBuf,
-    /// Page to write: effects, control charts of parameters, what stands out, what failed (HTML)
+    /// Page to write (HTML): effects, control charts of parameters, values outside their limits, failed records
     #[arg(long, value_name = "HTML")]
     pub(crate) page: Option<PathBuf>,
     /// Folder for the report of each actuator
     #[arg(long, value_name = "DIR")]
     pub(crate) reports: Option<PathBuf>,
-    /// Kind of the model that is fitted; `auto` takes pi or preisach, whichever explains a record better
+    /// Kind of model to fit; `auto` takes pi, or preisach if that predicts the record better
     #[arg(long, default_value = "auto", value_name = "KIND")]
     pub(crate) model: String,
-    /// Actuators at a time; one for each core if not given
+    /// Actuators processed in parallel; one per core if not given
     #[arg(long, value_name = "COUNT")]
     pub(crate) jobs: Option<usize>,
-    /// Seed of the bootstrap that judges effects
+    /// Seed of the bootstrap that tests the effects
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     #[command(flatten)]
@@ -304,15 +305,16 @@ pub(crate) struct FleetArgs {
 
 /// Compute the drive that makes an actuator follow a reference
 ///
-/// The reference has time_s and the model's output column, and temperature_degc where the model needs it. The drive has
-/// the reference's columns, then the computed input. What was limited is told on stderr. Nothing is moved.
+/// The reference has time_s and the model's output column, and temperature_degc if the model needs it. The drive file has
+/// the reference's columns, then the computed input. Limited rows are reported on stderr. Nothing moves.
 #[derive(Debug, Args)]
 #[command(after_help = COMPENSATE)]
 pub(crate) struct CompensateArgs {
     /// Model file
     #[arg(long)]
     pub(crate) model: PathBuf,
-    /// Record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS with sine, triangle, steps, raster, spiral, spiral-y or lissajous, at the rate of the model's record
+    /// Reference: record of the wanted output, or FORM:LOW,HIGH,HZ,SECONDS at the sample rate of the model's record; FORM
+    /// is sine, triangle, steps, raster, spiral, spiral-y or lissajous
     pub(crate) reference: PathBuf,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
@@ -327,80 +329,84 @@ pub(crate) struct CompensateArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Play a drive, or a reference through a model, on a device and record what it does
+/// Play a drive, or follow a reference with a model, on a device and record the output
 ///
 /// With --reference the drive is computed before anything moves, as by compensate, and the measured output is compared
-/// with the reference. With --drive a file with voltage_v is played as it stands; a drive outside the limits is refused.
-/// Limits that are not given are the device's, and with a model no wider than the record that it was fitted to. Ctrl-C
-/// ramps the device to rest. A record or log that is there already is kept: its name gets the ending .~1~, or the
-/// next free number.
+/// with the reference. With --drive a file with voltage_v is played unchanged; a drive outside the limits is refused.
+/// Without --limit the limits are the device's; with a model they are at most the range that it was fitted to. Ctrl-C
+/// ramps the device to rest. An existing record or log is kept: it is renamed with the ending .~1~ or the next free
+/// number.
 #[derive(Debug, Args)]
 #[command(override_usage = RUN_USAGE, after_help = RUN, after_long_help = format!("{RUN}\n\n{PLANT}"))]
 pub(crate) struct RunArgs {
-    // Not a comment for the documentation: it would take the brackets for links.
+    // `help =` instead of a doc comment: rustdoc reads the brackets as links.
     #[arg(long, value_name = "DEVICE", help = DEVICE)]
     pub(crate) daq: Device,
     /// Model file
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) model: Option<PathBuf>,
-    /// Record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, with sine, triangle, steps, raster, spiral, spiral-y or lissajous
+    /// Reference: record of the wanted output, - for stdin; or FORM:LOW,HIGH,HZ,SECONDS, where FORM is sine, triangle,
+    /// steps, raster, spiral, spiral-y or lissajous
     #[arg(long, requires = "model", required_unless_present = "drive", conflicts_with = "drive")]
     pub(crate) reference: Option<PathBuf>,
-    /// Record of the voltages to play, as excite or compensate writes it; - for stdin
+    /// Drive to play: record of voltages, as excite or compensate writes it; - for stdin
     #[arg(long)]
     pub(crate) drive: Option<PathBuf>,
-    /// What makes the drive of the reference
+    /// Controller that computes the drive from the reference
     #[arg(long, value_enum, default_value_t = Control::Feedforward, requires = "reference", conflicts_with = "drive")]
     pub(crate) control: Control,
-    /// Gains of the PID: V per output unit, V per output unit and second, V s per output unit; from the model if not given
+    /// Gains of the PID in V/y, V/(y s) and V s/y, where y is the output unit; from the model if not given
     #[arg(long, value_name = "KP,KI[,KD]", allow_hyphen_values = true, conflicts_with = "drive")]
     pub(crate) pid: Option<PidGains>,
     #[command(flatten)]
     pub(crate) temperature: TemperatureArg,
-    /// Log to write while the device runs (MCAP): all samples but those of rests between segments, ramps included
+    /// Log to write during the run (MCAP): all samples of segments and ramps, none of the rests between segments
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
-    /// Record to write when all is measured (CSV); - for stdout
+    /// Record to write after the run (CSV); - for stdout
     #[arg(long, value_name = "CSV")]
     pub(crate) record: Option<Target>,
     #[command(flatten)]
     pub(crate) limits: LimitArgs,
-    /// Silence of this computer after which a device comes to rest by itself; 0.5 if not given
+    /// Timeout of the device's watchdog: without a message for this long the device ramps to rest; 0.5 if not given
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(crate) silence: Option<f64>,
-    /// Clear the fault with which the device has ended an earlier run
+    /// Clear the fault of an earlier run before this run
     #[arg(long)]
     pub(crate) clear: bool,
-    /// End the run and come to rest above this temperature
+    /// End the run and ramp to rest above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// End the run and come to rest when the output is further than this from the reference for half a second, or a quarter of a segment that is shorter than two; breaks of a tenth of a second are no end [output unit]
+    /// End the run and ramp to rest if the tracking error exceeds this for 0.5 s, or for a quarter of a segment shorter
+    /// than 2 s; interruptions shorter than 0.1 s do not reset the timer [output unit]
     #[arg(long, value_name = "Y", value_parser = positive, conflicts_with = "drive")]
     pub(crate) max_error: Option<f64>,
-    /// Compare the output with the reference as late as it is: one delay, the one with the least error, does not count as an error. It is printed
+    /// Exclude one constant delay from the tracking error: the delay with the smallest error is estimated and printed
     #[arg(long, requires = "reference", conflicts_with = "drive")]
     pub(crate) allow_delay: bool,
-    /// Keep up with the actuator: correct what the inverse aims at by what is measured while it moves, within bounds. With FILE, continue from what an
-    /// earlier run has left there and leave it there again; the model stays as it is
+    /// Adapt the inverse to the actuator during the run, within bounds; with FILE, continue from the adaptation of an
+    /// earlier run and save it there again. The model file does not change
     #[arg(long, value_name = "FILE", num_args = 0..=1, requires = "reference", conflicts_with_all = ["drive", "kout"])]
     pub(crate) adapt: Option<Option<PathBuf>>,
-    /// Stiffness of the output: estimate the external force while the device runs, from a model of the free actuator. It is counted from what acts when the run begins [N per output unit]
+    /// Estimate the external force during the run with this stiffness of the output and a model of the free actuator; the
+    /// force is relative to the force at the start of the run [N per output unit]
     #[arg(long, value_name = "N_PER_Y", value_parser = positive, requires = "model")]
     pub(crate) kout: Option<f64>,
-    /// Show the run while it goes on in Foxglove or Lichtblick, which connect over a WebSocket to this address; 127.0.0.1:8765 if none is given
+    /// Stream the run to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
+    /// address is given
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub(crate) live: Option<SocketAddr>,
-    /// Show a bar on a terminal instead of a picture of the last seconds
+    /// Show a progress bar in the terminal instead of a plot of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Hold at the first value before a segment begins; 2 for a reference and 0 for a drive if not given. A model takes the actuator as
-    /// settled there, and creep takes its time
+    /// Hold the first value this long before each segment; 2 for a reference and 0 for a drive if not given. The model
+    /// assumes a settled actuator, and creep needs time to settle
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) settle: Option<f64>,
-    /// Seed of a simulated plant's noise, so that a second record has another one; that of its file if not given
+    /// Seed of the noise of a simulated plant; from its file if not given
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: Option<u64>,
-    /// Rest between two segments
+    /// Rest between segments
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds, allow_negative_numbers = true)]
     pub(crate) rest: f64,
     #[command(flatten)]
@@ -409,28 +415,30 @@ pub(crate) struct RunArgs {
     pub(crate) json: JsonArg,
 }
 
-const DEVICE: &str = "Device: sim:PLANT.toml (the simulated actuator that the file describes), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
+const DEVICE: &str = "Device: sim:PLANT.toml (simulated plant, described by the file), serial:PORT[@BAUD], \
+    slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
 
-/// Emergency stop: whatever a device does, let it come to rest and stay there
+/// Emergency stop: ramp a device to rest and keep it there
 ///
-/// The device ramps to rest at the slew limit of its run, and starts again only once that is cleared (run --clear). A serial port that another
-/// program holds cannot be reached so: press Ctrl-C there. On a CAN bus, and at the socket of a simulator, there is room for both.
+/// The device ramps to rest at the slew limit of its run. It starts again only after its fault is cleared (stop --clear
+/// or run --clear). A serial port that another program uses cannot be opened: press Ctrl-C in that program. A CAN bus
+/// and the socket of a simulator accept both programs.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl stop --daq can:can0")]
 pub(crate) struct StopArgs {
     /// Device, as for run
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
-    /// Clear the fault of a device that has come to rest, so that it can be started again; nothing moves by that
+    /// Clear the fault of a device at rest, so that it can start again; nothing moves
     #[arg(long)]
     pub(crate) clear: bool,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }
 
-/// Ask a device how it stands: at rest, running, or with which fault
+/// Show the state of a device: at rest, running, or stopped by a fault
 ///
-/// Nothing moves, and a run of another program goes on.
+/// Nothing moves, and a run of another program continues.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl status --daq serial:/dev/ttyACM0")]
 pub(crate) struct StatusArgs {
@@ -441,46 +449,47 @@ pub(crate) struct StatusArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Record what the sensors show while nothing moves
+/// Record the sensors of a device at rest
 ///
-/// The device stays at rest: noise, drift and what shakes the bench can be seen, and a thermometer can be read.
+/// Nothing moves. The record shows noise, drift and vibrations of the bench, and the temperature if it is measured.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl record --daq serial:/dev/ttyACM0 --seconds 60 -o rest.csv")]
 pub(crate) struct RecordArgs {
     /// Device, as for run
     #[arg(long, value_name = "DEVICE")]
     pub(crate) daq: Device,
-    /// How long
+    /// Duration
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(crate) seconds: f64,
-    /// Samples a second; 1000 if not given, as far as the device goes along
+    /// Sample rate; 1000 if not given, within the range of the device
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) rate: Option<f64>,
     /// Record to write (CSV); - for stdout
     #[arg(short, long, value_name = "CSV")]
     pub(crate) output: Option<Target>,
-    /// Log to write while it lasts (MCAP)
+    /// Log to write during the recording (MCAP)
     #[arg(long, value_name = "MCAP")]
     pub(crate) log: Option<PathBuf>,
-    /// End above this temperature
+    /// End the recording above this temperature
     #[arg(long, value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) hottest: Option<f64>,
-    /// Show the run while it goes on in Foxglove or Lichtblick, which connect over a WebSocket to this address; 127.0.0.1:8765 if none is given
+    /// Stream the samples to Foxglove or Lichtblick, which connect to this address over a WebSocket; 127.0.0.1:8765 if no
+    /// address is given
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub(crate) live: Option<SocketAddr>,
-    /// Show a bar on a terminal instead of a picture of the last seconds
+    /// Show a progress bar in the terminal instead of a plot of the last seconds
     #[arg(long)]
     pub(crate) plain: bool,
-    /// Seed of a simulated plant's noise; that of its file if not given
+    /// Seed of the noise of a simulated plant; from its file if not given
     #[arg(long, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: Option<u64>,
     #[command(flatten)]
     pub(crate) json: JsonArg,
 }
 
-/// Look into the log of a run, make a record of it, or recover one that was cut off
+/// Inspect the log of a run, convert it to a record, or recover one that was cut off
 ///
-/// fit, diagnose and the other commands read logs as they read records.
+/// fit, diagnose and the other commands also read logs directly, as they read records.
 #[derive(Debug, Args)]
 pub(crate) struct LogArgs {
     #[command(subcommand)]
@@ -494,7 +503,7 @@ pub(crate) enum LogCommand {
     Recover(LogRecoverArgs),
 }
 
-/// Say what ran, how long, and whether the log is whole
+/// Show the content of a log, its duration, and whether it was closed
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl log info run.mcap")]
 pub(crate) struct LogInfoArgs {
@@ -504,7 +513,7 @@ pub(crate) struct LogInfoArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Make a record of a log
+/// Convert a log to a record
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl log convert run.mcap -o run.csv")]
 pub(crate) struct LogConvertArgs {
@@ -513,14 +522,14 @@ pub(crate) struct LogConvertArgs {
     /// CSV file to write; stdout if not given
     #[arg(short, long, value_name = "CSV", default_value = "-", hide_default_value = true)]
     pub(crate) output: Target,
-    /// Ramps before and after each segment too
+    /// Include the ramps before and after each segment
     #[arg(long)]
     pub(crate) ramps: bool,
 }
 
-/// Make a closed log of one that was cut off
+/// Make a closed log from one that was cut off
 ///
-/// Everything up to the cut is kept: with hystctl's own logs all but the last second.
+/// Everything before the cut is kept. A log of hystctl loses at most the last second.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl log recover run.mcap -o whole.mcap")]
 pub(crate) struct LogRecoverArgs {
@@ -533,71 +542,73 @@ pub(crate) struct LogRecoverArgs {
     pub(crate) json: JsonArg,
 }
 
-/// What makes the drive of a reference.
+/// Controller that computes the drive of a reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Control {
-    /// A straight line through the ends of what the model was fitted to: no compensation
+    /// Straight line through the ends of the range that the model was fitted to: no compensation
     Gain,
-    /// The model's inverse
+    /// Inverse of the model
     #[default]
     Feedforward,
-    /// A PID on the measured output
+    /// PID on the measured output
     Pid,
-    /// Both
+    /// Inverse of the model and PID on the measured output
     #[value(name = "pid+feedforward")]
     #[serde(rename = "pid+feedforward")]
     PidFeedforward,
 }
 
 impl Control {
-    /// Whether the model's inverse takes part.
+    /// Whether the controller uses the model's inverse.
     pub(crate) fn inverts(self) -> bool {
         matches!(self, Self::Feedforward | Self::PidFeedforward)
     }
 
-    /// Whether the measured output takes part.
+    /// Whether the controller uses the measured output.
     pub(crate) fn closes(self) -> bool {
         matches!(self, Self::Pid | Self::PidFeedforward)
     }
 }
 
-/// What keeps a drive in bounds.
+/// Limits of a drive.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct LimitArgs {
-    /// Lowest and highest voltage; if not given, those of the record that the model was fitted to
+    /// Minimum and maximum voltage in V; the range that the model was fitted to if not given
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub(crate) limit: Option<VoltageLimits>,
-    /// Steepest slope of the drive
+    /// Maximum slope of the drive
     #[arg(long, value_name = "V_PER_S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) slew: Option<f64>,
-    /// Band in which lag, delay and resonances are inverted; chosen if not given
+    /// Bandwidth in which lag, delay and resonances are inverted; computed from the model if not given
     #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) bandwidth: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TemperatureArg {
-    /// Temperature, where the model needs it and the record or reference has no column of it
+    /// Constant temperature, if the model needs one and the record or reference has no temperature column
     #[arg(long = "temperature", value_name = "DEGC", allow_negative_numbers = true, value_parser = celsius)]
     pub(crate) degc: Option<f64>,
 }
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct MapArg {
-    /// Take a column of another name, as voltage_v=Vin, or of the other sign, as displacement_um=-Sensor; a column without a name goes by its number, as time_s=1; may be given several times
+    /// Read a column of another name (voltage_v=Vin), with the opposite sign (displacement_um=-Sensor), or by its number
+    /// (time_s=1); may be given several times
     #[arg(long, value_name = "NAME=COLUMN")]
     pub(crate) map: Vec<String>,
-    /// Samples a second of a file without times; times that it has are not read
+    /// Sample rate of a file without times (times in the file are ignored), or of a reference given as FORM:LOW,HIGH,HZ,SECONDS
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) rate: Option<f64>,
 }
 
-/// Show what a file holds: channels, units, rate, noise, and what may be wrong
+/// Show what a file holds: channels, units, sample rate, noise and possible problems
 ///
-/// A line for each channel: what the record reads it as (- where it is not read), its unit (? where the file states none), minimum, maximum,
-/// resolution (the smallest difference between two values), rows, and rows without a value. `note` is what was done to read the file,
-/// `warning` what may be wrong with the data. Ends with the command to type next. Nothing is written.
+/// Each channel has a line: what the record reads it as (- if it is not read), its unit (? if the file states none),
+/// minimum, maximum, resolution (smallest difference between two values), rows, and rows without a value. `note` lines
+/// say what was done to read the file, `warning` lines what may be wrong with the data. The last line is the command to
+/// type next. Nothing is written.
 #[derive(Debug, Args)]
 #[command(after_help = format!("Example:\n  hystctl info scan.csv\n\n{RECORDS}"))]
 pub(crate) struct InfoArgs {
@@ -609,15 +620,16 @@ pub(crate) struct InfoArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Write a file of any format as a record, or as what other programs load
+/// Convert a file of any readable format to a record or to a format of other programs
 ///
-/// Units are converted, columns get the names of the record format, and times the even grid that a fit uses.
+/// Units are converted, columns get the names of the record format, and the samples are put on an even time grid, as for a
+/// fit.
 #[derive(Debug, Args)]
 #[command(after_help = format!("Example:\n  hystctl convert scope.txt record.csv --map 'voltage_v=CH1 (V)'\n\n{RECORDS}"))]
 pub(crate) struct ConvertArgs {
     /// File to read
     pub(crate) input: PathBuf,
-    /// File to write, in the format that its name ends in: .csv, .npy, .mat or .tdms; - for CSV on stdout
+    /// File to write; the ending selects the format: .csv, .npy, .mat or .tdms; - for CSV on stdout
     pub(crate) output: Target,
     #[command(flatten)]
     pub(crate) map: MapArg,
@@ -625,17 +637,18 @@ pub(crate) struct ConvertArgs {
     pub(crate) json: JsonArg,
 }
 
-/// Draw records: loops, time, spectra, and what models miss of them
+/// Plot records: loops, time series, spectra, and residuals of models
 ///
-/// Several records are drawn over one another. With --model each record is simulated, and a panel for each model shows measured minus predicted,
-/// all on one scale. Nothing is fitted.
+/// Several records are drawn over one another. With --model each record is simulated, and a panel for each model shows
+/// the residuals (measured minus predicted), all on one scale. Nothing is fitted.
 #[derive(Debug, Args)]
-#[command(after_help = format!("Examples:\n  hystctl plot train.csv -o train.svg\n  hystctl plot test.csv --model pi.json --model extended.json -o compared.svg\n\n{RECORDS}"))]
+#[command(after_help = format!("Examples:\n  hystctl plot train.csv -o train.svg\n  \
+    hystctl plot test.csv --model pi.json --model extended.json -o compared.svg\n\n{RECORDS}"))]
 pub(crate) struct PlotArgs {
-    /// Records to draw
+    /// Records to plot
     #[arg(required = true)]
     pub(crate) records: Vec<PathBuf>,
-    /// Model files to compare with them; may be given several times
+    /// Model file whose residuals are plotted; may be given several times
     #[arg(long)]
     pub(crate) model: Vec<PathBuf>,
     /// Picture to write, .svg or .png; - for SVG on stdout
@@ -647,9 +660,9 @@ pub(crate) struct PlotArgs {
     pub(crate) map: MapArg,
 }
 
-/// List the serial ports and CAN interfaces at which a device may be
+/// List the serial ports and CAN interfaces at which a device may be connected
 ///
-/// Nothing is sent and nothing moves: they are only looked at.
+/// Nothing is sent and nothing moves.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  hystctl devices")]
 pub(crate) struct DevicesArgs {
@@ -666,7 +679,7 @@ pub(crate) struct JsonArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct ZeroArg {
-    /// Zero of the sensor: the model's (none), or one constant for each file (per-record)
+    /// Sensor zero: the model's (none), or one constant for each file (per-record)
     #[arg(long, value_enum, default_value_t = ZeroMode::None, hide_possible_values = true, value_name = "none|per-record")]
     zero: ZeroMode,
 }
@@ -700,7 +713,7 @@ mod tests {
     }
 
     #[test]
-    fn the_definition_is_sound() {
+    fn clap_accepts_the_definition() {
         Cli::command().debug_assert();
     }
 
@@ -725,7 +738,7 @@ mod tests {
     }
 
     #[test]
-    fn other_devices_and_models_are_refused_with_what_there_is() {
+    fn unknown_devices_and_models_are_refused_with_the_known_ones() {
         let message = parse("hystctl run --daq usb:3 --drive u.csv").unwrap_err();
         assert!(message.contains("sim:PLANT.toml"), "{message}");
         let message = parse("hystctl fit a.csv --model preisch -o m.json").unwrap_err();

@@ -1,4 +1,4 @@
-//! Arguments of the search behind a fit.
+//! Arguments of the parameter search of a fit.
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -8,51 +8,52 @@ use hyst_ident::identify::Form;
 
 use crate::exit::CommandError;
 
-/// How a fit goes about it.
+/// Options of the parameter search of a fit.
 #[derive(Debug, Args)]
 pub(crate) struct SearchArgs {
-    /// How to go about it; auto says what it chose and why
+    /// Optimizer; auto chooses one and prints which and why
     #[arg(long, value_name = "WAY", default_value = "auto", value_parser = optimizers())]
     pub(crate) optimizer: Optimizer,
-    /// Seed of what is drawn at random, kept in the model; 1 with auto and convex
+    /// Seed of random draws, written to the model; 1 with auto and convex
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// How often to repeat a search with other draws; the best is taken
+    /// Number of searches with different random draws; the best one is taken
     #[arg(long, default_value_t = 1)]
     pub(crate) trials: usize,
-    /// Most evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
+    /// Maximum evaluations of a trial; 1500 for each searched variable if not given, 200 with bouc-wen-oscillator
     #[arg(long, value_name = "COUNT")]
     pub(crate) evaluations: Option<u64>,
-    /// Members, particles or wolves; the search's own number if not given
+    /// Population size (members, particles or wolves); the default of the optimizer if not given
     #[arg(long, value_name = "COUNT")]
     pub(crate) population: Option<usize>,
-    /// Bounds of a searched variable instead of those that the record suggests; can be repeated
+    /// Bounds of a searched variable, instead of those derived from the record; can be repeated
     #[arg(long, value_name = "NAME=LOW..HIGH", value_parser = bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Vec<VariableBounds>,
     /// Form of bouc-wen (zhu: n = 1; xie: n is searched) or of an element of maxwell-slip (backlash, elasto-slip)
     #[arg(long, value_parser = forms())]
     pub(crate) form: Option<Form>,
-    /// How the drive of bouc-wen-oscillator goes on between samples: on straight lines, or as the band-limited signal through
-    /// them; both are tried if not given, and the one that leaves less of the records is taken and kept in the model
+    /// Interpolation of the drive of bouc-wen-oscillator between samples: linear or band-limited; if not given, both are
+    /// tried and the one with the smaller residual is written to the model
     #[arg(long, value_parser = between_samples())]
     pub(crate) between_samples: Option<BetweenSamples>,
-    /// Plays of gpi and td-pi, of pi when it is searched; elements of td-em; most elements of maxwell-slip
+    /// Number of play operators of gpi and td-pi, and of pi when it is searched; of elements of td-em; maximum number of
+    /// elements of maxwell-slip
     #[arg(long, value_name = "COUNT")]
     pub(crate) elements: Option<usize>,
-    /// Most thresholds of pi, chosen where the record calls for them; not given, they are even ones unless some that are no
-    /// more predict parts of the record clearly better
+    /// Maximum number of thresholds of pi, placed by the record; if not given, the thresholds are evenly spaced unless at
+    /// most as many placed ones predict parts of the record clearly better
     #[arg(long, value_name = "COUNT")]
     pub(crate) thresholds: Option<usize>,
 }
 
 impl SearchArgs {
-    /// As options of a fit.
+    /// Returns the options of a fit.
     pub(crate) fn options(&self, zero_per_record: bool) -> Result<FitOptions, CommandError> {
         let seed = match (&self.optimizer, self.seed) {
             (_, Some(seed)) => seed,
             (Optimizer::Search(name), None) => {
                 return Err(CommandError::bad_input(format!(
-                    "--optimizer {name} draws at random: give --seed N, so that it can be repeated"
+                    "--optimizer {name} is random and needs a seed to be repeatable; give --seed N, for example --seed 1"
                 )));
             }
             (_, None) => 1,
@@ -96,8 +97,8 @@ fn bounds(text: &str) -> Result<VariableBounds, String> {
     match parts {
         Some((name, lower, upper)) if lower < upper => Ok(VariableBounds { name: name.trim().into(), lower, upper }),
         Some((name, lower, upper)) => {
-            Err(format!("bounds of {name}: the lower one ({lower}) has to be below the upper one ({upper})"))
+            Err(format!("bounds of {name}: the lower bound {lower} must be below the upper bound {upper}"))
         }
-        None => Err("give the name of a variable and its bounds, as gamma=0.01..5".into()),
+        None => Err("expected a variable and its bounds; give NAME=LOW..HIGH, for example gamma=0.01..5".into()),
     }
 }

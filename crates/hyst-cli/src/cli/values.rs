@@ -1,16 +1,16 @@
-//! Arguments that are more than a number or a path.
+//! Arguments with a syntax of their own, and parsers of numbers with bounds.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use hyst_ident::record::ABSOLUTE_ZERO;
 
-/// Voltages between which a drive has to stay.
+/// Minimum and maximum voltage of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VoltageLimits {
-    /// Lowest \[V\].
+    /// Minimum \[V\].
     pub(crate) low: f64,
-    /// Highest \[V\].
+    /// Maximum \[V\].
     pub(crate) high: f64,
 }
 
@@ -20,53 +20,55 @@ impl FromStr for VoltageLimits {
         let number = |part: &str| part.trim().parse::<f64>().ok().filter(|volts| volts.is_finite());
         match text.split_once(',').map(|(low, high)| (number(low), number(high))) {
             Some((Some(low), Some(high))) if low < high => Ok(Self { low, high }),
-            Some((Some(_), Some(_))) => Err("the first voltage has to be the lower one".to_owned()),
-            _ => Err("give the lowest and the highest voltage, as 0,120".to_owned()),
+            Some((Some(_), Some(_))) => {
+                Err("the first voltage must be below the second one; give MIN,MAX, for example 0,120".to_owned())
+            }
+            _ => Err("expected two voltages; give MIN,MAX, for example 0,120".to_owned()),
         }
     }
 }
 
-/// Where a drive is played.
+/// Device that plays a drive, as `--daq` names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Device {
-    /// The simulated plant of this file.
+    /// The simulated plant that this file describes.
     Simulated(PathBuf),
-    /// At a serial port.
+    /// A device at a serial port.
     Serial {
-        /// What the system calls it.
+        /// Name of the port in the system.
         port: String,
-        /// Bits a second.
+        /// Baud rate \[bit/s\].
         baud: u32,
     },
-    /// On a CAN bus, behind an adapter at a serial port.
+    /// A device on a CAN bus, behind an adapter at a serial port.
     Slcan {
-        /// What the system calls the port.
+        /// Name of the port in the system.
         port: String,
-        /// Bits a second of the port.
+        /// Baud rate of the port \[bit/s\].
         baud: u32,
-        /// Bits a second of the bus.
+        /// Bit rate of the bus \[bit/s\].
         bits_per_s: u32,
     },
-    /// On a CAN bus, at an interface of the system.
+    /// A device on a CAN bus at an interface of the system.
     Can {
-        /// What the system calls it.
+        /// Name of the interface in the system.
         interface: String,
-        /// Whether frames are those of CAN FD.
+        /// Whether frames are CAN FD.
         fd: bool,
     },
-    /// At a socket, as `host:port`.
+    /// A device at a socket, as `host:port`.
     Tcp(String),
     /// The device of the program that runs the command.
     Host,
 }
 
-/// Bits a second of a serial port, if nothing is said.
-const USUAL_BAUD: u32 = 115_200;
-/// Bits a second of a CAN bus, if nothing is said.
-const USUAL_BUS: u32 = 500_000;
+/// Baud rate of a serial port if the argument has none \[bit/s\].
+const DEFAULT_BAUD: u32 = 115_200;
+/// Bit rate of a CAN bus if the argument has none \[bit/s\].
+const DEFAULT_CAN_BIT_RATE: u32 = 500_000;
 
 impl Device {
-    /// The file that describes it, if there is one.
+    /// The file of a simulated plant.
     pub(crate) fn file(&self) -> Option<&Path> {
         match self {
             Self::Simulated(path) => Some(path),
@@ -79,15 +81,15 @@ impl FromStr for Device {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
-            Some(("host", "")) if crate::host::is_lent() => Ok(Self::Host),
+            Some(("host", "")) if crate::host::has_host() => Ok(Self::Host),
             Some(("sim", path)) if !path.is_empty() => Ok(Self::Simulated(path.into())),
             Some(("serial", port)) if !port.is_empty() => {
-                let (port, baud) = at_rate(port, USUAL_BAUD, "serial:/dev/ttyACM0@921600")?;
+                let (port, baud) = port_and_rate(port, DEFAULT_BAUD, "serial:/dev/ttyACM0@921600")?;
                 Ok(Self::Serial { port, baud })
             }
             Some(("slcan", port)) if !port.is_empty() => {
-                let (port, bits_per_s) = at_rate(port, USUAL_BUS, "slcan:/dev/ttyACM0@250000")?;
-                Ok(Self::Slcan { port, baud: USUAL_BAUD, bits_per_s })
+                let (port, bits_per_s) = port_and_rate(port, DEFAULT_CAN_BIT_RATE, "slcan:/dev/ttyACM0@250000")?;
+                Ok(Self::Slcan { port, baud: DEFAULT_BAUD, bits_per_s })
             }
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
             Some(("can", interface)) if !interface.is_empty() => match interface.split_once(',') {
@@ -95,21 +97,25 @@ impl FromStr for Device {
                 Some((interface, "fd")) if !interface.is_empty() => {
                     Ok(Self::Can { interface: interface.to_owned(), fd: true })
                 }
-                Some(_) => Err("give can:can0, or can:can0,fd for frames of CAN FD".to_owned()),
+                Some(_) => {
+                    Err("give can:INTERFACE, or can:INTERFACE,fd for CAN FD, for example can:can0,fd".to_owned())
+                }
             },
-            _ => Err(format!("give {FORMS}")),
+            _ => Err(format!("expected a device; give {DEVICE_FORMS}")),
         }
     }
 }
 
-/// What a device can be given as.
-const FORMS: &str = "sim:PLANT.toml (the file that describes the simulated plant), serial:PORT[@BAUD], slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
+/// Syntax of `--daq`, for messages.
+const DEVICE_FORMS: &str = "sim:PLANT.toml (the file describes the simulated plant), serial:PORT[@BAUD], \
+    slcan:PORT[@BITS_PER_S], can:INTERFACE[,fd] or tcp:HOST:PORT";
 
-/// A port and the bits a second behind its `@`, if there is one.
-fn at_rate(port: &str, usual: u32, example: &str) -> Result<(String, u32), String> {
-    let Some((port, rate)) = port.rsplit_once('@') else { return Ok((port.to_owned(), usual)) };
+/// Splits `PORT[@RATE]` into the port and the rate \[bit/s\]; without `@RATE` the rate is `default`.
+fn port_and_rate(port: &str, default: u32, example: &str) -> Result<(String, u32), String> {
+    let Some((port, rate)) = port.rsplit_once('@') else { return Ok((port.to_owned(), default)) };
     let rate = rate.parse().ok().filter(|rate| *rate > 0);
-    let rate = rate.ok_or_else(|| format!("give the bits a second behind the @, as {example}"))?;
+    let rate =
+        rate.ok_or_else(|| format!("expected a positive integer after the @, in bit/s; give for example {example}"))?;
     Ok((port.to_owned(), rate))
 }
 
@@ -134,35 +140,32 @@ impl FromStr for PidGains {
                 let (proportional, integral) = (*proportional, *integral);
                 Ok(Self { proportional, integral, derivative: rest.first().copied().unwrap_or_default() })
             }
-            _ => Err("give KP,KI or KP,KI,KD, as 0.4,250".to_owned()),
+            _ => Err("expected two or three numbers; give KP,KI or KP,KI,KD, for example 0.4,250".to_owned()),
         }
     }
 }
 
-/// A positive, finite number.
+/// Parses a positive, finite number.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let usable = |x: &f64| x.is_finite() && *x > 0.0;
-    text.parse().ok().filter(usable).ok_or_else(|| "it has to be a positive number".to_owned())
+    text.parse().ok().filter(usable).ok_or_else(|| "expected a positive number".to_owned())
 }
 
-/// A finite number.
+/// Parses a finite number.
 pub(super) fn finite(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "it has to be a finite number".to_owned())
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a finite number".to_owned())
 }
 
-/// A temperature that there can be \[°C\].
+/// Parses a temperature at or above absolute zero \[°C\].
 pub(super) fn celsius(text: &str) -> Result<f64, String> {
     let usable = |degc: &f64| *degc >= ABSOLUTE_ZERO;
-    finite(text)
-        .ok()
-        .filter(usable)
-        .ok_or_else(|| format!("it has to be a temperature in degC, {ABSOLUTE_ZERO} or above"))
+    finite(text).ok().filter(usable).ok_or_else(|| format!("expected a temperature in degC, {ABSOLUTE_ZERO} or above"))
 }
 
-/// A time from zero up.
+/// Parses a time of zero or more \[s\].
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let usable = |x: &f64| x.is_finite() && *x >= 0.0;
-    text.parse().ok().filter(usable).ok_or_else(|| "it has to be a number of seconds from 0 up".to_owned())
+    text.parse().ok().filter(usable).ok_or_else(|| "expected a time in seconds, 0 or more".to_owned())
 }
 
 #[cfg(test)]
@@ -188,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn devices_have_a_kind_and_a_place() {
+    fn devices_have_a_kind_and_an_address() {
         assert_eq!("sim:a:b.toml".parse(), Ok(Device::Simulated("a:b.toml".into())));
         let serial = |port: &str, baud| Ok(Device::Serial { port: port.into(), baud });
         assert_eq!("serial:/dev/ttyACM0".parse(), serial("/dev/ttyACM0", 115_200));
@@ -209,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_positive() {
+    fn numbers_outside_their_bounds_are_refused() {
         assert_eq!(positive("2.5"), Ok(2.5));
         for text in ["0", "-1", "nan", "inf", "x"] {
             positive(text).unwrap_err();

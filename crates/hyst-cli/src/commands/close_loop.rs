@@ -1,4 +1,4 @@
-//! `close-loop`: measure, find what the model lacks, add it, compensate, measure again.
+//! `close-loop`: repeats experiment, diagnosis, extension and compensation on a simulated plant.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use hyst_ident::simulate::{Zero, simulate};
 use serde::Serialize;
 
 use crate::cli::CloseLoopArgs;
-use crate::device::{AnyDevice, Wishes};
+use crate::device::{AnyDevice, DeviceOptions};
 use crate::exit::{CommandError, CommandResult};
 use crate::host;
 use crate::output::{self, Report};
@@ -26,56 +26,58 @@ use plan::{Experiment, Plan};
 
 mod plan;
 
-/// Least sample rate of chosen experiments \[Hz\].
-const LEAST_RATE_HZ: f64 = 20.0;
+/// Minimum sample rate of chosen experiments \[Hz\].
+/// A lower rate cannot separate the typical dynamics of actuators.
+const MIN_RATE_HZ: f64 = 20.0;
 
 /// One turn.
 #[derive(Debug, Serialize)]
 struct Turn {
     turn: u32,
-    /// What was played, and what for.
+    /// The drive and its purpose.
     experiment: Experiment,
-    /// Kind of the base.
+    /// Kind of the base model.
     base: Kind,
-    /// Errors of the model of the turn before on this turn's record, which it has not seen.
+    /// Errors of the previous turn's model on this turn's record, which it was not fitted to.
     before: Option<Errors>,
-    /// Effects that were found in this turn.
+    /// Effects named in this turn.
     found: Vec<String>,
     remainder: RemainderKind,
-    /// Slope from which on the drive was not followed \[V/s\]; the next turn's stays below.
+    /// Slope above which the amplifier did not follow the drive \[V/s\].
+    /// The drives of later turns stay below.
     slew_limit: Option<f64>,
-    /// What is left, in words.
+    /// Description of the remainder.
     left: String,
-    /// What is open where experiments are chosen; empty if nothing is.
+    /// Undecided questions if experiments are chosen; empty if all are decided.
     #[serde(skip_serializing_if = "Option::is_none")]
     open: Option<Vec<Question>>,
-    /// How a reference was followed; chosen experiments follow it in the end.
+    /// Tracking errors; with chosen experiments only in the last turn.
     #[serde(flatten)]
     tracking: Option<Tracking>,
 }
 
-/// How a reference was followed.
+/// Errors of the followed reference.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Tracking {
-    /// Error of the followed reference \[output unit\].
+    /// RMS error without drift and interference of the sensor \[output unit\].
     tracking_rmse: f64,
     tracking_max_abs: f64,
-    /// The same of what the sensor showed: drift and tone that were found in it are not taken out.
+    /// RMS error with drift and interference of the sensor \[output unit\].
     tracking_shown_rmse: f64,
 }
 
-/// What came of it.
+/// Report of all turns.
 #[derive(Debug, Serialize)]
 struct Summary {
     unit: String,
-    /// Error of the same reference by a plain gain \[output unit\].
+    /// RMS tracking error of the same reference with a plain gain \[output unit\].
     plain_gain_rmse: f64,
-    /// By the inverse of the base model alone.
+    /// RMS tracking error with the inverse of the base model \[output unit\].
     base_inverse_rmse: f64,
     turns: Vec<Turn>,
     /// Time of all experiments \[s\].
     seconds: f64,
-    /// Why it ended.
+    /// Reason for the end.
     ended: String,
     folder: PathBuf,
 }
@@ -89,22 +91,24 @@ pub(super) fn run(args: &CloseLoopArgs) -> CommandResult {
     }
     if args.daq.file().is_none() {
         return Err(CommandError::bad_input(
-            "close-loop runs simulated plants alone (sim:PLANT.toml): an actuator that moves for minutes wants somebody beside it; go the same way with excite, run, fit, diagnose and run again, with --limit and --slew",
+            "close-loop runs only simulated plants (sim:PLANT.toml), because a real actuator that moves for minutes needs \
+             supervision; use excite, run, fit and diagnose in turn, with --limit and --slew",
         ));
     }
-    // Below it nothing typical of an actuator's dynamics can be told apart.
-    if args.until.is_some() && args.rate < LEAST_RATE_HZ {
-        return Err(CommandError::bad_input(format!("--rate: experiments are chosen from {LEAST_RATE_HZ} Hz on")));
+    if args.until.is_some() && args.rate < MIN_RATE_HZ {
+        return Err(CommandError::bad_input(format!(
+            "--rate: --until needs a sample rate of at least {MIN_RATE_HZ} Hz"
+        )));
     }
-    let mut device = AnyDevice::open(&args.daq, &Wishes::default())?;
+    let mut device = AnyDevice::open(&args.daq, &DeviceOptions::default())?;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
     let report = Report::new(args.json.json, &[])?;
-    let progress = Progress::spinner("closing the loop");
+    let progress = Progress::spinner("starting");
     let summary = turns(&mut device, args, &progress)?;
     drop(progress);
     write(out, "summary.json", &output::json(&summary)?)?;
-    report.print(&said(&summary), &summary)
+    report.print(&report_text(&summary), &summary)
 }
 
 fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> CommandResult<Summary> {
@@ -116,11 +120,11 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
     let mut kind = args.model;
     let mut unit = None;
     let mut plan = Plan::new(args, daq);
-    // Errors of a plain gain and of the inverse of the base alone, once a reference was followed.
+    // Tracking errors with a plain gain and with the inverse of the base model, after the first tracking.
     let mut without_effects = None;
-    let mut ended = format!("all {most} turns are done; give more with --turns");
+    let mut ended = format!("all {most} turns are finished; give more with --turns");
     for turn in 1..=most {
-        progress.say(&format!("turn {turn}: experiment"));
+        progress.set_message(&format!("turn {turn}: experiment"));
         let (experiment, record) = plan.play(daq, turn)?;
         let mut csv = Vec::new();
         record.write_csv(&mut csv).map_err(output::io_error)?;
@@ -130,21 +134,21 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let before = model.as_ref().map(|m| simulate(m, &record, Zero::None)).transpose()?.and_then(|s| s.errors);
         records.push(record);
         let train = Record::join(records.clone())?;
-        let told = |what: &str| progress.say(&format!("turn {turn}: {what}"));
+        let report = |what: &str| progress.set_message(&format!("turn {turn}: {what}"));
         let fitted = |kind: Kind| {
-            told("fit");
+            report("fit");
             fit(&train, kind, &FitOptions { seed: args.seed, ..FitOptions::default() })
         };
         let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
-        let diagnosed = |start: &Model| diagnose_until(&train, None, start, &options, &told, &host::stopping());
-        // With chosen experiments all records are diagnosed anew: each probability is then one of all that was measured.
+        let diagnosed = |start: &Model| diagnose_until(&train, None, start, &options, &report, &host::stopping());
+        // With chosen experiments the model is fitted again to all records, so that each probability uses all data.
         let mut start = match model.take().filter(|m| m.base.kind() == kind && args.until.is_none()) {
             Some(model) => model,
             None => fitted(kind)?,
         };
         let mut found = diagnosed(&start)?;
         if args.until.is_some() && is_too_coarse(&found.findings, kind) {
-            // A richer base needs no other experiment.
+            // A finer base model needs no new experiment.
             kind = Kind::Preisach;
             start = fitted(kind)?;
             found = diagnosed(&start)?;
@@ -156,17 +160,17 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
         let remainder = &found.findings.remainder;
         let too_coarse = is_too_coarse(&found.findings, kind);
         let is_slow = remainder.slew_limit.is_some();
-        // Nothing is asked of records that the amplifier has not followed.
+        // Records that the amplifier did not follow decide nothing.
         let (open, why) = match args.until {
             Some(_) if !is_slow => plan.next(&found.findings, &train)?,
             _ => (Vec::new(), None),
         };
         let ends = why.or_else(|| {
             let done = args.until.is_none() && names.is_empty() && !(is_slow || too_coarse);
-            done.then(|| "nothing more is found".to_owned())
+            done.then(|| "no further effect is found".to_owned())
         });
         let tracking = if args.until.is_none() || ends.is_some() || turn == most {
-            progress.say(&format!("turn {turn}: following a reference"));
+            progress.set_message(&format!("turn {turn}: following a reference"));
             let task = Task::of(&found.extended, &train, args.rate);
             if without_effects.is_none() {
                 let plain = task.judge(&task.by_gain(daq, &train, &start)?, &found.extended).rmse;
@@ -197,13 +201,13 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
             break;
         }
         if let Some(limit) = remainder.slew_limit {
-            // What the amplifier has not followed says little of the actuator: all is measured anew, less steeply.
+            // Records that the amplifier did not follow are useless for the actuator: measure again with a lower slope.
             plan.stay_below(FOLLOWED * limit);
             records.clear();
             continue;
         }
         if too_coarse {
-            // What is left is a map of the input's history: a richer one is fitted, and the effects are looked for anew on it.
+            // The remainder is hysteresis: fit a finer base model in the next turn and search the effects again.
             kind = Kind::Preisach;
         }
         model = Some(found.extended);
@@ -220,7 +224,7 @@ fn turns<D: Daq>(daq: &mut D, args: &CloseLoopArgs, progress: &Progress) -> Comm
     })
 }
 
-/// Whether what is left is a map of the input's history that another base takes.
+/// Whether the remainder is hysteresis that a finer base model describes.
 fn is_too_coarse(findings: &Findings, kind: Kind) -> bool {
     findings.remainder.kind == RemainderKind::BaseCapacity && kind == Kind::Pi
 }
@@ -229,10 +233,10 @@ fn write(folder: &Path, name: &str, content: &str) -> CommandResult {
     Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_bytes()))?)
 }
 
-fn said(summary: &Summary) -> String {
+fn report_text(summary: &Summary) -> String {
     let unit = text::symbol(&summary.unit);
     let head =
-        ["turn", "base", "found", &format!("on a new record [{unit}]"), &format!("tracking RMS [{unit}]"), "max"];
+        ["turn", "base", "found", &format!("RMS on a new record [{unit}]"), &format!("tracking RMS [{unit}]"), "max"];
     let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];
     let blank = |first: &str, rmse: f64| {
         let cells = [first, "", "", "", &text::short(rmse), ""];
@@ -242,7 +246,7 @@ fn said(summary: &Summary) -> String {
     rows.push(blank("base inverse", summary.base_inverse_rmse));
     let chosen = summary.turns.iter().any(|t| t.experiment.why.is_some());
     for t in &summary.turns {
-        let slow = t.slew_limit.map(|_| "a slow amplifier");
+        let slow = t.slew_limit.map(|_| "slow amplifier");
         let found: Vec<&str> = t.found.iter().map(String::as_str).chain(slow).collect();
         rows.push(vec![
             t.turn.to_string(),
@@ -253,12 +257,12 @@ fn said(summary: &Summary) -> String {
             t.tracking.map_or_else(String::new, |t| text::short(t.tracking_max_abs)),
         ]);
     }
-    let left = summary.turns.last().map_or("", |t| t.left.as_str());
+    let remainder = summary.turns.last().map_or("", |t| t.left.as_str());
     let last = summary.turns.last().and_then(|t| t.tracking);
     let shown = last.filter(|t| (t.tracking_shown_rmse / t.tracking_rmse - 1.0).abs() > 0.01);
     let sensor = shown.map_or_else(String::new, |t| {
         let rmse = text::short(t.tracking_shown_rmse);
-        format!("in the sensor: the last error is {rmse} {unit} with the drift and the tone that were found in it\n")
+        format!("with drift and interference of the sensor the last tracking error is {rmse} {unit} RMS\n")
     });
     let experiments: String = summary
         .turns
@@ -270,7 +274,7 @@ fn said(summary: &Summary) -> String {
         .collect();
     let time = if chosen { format!("experiments: {} s\n", text::short(summary.seconds)) } else { String::new() };
     format!(
-        "{}\n{experiments}{time}{sensor}ended: {}\nleft: {left}\nwritten: {}",
+        "{}\n{experiments}{time}{sensor}ended: {}\nremainder: {remainder}\nwritten: {}",
         text::table(&rows),
         summary.ended,
         summary.folder.display()

@@ -1,4 +1,4 @@
-//! `compare`: every model on a record, side by side.
+//! `compare`: fits all kinds of models to a record and compares their errors.
 
 mod picture;
 
@@ -18,15 +18,15 @@ use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
 use crate::{input, text};
 
-/// What is said about a comparison.
+/// Report of a comparison.
 #[derive(Debug, Serialize)]
 struct Summary {
     train: String,
-    /// Commands that say what the best model lacks.
+    /// Commands that find the missing effects of the best model.
     #[serde(skip)]
     next: Vec<String>,
     rows: usize,
-    /// Rows that are a start-up transient for one of the models, and count for none.
+    /// Start-up rows of at least one of the models, which are left out for all.
     settling_rows: usize,
     test: Option<String>,
     test_rows: Option<usize>,
@@ -34,7 +34,7 @@ struct Summary {
     unit: String,
     zero: Zero,
     seed: u64,
-    /// Whether the test record is one of the training's.
+    /// Whether the test record is one of the training records.
     #[serde(skip)]
     trained_on: bool,
     #[serde(flatten)]
@@ -53,7 +53,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let trained_on = test.as_ref().is_some_and(|test| input::is_trained_on(test, &train));
     match &test {
         Some(_) if trained_on => output::say(input::TRAINED_ON),
-        Some(test) => input::tell_repeated(test, &train),
+        Some(test) => input::print_repeated(test, &train),
         None => {}
     }
     let zero = args.zero.get();
@@ -62,7 +62,7 @@ pub(super) fn run(args: &CompareArgs) -> CommandResult {
     let progress = Progress::bar("comparing", args.models.0.len());
     let comparison = compare(&train, test.as_ref(), &args.models.0, &options, &mut |step: Step| {
         progress.at(step.done);
-        progress.say(&match step.evaluations {
+        progress.set_message(&match step.evaluations {
             (0, _) => format!("fitting {}", step.kind),
             (done, budget) => format!("fitting {}: {done} of at most {budget} evaluations", step.kind),
         });
@@ -100,10 +100,7 @@ impl Summary {
     fn text(&self) -> String {
         let unit = text::symbol(&self.unit);
         let rows = |name: &str, rows: usize, settling: usize| {
-            format!(
-                "{name}: {} ({settling} settling for one of the models and left out for all)",
-                text::count(rows, "row")
-            )
+            format!("{name}: {} (start-up rows of any model, left out for all: {settling})", text::count(rows, "row"))
         };
         let mut lines = vec![format!("fitted to {}", rows(&self.train, self.rows, self.settling_rows))];
         if let (Some(name), Some(count), Some(settling)) = (&self.test, self.test_rows, self.test_settling_rows) {
@@ -115,7 +112,7 @@ impl Summary {
             SortedBy::TestRmse if self.trained_on => "sorted by RMSE on a record that the models were fitted to".to_owned(),
             SortedBy::TestRmse => "sorted by RMSE on the test record, which no model was fitted to".to_owned(),
             SortedBy::TrainRmse => {
-                "sorted by RMSE on the training record, of which more parameters always leave less; --test RECORD shows what holds"
+                "sorted by RMSE on the training record, which always falls with more parameters; --test RECORD compares on new data"
                     .to_owned()
             }
         });
@@ -132,7 +129,8 @@ impl Summary {
         }
         if !self.next.is_empty() {
             lines.push(
-                "these are bare models of the hysteresis, and their order can turn once they have the effects that they lack (creep, resonance, temperature …). What the first of them lacks:"
+                "these models describe only the hysteresis; their order can change when missing effects are added (creep, \
+                 resonance, temperature …). Find the missing effects of the first model:"
                     .to_owned(),
             );
             lines.extend(self.next.iter().map(|command| format!("  {command}")));
@@ -141,7 +139,7 @@ impl Summary {
     }
 }
 
-/// The fit and the diagnosis of one of the models, as it was compared.
+/// Returns commands that fit and diagnose one of the models as it was compared.
 fn next(args: &CompareArgs, train: &Record, test: Option<&Record>, best: &Compared) -> Vec<String> {
     let (files, reading) = (files(train), further(&input::reading(&args.map, &args.zero)));
     let mut fit = Vec::new();
@@ -161,7 +159,7 @@ fn next(args: &CompareArgs, train: &Record, test: Option<&Record>, best: &Compar
     ]
 }
 
-/// One line for each model and record.
+/// Returns the table of errors, with one line for each model and record.
 fn table(comparison: &Comparison, unit: &str) -> String {
     let head = ["model", "on", "RMSE", "of span", "max", "PV", "MAPE", "without", "SMAPE", "params", "undet.", "fit"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];

@@ -1,4 +1,4 @@
-//! `compensate`: the drive that makes the actuator follow a reference.
+//! `compensate`: computes the drive that makes an actuator follow a reference.
 
 use hyst_ident::compensate::{CompensateOptions, Drive, Missed, compensate};
 use hyst_ident::model::{Channel, Effect, Model};
@@ -13,38 +13,38 @@ use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report, say};
 use crate::{input, text};
 
-/// What is said about a compensation.
+/// Report of a compensation.
 #[derive(Debug, Serialize)]
 pub(super) struct Compensation {
     rows: usize,
-    /// Where the drive was written; none where it runs live.
+    /// File of the drive; `None` if the drive is played.
     output: Option<String>,
-    /// Where the drive starts \[V\].
+    /// First voltage of the drive \[V\].
     first: f64,
     lowest: f64,
     highest: f64,
     lead_samples: usize,
     lead_s: f64,
-    /// None where no dynamic stage was inverted.
+    /// `None` if no dynamic stage was inverted.
     bandwidth_hz: Option<f64>,
-    /// Largest relative error of the inversion inside its band.
+    /// Maximum relative error of the inversion inside its band.
     band_error: f64,
     voltage_limited_rows: usize,
-    /// Of these, rows in which the reference asks for less than the lower limit.
+    /// Rows of these in which the reference needs a voltage below the lower limit.
     voltage_limited_low_rows: usize,
     slew_limited_rows: usize,
     #[serde(skip)]
     limits: (f64, f64),
-    /// Where the drive leaves the range that the model was fitted to; rows count from 1.
+    /// Rows in which the drive is outside the range that the model was fitted to; rows count from 1.
     extrapolated: Extrapolated,
     #[serde(skip)]
     input: Channel,
-    /// Effects that are in the sensor.
+    /// Effects in the sensor.
     not_compensated: Vec<&'static str>,
-    /// How long the device was held at the first value before \[s\]; none where nothing was played.
+    /// Hold time of the first value before the reference \[s\]; `None` if nothing was played.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) held_s: Option<f64>,
-    /// What the model itself misses with this drive; none where it runs live.
+    /// Tracking error that the model predicts for this drive; `None` if the drive is played.
     missed: Option<Missed>,
     #[serde(skip)]
     unit: String,
@@ -60,7 +60,7 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
     let shape = Shape::named(&args.reference)?;
     let reference = match shape {
         Some(_) if !args.map.map.is_empty() => {
-            return Err(CommandError::bad_input("--map is for a reference in a file"));
+            return Err(CommandError::bad_input("--map needs a reference in a file; leave --map out"));
         }
         Some(shape) => {
             shape.record(&args.reference, input::output_unit(&model)?, args.map.rate.unwrap_or(model.recorded_at_hz))?
@@ -71,26 +71,26 @@ pub(super) fn run(args: &CompensateArgs) -> CommandResult {
     let options = CompensateOptions { temperature, ..options(&args.limits) };
     let drive = compensate(&model, &reference, &options)?;
 
-    // The reference file keeps its own input, if it has one: no output is an input's file.
+    // An input column of the reference file is replaced in the output; the reference file itself is not changed.
     let column = model.input.column.as_str();
     let replaced = shape.is_none() && !input::present(&args.reference, &[column])?.is_empty();
     let extra = [Extra::numbers(column, &drive.voltage)];
     args.output.write(|out| reference.write_with(out, &extra).map_err(output::io_error))?;
     if replaced {
         say(&format!(
-            "note: {} has {column} already; in {} the computed drive stands in its place",
+            "note: {} already has {column}; {} has the computed drive instead",
             args.reference.display(),
             args.output
         ));
     }
     let mut compensation = Compensation::new(&model, &reference, &drive);
-    // People and JSON count rows from 1.
+    // Reports and JSON count rows from 1.
     compensation.missed = Some(Missed { row: drive.missed.row + 1, ..drive.missed });
     compensation.output = Some(args.output.to_string());
     report.print(&compensation.text(), &compensation)
 }
 
-/// The limits of the command line, as the library takes them.
+/// Returns the limits of the command line as options of the library.
 pub(super) fn options(limits: &LimitArgs) -> CompensateOptions {
     CompensateOptions {
         voltage: limits.limit.map(|limit| (limit.low, limit.high)),
@@ -100,7 +100,8 @@ pub(super) fn options(limits: &LimitArgs) -> CompensateOptions {
     }
 }
 
-/// Whether a row that the voltage limit acted on was to go below the lower one: one that the slew keeps from it is on its way there.
+/// Whether a row limited by voltage needs a voltage below the lower limit.
+/// A row that is also limited by slew moves towards its limit.
 fn below(drive: &Drive, row: usize) -> bool {
     let (low, high) = drive.limits;
     let volts = drive.voltage[row];
@@ -108,7 +109,7 @@ fn below(drive: &Drive, row: usize) -> bool {
 }
 
 impl Compensation {
-    /// Whether no limit held the drive anywhere.
+    /// Whether no row of the drive is limited.
     pub(super) fn is_unlimited(&self) -> bool {
         self.voltage_limited_rows == 0 && self.slew_limited_rows == 0
     }
@@ -151,31 +152,32 @@ impl Compensation {
             text::count(self.slew_limited_rows, "row")
         )];
         let (low, all) = (self.voltage_limited_low_rows, self.voltage_limited_rows);
-        // Where dynamics are inverted a quick part of a reference asks for more than the place that it goes to.
-        let quick = match self.bandwidth_hz {
-            Some(_) => "; where only quick parts do, round them off or lower --bandwidth",
+        // With inverted dynamics a fast part of the reference needs more voltage than its position.
+        let fast = match self.bandwidth_hz {
+            Some(_) => "; if only fast parts do, smooth them or reduce --bandwidth",
             None => "",
         };
         for (rows, what, end, advice) in [
-            (low, "less", self.limits.0, "shift it up, or shrink it about a higher middle"),
-            (all - low, "more", self.limits.1, "shift it down or shrink it"),
+            (low, "less", self.limits.0, "shift the reference up or reduce its amplitude"),
+            (all - low, "more", self.limits.1, "shift the reference down or reduce its amplitude"),
         ] {
             if rows > 0 {
                 lines.push(format!(
-                    "in {} the reference asks for {what} than {} {unit}: {advice}{quick}",
+                    "in {} the reference needs {what} than {} {unit}: {advice}{fast}",
                     text::count(rows, "row"),
                     short(end)
                 ));
             }
         }
-        // The range is that of a measured voltage: it ends a little beside the wanted one.
+        // The range is that of a measured voltage, which differs slightly from the commanded one.
         if self.extrapolated.largest > 1e-3 * (self.input.high - self.input.low) {
             let beyond = text::extrapolation("drive", &self.extrapolated, &self.input);
-            lines.push(format!("{beyond}: narrow --limit, or fit a wider record"));
+            lines.push(format!("{beyond}: narrow --limit or fit a record with a wider range"));
         }
         if self.slew_limited_rows > 0 {
             lines.push(
-                "where the slew is limited the actuator cannot follow: slow the reference down or shrink it".to_owned(),
+                "the actuator cannot follow where the slew is limited: slow the reference down or reduce its amplitude"
+                    .to_owned(),
             );
         }
         let lead = format!(
@@ -185,7 +187,7 @@ impl Compensation {
         );
         lines.push(match self.bandwidth_hz {
             Some(hz) => format!(
-                "{lead}; dynamics inverted up to {} Hz, to within {} there",
+                "{lead}; dynamics inverted up to {} Hz with an error of at most {}",
                 short(hz),
                 text::percent(100.0 * self.band_error)
             ),
@@ -194,15 +196,15 @@ impl Compensation {
         if let Some(missed) = &self.missed {
             let unit = text::symbol(&self.output_unit);
             let mut line = format!(
-                "with this drive the model itself misses the reference by {} {unit} RMS, {} at most (row {})",
+                "tracking error that the model predicts for this drive: {} {unit} RMS, {} at most (row {})",
                 short(missed.rmse),
                 short(missed.largest),
                 missed.row
             );
             if missed.settling_rows > 0 {
                 line += &format!(
-                    "; after {} of start-up (the actuator begins at rest) by {} {unit} RMS, {} at most",
-                    text::count(missed.settling_rows, "row"),
+                    "; after {} (the actuator starts from rest) {} {unit} RMS, {} at most",
+                    text::count(missed.settling_rows, "start-up row"),
                     short(missed.settled_rmse),
                     short(missed.settled_largest)
                 );
@@ -213,10 +215,13 @@ impl Compensation {
             let first = short(self.first);
             lines.push(match self.held_s {
                 None => format!(
-                    "the drive starts at {first} {unit}: ramp there first and hold; the model takes the actuator as settled at the first value"
+                    "the drive starts at {first} {unit}: ramp to this value and hold it first; the model assumes that the actuator \
+                     has settled there"
                 ),
                 Some(seconds) => format!(
-                    "before the reference began the device was ramped to {first} {unit} and held there for {seconds} s; the model takes the actuator as settled there, as after a ramp from rest: what creeps longer (--settle holds longer) and what earlier runs have left shows at first"
+                    "before the reference the device was ramped to {first} {unit} and held for {seconds} s; the model assumes that \
+                     the actuator has settled there after a ramp from rest. Slower creep (--settle holds longer) and the \
+                     history of earlier runs appear as an error at the start"
                 ),
             });
         }

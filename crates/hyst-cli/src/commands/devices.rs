@@ -1,4 +1,4 @@
-//! `hystctl devices`: what is connected. Nothing is sent, nothing moves.
+//! `devices`: lists serial ports and CAN interfaces. Nothing is sent, nothing moves.
 
 use hyst_hw::{Interface, Port, interfaces, ports};
 use serde::Serialize;
@@ -16,12 +16,12 @@ struct Found {
     what: String,
 }
 
-/// A CAN interface with all that it carries.
+/// Describes a CAN interface.
 fn can(interface: Interface) -> Found {
     let Interface { name, up, fd } = interface;
     let state = if up { "up" } else { "down" };
-    // That the interface can do FD does not say that the others on the bus can.
-    let kind = if fd { format!("CAN; with can:{name},fd in frames of CAN FD") } else { "CAN".to_owned() };
+    // FD is only offered: other nodes on the bus may not support it.
+    let kind = if fd { format!("CAN; can:{name},fd for CAN FD frames") } else { "CAN".to_owned() };
     Found { daq: format!("can:{name}"), what: format!("{kind}; {state}"), port: name }
 }
 
@@ -30,11 +30,12 @@ pub(super) fn run(args: &DevicesArgs) -> CommandResult {
         ports().into_iter().map(|Port { name, what }| Found { daq: format!("serial:{name}"), port: name, what });
     let found: Vec<Found> = serial.chain(interfaces().into_iter().map(can)).collect();
     let text = if found.is_empty() {
-        "no serial port and no CAN interface is connected\na device without one: sim:PLANT.toml (the simulated plant), tcp:HOST:PORT (a simulator or a bridge)"
+        "no serial port and no CAN interface found\ndevices without a port: sim:PLANT.toml (simulated plant), tcp:HOST:PORT \
+         (simulator or bridge)"
             .to_owned()
     } else {
         let rows = found.iter().map(|f| vec![f.daq.clone(), f.what.clone()]);
-        table(&std::iter::once(vec!["--daq".to_owned(), "what".to_owned()]).chain(rows).collect::<Vec<_>>())
+        table(&std::iter::once(vec!["--daq".to_owned(), "description".to_owned()]).chain(rows).collect::<Vec<_>>())
     };
     Report::new(args.json.json, &[])?.print(&text, &found)
 }

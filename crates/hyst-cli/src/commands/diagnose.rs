@@ -1,4 +1,4 @@
-//! `diagnose`: what a model lacks.
+//! `diagnose`: finds the missing effects of a model.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
     read.extend(args.test.as_deref());
     let written: Vec<&Target> = args.output.iter().chain(&args.findings).chain(&args.report).collect();
     output::check(&read, &written)?;
-    let said_as = Report::new(args.json.json, &written)?;
+    let report_to = Report::new(args.json.json, &written)?;
     let given = if is_auto { None } else { Some(input::model(&args.model)?) };
     let train = input::training(&args.train, &args.map)?;
     let test = args.test.as_ref().map(|path| input::record(path, &args.map, Need::InputAndOutput)).transpose()?;
@@ -45,15 +45,15 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
                 test.as_ref(),
                 &model,
                 &options,
-                &|doing| progress.say(doing),
+                &|doing| progress.set_message(doing),
                 &host::stopping(),
             )?;
             (model, text, diagnosis)
         }
         None => {
             let progress = Progress::spinner("fitting and diagnosing");
-            let tell = |doing: &str| progress.say(doing);
-            fitted_and_diagnosed(&train, test.as_ref(), None, &options, &tell, &host::stopping())?
+            let report = |doing: &str| progress.set_message(doing);
+            fitted_and_diagnosed(&train, test.as_ref(), None, &options, &report, &host::stopping())?
         }
     };
 
@@ -82,21 +82,21 @@ pub(super) fn run(args: &DiagnoseArgs) -> CommandResult {
         let page = report::page(&contents).map_err(CommandError::failed)?;
         target.write(|out| out.write_all(page.as_bytes()))?;
     }
-    let mut said = summary::of(findings, &next::advice(&contents));
+    let mut text = summary::of(findings, &next::advice(&contents));
     let same = diagnosis.extended == model;
-    let model_written = if same { "the same model, nothing was added" } else { "extended model" };
+    let model_written = if same { "unchanged model, no effect was added" } else { "extended model" };
     for (target, what) in [(&args.output, model_written), (&args.findings, "findings"), (&args.report, "report")] {
         if let Some(Target::File(path)) = target {
-            said.push_str(&format!("\n{what}: {}", path.display()));
+            text.push_str(&format!("\n{what}: {}", path.display()));
         }
     }
-    said_as.print(&said, findings)
+    report_to.print(&text, findings)
 }
 
-/// Name that stands for a model that is fitted here.
+/// Value of `--model` for a model that this command fits.
 const AUTO: &str = "auto";
 
-/// The kind that a name stands for; none for `auto`.
+/// Returns the kind of model with this name; `None` for `auto`.
 pub(crate) fn kind_of(name: &str) -> CommandResult<Option<Kind>> {
     match name {
         AUTO => Ok(None),
@@ -104,22 +104,24 @@ pub(crate) fn kind_of(name: &str) -> CommandResult<Option<Kind>> {
     }
 }
 
-/// A model that is fitted to the records, its file's text, and its diagnosis. Without a kind it is the one that explains the records best: another one
-/// is fitted once the diagnosis of the first says that it explains the record better with the same effects.
+/// Fits a model to the records and diagnoses it.
+/// Returns the model, the text of its file and the diagnosis.
+///
+/// Without a kind it fits pi, and then the base model that the diagnosis recommends, if it recommends one.
 pub(crate) fn fitted_and_diagnosed(
     train: &Record,
     test: Option<&Record>,
     kind: Option<Kind>,
     options: &DiagnoseOptions,
-    tell: &(dyn Fn(&str) + Sync),
+    report: &(dyn Fn(&str) + Sync),
     stop: &Stop,
 ) -> CommandResult<(Model, String, Diagnosis)> {
     let fitting = FitOptions { zero_per_record: options.zero == Zero::PerRecord, ..FitOptions::default() };
     let of = |kind: Kind| {
-        tell(&format!("fitting {kind}"));
+        report(&format!("fitting {kind}"));
         let mut watch = |_| if stop.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let model = fit_with(train, kind, &fitting, &mut watch)?.model;
-        let diagnosis = diagnose_until(train, test, &model, options, tell, stop)?;
+        let diagnosis = diagnose_until(train, test, &model, options, report, stop)?;
         let text = model.to_json();
         Ok::<_, CommandError>((model, text, diagnosis))
     };
@@ -130,22 +132,22 @@ pub(crate) fn fitted_and_diagnosed(
     }
 }
 
-/// Warns where the files are not what they should be for the figures to mean something.
+/// Prints notes about records that make the errors or the named effects unreliable.
 fn warn(model: &Model, train: &Record, test: Option<&Record>) {
     let fitted = |sha: &str| model.fitted_on.iter().any(|file| file.sha256 == sha);
-    let strange: Vec<&str> = train
+    let not_fitted: Vec<&str> = train
         .sources()
         .iter()
         .filter(|source| source.sha256.as_deref().is_some_and(|sha| !fitted(sha)))
         .map(|source| source.name.as_str())
         .collect();
-    if !strange.is_empty() {
-        let names = text::listed(&strange);
-        say(&format!("note: the model was not fitted to {names}; its misfit there may be called an effect"));
+    if !not_fitted.is_empty() {
+        let names = text::listed(&not_fitted);
+        say(&format!("note: the model was not fitted to {names}; its misfit there may be named as an effect"));
     }
     match test {
         Some(test) if model.was_fitted_to(test) || input::is_trained_on(test, train) => say(input::TRAINED_ON),
-        Some(test) => input::tell_repeated(test, train),
+        Some(test) => input::print_repeated(test, train),
         None => {}
     }
 }

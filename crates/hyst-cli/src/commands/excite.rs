@@ -1,4 +1,4 @@
-//! `excite`: drives with which to identify or test an actuator.
+//! `excite`: makes drives to identify or test an actuator.
 
 use hyst_ident::excite::{
     AmSine, DecayingSine, Drive, ExciteError, Forc, Identification, Limits, MinorLoops, Multisine, Peak, Phases,
@@ -13,7 +13,7 @@ use crate::text;
 
 mod separate;
 
-/// What is said about a drive.
+/// Report of a drive.
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     output: String,
@@ -21,9 +21,9 @@ struct Summary<'a> {
     rate_hz: f64,
     seconds: f64,
     segments: &'a [&'static str],
-    /// Steepest slope \[V/s\].
+    /// Maximum slope \[V/s\].
     steepest_v_per_s: f64,
-    /// Peak over root mean square of a multisine, without its fades.
+    /// Peak over RMS of a multisine, without its fades.
     #[serde(skip_serializing_if = "Option::is_none")]
     crest_factor: Option<f64>,
 }
@@ -50,17 +50,17 @@ pub(super) fn run(args: &ExciteArgs) -> CommandResult {
     report.print(&summary.text(), &summary)
 }
 
-/// What the arguments describe.
+/// Drive that the arguments describe.
 struct Made<'a> {
     common: &'a Common,
     drive: Result<Drive, ExciteError>,
     crest_factor: Option<f64>,
 }
 
-/// Rest between segments of one kind \[s\].
+/// Rest between segments of drives without an option for it \[s\].
 const REST: f64 = 1.0;
 
-/// Makes the drive, or gives back the arguments of a separation, which has a report of its own.
+/// Makes the drive; returns the arguments of `separate` as an error, because it has its own report.
 fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
     let limits = |c: &Common| Limits { rate_hz: c.rate, lo_v: c.low, hi_v: c.high, slew_v_per_s: c.slew };
     let (mut crest_factor, mut between) = (None, REST);
@@ -154,7 +154,7 @@ fn make(kind: &ExciteKind) -> Result<Made<'_>, &SeparateArgs> {
     Ok(Made { common, drive: Drive::new(&shapes, &limits(common), between), crest_factor })
 }
 
-/// The library's fields and the options that set them.
+/// Fields of the library and the options that set them.
 const OPTIONS: [(&str, &str); 25] = [
     ("modulation_hz", "--modulation"),
     ("slew_v_per_s", "--slew"),
@@ -183,7 +183,7 @@ const OPTIONS: [(&str, &str); 25] = [
     ("amplitude =", "--amplitudes ="),
 ];
 
-/// The message with the options' names instead of the fields'.
+/// Returns the error with names of options instead of names of fields.
 fn in_options(error: ExciteError) -> CommandError {
     let message = OPTIONS.iter().fold(error.to_string(), |text, (field, option)| text.replace(field, option));
     CommandError::new(Exit::BadInput, anyhow::anyhow!("{message}"))
@@ -193,7 +193,7 @@ impl Summary<'_> {
     fn text(&self) -> String {
         let crest = self.crest_factor.map_or_else(String::new, |crest| format!(", crest factor {crest:.2}"));
         format!(
-            "{}: {} at {} Hz, {} s, steepest slope {} V/s, {}: {}{crest}",
+            "{}: {} at {} Hz, {} s, maximum slope {} V/s, {}: {}{crest}",
             self.output,
             text::count(self.rows, "row"),
             self.rate_hz,

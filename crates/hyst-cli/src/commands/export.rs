@@ -1,4 +1,4 @@
-//! `export`: a model's parameters for a board.
+//! `export`: writes a model's parameters for firmware.
 
 use hyst_ident::export;
 
@@ -9,7 +9,7 @@ use crate::{input, output};
 /// Runs the command.
 pub(super) fn run(args: &ExportArgs) -> CommandResult {
     if args.name.is_some() && !matches!(args.format, ExportFormat::C) {
-        let message = "--name is for --format c; Rust source is called as its file, and a block has no name";
+        let message = "--name needs --format c: the name of Rust source is that of its file, and a block has none";
         return Err(CommandError::bad_input(message));
     }
     output::check(&[&args.model], &[&args.output])?;

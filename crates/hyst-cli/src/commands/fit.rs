@@ -1,4 +1,4 @@
-//! `fit`: a model of the hysteresis from records.
+//! `fit`: fits a hysteresis model to records.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ use crate::progress::Progress;
 use crate::report::next::{files, further, quoted};
 use crate::{input, text};
 
-/// What is said about a fit.
+/// Report of a fit.
 #[derive(Debug, Serialize)]
 struct Summary {
     model: &'static str,
@@ -42,37 +42,37 @@ struct Summary {
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     falls: bool,
     how: String,
-    /// How the drive goes on between samples.
+    /// Interpolation of the drive between samples.
     between_samples: BetweenSummary,
     seed: u64,
     evaluations: u64,
-    /// Standard errors, correlations and what the record does not determine.
+    /// Standard errors, correlations and undetermined parameters.
     estimate: Option<Estimate>,
-    /// How much the record says of each cell of a Preisach triangle, of each node of a mirror function.
+    /// How well the record determines the cells of a Preisach triangle or the nodes of a mirror function.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     tables: Vec<TableEstimate>,
-    /// How the searches ended, and how their costs scatter.
+    /// Ends and costs of the searches.
     trials: Option<TrialsSummary>,
-    /// What first-order descent curves show, with `--from fod`.
+    /// Everett surface from first-order descent curves, with `--from fod`.
     #[serde(skip_serializing_if = "Option::is_none")]
     surface: Option<FodReport>,
-    /// How the rate comes in, with `--model dpm`.
+    /// Rate dependence, with `--model dpm`.
     #[serde(skip_serializing_if = "Option::is_none")]
     dynamics: Option<DpmReport>,
     #[serde(skip)]
     input_unit: String,
     #[serde(skip)]
     seen: String,
-    /// The diagnosis of what was fitted.
+    /// Command that diagnoses the model.
     #[serde(skip)]
     next: Option<String>,
 }
 
-/// How the drive goes on between samples.
+/// Interpolation of the drive between samples.
 #[derive(Debug, Serialize)]
 struct BetweenSummary {
     taken: BetweenSamples,
-    /// RMSE of each way that was tried; empty if it was not a question.
+    /// RMSE of each interpolation that was tried; empty if none was compared.
     tried: Vec<TriedBetween>,
 }
 
@@ -82,7 +82,7 @@ struct TriedBetween {
     rmse: f64,
 }
 
-/// Searches with different draws.
+/// Searches with different random draws.
 #[derive(Debug, Serialize)]
 struct TrialsSummary {
     count: usize,
@@ -90,11 +90,11 @@ struct TrialsSummary {
     stopped: Vec<Stopped>,
 }
 
-/// The hysteresis in a few numbers.
+/// Main numbers of the hysteresis.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 enum BaseSummary {
-    /// `p0` is the gain of the part without hysteresis.
+    /// Prandtl-Ishlinskii: `p0` is the gain of the part without hysteresis.
     Pi { p0: f64, plays: usize, plays_with_weight: usize },
     /// Cells of the Preisach triangle.
     Preisach { cells: usize, cells_with_density: usize },
@@ -115,7 +115,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     let doing = format!("fitting {} to {}", args.model, text::count(record.rows(), "row"));
     let progress = Progress::spinner(&doing);
     let Identified { fit, surface, dynamics } = identify(args, &record, &options, &|done, budget| {
-        progress.say(&format!("{doing}: {done} of at most {budget} evaluations"));
+        progress.set_message(&format!("{doing}: {done} of at most {budget} evaluations"));
     })?;
     convergence::check(args, &fit)?;
     let Fit { model, how, estimate, tables, trials, evaluations, between_samples } = fit;
@@ -132,7 +132,7 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     notes.iter().for_each(|note| output::say(note));
     if args.model == Kind::Preisach && args.from.is_none() && shows_only_curves(&record) {
         output::say(
-            "note: this record holds first-order descent curves only; --from fod measures the Everett surface itself",
+            "note: this record has only first-order descent curves; --from fod measures the Everett surface directly",
         );
     }
     let summary = Summary {
@@ -172,35 +172,33 @@ pub(super) fn run(args: &FitArgs) -> CommandResult {
     report.print(&summary.text(), &summary)
 }
 
-/// A model and what was found on the way to it.
+/// A fitted model with the reports of its identification.
 struct Identified {
     fit: Fit,
     surface: Option<FodReport>,
     dynamics: Option<DpmReport>,
 }
 
-/// Identifies what was asked for; `tell` is told of evaluations done and of their budget.
+/// Identifies the model; `report` receives the number of evaluations so far and its maximum.
 fn identify(
     args: &FitArgs,
     record: &Record,
     options: &FitOptions,
-    tell: &dyn Fn(u64, u64),
+    report: &dyn Fn(u64, u64),
 ) -> CommandResult<Identified> {
     let fod = args.from == Some(FitFrom::Fod);
     if fod && args.model != Kind::Preisach {
         let message = format!(
-            "--from fod makes an Everett surface, which {} is not: give --model preisach (dpm finds descent curves by itself)",
+            "--from fod does not apply to {}; give --model preisach (dpm detects descent curves without this option)",
             args.model
         );
         return Err(CommandError::bad_input(message));
     }
     if args.as_measured && !fod {
-        return Err(CommandError::bad_input("--as-measured is about a measured surface; add --from fod"));
+        return Err(CommandError::bad_input("--as-measured needs a measured surface; add --from fod"));
     }
     if fod && !options.convex() {
-        return Err(CommandError::bad_input(
-            "--from fod reads the surface off the curves, there is nothing to search: leave --optimizer out",
-        ));
+        return Err(CommandError::bad_input("--from fod measures the surface without a search; leave --optimizer out"));
     }
     if fod {
         let options = FodOptions { as_measured: args.as_measured, seed: options.seed, cells: None };
@@ -214,13 +212,13 @@ fn identify(
         return Ok(Identified { fit: found.into(), surface: None, dynamics });
     }
     let fit = fit_with(record, args.model, options, &mut |p| {
-        tell(p.evaluations, p.budget);
+        report(p.evaluations, p.budget);
         host::going()
     })?;
     Ok(Identified { fit, surface: None, dynamics: None })
 }
 
-/// What the record looks like: a slip of a unit shows here.
+/// Describes the record in a line, in which a wrong unit is visible.
 fn seen(record: &Record, model: &Model) -> String {
     let (time, periods) = (record.time(), record.sample_periods());
     let active: f64 = record.segments().iter().zip(&periods).map(|(rows, period)| rows.len() as f64 * period).sum();
@@ -262,7 +260,7 @@ impl Summary {
     fn text(&self) -> String {
         let unit = text::symbol(&self.unit);
         let mut lines = vec![format!(
-            "{} fitted to {} ({} settling): {}",
+            "{} fitted to {} (start-up rows: {}): {}",
             self.model,
             text::count(self.rows, "row"),
             self.settling_rows,
@@ -273,26 +271,26 @@ impl Summary {
         lines.extend(self.base.as_ref().map(|base| match base {
             BaseSummary::Pi { p0, plays, plays_with_weight } => {
                 format!(
-                    "p0 {} {unit}/{}, {plays_with_weight} of {plays} plays with weight",
+                    "linear gain p0 {} {unit}/{}, {plays_with_weight} of {plays} play operators with a weight",
                     text::short(*p0),
                     self.input_unit
                 )
             }
             BaseSummary::Preisach { cells, cells_with_density } => {
-                format!("{cells_with_density} of {cells} cells with density")
+                format!("{cells_with_density} of {cells} cells with a density")
             }
         }));
         lines.extend(self.surface.as_ref().map(|s| surface::measured(s, unit)));
         lines.extend(self.dynamics.as_ref().map(|d| surface::dynamics(d, unit, &self.input_unit)));
         lines.push(format!("sensor zero {} {unit}", text::short(self.sensor_zero)));
         if self.falls {
-            lines.push("negative gain: the output falls where the input rises".to_owned());
+            lines.push("negative gain: the output falls while the input rises".to_owned());
         }
         lines.push(self.how.clone());
         lines.extend(self.between_samples.text(unit));
         if let Some(TrialsSummary { count, costs: Some(costs), .. }) = self.trials.as_ref().filter(|t| t.count > 1) {
             lines.push(format!(
-                "{count} trials: what they left from {} to {}, median {} {unit}",
+                "{count} trials: RMS residual from {} to {}, median {} {unit}",
                 text::short(costs.lowest),
                 text::short(costs.highest),
                 text::short(costs.median)
@@ -302,25 +300,26 @@ impl Summary {
         lines.extend(self.tables.iter().map(text::known));
         if matches!(self.base, Some(BaseSummary::Pi { .. } | BaseSummary::Preisach { .. })) {
             lines.push(
-                "(neighbouring plays and cells stand in for one another: what the record does not say of each alone does not harm predictions within its range)"
+                "(neighbouring play operators or cells can replace each other: undetermined ones do not impair predictions within the \
+                 range of the record)"
                     .to_owned(),
             );
         }
-        lines.extend(self.next.iter().map(|command| format!("next, what the model lacks: {command}")));
+        lines.extend(self.next.iter().map(|command| format!("next, find missing effects: {command}")));
         lines.join("\n")
     }
 }
 
 impl BetweenSummary {
-    /// What was taken and why, if it was a question.
+    /// Returns a line about the interpolations that were compared, if there were any.
     fn text(&self, unit: &str) -> Option<String> {
-        let left = |t: &TriedBetween| format!("{} leaves {} {unit}", t.between_samples, text::short(t.rmse));
-        let left: Vec<String> = self.tried.iter().map(left).collect();
-        (!left.is_empty()).then(|| format!("drive between samples: {}, taken: {}", left.join(", "), self.taken))
+        let tried = |t: &TriedBetween| format!("{} RMSE {} {unit}", t.between_samples, text::short(t.rmse));
+        let tried: Vec<String> = self.tried.iter().map(tried).collect();
+        (!tried.is_empty()).then(|| format!("drive between samples: {}; taken: {}", tried.join(", "), self.taken))
     }
 }
 
-/// Parameters with their standard errors, and what the record does not say.
+/// Returns the parameters with their standard errors, and what the record does not determine.
 fn parameters(estimate: &Estimate) -> String {
     let mut lines = Vec::new();
     let width = estimate.parameters.iter().map(|p| p.name.len()).max().unwrap_or(0);
@@ -328,18 +327,18 @@ fn parameters(estimate: &Estimate) -> String {
         let what = match p.determined {
             Determined::Yes => "",
             Determined::NearZero => "  (zero within its error)",
-            Determined::Together => "  (known only together with others)",
+            Determined::Together => "  (determined only together with others)",
             Determined::No => "  (NOT determined by this record)",
         };
         lines.push(format!("  {:width$}  {} ± {}{what}", p.name, text::short(p.value), text::short(p.std_error)));
     }
     if !estimate.held.is_empty() {
-        lines.push(format!("  held at a bound: {}", text::listed(&estimate.held)));
+        lines.push(format!("  at a bound: {}", text::listed(&estimate.held)));
     }
     for TradeOff { changes, std_error } in estimate.trade_offs.iter().take(3) {
         let part = |(name, share): &(String, f64)| format!("{name} {share:+.2}");
         lines.push(format!(
-            "  free by {}: {} together leave no trace",
+            "  undetermined to {}: the joint change {} hardly changes the prediction",
             text::percent(100.0 * std_error),
             changes.iter().map(part).collect::<Vec<_>>().join(", ")
         ));

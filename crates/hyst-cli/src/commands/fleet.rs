@@ -1,4 +1,4 @@
-//! `fleet`: many actuators, each fitted and diagnosed, as one table and one page.
+//! `fleet`: fits and diagnoses many actuators; writes one table and one page.
 
 use std::io;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,14 +18,14 @@ use crate::output::{self, Report, Target};
 use crate::progress::Progress;
 use crate::{host, text};
 
-/// What is said about a fleet.
+/// Report of a fleet.
 #[derive(Debug, Serialize)]
 struct Summary {
     actuators: usize,
-    /// Done in this call and in earlier ones.
+    /// Actuators finished by this call and earlier ones.
     done: usize,
     failed: usize,
-    /// Done by earlier calls.
+    /// Actuators finished by earlier calls.
     kept: usize,
     seconds: f64,
     output: String,
@@ -33,8 +33,8 @@ struct Summary {
     page: Option<String>,
 }
 
-/// How long the bar stands still at most.
-const LOOK: Duration = Duration::from_millis(200);
+/// Maximum interval between updates of the progress bar.
+const BAR_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Runs the command.
 pub(super) fn run(args: &FleetArgs) -> CommandResult {
@@ -60,22 +60,22 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
     let in_journal = |error: io::Error| CommandError::bad_input(format!("{}: {error}", place.display()));
     let mut journal = Journal::open(&place).map_err(in_journal)?;
     let began = Instant::now();
-    let bar = Progress::bar("looking at files", all.len());
+    let bar = Progress::bar("checking files", all.len());
     let due = fleet::due(&all, &journal, &options, &mut |k| bar.at(k));
     drop(bar);
     let kept = all.len() - due.len();
     if kept > 0 {
-        output::say(&format!("note: {} done already, by {}", text::count(kept, "actuator"), place.display()));
+        output::say(&format!("note: {} already finished, see {}", text::count(kept, "actuator"), place.display()));
     }
     let jobs = args.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    let lost = work(&due, &options, jobs, &mut |row| journal.add(row));
-    // What is done is shown in any case.
+    let journaled = work(&due, &options, jobs, &mut |row| journal.add(row));
+    // The finished actuators are written even if the journal failed.
     output.write(|out| table::write(out, &journal, &all))?;
     if let Some(target) = &summary {
         let html = page::page(&page::title(&args.records), &journal, &all)?;
         target.write(|out| out.write_all(html.as_bytes()))?;
     }
-    lost.map_err(in_journal)?;
+    journaled.map_err(in_journal)?;
     let (done, failed) = journal.count(&all);
     let summary = Summary {
         actuators: all.len(),
@@ -89,23 +89,23 @@ pub(super) fn run(args: &FleetArgs) -> CommandResult {
     };
     report.print(&summary.text(), &summary)?;
     if host::stopping().is_stopped() {
-        Err(CommandError::failed("stopped; the same command continues"))
+        Err(CommandError::failed("stopped; run the same command again to continue"))
     } else {
         Ok(())
     }
 }
 
-/// Does what is due, a thread for each job, and gives each row to `keep` as it comes.
+/// Processes the actuators that are due, with one thread for each job, and passes each row to `keep`.
 fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row) -> io::Result<()>) -> io::Result<()> {
     let (next, stop) = (AtomicUsize::new(0), host::stopping());
     let lost = Stop::default();
     let bar = Progress::bar("diagnosing", due.len());
-    let (rows, came) = channel();
+    let (rows, finished) = channel();
     thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, due.len().max(1)) {
             let (rows, next, stop, lost) = (rows.clone(), &next, &stop, &lost);
             scope.spawn(move || {
-                // An actuator has one thread: more of them side by side waste nothing on waiting for one another.
+                // Each actuator is processed by one thread: several actuators in parallel need no synchronisation.
                 let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return };
                 while let Some(entry) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let row = pool.install(|| one::row(entry, options, stop));
@@ -119,7 +119,7 @@ fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row
         let mut done = 0;
         let mut kept = Ok(());
         loop {
-            match came.recv_timeout(LOOK) {
+            match finished.recv_timeout(BAR_INTERVAL) {
                 Ok(row) => {
                     done += 1;
                     bar.at(done);
@@ -139,7 +139,7 @@ fn work(due: &[Entry], options: &Options, jobs: usize, keep: &mut dyn FnMut(&Row
 impl Summary {
     fn text(&self) -> String {
         let mut lines = vec![format!(
-            "{} of {} done ({} in this call, in {} s), {} without a diagnosis",
+            "{} of {} finished ({} in this call, in {} s), {} without a diagnosis",
             self.done,
             text::count(self.actuators, "actuator"),
             self.done - self.kept.min(self.done),

@@ -1,4 +1,4 @@
-//! `force`: an external force without a force sensor.
+//! `force`: estimates an external force without a force sensor.
 
 use hyst_ident::force::{ForceOptions, Free, estimate_force};
 use hyst_ident::metrics::Errors;
@@ -16,7 +16,7 @@ use crate::{input, text};
 /// Column of the estimate.
 const COLUMN: &str = "estimated_force_n";
 
-/// What is said about an estimate.
+/// Report of an estimate.
 #[derive(Debug, Serialize)]
 struct Summary {
     record: String,
@@ -27,11 +27,11 @@ struct Summary {
     kappa: f64,
     /// \[output unit\]
     chi: f64,
-    /// Rows that κ and χ follow from.
+    /// Number of rows without a force, from which κ and χ are computed.
     free_rows: usize,
     lowest_n: f64,
     highest_n: f64,
-    /// Against the record's `load_n`; none without it.
+    /// Errors against the record's `load_n`; `None` without it.
     errors: Option<Errors>,
     extrapolated: Extrapolated,
     #[serde(skip)]
@@ -54,7 +54,7 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
     };
     let own = model.effects.load.as_ref().filter(|load| load.per_newton > 0.0).map(|load| 1.0 / load.per_newton);
     let stiffness = args.kout.or(own).ok_or_else(|| {
-        CommandError::bad_input("--kout is needed: the model has no compliance that the stiffness could follow from")
+        CommandError::bad_input("the stiffness is unknown, because the model has no compliance; give --kout")
     })?;
     let temperature = input::temperature(args.temperature, &model, &record);
     let estimated = estimate_force(&model, &record, &ForceOptions { stiffness, free, temperature })
@@ -64,13 +64,10 @@ pub(super) fn run(args: &ForceArgs) -> CommandResult {
     let extra = [Extra::numbers(COLUMN, &estimated.force)];
     args.output.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     if !replaced.is_empty() {
-        say(&format!(
-            "note: {} has {COLUMN} already; in the output this estimate stands in its place",
-            args.record.display()
-        ));
+        say(&format!("note: {} already has {COLUMN}; the output has this estimate instead", args.record.display()));
     }
     if model.effects.names().contains(&Effect::Load) {
-        say("note: the model's compliance is left out: what it explains is what is looked for");
+        say("note: the model's compliance is not used, because it would explain the force that is estimated");
     }
     if estimated.extrapolated.rows > 0 {
         let beyond = text::extrapolation("input", &text::from_one(estimated.extrapolated), &model.input);
@@ -115,7 +112,8 @@ impl Summary {
                 text::count(self.free_rows, "row")
             )
         } else {
-            "κ = 1, χ = 0: a gain or zero that has changed since the fit shows as a force; --free or --free-until takes it out".to_owned()
+            "κ = 1, χ = 0: a change of gain or zero since the fit appears as a force; --free or --free-until corrects it"
+                .to_owned()
         });
         lines.extend(self.errors.as_ref().map(|errors| {
             let (rmse, share) = (short(errors.rmse), text::percent(errors.nrmse_percent));

@@ -1,4 +1,4 @@
-//! `gain`: gain and phase of sines over amplitude and frequency.
+//! `gain`: measures gain and phase of sines over amplitude and frequency.
 
 use hyst_ident::Samples;
 use hyst_ident::linear::{GainPoint, gain_map};
@@ -9,7 +9,7 @@ use crate::exit::CommandResult;
 use crate::output::{self, Report, Target, say};
 use crate::{input, text};
 
-/// What is said about a gain map.
+/// Report of a gain map.
 #[derive(Debug, Serialize)]
 struct Summary {
     unit: String,
@@ -30,17 +30,17 @@ pub(super) fn run(args: &GainArgs) -> CommandResult {
     if let Some(target) = &args.output {
         target.write(|out| csv(out, &summary.points))?;
     }
-    let mut said = summary.text();
+    let mut text = summary.text();
     let absent = |segment: &usize| summary.points.iter().all(|p| p.segment != *segment);
     let left_out: Vec<String> = (0..record.segments().len()).filter(absent).map(|s| s.to_string()).collect();
     if !left_out.is_empty() {
         let which = text::listed(&left_out);
-        say(&format!("note: no three cycles of a sine in {}: {which}", text::count(left_out.len(), "segment")));
+        say(&format!("note: fewer than three cycles of a sine in {}: {which}", text::count(left_out.len(), "segment")));
     }
     if let Some(Target::File(path)) = &args.output {
-        said.push_str(&format!("\npoints: {}", path.display()));
+        text.push_str(&format!("\npoints: {}", path.display()));
     }
-    report.print(&said, &summary)
+    report.print(&text, &summary)
 }
 
 fn csv(out: &mut dyn std::io::Write, points: &[GainPoint]) -> std::io::Result<()> {

@@ -1,4 +1,4 @@
-//! `loop`: a loop before and after the structure's phase and gain are removed.
+//! `loop`: measures a loop before and after phase and gain of the structure are removed.
 
 use hyst_ident::linear::{CorrectedLoop, LoopFigures, corrected_loop};
 use hyst_ident::record::Need;
@@ -9,7 +9,7 @@ use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Report, Target};
 use crate::{input, text};
 
-/// What is said about a loop.
+/// Report of a loop.
 #[derive(Debug, Serialize)]
 struct Summary {
     record: String,
@@ -37,7 +37,7 @@ pub(super) fn run(args: &LoopArgs) -> CommandResult {
             let reference = input::record(path, &args.map, Need::Output)?;
             if reference.rows() != record.rows() || reference.output_unit() != record.output_unit() {
                 let message = format!(
-                    "{}: a reference for {} has {} of the same unit; this one has {}",
+                    "{}: the reference for {} needs {} of the same unit, but has {}",
                     path.display(),
                     args.record.display(),
                     text::count(record.rows(), "row"),
@@ -67,11 +67,11 @@ pub(super) fn run(args: &LoopArgs) -> CommandResult {
         raw: found.raw,
         corrected: found.corrected,
     };
-    let mut said = summary.text();
+    let mut text = summary.text();
     if let Some(Target::File(path)) = &args.output {
-        said.push_str(&format!("\nloop: {}", path.display()));
+        text.push_str(&format!("\nloop: {}", path.display()));
     }
-    report.print(&said, &summary)
+    report.print(&text, &summary)
 }
 
 fn csv(out: &mut dyn std::io::Write, found: &CorrectedLoop) -> std::io::Result<()> {
@@ -84,17 +84,17 @@ fn csv(out: &mut dyn std::io::Write, found: &CorrectedLoop) -> std::io::Result<(
 
 impl Summary {
     fn text(&self) -> String {
-        let head = ["", "loop width", "RMS from a line"].map(str::to_owned).to_vec();
+        let head = ["", "loop width", "RMS deviation from a line"].map(str::to_owned).to_vec();
         let row = |name: &str, figures: &LoopFigures| {
             vec![name.to_owned(), text::percent(figures.width_percent), text::percent(figures.rmse_percent)]
         };
         let rows = [
             head,
             row("as measured", &self.raw),
-            row(&format!("without {} deg and the gain", self.phase_deg), &self.corrected),
+            row(&format!("without {} deg phase and gain", self.phase_deg), &self.corrected),
         ];
         format!(
-            "{}: {} of {} Hz over {}, of the output's span\n{}",
+            "{}: {} of {} Hz over {}; percentages of the output's span\n{}",
             self.record,
             text::count(self.cycles, "cycle"),
             text::short(self.hz),

@@ -1,4 +1,4 @@
-//! `info`: what a file holds, what may be wrong with it, and what to type next.
+//! `info`: shows what a file holds, its possible problems, and the next command.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -20,19 +20,19 @@ use crate::output::Report;
 use crate::report::next::{further, quoted};
 use crate::{input, text};
 
-/// A channel, as `--json` tells it.
+/// A channel in the report.
 #[derive(Debug, Serialize)]
 struct ChannelSummary {
     name: String,
-    /// What the record takes it for.
+    /// Column of the record that it is read as.
     role: Option<&'static str>,
-    /// The unit that the file states.
+    /// Unit stated by the file.
     unit: Option<&'static str>,
-    /// The unit that `--map` states instead.
+    /// Unit stated by `--map`, which replaces that of the file.
     mapped_unit: Option<&'static str>,
-    /// How many of that unit one of the file's numbers is, if `--map` says so.
+    /// Factor from the numbers of the file to `mapped_unit`, if `--map` has one.
     scale: Option<f64>,
-    /// Whether the unit is stated elsewhere in the file than in the channel's name.
+    /// Whether the file states the unit outside the name of the channel.
     #[serde(skip)]
     unit_outside_name: bool,
     rows: usize,
@@ -43,16 +43,16 @@ struct ChannelSummary {
     resolution: f64,
 }
 
-/// What the record is.
+/// The record in the report.
 #[derive(Debug, Serialize)]
 struct RecordSummary {
     rows: usize,
     sample_rate_hz: f64,
     seconds: f64,
     segments: usize,
-    /// Whether the times were uneven, and the values are interpolated at even ones; a note has the size of the jitter.
+    /// Whether uneven times were resampled to an even grid; a note has the size of the jitter.
     resampled: bool,
-    /// Where the times come from.
+    /// Source of the times.
     times: Option<String>,
     input: Option<String>,
     output: Option<&'static str>,
@@ -60,7 +60,7 @@ struct RecordSummary {
     load: bool,
     /// White noise of the output, standard deviation \[output unit\].
     noise: Option<f64>,
-    /// The same as a share of the output's span.
+    /// `noise` as a share of the output's span.
     noise_share: Option<f64>,
 }
 
@@ -70,11 +70,11 @@ struct Summary {
     format: String,
     channels: Vec<ChannelSummary>,
     record: Option<RecordSummary>,
-    /// Why the channels are no record yet, and what to type.
+    /// Reason why the channels are not a record, and what to type.
     missing: Option<String>,
-    /// What may be wrong with the record.
+    /// Possible problems of the record.
     warnings: Vec<String>,
-    /// What is done to read the record.
+    /// What was done to read the record.
     notes: Vec<String>,
     next: Option<String>,
     #[serde(skip)]
@@ -88,14 +88,14 @@ pub(super) fn run(args: &InfoArgs) -> CommandResult {
     let summary = summary(args, survey);
     let report = Report::new(args.json.json, &[])?;
     report.print(&summary.text(), &summary)?;
-    // Columns that cannot be used are bad input for whatever comes next, but they were looked at.
+    // A file without channels is bad input. Channels that are not a record yet are a valid result of `info`.
     match (summary.channels.is_empty(), &summary.missing) {
         (true, Some(why)) => Err(CommandError::bad_input(why.clone())),
         _ => Ok(()),
     }
 }
 
-/// What a map may say instead of V, µm and s.
+/// Columns and factors of `--map` for units other than V, µm and s.
 const OTHER_UNITS: &str = "displacement_nm, displacement_mm, force_n, time_ms, time_us, and 0.001*COLUMN for mV";
 
 fn summary(args: &InfoArgs, survey: Survey) -> Summary {
@@ -107,23 +107,22 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
             (
                 None,
                 Some(format!(
-                    "{problems}. If columns and units are right, continue as below; --map also takes {OTHER_UNITS}"
+                    "{problems}. If columns and units are right, run the command below; --map also takes {OTHER_UNITS}"
                 )),
                 Some(next),
             )
         }
         Err(error) => (None, Some(error.to_string()), None),
     };
-    let mut warnings: Vec<String> = survey.channels.iter().filter_map(never_moves).collect();
+    let mut warnings: Vec<String> = survey.channels.iter().filter_map(constant).collect();
     let text = |(name, cell): &(String, String)| format!("\"{name}\" is not read: it holds text (\"{cell}\")");
     warnings.extend(survey.texts.iter().map(text));
-    warnings.extend(record.iter().flat_map(input::oddities));
-    // The table of channels says already what is read as what.
-    let told = |note: &&String| {
-        // A warning says more of a log that was cut off.
+    warnings.extend(record.iter().flat_map(input::warnings));
+    let is_shown = |note: &&String| {
+        // The table shows the roles of the channels, and a warning has more about a log that was cut off.
         (!note.contains(" is read as ") || note.contains("converted")) && !note.starts_with("the log was cut off")
     };
-    let notes = record.iter().flat_map(|record| record.notes().iter().filter(told).cloned()).collect();
+    let notes = record.iter().flat_map(|record| record.notes().iter().filter(is_shown).cloned()).collect();
     let options = further(&input::columns(&args.map));
     let next = match &record {
         Some(record) if cannot_be_fitted(record) => None,
@@ -151,7 +150,7 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
         picture: record.as_ref().map(picture).unwrap_or_default(),
         record: record.as_ref().map(|record| of_record(record, times.clone())),
         missing: missing.map(|why| match &times {
-            Some(times) if record.is_none() => format!("{why}. Times are known from {times}"),
+            Some(times) if record.is_none() => format!("{why}. Times come from {times}"),
             _ => why,
         }),
         warnings,
@@ -160,16 +159,16 @@ fn summary(args: &InfoArgs, survey: Survey) -> Summary {
     }
 }
 
-/// Whether a record has input and output, and a fit refuses it because one of them never moves.
+/// Whether a record has input and output, but one of them is constant, so that a fit refuses it.
 fn cannot_be_fitted(record: &Record) -> bool {
-    !record.input().is_empty() && record.output().is_some() && input::refuse_still(record).is_err()
+    !record.input().is_empty() && record.output().is_some() && input::refuse_constant(record).is_err()
 }
 
-fn never_moves(channel: &Channel) -> Option<String> {
+fn constant(channel: &Channel) -> Option<String> {
     let (low, high) = channel.range?;
     (low == high).then(|| {
         format!(
-            "\"{}\" never moves: it is {} throughout; as an input or output it cannot be fitted",
+            "\"{}\" is constant, {} in every row; it cannot be fitted as an input or output",
             channel.name,
             text::short(low)
         )
@@ -202,7 +201,7 @@ fn of_record(record: &Record, times: Option<String>) -> RecordSummary {
     }
 }
 
-/// What to type next with this record.
+/// Returns the next command for this record.
 fn next(file: &str, record: &Record, options: &str) -> Option<String> {
     let model = Path::new(file).file_stem().map_or("model".into(), |stem| stem.to_string_lossy());
     let model = quoted(&format!("{model}-pi.json"));
@@ -217,10 +216,10 @@ fn next(file: &str, record: &Record, options: &str) -> Option<String> {
 
 /// Width and height of the picture \[characters\].
 const PICTURE: (u16, u16) = (64, 18);
-/// Points of the picture.
-const POINTS: usize = 20_000;
+/// Maximum number of points of the picture.
+const MAX_POINTS: usize = 20_000;
 
-/// The loop of output over input, or one of them over time, in dots.
+/// Returns a plot of output over input, or of one of them over time, as text.
 fn picture(record: &Record) -> String {
     let time = record.time();
     let (x, y, names) = match (record.input(), record.output()) {
@@ -230,7 +229,7 @@ fn picture(record: &Record) -> String {
         (_, Some(y)) => (time, y, ("time_s", record.output_unit().map_or("", |unit| unit.column()))),
         (u, None) => (time, u, ("time_s", record.input_column())),
     };
-    let step = x.len().div_ceil(POINTS).max(1);
+    let step = x.len().div_ceil(MAX_POINTS).max(1);
     let spiked: HashSet<usize> = spikes_of(record).iter().map(|spike| spike.row).collect();
     let points: Vec<(f64, f64)> =
         (0..x.len()).step_by(step).filter(|k| !spiked.contains(k)).map(|k| (x[k], y[k])).collect();
@@ -253,7 +252,7 @@ fn picture(record: &Record) -> String {
     };
     let lines: Vec<String> = (0..PICTURE.1).map(line).collect();
     format!(
-        "  {} up, {} to {}\n{}\n  {} across, {} to {}",
+        "  vertical: {}, {} to {}\n{}\n  horizontal: {}, {} to {}",
         names.1,
         text::short(up[0]),
         text::short(up[1]),
@@ -264,7 +263,7 @@ fn picture(record: &Record) -> String {
     )
 }
 
-/// A resolution; of doubles it is often so small that zeros would have to be counted.
+/// Formats a resolution; the resolution of doubles is often very small and is written with an exponent.
 fn resolution(step: f64) -> String {
     if step > 0.0 && step < 1e-4 { format!("{step:.1e}") } else { text::short(step) }
 }
@@ -275,7 +274,7 @@ impl Summary {
         let wide = self.channels.iter().map(|c| c.name.chars().count()).max().unwrap_or(0).clamp(7, 40);
         lines.push(format!(
             "  {:wide$}  {:11}  {:>8}  {:>11}  {:>11}  {:>12}  {:>8}  {:>7}",
-            "channel", "read as", "unit", "min", "max", "finest step", "rows", "missing"
+            "channel", "read as", "unit", "min", "max", "resolution", "rows", "missing"
         ));
         for c in &self.channels {
             let number = |value: Option<f64>| value.map_or("-".to_owned(), text::short);
@@ -301,11 +300,10 @@ impl Summary {
             lines.push("  * from --map, not from the file".to_owned());
         }
         if self.channels.iter().any(|c| c.unit_outside_name) {
-            lines
-                .push("  units come from the header, a row of units or attributes where a name states none".to_owned());
+            lines.push("  units that are not in a name come from the header, a row of units or attributes".to_owned());
         }
         if self.channels.len() == MAX_CHANNELS {
-            lines.push(format!("  (the first {MAX_CHANNELS})"));
+            lines.push(format!("  (only the first {MAX_CHANNELS} channels)"));
         }
         lines.push(String::new());
         if let Some(record) = &self.record {
@@ -315,7 +313,7 @@ impl Summary {
                 text::short(record.seconds),
                 text::count(record.segments, "segment"),
                 text::short(record.sample_rate_hz),
-                if record.resampled { "uneven (note below)" } else { "even to within their rounding" }
+                if record.resampled { "uneven (note below)" } else { "even within rounding" }
             ));
             let uses = [
                 ("times from", record.times.as_deref()),
@@ -329,7 +327,7 @@ impl Summary {
             if let (Some(noise), Some(share), Some(column)) = (record.noise, record.noise_share, record.output) {
                 let unit = OutputUnit::of_column(column).map_or("", OutputUnit::symbol);
                 lines.push(format!(
-                    "white noise of the output: {} {unit} rms, {} of its span",
+                    "white noise of the output: {} {unit} RMS, {} of its span",
                     text::short(noise),
                     text::percent(100.0 * share)
                 ));
@@ -338,7 +336,7 @@ impl Summary {
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         match (self.warnings.as_slice(), &self.record) {
             ([], Some(_)) => {
-                let notes = if self.notes.is_empty() { "" } else { "; the notes say what was done to read the file" };
+                let notes = if self.notes.is_empty() { "" } else { "; the notes show what was done to read the file" };
                 let mapped = self.channels.iter().any(|c| c.mapped_unit.is_some());
                 let units = if mapped { "; units marked * are from --map" } else { "" };
                 lines.push(format!("warnings: none{notes}{units}"));
@@ -350,11 +348,11 @@ impl Summary {
         }
         lines.extend(self.missing.iter().flat_map(|why| [String::new(), format!("not a record yet: {why}")]));
         if self.missing.is_some() && self.next.is_some() {
-            lines.push("rates, noise and further warnings follow once columns and units are known".to_owned());
+            lines.push("sample rate, noise and further warnings need known columns and units".to_owned());
         }
         lines.extend(self.next.iter().flat_map(|next| [String::new(), format!("next: {next}")]));
         if self.next.as_ref().is_some_and(|next| next.contains("MODEL.json")) {
-            lines.push("(MODEL.json is what hystctl fit writes)".to_owned());
+            lines.push("(MODEL.json is a model file written by hystctl fit)".to_owned());
         }
         lines.join("\n")
     }

@@ -1,4 +1,4 @@
-//! `learn`: the drive of a reference that repeats, improved pass by pass.
+//! `learn`: improves the drive of a repeated reference pass by pass.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,24 +15,24 @@ use super::run::interrupt;
 use super::run::job::{Followed, Job};
 use super::run::play::{self, Played};
 use crate::cli::LearnArgs;
-use crate::device::{AnyDevice, Wishes};
+use crate::device::{AnyDevice, DeviceOptions};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target, say};
 use crate::progress::Progress;
 use crate::{recording, text};
 
-/// How often a pass is played again in which the device had no next value in time.
-const REPLAYS: u32 = 4;
+/// Maximum number of repetitions of a pass in which the device did not receive a value in time.
+const MAX_REPLAYS: u32 = 4;
 
-/// An effect that the passes show.
+/// A missing effect that the passes show.
 #[derive(Debug, Serialize)]
 struct Found {
     effect: &'static str,
     probability: f64,
 }
 
-/// What is said about learning.
+/// Report of learning.
 #[derive(Debug, Serialize)]
 struct Summary {
     device: String,
@@ -43,21 +43,23 @@ struct Summary {
     /// The best pass, from 1.
     best: usize,
     ended: Ended,
-    /// Root mean square of what differs from play to play, as known after the first pass and after the last one \[output unit\].
+    /// RMS of the difference between plays of one drive \[output unit\].
+    /// Estimated after the first pass and after the last pass.
     repeatability_estimate: f64,
     repeatability: f64,
-    /// By how much the error of the best pass is smaller than that of the first one.
+    /// RMS error of the first pass over that of the best pass.
     improvement: f64,
-    /// Root mean square and largest value of the correction, reference less what the model predicts for the drive \[output unit\].
+    /// RMS and maximum of the correction \[output unit\].
+    /// The correction is the reference minus the model's prediction for the drive.
     correction_rms: f64,
     correction_max_abs: f64,
-    /// Effects that explain it; none where it was not looked for.
+    /// Missing effects that explain the correction; `None` without a diagnosis.
     found: Option<Vec<Found>>,
     output: String,
     logs: Option<String>,
-    /// The model with these effects, if it was written.
+    /// File of the extended model, if it was written.
     extended: Option<String>,
-    /// How long the first value was held before each play \[s\].
+    /// Hold time of the first value before each play \[s\].
     settle_s: f64,
     #[serde(skip)]
     symbol: &'static str,
@@ -76,7 +78,7 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
         return Err(CommandError::bad_input(message));
     }
     let report = Report::new(args.json.json, &written)?;
-    let wishes = Wishes {
+    let device_options = DeviceOptions {
         noise: args.seed,
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
@@ -85,17 +87,18 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
         hottest_degc: args.hottest,
         error: args.max_error,
     };
-    let mut device = AnyDevice::open(&args.daq, &wishes)?;
+    let mut device = AnyDevice::open(&args.daq, &device_options)?;
     let mut job = Job::read(&args.to_run(), device.capabilities())?;
     let Some(followed) = job.followed.as_mut() else {
         return Err(CommandError::bad_input("give --model and --reference"));
     };
-    // The same drive in each play of a pass: a temperature that moves is one of the things that do not repeat.
+    // All plays of a pass have the same drive: a change of temperature does not repeat and is not corrected.
     if followed.live.take().is_some()
         && let (None, Some(degc)) = (args.temperature.degc, followed.options.temperature)
     {
         say(&format!(
-            "note: the first drive is planned for {} °C, where the model's gain is stated; --temperature gives that of today",
+            "note: the first drive is planned for {} °C, the reference temperature of the model; give the present temperature \
+             with --temperature",
             text::short(degc)
         ));
     }
@@ -106,8 +109,8 @@ pub(super) fn run(args: &LearnArgs) -> CommandResult {
     let (model, json) = (model.clone(), json.clone());
     let options = LearnOptions { compensate: *options, passes: args.passes as usize, ..LearnOptions::default() };
     let learner = Learner::new(&model, reference, options).map_err(CommandError::bad_input)?;
-    if let Some(foreseen) = job.foreseen() {
-        say(&format!("note: {foreseen}"));
+    if let Some(predicted) = job.predicted_error() {
+        say(&format!("note: {predicted}"));
     }
     if let Some(folder) = &args.logs {
         fs::create_dir_all(folder).map_err(|e| {
@@ -131,13 +134,13 @@ struct Passes<'a> {
     args: &'a LearnArgs,
     model: &'a Model,
     json: &'a str,
-    /// What the passes measured.
+    /// Records of the passes.
     records: Vec<Record>,
     rate_hz: f64,
 }
 
 impl<'a> Passes<'a> {
-    /// All passes. Whatever ends them, the best drive so far is kept.
+    /// Plays all passes. If an error ends them, the best drive so far is written.
     fn all(&mut self, mut learner: Learner<'a>) -> CommandResult<(Learner<'a>, Ended)> {
         let symbol = recording::unit(self.device.capabilities().output).symbol();
         let mut number = 0;
@@ -156,14 +159,14 @@ impl<'a> Passes<'a> {
                         text::short(times),
                         text::short(pass.repeatability)
                     ),
-                    None => "and each play gives the same".to_owned(),
+                    None => "equal in all plays".to_owned(),
                 };
-                let held = if pass.limited_rows == 0 {
+                let limited = if pass.limited_rows == 0 {
                     String::new()
                 } else {
-                    format!("; a limit held the drive in {}", text::count(pass.limited_rows, "row"))
+                    format!("; the drive is at a limit in {}", text::count(pass.limited_rows, "row"))
                 };
-                say(&format!("pass {number}: RMSE {} {symbol}, {repeats}{held}", text::short(pass.rmse)));
+                say(&format!("pass {number}: RMSE {} {symbol}, {repeats}{limited}", text::short(pass.rmse)));
             }
             if let Some(ended) = ended {
                 return Ok((learner, ended));
@@ -175,41 +178,44 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// The error that ended it, once the best drive so far is written.
+    /// Writes the best drive so far and returns the error that ended the passes.
     fn kept(&self, learner: &Learner<'_>, error: CommandError) -> CommandError {
         let Some((best, pass, drive)) = learner.best() else { return error };
         let symbol = recording::unit(self.device.capabilities().output).symbol();
-        let what = format!("the best drive so far, of pass {}, RMSE {} {symbol},", best + 1, text::short(pass.rmse));
+        let what = format!("the best drive so far (pass {}, RMSE {} {symbol})", best + 1, text::short(pass.rmse));
         say(&match write_drive(&self.args.output, self.model, learner, drive) {
-            Ok(()) => format!("note: {what} is kept in {}", self.args.output),
-            Err(error) => format!("warning: {what} cannot be kept there: {}", error.text()),
+            Ok(()) => format!("note: {what} is saved in {}", self.args.output),
+            Err(error) => format!("warning: {what} could not be saved: {}", error.text()),
         });
         error
     }
 
-    /// One pass: the outputs of each play at the rows of the drive. A pass in which the device had to wait for its drive is played again: a host that
-    /// is held up now and then spoils some, a line that is too slow all of them.
+    /// Plays one pass; returns the outputs of each play at the rows of the drive.
+    ///
+    /// A pass in which the device had to wait for its drive is repeated, because the delay may be a single one of this
+    /// computer. If all repetitions have gaps, the line is too slow.
     fn plays(&mut self, learner: &Learner<'_>, number: usize) -> CommandResult<Vec<Vec<f64>>> {
         let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}.mcap")));
         let (mut recording, mut gaps) = self.played(learner, name.as_deref())?;
-        for again in 1..=REPLAYS {
+        for again in 1..=MAX_REPLAYS {
             if gaps == 0 {
                 break;
             }
             let ending = if again == 1 { "again".to_owned() } else { format!("again-{again}") };
             let name = self.args.logs.as_ref().map(|folder| folder.join(format!("pass-{number}-{ending}.mcap")));
             say(&format!(
-                "note: pass {number} is played again: the device had no next value in time, so its drive was another one"
+                "note: pass {number} is repeated: the device did not receive its next value in time and held the last one"
             ));
             (recording, gaps) = self.played(learner, name.as_deref())?;
         }
         if gaps > 0 {
             return Err(CommandError::failed(
-                "the line is too slow for this rate: the device held old values on the way; use a faster line, or a reference with fewer samples a second",
+                "the line is too slow for this sample rate: the device held old values; use a faster line or a reference \
+                 with a lower sample rate",
             ));
         }
         self.rate_hz = recording.rate_hz;
-        // The first play is left out: the actuator remembers other drives in it.
+        // The first play is left out, because it depends on earlier drives.
         recording.segments.drain(..recording.segments.len().min(1));
         let outputs = recording.segments.iter().map(|s| s.samples.iter().map(|s| s.output).collect()).collect();
         let unit = recording::unit(self.device.capabilities().output);
@@ -218,7 +224,8 @@ impl<'a> Passes<'a> {
         Ok(outputs)
     }
 
-    /// All plays of a pass, the first one included, and how often the device had to wait.
+    /// Plays all plays of a pass, including the first one.
+    /// Returns the recording and how often the device had to wait.
     fn played(&mut self, learner: &Learner<'_>, log: Option<&Path>) -> CommandResult<(Recording, usize)> {
         let plays = self.args.plays as usize;
         let unit = recording::unit(self.device.capabilities().output);
@@ -248,13 +255,13 @@ impl<'a> Passes<'a> {
     }
 }
 
-/// Writes a drive with its reference; an older file keeps its content under another name.
+/// Writes a drive with its reference; an existing file is renamed.
 fn write_drive(to: &Target, model: &Model, learner: &Learner<'_>, drive: &LearnedDrive) -> CommandResult {
     let extra = [Extra::numbers(&model.input.column, &drive.voltage)];
     to.write_measured(|out| learner.reference().write_with(out, &extra).map_err(output::io_error))
 }
 
-/// Writes the drive, looks for what the model lacks, and sums up.
+/// Writes the drive, diagnoses the error of the model, and returns the report.
 fn finish(
     args: &LearnArgs,
     model: &Model,
@@ -278,7 +285,7 @@ fn finish(
             Some(target.to_string())
         }
         (Some(target), found) => {
-            let why = if found.is_some() { ": the passes show no effect to add to the model" } else { "" };
+            let why = if found.is_some() { ": the passes show no missing effect" } else { "" };
             say(&format!("note: {target} is not written{why}"));
             None
         }
@@ -311,20 +318,20 @@ fn finish(
     })
 }
 
-/// What the model lacks on all passes together; none where a diagnosis cannot say.
+/// Diagnoses the model on all passes together; `None` if that is not possible.
 fn diagnosed(args: &LearnArgs, model: &Model, records: &[Record]) -> CommandResult<Option<Diagnosis>> {
     if records.is_empty() {
         return Ok(None);
     }
-    let progress = Progress::spinner("what the model had wrong");
+    let progress = Progress::spinner("diagnosing the model");
     let joined = Record::join(records.to_vec())?;
     let options = DiagnoseOptions { zero: Zero::PerRecord, seed: args.seed.unwrap_or(1) };
-    let told = |what: &str| progress.say(&format!("what the model had wrong: {what}"));
-    match diagnose_until(&joined, None, model, &options, &told, &interrupt::stopping()) {
+    let report = |what: &str| progress.set_message(&format!("diagnosing the model: {what}"));
+    match diagnose_until(&joined, None, model, &options, &report, &interrupt::stopping()) {
         Ok(found) => Ok(Some(found)),
         Err(error) => {
             drop(progress);
-            say(&format!("note: what the model had wrong cannot be diagnosed on these passes: {error}"));
+            say(&format!("note: the error of the model cannot be diagnosed on these passes: {error}"));
             Ok(None)
         }
     }
@@ -334,7 +341,7 @@ impl Summary {
     fn text(&self) -> String {
         let (short, unit) = (text::short, self.symbol);
         let mut rows = vec![
-            ["pass", &format!("RMSE [{unit}]"), "largest", "repeating part", "over repeatability"]
+            ["pass", &format!("RMSE [{unit}]"), "maximum", "repeating part", "RMSE / repeatability"]
                 .map(str::to_owned)
                 .to_vec(),
         ];
@@ -349,18 +356,20 @@ impl Summary {
             ]
         }));
         let why = match self.ended {
-            Ended::AtFloor => "the error is that of playing the same drive again",
-            Ended::NoGain => "the last passes brought less than 5 %",
+            Ended::AtFloor => "the error has reached the repeatability",
+            Ended::NoGain => "the last passes reduced the error by less than 5 %",
             Ended::Worse => {
-                "three passes in a row were worse than the best: the model is too far from this actuator; fit it anew, or add what diagnose finds"
+                "three successive passes were worse than the best one: the model does not match this actuator; fit it again or \
+                 add the effects that diagnose finds"
             }
-            Ended::Passes => "all passes are done; give more with --passes",
+            Ended::Passes => "all passes are played; give more with --passes",
         };
         let mut lines = vec![
             text::table(&rows),
             format!("ended: {why}"),
             format!(
-                "repeatability: {} {unit} (estimated at {} {unit} after the first pass); error {} times smaller than that of the model's inverse",
+                "repeatability: {} {unit} (estimate after the first pass: {} {unit}); error {} times smaller than with the \
+                 model's inverse",
                 short(self.repeatability),
                 short(self.repeatability_estimate),
                 short(self.improvement)
@@ -375,10 +384,10 @@ impl Summary {
             let names: Vec<String> =
                 found.iter().map(|f| format!("{} (probability {})", f.effect, short(f.probability))).collect();
             lines.push(match (names.is_empty(), &self.extended) {
-                (true, _) => "no effect that the model lacks explains it".to_owned(),
-                (false, Some(path)) => format!("the model lacks {}; with that: {path}", text::listed(&names)),
+                (true, _) => "missing effects: none explains the correction".to_owned(),
+                (false, Some(path)) => format!("missing effects: {}; extended model: {path}", text::listed(&names)),
                 (false, None) => {
-                    format!("the model lacks {}; --extended MODEL writes one with that", text::listed(&names))
+                    format!("missing effects: {}; --extended MODEL writes the extended model", text::listed(&names))
                 }
             });
         }

@@ -1,4 +1,4 @@
-//! `log`: what stands in the log of a run, as a record, and what is left of one that was cut off.
+//! `log`: inspects the log of a run, converts it to a record, or recovers a log that was cut off.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -30,27 +30,27 @@ fn read(path: &Path) -> CommandResult<(Vec<u8>, RunLog)> {
     Ok((bytes, log))
 }
 
-/// What is said about a log.
+/// Report of a log.
 #[derive(Debug, Serialize)]
 struct Summary {
     log: String,
-    /// Whether it was closed; else it was cut off.
+    /// Whether it was closed; if not, it was cut off.
     closed: bool,
-    /// Chunks of samples and other records that are left out because they are damaged.
+    /// Damaged chunks of samples and other damaged records, which are left out.
     damaged: usize,
     samples: usize,
-    /// Holes in time within a segment; behind each another segment begins.
+    /// Gaps within segments; after each a new segment begins.
     holes: usize,
-    /// Of the samples, those that are part of what was asked for.
+    /// Samples of segments, without those of ramps.
     record_samples: usize,
     segments: usize,
-    /// \[s\]
+    /// Duration \[s\].
     seconds: f64,
-    /// Root of the mean squared output less reference; none where nothing was followed \[output unit\].
+    /// RMS of output minus reference \[output unit\]; `None` without a reference.
     tracking_rmse: Option<f64>,
     model: bool,
     metadata: BTreeMap<String, String>,
-    /// What happened on the way.
+    /// Events during the run.
     events: Vec<LogEvent>,
     #[serde(skip)]
     symbol: &'static str,
@@ -89,15 +89,16 @@ impl Summary {
             text::short(self.seconds),
             self.record_samples,
             text::count(self.segments, "segment"),
-            if self.closed { "closed" } else { "cut off: hystctl log recover makes a closed one of it" }
+            if self.closed { "closed" } else { "cut off; hystctl log recover makes a closed log from it" }
         )];
         lines.extend(input::damage(self.damaged));
-        lines.extend(input::holes(self.holes));
+        lines.extend(input::gaps(self.holes));
         lines.extend(
-            self.tracking_rmse.map(|rmse| format!("output less reference: RMSE {} {}", text::short(rmse), self.symbol)),
+            self.tracking_rmse
+                .map(|rmse| format!("output minus reference: RMSE {} {}", text::short(rmse), self.symbol)),
         );
-        let told = |event: &LogEvent| format!("at {} s {}: {}", text::short(event.time_s), event.kind, event.text);
-        lines.extend(self.events.iter().map(told));
+        let line = |event: &LogEvent| format!("at {} s {}: {}", text::short(event.time_s), event.kind, event.text);
+        lines.extend(self.events.iter().map(line));
         lines.extend(self.metadata.iter().map(|(key, value)| format!("  {key}: {value}")));
         lines.extend(self.model.then(|| "  attached: model.json".to_owned()));
         lines.join("\n")
@@ -118,25 +119,23 @@ fn convert(args: &LogConvertArgs) -> CommandResult {
         return Err(CommandError::bad_input(format!("{}: the log has no sample: {what}", args.log.display())));
     }
     let text = log.csv(&args.log.display().to_string(), args.ramps)?;
-    input::losses(log.lost).iter().for_each(|told| output::say(&format!("note: {told}")));
+    input::losses(log.lost).iter().for_each(|loss| output::say(&format!("note: {loss}")));
     if !args.ramps && !log.samples.iter().any(LogSample::is_record) {
         let many = text::count(log.samples.len(), "sample");
-        output::say(&format!(
-            "note: {many}, and none of what was asked for: all are of the ramps before and after (--ramps)"
-        ));
+        output::say(&format!("note: the log has {many}, all of them in ramps; --ramps includes them"));
     }
     args.output.write_beside_older(|out| out.write_all(text.as_bytes()))
 }
 
-/// What is said about a recovery.
+/// Report of a recovery.
 #[derive(Debug, Serialize)]
 struct Recovered {
     log: String,
     output: String,
     samples: usize,
-    /// Whether there was anything to recover.
+    /// Whether the log was closed before.
     was_closed: bool,
-    /// Chunks of samples and other records that were left out because they are damaged.
+    /// Damaged chunks of samples and other damaged records, which were left out.
     damaged: usize,
 }
 
@@ -153,8 +152,8 @@ fn recover(args: &LogRecoverArgs) -> CommandResult {
         was_closed: !log.lost.cut_off,
         damaged: log.lost.damaged,
     };
-    let how = if !log.lost.cut_off { "was closed already" } else { "had been cut off" };
-    let said = format!("{} {how}; {}: {}", done.log, done.output, text::count(done.samples, "sample"));
-    let said: Vec<String> = std::iter::once(said).chain(input::damage(done.damaged)).collect();
-    report.print(&said.join("\n"), &done)
+    let how = if !log.lost.cut_off { "was already closed" } else { "was cut off" };
+    let line = format!("{} {how}; {}: {}", done.log, done.output, text::count(done.samples, "sample"));
+    let lines: Vec<String> = std::iter::once(line).chain(input::damage(done.damaged)).collect();
+    report.print(&lines.join("\n"), &done)
 }

@@ -1,4 +1,4 @@
-//! The commands, and the one place where they are dispatched.
+//! The commands and their dispatch.
 
 mod close_loop;
 mod compare;
@@ -59,7 +59,7 @@ pub(crate) fn dispatch(command: Command) -> CommandResult {
         Command::Export(args) => export::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions { shell } => {
-            // The generator panics where its writer fails, as a closed pipe does.
+            // The generator panics if its writer fails, for example at a closed pipe.
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "hystctl", &mut script);
             Target::Stdout.write(|out| out.write_all(&script))

@@ -1,4 +1,4 @@
-//! `plot`: records, and what models miss of them, as a picture.
+//! `plot`: draws records and residuals of models.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::cli::PlotArgs;
 use crate::exit::{CommandError, CommandResult};
 use crate::{input, output, text};
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito 2008).
+/// Colours that are readable with colour vision deficiency (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -31,12 +31,12 @@ const HEIGHT: u32 = 420;
 /// A curve of a record.
 type Pieces = Vec<Vec<(f64, f64)>>;
 
-/// What a model misses of the records.
-struct Missed {
+/// Residuals of a model on all records.
+struct Residuals {
     model: String,
-    /// Measured minus predicted of each record, where it has an output.
+    /// Measured minus predicted for each record; `None` for a record without an output.
     residuals: Vec<Option<Vec<f64>>>,
-    /// Rows that count.
+    /// Whether each row counts; start-up rows do not.
     counts: Vec<Vec<bool>>,
 }
 
@@ -47,15 +47,15 @@ pub(super) fn run(args: &PlotArgs) -> CommandResult {
     let format = Format::of(&args.output)?;
     let records: Vec<Record> =
         args.records.iter().map(|path| input::any(path, &args.map)).collect::<CommandResult<_>>()?;
-    let missed: Vec<Missed> =
-        args.model.iter().map(|path| missed(path, &records, args)).collect::<CommandResult<_>>()?;
+    let models: Vec<Residuals> =
+        args.model.iter().map(|path| residuals_of(path, &records, args)).collect::<CommandResult<_>>()?;
     same_units(&records)?;
-    let size = (WIDTH, (2 + missed.len() as u32) * HEIGHT);
-    let picture = format.draw(size, |root| panels(root, &records, &missed))?;
+    let size = (WIDTH, (2 + models.len() as u32) * HEIGHT);
+    let picture = format.draw(size, |root| panels(root, &records, &models))?;
     args.output.write(|out| out.write_all(&picture))
 }
 
-fn missed(path: &Path, records: &[Record], args: &PlotArgs) -> CommandResult<Missed> {
+fn residuals_of(path: &Path, records: &[Record], args: &PlotArgs) -> CommandResult<Residuals> {
     let (model, _) = input::model(path)?;
     let options = SimulateOptions { zero: args.zero.get(), ..SimulateOptions::default() };
     let (mut residuals, mut counts) = (Vec::new(), Vec::new());
@@ -66,21 +66,21 @@ fn missed(path: &Path, records: &[Record], args: &PlotArgs) -> CommandResult<Mis
         counts.push(simulation.settling.iter().map(|settling| !settling).collect());
     }
     let model = path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned());
-    Ok(Missed { model, residuals, counts })
+    Ok(Residuals { model, residuals, counts })
 }
 
-/// A record's file without its folder.
+/// Returns the name of a record's file without its folder.
 fn name(record: &Record) -> String {
     let name = record.name();
     Path::new(&name).file_name().map_or(name.clone(), |file| file.to_string_lossy().into_owned())
 }
 
-/// Rows of `of`, in a piece for each segment.
+/// Returns the points of a curve, in one piece for each segment.
 fn pieces(record: &Record, of: impl Fn(usize) -> Option<(f64, f64)>) -> Pieces {
     record.segments().iter().map(|rows| rows.clone().filter_map(&of).collect()).collect()
 }
 
-/// Refuses records whose inputs, or outputs, have different units: they do not share an axis.
+/// Refuses records with different units of the inputs or outputs, which cannot share an axis.
 fn same_units(records: &[Record]) -> CommandResult {
     let inputs = records.iter().filter(|record| !record.input().is_empty()).map(|r| (r, r.input_column().to_owned()));
     let outputs = records.iter().filter_map(|r| Some((r, r.output_unit()?.column().to_owned())));
@@ -88,7 +88,7 @@ fn same_units(records: &[Record]) -> CommandResult {
         let Some(((first, column), others)) = columns.split_first() else { continue };
         if let Some((other, different)) = others.iter().find(|(_, own)| own != column) {
             return Err(CommandError::bad_input(format!(
-                "{} has {column} and {} has {different}: they do not share an axis; plot them one by one",
+                "{} has {column} and {} has {different}: they cannot share an axis; plot each record separately",
                 first.name(),
                 other.name()
             )));
@@ -97,8 +97,8 @@ fn same_units(records: &[Record]) -> CommandResult {
     Ok(())
 }
 
-fn panels(root: &Area<'_>, records: &[Record], missed: &[Missed]) -> Drawn {
-    let areas = root.split_evenly((2 + missed.len(), 1));
+fn panels(root: &Area<'_>, records: &[Record], models: &[Residuals]) -> Drawn {
+    let areas = root.split_evenly((2 + models.len(), 1));
     let unit = records.iter().find_map(Record::output_unit).map_or("", |unit| unit.symbol());
     let output = format!("output [{unit}]");
     let drive = records
@@ -139,31 +139,31 @@ fn panels(root: &Area<'_>, records: &[Record], missed: &[Missed]) -> Drawn {
         }
     }
     let mut further = COLOURS.iter().cycle().skip(records.len());
-    for missed in missed {
-        for (record, residual) in records.iter().zip(&missed.residuals) {
+    for model in models {
+        for (record, residual) in records.iter().zip(&model.residuals) {
             let Some(residual) = residual else { continue };
             let density = amplitude_density(residual, record.segments(), record.sample_period());
             let colour = *further.next().unwrap_or(&BLACK);
-            spectra.curve(&format!("{} − {}", name(record), missed.model), colour, &[density]);
+            spectra.curve(&format!("{} − {}", name(record), model.model), colour, &[density]);
         }
     }
     spectra.draw_if_any(&areas[1])?;
 
-    // One scale for all models: panels side by side are compared.
-    let all = missed.iter().flat_map(|m| m.residuals.iter().flatten().zip(&m.counts));
+    // One scale for all models, so that the panels can be compared.
+    let all = models.iter().flat_map(|m| m.residuals.iter().flatten().zip(&m.counts));
     let (low, high) =
         range(all.flat_map(|(r, counts)| r.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r)));
     let most = low.abs().max(high.abs());
-    for (missed, area) in missed.iter().zip(&areas[2..]) {
-        let title = format!("measured minus predicted by {}", missed.model);
+    for (model, area) in models.iter().zip(&areas[2..]) {
+        let title = format!("measured minus predicted by {}", model.model);
         let mut chart = Chart::new(&title, "time [s]", &format!("residual [{unit}]"));
         if most.is_finite() && most > 0.0 {
             chart = chart.between(-1.08 * most, 1.08 * most);
         }
-        for ((record, colour), (residual, counts)) in coloured().zip(missed.residuals.iter().zip(&missed.counts)) {
+        for ((record, colour), (residual, counts)) in coloured().zip(model.residuals.iter().zip(&model.counts)) {
             let Some(residual) = residual else { continue };
-            let there = || residual.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r);
-            let rms = (there().map(|r| r * r).sum::<f64>() / there().count().max(1) as f64).sqrt();
+            let counted = || residual.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r);
+            let rms = (counted().map(|r| r * r).sum::<f64>() / counted().count().max(1) as f64).sqrt();
             let t = record.time();
             let label = format!("{}, RMS {} {unit}", name(record), text::short(rms));
             chart.curve(&label, *colour, &pieces(record, |k| counts[k].then(|| (t[k], residual[k]))));

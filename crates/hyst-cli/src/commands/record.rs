@@ -1,4 +1,4 @@
-//! `record`: what the sensors of a device show while nothing is put out.
+//! `record`: records the sensors of a device at rest.
 
 use std::path::Path;
 
@@ -10,32 +10,33 @@ use super::run::gaps::Gaps;
 use super::run::job::{Job, thermometer};
 use super::run::play::{Played, play};
 use crate::cli::RecordArgs;
-use crate::device::{AnyDevice, Wishes};
+use crate::device::{AnyDevice, DeviceOptions};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{RunInfo, RunLog};
 use crate::output::{self, Report, Target};
 use crate::{recording, text};
 
-/// Sample rate if nothing is said, as far as the device goes along \[Hz\].
-const USUAL_HZ: f64 = 1000.0;
-/// Most samples.
-const MOST: f64 = 1e8;
+/// Default sample rate, within the range of the device \[Hz\].
+const DEFAULT_RATE_HZ: f64 = 1000.0;
+/// Maximum number of samples.
+const MAX_SAMPLES: f64 = 1e8;
 
-/// What is said about a record.
+/// Report of a recording.
 #[derive(Debug, Serialize)]
 struct Summary {
     device: String,
     rate_hz: f64,
     samples: usize,
     unit: &'static str,
-    /// Voltage at which the device rested \[V\].
+    /// Voltage of the device at rest \[V\].
     rest_v: f64,
+    /// Mean output \[output unit\].
     mean: f64,
-    /// Standard deviation \[output unit\].
+    /// Standard deviation of the output \[output unit\].
     deviation: f64,
-    /// Highest less lowest output \[output unit\].
+    /// Maximum minus minimum of the output \[output unit\].
     span: f64,
-    /// Periods that are missing.
+    /// Missing sample periods.
     gaps: Gaps,
     log: Option<String>,
     record: Option<String>,
@@ -48,7 +49,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let log = args.log.clone().map(Target::File);
     let written: Vec<&Target> = log.iter().chain(&args.output).collect();
     if written.is_empty() {
-        return Err(CommandError::bad_input("what is measured would be lost: give -o, --log or both"));
+        return Err(CommandError::bad_input("the measured data would be lost; give -o, --log or both"));
     }
     if args.log.as_deref() == Some(Path::new("-")) {
         return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
@@ -56,20 +57,22 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     let read: Vec<&Path> = args.daq.file().into_iter().collect();
     output::check(&read, &written)?;
     let report = Report::new(args.json.json, &written)?;
-    let wishes = Wishes { noise: args.seed, hottest_degc: args.hottest, ..Wishes::default() };
-    let mut daq = AnyDevice::open(&args.daq, &wishes)?;
+    let device_options = DeviceOptions { noise: args.seed, hottest_degc: args.hottest, ..DeviceOptions::default() };
+    let mut daq = AnyDevice::open(&args.daq, &device_options)?;
     daq.observe();
     let can = daq.capabilities().clone();
-    let rate_hz = args.rate.unwrap_or(USUAL_HZ.clamp(can.min_rate_hz, can.max_rate_hz));
+    let rate_hz = args.rate.unwrap_or(DEFAULT_RATE_HZ.clamp(can.min_rate_hz, can.max_rate_hz));
     let rows = (args.seconds * rate_hz).round();
-    if !(1.0..=MOST).contains(&rows) {
-        let message =
-            format!("{} s at {rate_hz} Hz are {rows} samples; give another --seconds or --rate", args.seconds);
+    if !(1.0..=MAX_SAMPLES).contains(&rows) {
+        let message = format!(
+            "{} s at {rate_hz} Hz are {rows} samples, expected 1 to {MAX_SAMPLES}; give another --seconds or --rate",
+            args.seconds
+        );
         return Err(CommandError::bad_input(message));
     }
     if daq.present_v() != can.voltage.rest_v {
         let message = format!(
-            "{} stands at {} V, and rests at {} V: it would move at the end; let it come to rest first",
+            "{} is at {} V, but rests at {} V, so it would move at the end; ramp it to rest first (hystctl stop)",
             can.device,
             daq.present_v(),
             can.voltage.rest_v
@@ -86,7 +89,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
     };
     let played = play(&mut daq, &mut job, log.as_mut());
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
-        output::tell_set_aside(path, older);
+        output::print_renamed(path, older);
     }
     let closed = log.filter(|log| log.samples() > 0).map_or(Ok(()), RunLog::finish);
     let Played { recording, gaps, error, .. } = played?;
@@ -101,7 +104,7 @@ pub(super) fn run(args: &RecordArgs) -> CommandResult {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
         target.write_measured(|out| record.write_with(out, &[]).map_err(output::io_error))?;
     }
-    // The record may lie on another disk than a log that could not be closed.
+    // After the record, which may be on another disk than a log that could not be closed.
     closed?;
     let measured: Vec<f64> = recording.segments.iter().flat_map(|s| &s.samples).map(|s| s.output).collect();
     let count = measured.len().max(1) as f64;
@@ -129,7 +132,7 @@ impl Summary {
     fn text(&self) -> String {
         let (short, unit) = (text::short, self.symbol);
         let mut lines = vec![format!(
-            "{}: {} at {} Hz, nothing moved; output {} {unit} at {} V, deviation {} {unit}, span {} {unit}",
+            "{}: {} at {} Hz, nothing moved; mean output {} {unit} at {} V, standard deviation {} {unit}, span {} {unit}",
             self.device,
             text::count(self.samples, "sample"),
             self.rate_hz,

@@ -1,4 +1,4 @@
-//! `response`: frequency response with coherence, and the modes of the structure.
+//! `response`: estimates the frequency response with coherence, and the modes of the structure.
 
 use std::fmt::Write as _;
 
@@ -17,7 +17,7 @@ use crate::{input, text};
 
 mod picture;
 
-/// What is said about a response.
+/// Report of a response.
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     unit: &'a str,
@@ -87,16 +87,16 @@ pub(super) fn run(args: &ResponseArgs) -> CommandResult {
         target.write(|out| out.write_all(&picture))?;
     }
     let summary = Summary::new(&found, &unit, &args.at);
-    let mut said = summary.text();
+    let mut text = summary.text();
     for (target, what) in [(&args.output, "response"), (&args.picture, "picture")] {
         if let Some(Target::File(path)) = target {
-            let _ = write!(said, "\n{what}: {}", path.display());
+            let _ = write!(text, "\n{what}: {}", path.display());
         }
     }
-    report.print(&said, &summary)
+    report.print(&text, &summary)
 }
 
-/// One row for each line of the response, with the model's gain and phase beside.
+/// Writes one row for each line of the response, with gain and phase of the model.
 fn csv(out: &mut dyn std::io::Write, found: &Structure) -> std::io::Result<()> {
     writeln!(out, "hz,gain,phase_deg,coherence,gain_low,gain_high,model_gain,model_phase_deg")?;
     let FrequencyResponse { lines, .. } = &found.response;
@@ -104,7 +104,7 @@ fn csv(out: &mut dyn std::io::Write, found: &Structure) -> std::io::Result<()> {
         let (low, high) = line.gain_band();
         let (hz, gain, phase, coherence) = (line.hz, line.gain, line.phase.to_degrees(), line.coherence);
         write!(out, "{hz:.6},{gain:.6e},{phase:.3},{coherence:.5},{low:.6e},{high:.6e}")?;
-        // Beyond its band the model is a guess.
+        // The model is not valid above its band.
         if line.hz <= found.band_hz {
             let model = found.model.response(line.hz);
             writeln!(out, ",{:.6e},{:.3}", model.abs(), model.arg().to_degrees())?;
@@ -135,7 +135,7 @@ impl<'a> Summary<'a> {
             modes: found
                 .modes
                 .iter()
-                // What lies beyond the band is no mode of the structure.
+                // Poles above the band are not modes of the structure.
                 .filter(|m| m.hz <= found.band_hz)
                 .map(|m| ModeRow {
                     hz: m.hz,
@@ -165,7 +165,7 @@ impl<'a> Summary<'a> {
                 text::short(effective_averages)
             ),
             Method::Periodic { period_s, periods, unexcited_share } => format!(
-                "response: {} lines, averages over {periods} periods of {} s; at lines without drive {} of the output\n",
+                "response: {} lines, averages over {periods} periods of {} s; share of the output at lines without drive {}\n",
                 self.lines,
                 text::short(period_s),
                 text::percent(100.0 * unexcited_share)
@@ -186,7 +186,7 @@ impl<'a> Summary<'a> {
         let _ = writeln!(text, "order: {}", self.reason);
         let _ = writeln!(
             text,
-            "missed: {} one row ahead, {} of the output's deviation in simulation\n",
+            "model error: {} one row ahead, {} of the output's standard deviation in simulation\n",
             text::short(self.prediction_error),
             text::percent(self.simulation_percent)
         );

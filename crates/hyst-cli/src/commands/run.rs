@@ -1,14 +1,14 @@
-//! `run`: plays a drive, or a reference through a model, on a device.
+//! `run`: plays a drive on a device, or follows a reference with a model.
 
 mod adapt;
-mod beside;
 mod control;
 pub(super) mod gaps;
 mod guard;
 pub(super) mod interrupt;
 pub(super) mod job;
 mod live;
-mod lookout;
+mod monitor;
+mod parallel;
 pub(super) mod play;
 pub(super) mod shape;
 mod sweep;
@@ -27,19 +27,19 @@ use serde::Serialize;
 use super::compensate::Compensation;
 use super::status::Stated;
 use crate::cli::{Control, PidGains, RunArgs};
-use crate::device::{AnyDevice, Wishes};
+use crate::device::{AnyDevice, DeviceOptions};
 use crate::exit::{CommandError, CommandResult, Exit};
 use crate::log::{LoggedModel, RunInfo, RunLog};
 use crate::output::{self, Report, Target};
-use crate::recording::Beside;
+use crate::recording::ExtraColumns;
 use crate::{recording, text};
 use adapt::{Adapting, Change};
-use beside::Watched;
 use gaps::Gaps;
-use job::{Followed, HandedOver, Job, Told};
+use job::{Followed, HandedOver, Job, PidReport};
+use parallel::Watched;
 use play::Played;
 
-/// What is said about a run.
+/// Report of a run.
 #[derive(Debug, Serialize)]
 struct Summary {
     device: String,
@@ -49,26 +49,27 @@ struct Summary {
     unit: &'static str,
     lowest_output: f64,
     highest_output: f64,
-    /// None when a drive was played.
+    /// `None` if a drive was played.
     tracking: Option<Tracking>,
     compensation: Option<Compensation>,
-    /// None when a drive was played.
+    /// `None` if a drive was played.
     control: Option<Control>,
-    /// None without a PID.
+    /// `None` without a PID.
     pid: Option<Gains>,
-    /// Whether the device closed the loop.
+    /// Whether the loop was closed on the device.
     loop_on_device: bool,
-    /// Whether the model still explains the device; none where that was not watched.
+    /// Whether the model explained the measured output; `None` if that was not monitored.
     watch: Option<WatchSummary>,
-    /// Lowest and highest estimated force, counted from what acted when the run began \[N\]; none where none is estimated.
+    /// Minimum and maximum of the estimated force, relative to the start of the run \[N\].
+    /// `None` without an estimate.
     force_n: Option<(f64, f64)>,
-    /// Periods for which the device had nothing to put out.
+    /// Sample periods without a value for the device.
     gaps: Gaps,
-    /// The device's clock against this computer's; none where it has no other.
+    /// The device's clock relative to this computer's; `None` if the device uses this computer's clock.
     clock: Option<ClockSummary>,
-    /// Whether the drive was corrected by the measured temperature on the way.
+    /// Whether the drive was corrected for the measured temperature.
     temperature_followed: bool,
-    /// How the actuator differs from its model, as learned by the end; none where that was not asked for.
+    /// Difference between actuator and model at the end of the run; `None` without `--adapt`.
     adapted: Option<Change>,
     log: Option<String>,
     record: Option<String>,
@@ -78,18 +79,18 @@ struct Summary {
     symbol: &'static str,
 }
 
-/// An offset is told where less than this share of the error is left without it.
-const MOSTLY_OFFSET: f64 = 0.5;
+/// An offset is reported if the RMSE without it is below this share of the RMSE.
+const MAX_SHARE_WITHOUT_OFFSET: f64 = 0.5;
 
-/// Whether the model still explains the device.
+/// Whether the model explained the measured output.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct WatchSummary {
     explains: bool,
-    /// When it stopped doing so for the first time, by the device's clock \[s\].
+    /// First time at which it did not, by the device's clock \[s\].
     lost_at_s: Option<f64>,
-    /// Of the last block \[output unit\].
+    /// RMS residual of the last block \[output unit\].
     residual_rms: f64,
-    /// Of the model's own record \[output unit\].
+    /// RMS residual of the model on its training record \[output unit\].
     fitted_rms: f64,
 }
 
@@ -98,24 +99,25 @@ impl WatchSummary {
         let (now, fitted) = (text::short(self.residual_rms), text::short(self.fitted_rms));
         self.lost_at_s.map(|at| {
             format!(
-                "from {} s on the model did not explain the device: {now} {unit} of residual at the end, {fitted} {unit} where it was fitted",
+                "from {} s on the model did not explain the output: RMS residual {now} {unit} at the end, {fitted} {unit} on \
+                 the training record",
                 text::short(at)
             )
         })
     }
 
-    fn new(Watched { lost_at, residual, trained_to }: Watched) -> Self {
-        Self { explains: lost_at.is_none(), lost_at_s: lost_at, residual_rms: residual, fitted_rms: trained_to }
+    fn new(Watched { lost_at, residual, fitted_rmse }: Watched) -> Self {
+        Self { explains: lost_at.is_none(), lost_at_s: lost_at, residual_rms: residual, fitted_rms: fitted_rmse }
     }
 }
 
-/// The device's clock against this computer's.
+/// The device's clock relative to this computer's.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct ClockSummary {
-    /// When period 0 of the run began \[s since 1970-01-01 UTC\], and to what that is known \[s\].
+    /// Start of period 0 of the run \[s since 1970-01-01 UTC\], and its uncertainty \[s\].
     began_unix_s: f64,
     uncertainty_s: f64,
-    /// By how much the device's clock is faster; none for a short run.
+    /// Frequency error of the device's clock, positive if it is faster \[ppm\]; `None` for a short run.
     faster_ppm: Option<f64>,
 }
 
@@ -124,7 +126,7 @@ impl ClockSummary {
         Self { began_unix_s, uncertainty_s, faster_ppm }
     }
 
-    /// As a log has it.
+    /// Returns metadata of a log.
     fn entries(&self) -> BTreeMap<String, String> {
         let mut entries = BTreeMap::from([
             ("began_unix_s".to_owned(), self.began_unix_s.to_string()),
@@ -135,20 +137,21 @@ impl ClockSummary {
     }
 }
 
-/// A PID that took part.
+/// The PID of a run.
 #[derive(Debug, Serialize)]
 struct Gains {
-    /// \[V/y\]
+    /// Proportional gain \[V/y\].
     proportional: f64,
-    /// \[V/(y s)\]
+    /// Integral gain \[V/(y s)\].
     integral: f64,
-    /// \[V s/y\]
+    /// Derivative gain \[V s/y\].
     derivative: f64,
-    /// Where the loop's gain falls below one, as the model has it; none for given gains \[Hz\].
+    /// Crossover frequency of the loop, from the model \[Hz\]; `None` for given gains.
     crossover_hz: Option<f64>,
-    /// Share of the samples in which a limit held the drive; on a device, and the output away from its reference \[%\].
+    /// Share of the samples in which the drive was at a limit \[%\].
+    /// For a loop on the device only those with a tracking error.
     limited_percent: Option<f64>,
-    /// Why the gains are these, in words.
+    /// Reason for these gains.
     why: String,
 }
 
@@ -157,7 +160,7 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     let log = args.log.clone().map(Target::File);
     let written: Vec<&Target> = log.iter().chain(&args.record).collect();
     if args.drive.is_some() && written.is_empty() {
-        return Err(CommandError::bad_input("what is measured would be lost: give --record, --log or both"));
+        return Err(CommandError::bad_input("the measured data would be lost; give --record, --log or both"));
     }
     if args.log.as_deref() == Some(Path::new("-")) {
         return Err(CommandError::bad_input("--log needs a file: a log cannot be written to stdout"));
@@ -167,7 +170,7 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
     let kept = args.adapt.clone().flatten().map(Target::File);
     output::check(&read, &[&written[..], &kept.iter().collect::<Vec<_>>()].concat())?;
     let report = Report::new(args.json.json, &written)?;
-    let wishes = Wishes {
+    let device_options = DeviceOptions {
         noise: args.seed,
         voltage: args.limits.limit.map(|limit| (limit.low, limit.high)),
         slew_v_per_s: args.limits.slew,
@@ -176,17 +179,17 @@ pub(super) fn run(args: &RunArgs) -> CommandResult {
         hottest_degc: args.hottest,
         error: args.max_error,
     };
-    on_device(&mut AnyDevice::open(&args.daq, &wishes)?, args, report)
+    on_device(&mut AnyDevice::open(&args.daq, &device_options)?, args, report)
 }
 
-/// The run on a device.
+/// Runs the job on a device.
 fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResult {
     let mut job = Job::read(args, daq.capabilities())?;
     if args.record.is_none() && args.log.is_none() {
-        output::say("note: what is measured is not kept; give --record, --log or both");
+        output::say("note: the measured data are not saved; give --record, --log or both");
     }
-    if let Some(foreseen) = job.foreseen() {
-        output::say(&format!("note: {foreseen}"));
+    if let Some(predicted) = job.predicted_error() {
+        output::say(&format!("note: {predicted}"));
     }
     let unit = recording::unit(daq.capabilities().output);
     let device = daq.capabilities().device.clone();
@@ -198,7 +201,7 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     if let Some(log) = &mut log {
         log.note("asked", asked(args)).map_err(|error| CommandError::new(Exit::Failed, error))?;
     }
-    // All that can be refused has been, but by the device itself.
+    // From here on only the device can refuse the run.
     if let Some(fault) = if args.clear { clear(daq)? } else { None }
         && let Some(log) = &mut log
     {
@@ -209,9 +212,9 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     }
     daq.gentle(job.steepest());
     let played = play::play(daq, &mut job, log.as_mut());
-    // What was measured is kept in any case; the first error is the one to tell.
+    // The measured data are written in any case; the first error is reported.
     if let Some((path, older)) = log.as_ref().and_then(|log| Some((log.path(), log.older()?))) {
-        output::tell_set_aside(path, older);
+        output::print_renamed(path, older);
     }
     let noted = match (log.as_mut().filter(|log| log.samples() > 0), daq.clock()) {
         (Some(log), Some(clock)) => log.note("clock", ClockSummary::new(clock).entries()),
@@ -232,19 +235,19 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     let wanted = job.followed.as_ref().map(|followed| followed.wanted_at(&recording));
     let wanted = wanted.map(|wanted| (format!("reference_{}", unit.suffix()), wanted));
     let forces = (forces.len() == rows).then(|| ("estimated_force_n".to_owned(), forces));
-    let beside: Beside = wanted.into_iter().chain(forces).collect();
+    let columns: ExtraColumns = wanted.into_iter().chain(forces).collect();
     if let Some(error) = error {
         if let Some(target) = &args.record {
-            recording::keep_partial(recording, beside, target, unit);
+            recording::keep_partial(recording, columns, target, unit);
         }
         return Err(error);
     }
     let recording = recording::split(recording);
     if let Some(target) = &args.record {
         let record = recording::to_record(&recording, &target.to_string(), unit)?;
-        target.write_measured(|out| record.write_with(out, &recording::extra(&beside)).map_err(output::io_error))?;
+        target.write_measured(|out| record.write_with(out, &recording::extra(&columns)).map_err(output::io_error))?;
     }
-    // The record may lie on another disk than a log that could not be closed.
+    // After the record, which may be on another disk than a log that could not be closed.
     closed?;
     if let (Some(Some(file)), Some(adapting)) =
         (&args.adapt, job.followed.as_ref().and_then(|followed| followed.adapting.as_ref()))
@@ -286,14 +289,14 @@ fn on_device(daq: &mut AnyDevice, args: &RunArgs, report: Report) -> CommandResu
     report.print(&summary.text(), &summary)
 }
 
-/// Clears the fault of an earlier run, and says which it was.
+/// Clears the fault of an earlier run, prints it and returns it.
 pub(super) fn clear(daq: &mut AnyDevice) -> CommandResult<Option<String>> {
     let fault = daq.clear()?.map(Stated::of).map(|Stated { code, text }| format!("{code}: {text}"));
-    fault.iter().for_each(|fault| output::say(&format!("note: cleared fault {fault}, of an earlier run")));
+    fault.iter().for_each(|fault| output::say(&format!("note: cleared the fault of an earlier run: {fault}")));
     Ok(fault)
 }
 
-/// What was asked for, as a log has it.
+/// Returns the arguments of a run as metadata of its log.
 fn asked(args: &RunArgs) -> BTreeMap<String, String> {
     let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
     let control = args.control.to_possible_value().map(|value| value.get_name().to_owned());
@@ -329,7 +332,7 @@ fn asked(args: &RunArgs) -> BTreeMap<String, String> {
 }
 
 impl Gains {
-    fn of(Told { gains, why, crossover_hz, limited_percent }: Told<'_>) -> Self {
+    fn of(PidReport { gains, why, crossover_hz, limited_percent }: PidReport<'_>) -> Self {
         let (PidParams { proportional, integral, derivative, .. }, why) = (*gains, why.to_owned());
         Self { proportional, integral, derivative, crossover_hz, limited_percent, why }
     }
@@ -344,23 +347,23 @@ impl Gains {
             self.why
         );
         if let Some(share) = self.limited_percent.filter(|share| *share > 0.0) {
-            line += &format!("; a limit held its drive in {} of the samples", text::percent(share));
+            line += &format!("; the drive was at a limit in {} of the samples", text::percent(share));
         }
         line
     }
 }
 
-/// What is said of delay, turning points and harmonics, each in a line of its own.
+/// Returns lines about delay, turning points and harmonics.
 fn tracking_details(tracking: &Tracking, unit: &str) -> String {
     let short = text::short;
     let mut lines = Vec::new();
     if let Some(delay) = tracking.delay_s {
         let how = if delay < 0.0 { "earlier" } else { "later" };
-        lines.push(format!("against the reference {} ms {how}, which was allowed", short(1e3 * delay.abs())));
+        lines.push(format!("compared with the reference {} ms {how} (--allow-delay)", short(1e3 * delay.abs())));
     }
     if let Some(Turning { points, near_percent, rmse, max_abs, rmse_between }) = tracking.turning {
         lines.push(format!(
-            "near {} ({} of the way to the next one): RMSE {} {unit}, largest {} {unit}; between them RMSE {} {unit}",
+            "near {} (within {} of the time to the next one): RMSE {} {unit}, largest {} {unit}; between them RMSE {} {unit}",
             text::count(points, "turning point"),
             text::percent(near_percent),
             short(rmse),
@@ -369,9 +372,9 @@ fn tracking_details(tracking: &Tracking, unit: &str) -> String {
         ));
     }
     if !tracking.harmonics.is_empty() {
-        let said = |h: &Harmonic| format!("{} Hz {} at {:.2}°", short(h.frequency_hz), short(h.gain), h.phase_deg);
-        let said: Vec<String> = tracking.harmonics.iter().map(said).collect();
-        lines.push(format!("gain and phase of the harmonics: {}", said.join(", ")));
+        let harmonic = |h: &Harmonic| format!("{} Hz {} at {:.2}°", short(h.frequency_hz), short(h.gain), h.phase_deg);
+        let harmonics: Vec<String> = tracking.harmonics.iter().map(harmonic).collect();
+        lines.push(format!("gain and phase of the harmonics: {}", harmonics.join(", ")));
     }
     lines.iter().map(|line| format!("\n          {line}")).collect()
 }
@@ -394,12 +397,15 @@ impl Summary {
             let mut line = format!(
                 "tracking: RMSE {rmse} {unit} ({share} of the reference's span), largest {most} {unit}; RMSE of the last half {late} {unit}"
             );
-            // Without the inverse it is the hysteresis, with feedback a limit or a loop that is too slow.
+            // Only for feedforward without limits: otherwise hysteresis, a limit or a slow loop causes the offset.
             let free = self.compensation.as_ref().is_some_and(Compensation::is_unlimited);
-            if self.control == Some(Control::Feedforward) && free && t.rmse_about_mean < MOSTLY_OFFSET * t.rmse {
+            let is_offset = t.rmse_about_mean < MAX_SHARE_WITHOUT_OFFSET * t.rmse;
+            if self.control == Some(Control::Feedforward) && free && is_offset {
                 let (above, offset) = (if t.mean < 0.0 { "below" } else { "above" }, short(t.mean.abs()));
                 line += &format!(
-                    "\n          most of it is an offset: it stands {offset} {unit} {above} the reference, and RMSE {} {unit} is left about that; the sensor's zero, or what earlier runs have left in the actuator (--control pid+feedforward takes it)",
+                    "\n          most of it is an offset: the output is {offset} {unit} {above} the reference, and without the \
+                     offset the RMSE is {} {unit}; the cause is the sensor zero or the history of earlier runs (--control \
+                     pid+feedforward removes it)",
                     short(t.rmse_about_mean)
                 );
             }
@@ -411,17 +417,19 @@ impl Summary {
             lines.push("the loop was closed on the device".to_owned());
         }
         if self.temperature_followed {
-            lines.push("the drive was corrected by the measured temperature on the way".to_owned());
+            lines.push("the drive was corrected for the measured temperature".to_owned());
         }
         if let Some(change) = &self.adapted {
             lines.push(match change.updates {
-                0 => "adapted: nothing was learned; the drive has to go over its range both ways first".to_owned(),
+                0 => "adapted: nothing was learned, because the drive did not cover its range in both directions"
+                    .to_owned(),
                 _ => format!("adapted: {}", change.text(unit)),
             });
         }
         lines.extend(self.force_n.map(|(low, high)| {
             format!(
-                "force: {} to {} N beyond what acted when the run began, and what the actuator remembered of earlier runs; the model is not watched meanwhile",
+                "force: {} to {} N relative to the start of the run; the history of earlier runs appears as a force, too; the \
+                 model is not monitored during a force estimate",
                 short(low),
                 short(high)
             )
@@ -431,7 +439,7 @@ impl Summary {
         if let (Some(WatchSummary { explains: false, .. }), Some(log), Some(model)) =
             (self.watch, &self.log, &self.model)
         {
-            // Not over the model that is read.
+            // The output must not be the model that is read.
             let extended =
                 if Path::new(model).ends_with("extended.json") { "extended-again.json" } else { "extended.json" };
             lines.push(format!("next: hystctl diagnose {log} --model {model} -o {extended}"));

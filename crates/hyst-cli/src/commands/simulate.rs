@@ -1,4 +1,4 @@
-//! `simulate`: what a model says about a record.
+//! `simulate`: predicts the output of a record with a model.
 
 use hyst_ident::BetweenSamples;
 use hyst_ident::metrics::{Errors, Mape, mape};
@@ -11,7 +11,7 @@ use crate::exit::CommandResult;
 use crate::output::{self, Report, say};
 use crate::{input, text};
 
-/// What is said about a simulation.
+/// Report of a simulation.
 #[derive(Debug, Serialize)]
 struct Summary {
     record: String,
@@ -20,22 +20,23 @@ struct Summary {
     rows: usize,
     settling_rows: usize,
     zero: Zero,
-    /// Whether the segments were passed twice.
+    /// Whether the model ran through each segment twice.
     periodic: bool,
-    /// How the drive goes on between samples, as the model's file says.
+    /// Interpolation of the drive between samples, from the model file.
     between_samples: BetweenSamples,
     /// Constant that was added for the record, with `--zero per-record`.
     zeros: Vec<f64>,
-    /// Angle in rad by which the tone of the model is ahead of the model's clock: the first rows show it; 0 where the clock goes on.
+    /// Phase of the interference relative to the model's clock \[rad\], estimated from the first rows.
+    /// 0 if the clock continues.
     tone_ahead_rad: f64,
-    /// How far away from the first motion of each segment the actuator had rested before, in the output's unit: the first rows show by how much a creep goes
-    /// on; 0 from rest.
+    /// Distance between the earlier rest position and the start of each segment \[output unit\].
+    /// Estimated from the creep in the first rows; 0 for a start from rest.
     creep_away: Vec<f64>,
-    /// None without a measured output.
+    /// `None` without a measured output.
     errors: Option<Errors>,
-    /// Inputs beyond the range of the record that the model was fitted to.
+    /// Inputs outside the range that the model was fitted to.
     extrapolated: Extrapolated,
-    /// None without a measured output.
+    /// `None` without a measured output.
     mape: Option<Mape>,
 }
 
@@ -60,19 +61,19 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
     args.output.write(|out| record.write_with(out, &extra).map_err(output::io_error))?;
     if !replaced.is_empty() {
         say(&format!(
-            "note: {} has {} already; in the output this simulation stands in its place",
+            "note: {} already has {}; the output has this simulation instead",
             args.input.display(),
             text::listed(&replaced)
         ));
     }
     if zero == Zero::PerRecord && simulated.errors.is_none() {
-        say("note: without a measured output --zero per-record has no effect");
+        say("note: --zero per-record has no effect without a measured output");
     }
     if simulated.extrapolated.rows > 0 {
         let beyond = text::extrapolation("input", &text::from_one(simulated.extrapolated), &model.input);
         say(&format!("warning: {beyond}; the prediction is extrapolated there"));
     }
-    // What could not be compared is an error of the simulation already.
+    // `None` also for an error: `simulate_with` has compared the same rows and has reported it.
     let mape = record.output().and_then(|y| mape(y, &simulated.predicted, &simulated.settling).ok());
     let summary = Summary {
         record: args.input.display().to_string(),
@@ -87,7 +88,7 @@ pub(super) fn run(args: &SimulateArgs) -> CommandResult {
         tone_ahead_rad: simulated.tone_ahead.first().copied().unwrap_or(0.0),
         creep_away: simulated.creep_away,
         errors: simulated.errors,
-        // People and JSON count rows from 1, where there is one.
+        // Reports and JSON count rows from 1.
         extrapolated: text::from_one(simulated.extrapolated),
         mape,
     };
@@ -101,28 +102,28 @@ impl Summary {
         let text = match &self.errors {
             None => format!("{}: {rows}, no measured output to compare with", self.record),
             Some(errors) => {
-                let mut text = format!("{}: {rows} ({} settling), ", self.record, self.settling_rows);
+                let mut text = format!("{}: {rows} (start-up rows: {}), ", self.record, self.settling_rows);
                 text.push_str(&text::errors(errors, unit));
                 if let Some(mape) = &self.mape {
                     text.push_str(&format!("\n{}", text::mape(mape)));
                 }
                 for zero in &self.zeros {
                     text.push_str(&format!(
-                        "\nsensor zero of the record: {} {unit} from the model's",
+                        "\nsensor zero of the record: {} {unit} relative to the model's",
                         text::short(*zero)
                     ));
                 }
                 if self.tone_ahead_rad != 0.0 {
                     text.push_str(&format!(
-                        "\nphase of the tone, from the first rows: {}° from that of the model's clock",
+                        "\nphase of the interference, estimated from the first rows: {}° relative to the model's clock",
                         text::short(self.tone_ahead_rad.to_degrees())
                     ));
                 }
-                let crept: Vec<f64> = self.creep_away.iter().copied().filter(|away| *away != 0.0).collect();
-                if let Some(largest) = crept.iter().copied().reduce(|a, b| if b.abs() > a.abs() { b } else { a }) {
+                let continued: Vec<f64> = self.creep_away.iter().copied().filter(|away| *away != 0.0).collect();
+                if let Some(largest) = continued.iter().copied().reduce(|a, b| if b.abs() > a.abs() { b } else { a }) {
                     text.push_str(&format!(
-                        "\ncreep continues from before the record in {} of {}: the actuator rested {} {unit} from where it starts",
-                        crept.len(),
+                        "\ncreep from before the record continues in {} of {}: the actuator had rested {} {unit} away from the start",
+                        continued.len(),
                         text::count(self.creep_away.len(), "segment"),
                         text::short(largest)
                     ));

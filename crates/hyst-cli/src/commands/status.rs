@@ -1,11 +1,11 @@
-//! `status`: how a device stands. Nothing moves.
+//! `status`: shows the state of a device. Nothing moves.
 
 use hyst_hw::Daq;
 use hyst_hw::wire::{Fault, State};
 use serde::Serialize;
 
 use crate::cli::StatusArgs;
-use crate::device::{AnyDevice, DeviceError, Wishes};
+use crate::device::{AnyDevice, DeviceError, DeviceOptions};
 use crate::exit::{CommandError, CommandResult};
 use crate::output::Report;
 use crate::{recording, text};
@@ -16,24 +16,24 @@ struct Summary {
     /// `idle`, `running`, `stopping` or `fault`.
     state: &'static str,
     fault: Option<Stated>,
-    /// What it puts out \[V\].
+    /// Present voltage \[V\].
     present_v: f32,
     output: f32,
     unit: &'static str,
     low_v: f64,
     high_v: f64,
     rest_v: f64,
-    /// \[V/s\]
+    /// Maximum slope \[V/s\].
     max_slew_v_per_s: f64,
     min_rate_hz: f64,
     max_rate_hz: f64,
-    /// Whether it can be handed a controller.
+    /// Whether it accepts a controller.
     follows: bool,
     #[serde(skip)]
     symbol: &'static str,
 }
 
-/// A fault, by its number and in words.
+/// A fault: number and description.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Stated {
     pub(super) code: u8,
@@ -49,11 +49,12 @@ impl Stated {
 /// Runs the command.
 pub(super) fn run(args: &StatusArgs) -> CommandResult {
     let report = Report::new(args.json.json, &[])?;
-    let mut daq = AnyDevice::open(&args.daq, &Wishes::default())?;
+    let mut daq = AnyDevice::open(&args.daq, &DeviceOptions::default())?;
     let can = daq.capabilities().clone();
     let Some(remote) = daq.remote() else {
         return Err(CommandError::bad_input(
-            "a simulated plant stands at rest whenever no command plays it: ask a device at the other end of a line",
+            "a simulated plant has no state: it is at rest unless a command plays it; give a device at a line, for example \
+             serial:/dev/ttyACM0",
         ));
     };
     let status = remote.status().map_err(DeviceError::from)?;
@@ -88,23 +89,24 @@ impl Summary {
         let short = text::short;
         let (volts, output) = (short(self.present_v.into()), short(self.output.into()));
         let moves = f64::from(self.present_v) != self.rest_v;
-        let stands = match (self.state, &self.fault) {
-            (_, Some(Stated { code, text })) if moves => format!("still on its way to rest after fault {code}: {text}"),
+        let state = match (self.state, &self.fault) {
+            (_, Some(Stated { code, text })) if moves => format!("ramping to rest after fault {code}: {text}"),
             (_, Some(Stated { code, text })) => format!(
-                "stands with fault {code}: {text}; when that is mended, clear it (hystctl stop --clear, or run --clear)"
+                "at rest with fault {code}: {text}; fix the cause, then clear the fault (hystctl stop --clear or \
+                 hystctl run --clear)"
             ),
-            ("idle", _) => "at rest, and can be started".to_owned(),
-            ("stopping", _) => "comes to rest".to_owned(),
-            _ => "runs".to_owned(),
+            ("idle", _) => "at rest, ready to start".to_owned(),
+            ("stopping", _) => "ramping to rest".to_owned(),
+            _ => "running".to_owned(),
         };
         let rates = if self.min_rate_hz == self.max_rate_hz {
             format!("{} Hz", self.max_rate_hz)
         } else {
             format!("{} to {} Hz", self.min_rate_hz, self.max_rate_hz)
         };
-        let loops = if self.follows { "; takes a controller" } else { "" };
+        let loops = if self.follows { "; accepts a controller" } else { "" };
         format!(
-            "{}: {stands}\nputs out {volts} V, shows {output} {}\ncan do {} to {} V, rests at {} V, at most {} V/s, {rates}{loops}",
+            "{}: {state}\ndrive {volts} V, output {output} {}\nrange {} to {} V, rests at {} V, maximum slope {} V/s, {rates}{loops}",
             self.device,
             self.symbol,
             short(self.low_v),

@@ -1,8 +1,8 @@
-//! `demo`: the whole way on a simulated actuator whose effect nobody declared.
+//! `demo`: all steps on a simulated actuator with an effect that the seed chooses.
 //!
-//! Experiment → fit → diagnosis → extension → compensation → measured again. The identification is
-//! given what an engineer would have: the drive, the measured output, a temperature if the device has
-//! one. Only at the very end is the plant's file opened to compare.
+//! Steps: experiment, fit, diagnosis, extension, compensation, tracking. The identification uses only what an engineer
+//! has: the drive, the measured output, and a temperature if the device measures one. The plant file is compared with
+//! the result at the end.
 
 mod picture;
 
@@ -31,7 +31,7 @@ use crate::{recording, text};
 /// Sample rate of the experiments \[Hz\].
 const RATE_HZ: f64 = 1000.0;
 
-/// Summary of a demo, and the sign that a folder is one's.
+/// Summary of a demo; it also marks a folder as that of a demo.
 const MARK: &str = "demo.json";
 
 /// Runs the command.
@@ -39,39 +39,39 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     let out = &args.out;
     fs::create_dir_all(out)
         .map_err(|e| CommandError::failed(format!("{}: {e}; choose another folder with --out", out.display())))?;
-    // Only a folder that is empty or that a demo has made: its file names are everybody's.
+    // The file names are common ones, so a folder with other files is refused.
     let foreign = fs::read_dir(out).is_ok_and(|mut files| files.next().is_some()) && !out.join(MARK).is_file();
     if foreign {
         let message = format!(
-            "{}: the folder holds files that no demo has written; choose another one with --out",
+            "{}: the folder holds files that are not from a demo; give another folder with --out",
             out.display()
         );
         return Err(CommandError::bad_input(message));
     }
     write(out, MARK, "{}\n")?;
-    let progress = Progress::spinner("simulating an actuator");
+    let progress = Progress::spinner("creating the simulated actuator");
 
-    // The plant's seed is the demo's: its effect is drawn from it and told to nobody.
+    // The seed chooses the effect; the identification does not use `config`, except for the voltage limits.
     let config = PlantConfig::random(args.seed);
     let mut plant = Plant::new(config.clone()).map_err(CommandError::failed)?;
     let limits =
         Limits { rate_hz: RATE_HZ, lo_v: config.actuator.min_v, hi_v: config.actuator.max_v, slew_v_per_s: None };
     let usual = Identification::at_rate(RATE_HZ, args.seed);
 
-    progress.say("driving the identification experiment");
+    progress.set_message("recording the identification drive");
     let train = experiment(&mut plant, &usual.drive(&limits)?, "train.csv")?;
-    progress.say("driving a second experiment, for the test");
+    progress.set_message("recording the test drive");
     let test = experiment(&mut plant, &usual.for_test().drive(&limits)?, "test.csv")?;
     let train = write_record(out, "train.csv", train)?;
     let test = write_record(out, "test.csv", test)?;
 
-    progress.say("fitting Prandtl-Ishlinskii");
+    progress.set_message("fitting Prandtl-Ishlinskii");
     let model = fit(&train, Kind::Pi, &FitOptions { seed: args.seed, ..FitOptions::default() })?;
     let options = DiagnoseOptions { zero: Zero::None, seed: args.seed };
     let diagnosis =
-        diagnose_until(&train, Some(&test), &model, &options, &|what| progress.say(what), &host::stopping())?;
+        diagnose_until(&train, Some(&test), &model, &options, &|what| progress.set_message(what), &host::stopping())?;
 
-    progress.say("compensating a reference on the actuator");
+    progress.set_message("following a reference");
     let task = Task::of(&diagnosis.extended, &train, RATE_HZ);
     let judged = |samples: &[Sample]| task.judge(samples, &diagnosis.extended);
     let files = Files { log: &out.join("run.mcap"), drive: &out.join("drive.csv") };
@@ -83,7 +83,7 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
         travel: task.travel.clone(),
     };
 
-    progress.say("drawing");
+    progress.set_message("drawing the picture");
     let before = simulate(&model, &test, Zero::None)?;
     let after = simulate(&diagnosis.extended, &test, Zero::None)?;
     let picture = picture::draw(&test, &before.predicted, &after.predicted, &runs, &diagnosis.findings)?;
@@ -95,16 +95,16 @@ pub(crate) fn run(args: &DemoArgs) -> CommandResult {
     write(out, "plant.toml", config.to_toml().map_err(CommandError::failed)?)?;
     drop(progress);
 
-    let story = Story { diagnosis: &diagnosis, model: &model, runs: &runs, config: &config };
-    write(out, MARK, &json(&story.summary())?)?;
-    Report::new(args.json.json, &[])?.print(&story.text(out), &story.summary())
+    let outcome = Outcome { diagnosis: &diagnosis, model: &model, runs: &runs, config: &config };
+    write(out, MARK, &json(&outcome.summary())?)?;
+    Report::new(args.json.json, &[])?.print(&outcome.text(out), &outcome.summary())
 }
 
 fn json(value: &impl serde::Serialize) -> CommandResult<String> {
     Ok(serde_json::to_string_pretty(value).map_err(io::Error::other)? + "\n")
 }
 
-/// Plays a designed drive, segment by segment with rests between, and returns the record.
+/// Plays a drive, with rests between its segments, and returns the record.
 fn experiment(plant: &mut Plant, drive: &Drive, name: &str) -> CommandResult<Record> {
     let segments: Vec<&[f64]> = drive.segments().iter().map(|rows| &drive.voltage()[rows.clone()]).collect();
     let recording = hyst_hw::record(plant, &segments, &RecordOptions::at(RATE_HZ), |_| host::going())
@@ -116,7 +116,7 @@ fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> CommandResult 
     Ok(write_atomic(folder.join(name), |out| out.write_all(content.as_ref()))?)
 }
 
-/// Writes a record, which knows its file from then on.
+/// Writes a record and returns it with the checksum of its file.
 fn write_record(folder: &Path, name: &str, record: Record) -> CommandResult<Record> {
     let mut file = Vec::new();
     record.write_csv(&mut file).map_err(output::io_error)?;
@@ -124,7 +124,7 @@ fn write_record(folder: &Path, name: &str, record: Record) -> CommandResult<Reco
     Ok(record.kept_as(&file))
 }
 
-/// One reference, three ways to drive it: a plain gain, the base model's inverse, the extended one's.
+/// Runs with one reference: plain gain, inverse of the base model, inverse of the extended model.
 struct Runs {
     time: Vec<f64>,
     /// Wanted displacement from rest \[output unit\].
@@ -134,15 +134,15 @@ struct Runs {
     extended: Run,
 }
 
-/// What is told at the end.
-struct Story<'a> {
+/// Results of a demo.
+struct Outcome<'a> {
     diagnosis: &'a Diagnosis,
     model: &'a Model,
     runs: &'a Runs,
     config: &'a PlantConfig,
 }
 
-impl Story<'_> {
+impl Outcome<'_> {
     fn text(&self, out: &Path) -> String {
         let (f, runs) = (&self.diagnosis.findings, self.runs);
         let unit = text::symbol(&f.unit);
@@ -154,7 +154,7 @@ impl Story<'_> {
         let rows: usize = self.model.fitted_on.iter().map(|f| f.rows).sum();
         let mut lines = vec![
             format!("fit        {} on {rows} rows of an identification experiment", self.model.base.kind()),
-            format!("           RMSE {} on a second experiment, which is never fitted", error(f.before.test)),
+            format!("           RMSE {} on a test record, which is never fitted", error(f.before.test)),
         ];
         if f.effects.is_empty() {
             lines.push(format!("found      no effect: {}", verdict(f.verdict)));
@@ -164,19 +164,15 @@ impl Story<'_> {
             lines.push(format!("found      {}: {}", effect.name, evidence.next().map_or("", String::as_str)));
             lines.extend(evidence.map(|line| format!("           {line}")));
             for other in effect.alternatives.iter().filter(|a| a.indistinguishable) {
-                lines.push(format!("           the record does not tell it from {}", other.name));
+                lines.push(format!("           the record cannot distinguish it from {}", other.name));
             }
         }
-        lines.push(format!(
-            "extended   RMSE {} → {} on the second experiment",
-            error(f.before.test),
-            error(f.after.test)
-        ));
-        lines.push(format!("left       {}", f.remainder.description));
-        lines.push("tracking   of a reference on the actuator, RMS error:".to_owned());
+        lines.push(format!("extended   RMSE {} → {} on the test record", error(f.before.test), error(f.after.test)));
+        lines.push(format!("remainder  {}", f.remainder.description));
+        lines.push("tracking   RMS error of a reference on the actuator:".to_owned());
         let against = |run: &Run| {
             let times = runs.plain.rmse / run.rmse;
-            format!("{} {unit}, {times:.1} times better than the plain gain", text::short(run.rmse))
+            format!("{} {unit}, {times:.1} times smaller than with the plain gain", text::short(run.rmse))
         };
         lines.push(format!("             plain gain        {} {unit}", text::short(runs.plain.rmse)));
         lines.push(format!("             base inverse      {}", against(&runs.base)));
@@ -186,7 +182,8 @@ impl Story<'_> {
         if !sensor.is_empty() {
             let (effects, verb) = (text::listed(&sensor), if sensor.len() == 1 { "is" } else { "are" });
             lines.push(format!(
-                "           {effects} {verb} in the sensor, not in the motion: taken out of all three errors (the last is {} {unit} with it), not driven against",
+                "           {effects} {verb} in the sensor, not in the motion: removed from all three errors (the last one is {} \
+                 {unit} with it) and not compensated",
                 text::short(runs.extended.shown_rmse)
             ));
         }
@@ -200,8 +197,8 @@ impl Story<'_> {
         };
         let had = if truth.is_empty() { "no effect".to_owned() } else { text::listed(&truth) };
         lines.push(format!(
-            "revealed   the plant's file has {had}: {}{of_modes}",
-            if truth == named { "as found" } else { "NOT as found" }
+            "truth      the plant file has {had}: {}{of_modes}",
+            if truth == named { "found correctly" } else { "NOT found correctly" }
         ));
         lines.push(format!("written    {}", out.display()));
         lines.join("\n")
@@ -228,8 +225,16 @@ impl Story<'_> {
             "verdict": f.verdict,
             "unit": f.unit,
             "test": { "before": f.before.test, "after": f.after.test },
-            "tracking_rmse": { "plain_gain": self.runs.plain.rmse, "base_inverse": self.runs.base.rmse, "extended_inverse": self.runs.extended.rmse },
-            "tracking_max_abs": { "plain_gain": self.runs.plain.max_abs, "base_inverse": self.runs.base.max_abs, "extended_inverse": self.runs.extended.max_abs },
+            "tracking_rmse": {
+                "plain_gain": self.runs.plain.rmse,
+                "base_inverse": self.runs.base.rmse,
+                "extended_inverse": self.runs.extended.rmse,
+            },
+            "tracking_max_abs": {
+                "plain_gain": self.runs.plain.max_abs,
+                "base_inverse": self.runs.base.max_abs,
+                "extended_inverse": self.runs.extended.max_abs,
+            },
         })
     }
 }
@@ -237,9 +242,9 @@ impl Story<'_> {
 fn verdict(v: Verdict) -> &'static str {
     match v {
         Verdict::Explained => "explained",
-        Verdict::NothingMissing => "the model is at the noise floor",
-        Verdict::BaseTooCoarse => "the base is too coarse",
-        Verdict::Unexplained => "something is left that nothing on the list explains",
+        Verdict::NothingMissing => "the residual is at the noise floor",
+        Verdict::BaseTooCoarse => "the base model is too coarse",
+        Verdict::Unexplained => "the residual matches none of the known effects",
     }
 }
 
@@ -249,7 +254,7 @@ mod tests {
     use hyst_ident::record::{ColumnMap, Columns, Need};
 
     #[test]
-    fn a_record_that_is_fitted_knows_its_file() {
+    fn a_written_record_has_the_checksum_of_its_file() {
         let folder = tempfile::tempdir().unwrap();
         let columns =
             Columns { time: vec![0.0, 0.1, 0.2], input: Some(vec![0.0, 1.0, 0.1 + 0.2]), ..Columns::default() };

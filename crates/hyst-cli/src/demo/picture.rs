@@ -1,4 +1,4 @@
-//! One picture of a demo: loop, residual, tracking errors.
+//! Picture of a demo: loop, residual and tracking errors.
 
 use hyst_ident::diagnose::Findings;
 use hyst_ident::record::Record;
@@ -14,7 +14,7 @@ const BEFORE: RGBColor = RGBColor(200, 80, 40);
 const AFTER: RGBColor = RGBColor(30, 110, 190);
 const MEASURED: RGBColor = RGBColor(120, 120, 120);
 
-/// The picture as SVG.
+/// Draws the picture as SVG.
 pub(super) fn draw(
     test: &Record,
     before: &[f64],
@@ -34,7 +34,7 @@ fn panels(root: &Area<'_>, test: &Record, before: &[f64], after: &[f64], runs: &
     let (left, right) = top.split_horizontally(560);
     let unit = text::symbol(&findings.unit);
     let (u, y) = (test.input(), test.output().unwrap_or_default());
-    // The first segment's nested loops; all of them at once would be a blot.
+    // Only the nested loops of the first segment: all segments together are not readable.
     let nested = test.segments().first().cloned().unwrap_or(0..0);
     let mut volts = Chart::new("test record: nested loops", "voltage [V]", &format!("output [{unit}]"));
     volts.path("measured", MEASURED, &u[nested.clone()], &y[nested.clone()]);
@@ -49,15 +49,15 @@ fn panels(root: &Area<'_>, test: &Record, before: &[f64], after: &[f64], runs: &
     let rmse = |e: Option<hyst_ident::metrics::Errors>| {
         e.map_or_else(String::new, |e| format!("RMS {} {unit}", text::short(e.rmse)))
     };
-    let mut left_over = Chart::new("test record: measured minus model", "time [s]", &format!("residual [{unit}]"));
-    left_over.curve(&format!("base, {}", rmse(findings.before.test)), BEFORE, &residual(before));
-    left_over.curve(&format!("extended, {}", rmse(findings.after.test)), AFTER, &residual(after));
-    left_over.draw(&right)?;
+    let mut residuals = Chart::new("test record: measured minus model", "time [s]", &format!("residual [{unit}]"));
+    residuals.curve(&format!("base, {}", rmse(findings.before.test)), BEFORE, &residual(before));
+    residuals.curve(&format!("extended, {}", rmse(findings.after.test)), AFTER, &residual(after));
+    residuals.draw(&right)?;
 
     let (above, below) = bottom.split_vertically(170);
     let with = |v: &[f64]| vec![runs.time.iter().copied().zip(v.iter().copied()).collect()];
-    let mut reference = Chart::new("tracking: wanted travel", "", &format!("[{unit}]"));
-    reference.curve("wanted", BLACK, &with(&runs.travel));
+    let mut reference = Chart::new("tracking: reference, relative to rest", "", &format!("[{unit}]"));
+    reference.curve("reference", BLACK, &with(&runs.travel));
     reference.draw(&above)?;
     let mut errors = Chart::new("tracking: error on the actuator", "time [s]", &format!("error [{unit}]"));
     for (name, run, colour) in [

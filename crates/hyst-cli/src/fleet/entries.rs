@@ -1,22 +1,23 @@
-//! Which actuators a fleet has: the files of a folder, or those that a list names.
+//! Actuators of a fleet: the files of a folder, or those of a list.
 
 use std::fs;
 use std::path::Path;
 
 use super::Entry;
 
-/// Endings of files that are no records: what this program writes, and what lies beside records.
+/// Endings of files that are not records: files of hystctl, and files often stored with records.
 const NOT_RECORDS: &[&str] = &["json", "toml", "html", "svg", "png", "md", "journal", "pdf", "py", "m", "tdms_index"];
 
-/// The files in a folder and the folders in it, in the order of their names, without hidden ones; or the lines of a list.
+/// Returns the actuators in a folder or in a list.
 ///
-/// `output` is where the results go: it, and what lies beside it under its name, is no record.
+/// A folder is searched with its subfolders, in the order of the names, without hidden files. Files whose name starts with
+/// that of `output` (the results) are left out.
 ///
-/// A list is text with a path in each line, or a table (`,`) whose header names `file` and, of `test`, `serial` and `date`, what it has. Paths are
-/// relative to the list's folder.
+/// A list is text with one path per line, or a table (`,`) with the column `file` and optionally `test`, `serial` and
+/// `date`. Paths are relative to the folder of the list.
 ///
 /// # Errors
-/// In words, with file and line, where there is nothing or a line is wrong.
+/// A message with file and line when there is no record or a line is wrong.
 pub fn of(path: &Path, output: &Path) -> Result<Vec<Entry>, String> {
     let shown = path.display();
     let found = if path.is_dir() {
@@ -30,22 +31,23 @@ pub fn of(path: &Path, output: &Path) -> Result<Vec<Entry>, String> {
         found
     } else {
         let text = fs::read_to_string(path).map_err(|error| {
-            format!("{shown}: {error}; give a folder of records, or a list of them (a path in each line, or a table with the column file)")
+            format!("{shown}: {error}; give a folder of records or a list (one path per line, or a CSV table with the column file)")
         })?;
         listed(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))?
     };
     if !path.is_dir() && !found.is_empty() && found.iter().all(|entry| !Path::new(&entry.file).exists()) {
         let first = &found[0].file;
         return Err(format!(
-            "{shown}: none of the files in this list exists, as {first}; give a path in each line, or a CSV table with the column file"
+            "{shown}: none of the files in this list exists, for example {first}; give one path per line, or a CSV table \
+             with the column file"
         ));
     }
     let mut seen = std::collections::BTreeSet::new();
     if let Some(twice) = found.iter().find(|entry| !seen.insert((&entry.file, &entry.test))) {
-        return Err(format!("{shown}: {} is named twice; an actuator has one line", twice.file));
+        return Err(format!("{shown}: {} is listed twice; give one line for each actuator", twice.file));
     }
     if found.is_empty() {
-        return Err(format!("{shown}: no records; give a folder of records or a list of them"));
+        return Err(format!("{shown}: no records; give a folder of records or a list of records"));
     }
     Ok(found)
 }
@@ -60,7 +62,7 @@ fn walk(folder: &Path, found: &mut Vec<Entry>) -> std::io::Result<()> {
         if hidden {
             continue;
         }
-        // A link to a folder may lead to one that is walked already.
+        // Links to folders are not followed: they may lead to a folder that is searched anyway.
         if each.file_type()?.is_dir() {
             walk(&path, found)?;
         } else if path.is_file() && !ending.ends_with('~') && !NOT_RECORDS.contains(&ending.as_str()) {
@@ -89,7 +91,7 @@ fn listed(text: &str, list: &str, folder: &Path) -> Result<Vec<Entry>, String> {
                 column.and_then(|k| cells.get(k)).filter(|cell| !cell.is_empty()).map(|cell| (*cell).to_owned())
             };
             let Some(path) = cell(Some(file)) else {
-                return Err(format!("{list}, line {number}: no path in the column file"));
+                return Err(format!("{list}, line {number}: the column \"file\" is empty; give the path of a record"));
             };
             Ok(Entry {
                 file: at(&path),
@@ -124,7 +126,7 @@ mod tests {
         assert_eq!(entries[0].serial.as_deref(), Some("P-7"));
         assert_eq!((entries[0].test.as_ref(), entries[0].date.as_deref()), (None, Some("2026-05-02")));
         assert_eq!(entries[1].test, Some(own(&["c.csv"]).remove(0)));
-        for (text, why) in [("c.csv\nc.csv\n", "named twice"), ("no.csv\nnone.csv\n", "none of the files")] {
+        for (text, why) in [("c.csv\nc.csv\n", "listed twice"), ("no.csv\nnone.csv\n", "none of the files")] {
             fs::write(&list, text).unwrap();
             assert!(of(&list, &at("r.parquet")).unwrap_err().contains(why));
         }

@@ -1,6 +1,7 @@
-//! What is done: a line of JSON for each actuator, written and on the disk as soon as it is known.
+//! Journal of a fleet: one line of JSON for each finished actuator.
 //!
-//! A line is written by one call, and a line that was cut off by a kill is no line: it is done again. Of several rows of one actuator the last counts.
+//! A line is on the disk as soon as its actuator is finished. Each line is written by one call. A last line that was
+//! cut off is ignored, and its actuator is processed again. If an actuator has several rows, the last one counts.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -12,27 +13,27 @@ use sha2::{Digest, Sha256};
 
 use super::{Entry, Row};
 
-/// Rows that are done, in a file.
+/// Rows of finished actuators in a file.
 pub struct Journal {
     file: File,
     path: PathBuf,
-    /// The end of its whole lines.
+    /// Offset of the end of the last complete line.
     end: u64,
     done: BTreeMap<Key, Done>,
 }
 
-/// An actuator: its record and its test record.
+/// Key of an actuator: its record and its test record.
 type Key = (String, Option<String>);
 
 fn key(entry: &Entry) -> Key {
     (entry.file.clone(), entry.test.clone())
 }
 
-/// A row that is in the journal.
+/// A row of the journal.
 struct Done {
-    /// Where its line begins.
+    /// Offset of its line.
     at: u64,
-    /// What it depends on, as a hash; none where a file could not be read.
+    /// Hash of its files and options; `None` if a file could not be read.
     depends_on: Option<[u8; 32]>,
     failed: bool,
     has_report: bool,
@@ -52,16 +53,16 @@ impl Done {
 }
 
 impl Journal {
-    /// Opens the journal at `path`, or begins it, to add to it. Nobody else may meanwhile.
+    /// Opens or creates the journal at `path` for adding rows, and locks it.
     ///
     /// # Errors
-    /// When it cannot be read or written, is no journal, or somebody else adds to it.
+    /// When it cannot be read or written, is not a journal, or another process has locked it.
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                return Err(io::Error::other("another fleet is being written here; wait for it, or give another name"));
+                return Err(io::Error::other("another fleet writes this journal; wait for it or give another output"));
             }
             Err(TryLockError::Error(error)) => return Err(error),
         }
@@ -72,10 +73,10 @@ impl Journal {
         Ok(journal)
     }
 
-    /// Opens the journal at `path` to look at it.
+    /// Opens the journal at `path` for reading.
     ///
     /// # Errors
-    /// When it cannot be read or is no journal.
+    /// When it cannot be read or is not a journal.
     pub fn read(path: &Path) -> io::Result<Self> {
         Self::of(File::open(path)?, path)
     }
@@ -88,7 +89,7 @@ impl Journal {
         loop {
             line.clear();
             let n = reader.read_until(b'\n', &mut line)? as u64;
-            // A kill can only have cut the last line.
+            // Only the last line can be cut off.
             if n == 0 || !line.ends_with(b"\n") {
                 break;
             }
@@ -98,11 +99,11 @@ impl Journal {
                     let own = Done::of(&row, at);
                     done.insert(key(&row.entry), own);
                 }
-                // A row of another version, or one that is damaged: its actuator is done again.
+                // A row of another version or a damaged row: its actuator is processed again.
                 Err(_) if serde_json::from_slice::<Value>(&line).is_ok_and(|value| value.get("file").is_some()) => {}
                 Err(error) => {
                     let message =
-                        format!("line {number} is not a row of a fleet's journal ({error}); give another name");
+                        format!("line {number} is not a row of a fleet journal ({error}); give another output");
                     return Err(io::Error::new(io::ErrorKind::InvalidData, message));
                 }
             }
@@ -112,9 +113,11 @@ impl Journal {
         Ok(Self { file, path: path.to_owned(), end: at, done })
     }
 
-    /// Whether an actuator's row is there, of these files and options, with a report where reports are wanted.
+    /// Whether the journal has the row of an actuator with these files and options.
+    ///
+    /// With `reports`, the report must exist, too.
     pub fn has(&self, entry: &Entry, sha256: Option<&str>, options: &str, reports: bool) -> bool {
-        // A file that could not be read may be readable now.
+        // A file that could not be read is tried again.
         let Some(wanted) = depends_on(sha256, options) else { return false };
         self.done
             .get(&key(entry))
@@ -135,22 +138,23 @@ impl Journal {
         Ok(())
     }
 
-    /// Lets others add to it; this one adds nothing more.
+    /// Unlocks the journal; this process adds no more rows.
     ///
     /// # Errors
-    /// Those of the system.
+    /// When the system cannot unlock the file.
     pub fn unlock(&self) -> io::Result<()> {
         self.file.unlock()
     }
 
-    /// How many of these actuators are done, and how many of them failed.
+    /// Returns how many of these actuators are finished, and how many of those failed.
     pub fn count(&self, entries: &[Entry]) -> (usize, usize) {
         let done = || entries.iter().filter_map(|entry| self.done.get(&key(entry)));
         (done().count(), done().filter(|done| done.failed).count())
     }
 
-    /// The rows of these actuators that are done, each with its place in `entries`, in their order, one at a time. Serial numbers and dates are those of
-    /// `entries`.
+    /// Returns the finished rows of these actuators one by one, each with its index in `entries`.
+    ///
+    /// The order, the serial numbers and the dates are those of `entries`.
     ///
     /// # Errors
     /// When the journal cannot be read again.
@@ -177,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_off_is_done_again_and_the_last_row_of_a_file_counts() {
+    fn a_row_that_is_cut_off_is_repeated_and_the_last_row_of_an_actuator_counts() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fleet.journal");
         let mut journal = Journal::open(&path).unwrap();
@@ -187,17 +191,17 @@ mod tests {
         let (a, b) = (row("a", "2"), row("b", "1"));
         assert!(journal.has(&a.entry, Some("2"), "o", false) && !journal.has(&a.entry, Some("1"), "o", false));
         assert!(!journal.has(&b.entry, Some("1"), "other", false) && !journal.has(&b.entry, None, "o", false));
-        // One is not done; a serial number is that of the list.
+        // One actuator is not finished; the serial number is that of the list.
         let numbered = Entry { serial: Some("P-7".into()), ..a.entry.clone() };
         let entries = [b.entry.clone(), row("c", "1").entry, numbered.clone()];
         let rows: Vec<(usize, Row)> = journal.rows(&entries).unwrap().map(Result::unwrap).collect();
         assert_eq!(rows, [(0, b.clone()), (2, Row { entry: numbered, ..a.clone() })]);
-        // Nobody else adds to it, but anybody may look.
+        // A locked journal cannot be opened for adding, but can be read.
         assert!(Journal::open(&path).is_err());
         assert_eq!(Journal::read(&path).unwrap().count(&entries), (2, 2));
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
-        // However much of the last row was written.
+        // The last row is cut off at several places.
         let last = serde_json::to_vec(&a).unwrap().len();
         for cut in [1, last / 2, last] {
             std::fs::write(&path, &whole[..whole.len() - cut]).unwrap();
@@ -209,7 +213,7 @@ mod tests {
             journal.add(&a).unwrap();
             assert_eq!(std::fs::read(&path).unwrap(), whole);
         }
-        // A row that is none of this version is done again; the others stay.
+        // A row of another version is processed again; the other rows are kept.
         let strange = [b"{\"file\": \"b\", \"outcome\": 3}\n".as_slice(), &whole].concat();
         std::fs::write(&path, &strange).unwrap();
         assert!(Journal::open(&path).unwrap().has(&a.entry, Some("2"), "o", false));

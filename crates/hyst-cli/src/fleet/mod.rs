@@ -1,7 +1,7 @@
-//! Diagnoses of many actuators: one row each, whatever their number.
+//! Diagnoses of many actuators, one row of results each.
 //!
-//! A row is written to a journal as soon as its actuator is done, so that what is done is never done again ([`journal`]). The table of all
-//! rows is made from the journal ([`table`]), and a page that shows them together ([`page`]). In memory there are some hundred bytes for each actuator.
+//! A row is written to a [`journal`] as soon as its actuator is finished, so that an interrupted fleet continues. The
+//! results [`table`] and the HTML [`page`] are made from the journal. Memory: a few hundred bytes for each actuator.
 
 pub mod entries;
 pub mod journal;
@@ -18,25 +18,25 @@ use serde::{Deserialize, Serialize};
 /// An actuator of the fleet.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
-    /// The file of its record, as it was given: the name of its row.
+    /// File of its record as it was given; it names the row.
     pub file: String,
-    /// Another record, on which errors are shown; it is never fitted.
+    /// Test record: its errors are reported, it is never fitted.
     #[serde(default)]
     pub test: Option<String>,
-    /// Its serial number.
+    /// Serial number.
     #[serde(default)]
     pub serial: Option<String>,
-    /// When it was measured, as the list says it.
+    /// Date of the measurement, as in the list.
     #[serde(default)]
     pub date: Option<String>,
 }
 
-/// What is done with each actuator.
+/// Options of the fit and the diagnosis of each actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {
-    /// Kind of the model that is fitted; `auto` takes pi or preisach.
+    /// Kind of model to fit; `auto` takes pi or preisach.
     pub model: String,
-    /// Whether each file has a sensor zero of its own.
+    /// Whether one sensor zero per file is estimated.
     pub zero_per_record: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
@@ -50,18 +50,18 @@ pub struct Options {
 }
 
 impl Options {
-    /// Refuses what no actuator could be done with.
+    /// Checks kind of model and columns.
     ///
     /// # Errors
-    /// In words.
+    /// A message with the wrong value.
     pub fn check(&self) -> Result<(), String> {
         crate::commands::diagnose::kind_of(&self.model).map_err(|error| error.text())?;
         ColumnMap::parse(&self.map).map(|_| ()).map_err(|error| error.to_string())
     }
 
-    /// What a row depends on besides its files. Rows of other options are done anew.
+    /// Returns version and options as text. Rows with another text are processed again.
     pub fn fingerprint(&self) -> String {
-        // A structure of numbers and texts has JSON.
+        // Numbers and strings can always be written as JSON.
         format!("{} {}", env!("CARGO_PKG_VERSION"), serde_json::to_string(self).unwrap_or_default())
     }
 }
@@ -69,26 +69,26 @@ impl Options {
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Its value.
+    /// Value \[unit\].
     pub value: f64,
-    /// Its standard error, where it was estimated.
+    /// Standard error \[unit\], if it was estimated.
     pub std_error: Option<f64>,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
 }
 
-/// An effect that was named.
+/// A named effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedEffect {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Probability that the name is right.
     pub probability: f64,
-    /// Its parameters.
+    /// Parameters by name.
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// What a diagnosis has found of an actuator.
+/// Results of the diagnosis of an actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// Rows of its record.
@@ -101,49 +101,50 @@ pub struct Found {
     pub verdict: String,
     /// White noise of the output, standard deviation \[unit\].
     pub noise: f64,
-    /// Errors of the model on its record before and after its extension \[unit\].
+    /// RMS error of the fitted model on the training record \[unit\].
     pub rmse_before: Option<f64>,
-    /// After it.
+    /// RMS error of the extended model on the training record \[unit\].
     pub rmse_after: Option<f64>,
-    /// The same on the test record, where there is one.
+    /// RMS error of the fitted model on the test record \[unit\].
     pub test_rmse_before: Option<f64>,
-    /// After it.
+    /// RMS error of the extended model on the test record \[unit\].
     pub test_rmse_after: Option<f64>,
-    /// What was named.
+    /// Named effects.
     pub effects: Vec<NamedEffect>,
-    /// What may be there, with its probability.
+    /// Probabilities of suspected effects by name.
     pub suspects: BTreeMap<String, f64>,
-    /// The report, if one was written.
+    /// Path of the report, if one was written.
     pub report: Option<String>,
-    /// Why none was, where one was wanted.
+    /// Error of a report that could not be written.
     #[serde(default)]
     pub report_error: Option<String>,
 }
 
-/// One actuator's row.
+/// The row of one actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The actuator.
     #[serde(flatten)]
     pub entry: Entry,
-    /// SHA-256 of its files, in hexadecimal digits; none where one could not be read.
+    /// SHA-256 of its files, in hexadecimal digits; `None` if a file could not be read.
     pub sha256: Option<String>,
-    /// What it depends on besides ([`Options::fingerprint`]).
+    /// Version and options ([`Options::fingerprint`]).
     pub options: String,
-    /// How long it took \[s\]: the one number that differs from run to run.
+    /// Computing time \[s\]; the only value that is not reproducible.
     pub took_s: f64,
-    /// What was found, or why nothing could be.
+    /// Results, or the reason of a failure.
     pub outcome: Result<Found, String>,
 }
 
-/// The journal beside a table of results.
+/// Returns the path of the journal of a results file.
 pub fn journal_of(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(".journal");
     name.into()
 }
 
-/// The actuators that are not done yet, or whose files have changed since; `watch` is given how many files were looked at.
+/// Returns the actuators that are not finished or whose files have changed.
+/// `watch` receives the number of checked actuators.
 pub fn due(
     entries: &[Entry],
     journal: &journal::Journal,

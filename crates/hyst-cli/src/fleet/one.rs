@@ -1,4 +1,4 @@
-//! One actuator: read, fitted, diagnosed, on the threads of the pool that calls.
+//! Reads, fits and diagnoses one actuator, on the threads of the calling pool.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,14 +19,14 @@ use crate::commands::diagnose::{fitted_and_diagnosed, kind_of};
 use crate::exit::{CommandError, CommandResult};
 use crate::report::{self, Contents};
 
-/// How parameters of single creep elements begin.
+/// Prefix of the parameters of single creep elements.
 const CREEP_ELEMENT: &str = "share_";
 
-/// SHA-256 of an actuator's files; `None` where one cannot be read.
+/// Returns the SHA-256 of an actuator's files; `None` if a file cannot be read.
 pub fn sum_of(entry: &Entry) -> Option<String> {
     let mut sum = Sha256::new();
     for path in [Some(&entry.file), entry.test.as_ref()].into_iter().flatten() {
-        // The length first: two files are not one that is longer.
+        // The length comes first, so that two files and one joined file have different sums.
         let bytes = fs::read(path).ok()?;
         sum.update((bytes.len() as u64).to_le_bytes());
         sum.update(&bytes);
@@ -34,10 +34,10 @@ pub fn sum_of(entry: &Entry) -> Option<String> {
     Some(format!("{:x}", sum.finalize()))
 }
 
-/// The row of an actuator, whatever is wrong with its files; `None` where `stop` has ended it.
+/// Returns the row of an actuator, also if it fails; `None` if `stop` has ended it.
 pub fn row(entry: &Entry, options: &Options, stop: &Stop) -> Option<Row> {
     let began = Instant::now();
-    // Before anything is read: a file that changes meanwhile is done again.
+    // Computed before the files are read, so that a file that changes meanwhile is processed again.
     let sha256 = sum_of(entry);
     let outcome = catch_unwind(AssertUnwindSafe(|| found(entry, options, stop)));
     if stop.is_stopped() {
@@ -45,7 +45,7 @@ pub fn row(entry: &Entry, options: &Options, stop: &Stop) -> Option<Row> {
     }
     let outcome = match outcome {
         Ok(found) => found.map_err(|error| error.text()),
-        Err(_) => Err("an error of the program itself; please report it with this file".to_owned()),
+        Err(_) => Err("internal error of hystctl; please report it with this file".to_owned()),
     };
     Some(Row {
         entry: entry.clone(),
@@ -64,7 +64,7 @@ fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> 
     let diagnosing = DiagnoseOptions { zero, seed: options.seed };
     let kind = kind_of(&options.model)?;
     let (model, text, diagnosis) = fitted_and_diagnosed(&train, test.as_ref(), kind, &diagnosing, &|_| {}, stop)?;
-    // A diagnosis without its report is still one.
+    // If the report cannot be written, the results are kept.
     let report = written(entry, options, (&train, test.as_ref()), (&model, &text), &diagnosis);
     let (report, report_error) = match report {
         Ok(path) => (path, None),
@@ -77,7 +77,7 @@ fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> 
         parameters: finding
             .parameters
             .iter()
-            // The elements of a creep are others in each record; its total is not.
+            // Creep elements have different time constants in each record; only their total is comparable.
             .filter(|(name, _)| !name.starts_with(CREEP_ELEMENT))
             .map(|(name, found)| {
                 let (value, std_error, unit) = (found.value, found.std_error, found.unit.clone());
@@ -110,7 +110,7 @@ fn found(entry: &Entry, options: &Options, stop: &Stop) -> CommandResult<Found> 
     })
 }
 
-/// Writes the report, if reports are wanted; its path.
+/// Writes the report if the options ask for reports; returns its path.
 fn written(
     entry: &Entry,
     options: &Options,
@@ -132,7 +132,7 @@ fn written(
         seed: options.seed,
     };
     let page = report::page(&contents).map_err(CommandError::failed)?;
-    // Files of one name in two folders have two reports, and no name is too long.
+    // The hash distinguishes files of the same name; the limit keeps names short enough for file systems.
     let stem = Path::new(&entry.file).file_stem().unwrap_or_default().to_string_lossy();
     let stem: String =
         stem.chars().map(|c| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' }).take(80).collect();

@@ -1,7 +1,8 @@
-//! The fleet on a page: which actuators show which effects, parameters in order with control limits, what stands out, what failed.
+//! HTML page of a fleet: effects, control charts of parameters, failed records, actuators.
 //!
-//! The charts are charts of individual values (Wheeler and Chambers, *Understanding Statistical Process Control*): the centre is the median, the
-//! limits are 3.145 median moving ranges away from it, 3 standard deviations of what changes from one actuator to the next.
+//! The charts are control charts of individual values (Wheeler and Chambers, *Understanding Statistical Process Control*).
+//! The centre is the median. The limits are 3.145 median moving ranges from the centre, which is 3 standard deviations of
+//! the differences between successive actuators.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -15,24 +16,24 @@ use crate::report::figures;
 use crate::report::html::{Page, Table, escaped};
 use crate::text::{count, percent, short, symbol};
 
-/// Median moving ranges from the centre to a limit: 3/0.954.
+/// Distance from the centre to a limit, in median moving ranges: 3/0.954.
 const RANGES_TO_LIMIT: f64 = 3.145;
-/// Fewest values of a chart.
+/// Minimum number of values of a chart.
 const MIN_VALUES: usize = 8;
-/// Actuators that a table lists.
+/// Maximum number of actuators in a table.
 const MAX_LISTED: usize = 500;
-/// Points of a chart; of more values some are left out, but none that is out of its limits.
+/// Maximum number of points within the limits of a chart; points outside the limits are always drawn.
 const MAX_POINTS: usize = 1500;
 
 /// A parameter of an effect over the fleet.
 #[derive(Default)]
 struct Series {
     unit: String,
-    /// Number of the actuator in its order, and value.
+    /// Index of the actuator in its order, and value.
     values: Vec<(usize, f64)>,
 }
 
-/// What a chart says.
+/// Centre and limits of a chart.
 struct Limits {
     centre: f64,
     low: f64,
@@ -61,12 +62,12 @@ impl Limits {
     }
 }
 
-/// The actuators in the order of their dates, of those of one day of their serial numbers, and what that order is.
+/// Sorts the actuators by date and serial number; returns them with a description of the order.
 fn in_order(entries: &[Entry]) -> (Vec<Entry>, &'static str) {
     let mut sorted = entries.to_vec();
     let dated = entries.iter().any(|entry| entry.date.is_some());
     let numbered = entries.iter().any(|entry| entry.serial.is_some());
-    // Numbers in a serial number count as numbers: P-9 comes before P-10.
+    // Digits in a serial number are compared as numbers: P-9 comes before P-10.
     let natural = |text: &Option<String>| -> Vec<(u128, String)> {
         let text = text.as_deref().unwrap_or_default();
         text.split_inclusive(|c: char| !c.is_ascii_digit())
@@ -78,9 +79,9 @@ fn in_order(entries: &[Entry]) -> (Vec<Entry>, &'static str) {
     };
     sorted.sort_by_cached_key(|entry| (entry.date.clone().unwrap_or_default(), natural(&entry.serial)));
     let order = match (dated, numbered) {
-        (true, _) => "in the order of their dates",
-        (false, true) => "in the order of their serial numbers",
-        (false, false) => "in the order of their files",
+        (true, _) => "sorted by date",
+        (false, true) => "sorted by serial number",
+        (false, false) => "sorted by file",
     };
     (sorted, order)
 }
@@ -89,12 +90,12 @@ fn name(entry: &Entry) -> String {
     entry.serial.as_ref().map_or_else(|| entry.file.clone(), |serial| format!("{serial} ({})", entry.file))
 }
 
-/// What a fleet is called.
+/// Returns the title of a fleet.
 pub fn title(records: &Path) -> String {
     format!("Fleet {}", records.file_name().unwrap_or(records.as_os_str()).to_string_lossy())
 }
 
-/// The page of these actuators; `title` is what the fleet is called.
+/// Returns the page of these actuators as HTML.
 ///
 /// # Errors
 /// When the journal cannot be read.
@@ -163,7 +164,7 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
     write_charts(&mut page, &series, &entries, order);
     if failed > 0 {
         page.section("failed", "Records without a diagnosis");
-        let mut table = Table::new("").words("actuator").words("why");
+        let mut table = Table::new("").words("actuator").words("reason");
         failures.iter().for_each(|(name, why)| table.row(&[name, why]));
         page.table(&table);
         more(&mut page, failed, failures.len());
@@ -178,14 +179,14 @@ pub fn page(title: &str, journal: &Journal, entries: &[Entry]) -> io::Result<Str
 fn link(path: &str) -> String {
     let file = Path::new(path);
     let parts: Vec<_> = [file.parent().and_then(Path::file_name), file.file_name()].into_iter().flatten().collect();
-    // The page lies beside the folder of the reports.
+    // The page and the folder of the reports are in the same folder.
     let at = parts.iter().map(|part| part.to_string_lossy()).collect::<Vec<_>>().join("/");
     format!("<a href=\"{}\">report</a>", escaped(at))
 }
 
 fn more(page: &mut Page, all: usize, shown: usize) {
     if all > shown {
-        page.paragraph("soft", &format!("the first {shown} of {all}; the table of results has all"));
+        page.paragraph("soft", &format!("the first {shown} of {all}; the results file has all"));
     }
 }
 
@@ -203,7 +204,10 @@ fn summary(done: usize, failed: usize, all: usize, verdicts: &BTreeMap<String, u
     }
     better.sort_unstable_by(f64::total_cmp);
     if let Some(middle) = better.get(better.len() / 2) {
-        text += &format!(". The residual of the extended model is {} of the model's (median)", percent(100.0 * middle));
+        text += &format!(
+            ". Extended models have {} of the RMS residual of the fitted models (median)",
+            percent(100.0 * middle)
+        );
     }
     text
 }
@@ -227,7 +231,7 @@ fn write_effects(page: &mut Page, effects: &BTreeMap<String, Vec<f64>>, diagnose
     page.table(&table);
 }
 
-/// What a series is called.
+/// Returns the title of a series.
 fn called(effect: &str, parameter: &str) -> String {
     if effect.is_empty() { "White noise of the output".to_owned() } else { format!("{effect}: {parameter}") }
 }
@@ -266,7 +270,7 @@ fn write_charts(page: &mut Page, series: &BTreeMap<(String, String), Series>, en
     }
 }
 
-/// A chart of each parameter that enough actuators have.
+/// Returns a chart of each parameter that has at least [`MIN_VALUES`] values.
 fn charts(series: &BTreeMap<(String, String), Series>, order: &str) -> Vec<Picture> {
     let chart = |((effect, parameter), own): (&(String, String), &Series)| {
         let limits = own.limits()?;
@@ -320,7 +324,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_are_those_of_what_changes_from_one_to_the_next() {
+    fn limits_follow_from_the_moving_ranges() {
         let value = |k: usize| (k, 10.0 + [0.0, 1.0, -1.0, 0.5][k % 4] + if k == 17 { 30.0 } else { 0.0 });
         let series = Series { unit: String::new(), values: (0..40).map(value).collect() };
         let limits = series.limits().unwrap();
@@ -343,10 +347,7 @@ mod tests {
         };
         let serials = |entries: &[Entry]| entries.iter().map(|e| e.file.clone()).collect::<Vec<_>>();
         let (sorted, order) = in_order(&[entry("P-10", None), entry("P-9", None)]);
-        assert_eq!(
-            (serials(&sorted), order),
-            (vec!["P-9".to_owned(), "P-10".to_owned()], "in the order of their serial numbers")
-        );
+        assert_eq!((serials(&sorted), order), (vec!["P-9".to_owned(), "P-10".to_owned()], "sorted by serial number"));
         let (sorted, _) = in_order(&[entry("P-9", Some("2026-05-02")), entry("P-10", Some("2026-05-01"))]);
         assert_eq!(serials(&sorted), ["P-10", "P-9"]);
     }

@@ -1,6 +1,6 @@
-//! All rows as a Parquet file: one row an actuator, columns for what any of them has.
+//! Results of a fleet as a Parquet file: one row per actuator, with the columns of all actuators.
 //!
-//! Two passes over the journal, in blocks: the first finds the columns, the second writes them.
+//! The journal is read twice: first to find the columns, then to write them in blocks.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -16,10 +16,10 @@ use parquet::schema::parser::parse_message_type;
 use super::journal::Journal;
 use super::{Entry, Found, Row};
 
-/// Rows that are held at a time.
+/// Number of rows that are held in memory.
 const BLOCK: usize = 4096;
 
-/// What a column holds.
+/// Values of a column.
 enum Cells {
     Texts(Vec<Option<String>>),
     Numbers(Vec<Option<f64>>),
@@ -58,7 +58,7 @@ fn found(row: &Row) -> Option<&Found> {
     row.outcome.as_ref().ok()
 }
 
-/// What an effect has as columns: its probability, its parameters and their standard errors.
+/// Returns the columns of all effects of an actuator: probabilities, parameters and standard errors.
 fn of_effects(found: &Found) -> impl Iterator<Item = (String, Option<f64>)> + '_ {
     let suspected = found.suspects.iter().map(|(name, p)| (format!("{name}_suspected"), Some(*p)));
     let named = found.effects.iter().flat_map(|effect| {
@@ -74,7 +74,7 @@ fn of_effects(found: &Found) -> impl Iterator<Item = (String, Option<f64>)> + '_
 /// Writes the rows of these actuators.
 ///
 /// # Errors
-/// When the journal cannot be read or `out` not written.
+/// When the journal cannot be read or `out` cannot be written.
 pub fn write(out: &mut dyn Write, journal: &Journal, entries: &[Entry]) -> io::Result<()> {
     in_blocks(out, journal, entries, BLOCK)
 }
@@ -89,12 +89,12 @@ fn in_blocks(out: &mut dyn Write, journal: &Journal, entries: &[Entry], block_ro
     let counts = std::iter::once("OPTIONAL INT64 rows;".to_owned());
     let numbers =
         NUMBERS.iter().map(|(name, _)| (*name).to_owned()).chain(["took_s".to_owned()]).chain(further.iter().cloned());
-    // A hyphen is no letter of the schema's language.
+    // Names in the schema must not contain hyphens.
     let numbers = numbers.map(|name| format!("OPTIONAL DOUBLE {};", column(&name)));
     let schema = format!("message fleet {{ {} }}", texts.chain(counts).chain(numbers).collect::<Vec<_>>().join(" "));
     let schema = Arc::new(parse_message_type(&schema).map_err(failed)?);
     let properties = Arc::new(WriterProperties::builder().set_compression(Compression::SNAPPY).build());
-    // The writer wants something that may go to another thread: a block at a time waits in memory.
+    // The writer needs an output that is `Send`, so each block is buffered in memory.
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).map_err(failed)?;
     let mut rows = journal.rows(entries)?;
     loop {
@@ -114,7 +114,7 @@ fn in_blocks(out: &mut dyn Write, journal: &Journal, entries: &[Entry], block_ro
     out.write_all(writer.inner())
 }
 
-/// A name as columns have it.
+/// Returns a name with only letters, digits and underscores.
 fn column(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
@@ -123,7 +123,7 @@ fn failed(error: ParquetError) -> io::Error {
     io::Error::other(error)
 }
 
-/// The cells of each column, in the order of the schema.
+/// Returns the values of each column, in the order of the schema.
 fn cells(block: &[Row], further: &BTreeSet<String>) -> Vec<Cells> {
     let texts = TEXTS.iter().map(|(_, of)| Cells::Texts(block.iter().map(of).collect()));
     let rows = |row: &Row| found(row).map(|found| found.rows as i64);
@@ -163,7 +163,7 @@ fn write_cells(group: &mut SerializedRowGroupWriter<'_, Vec<u8>>, cells: Cells) 
     column.close()
 }
 
-/// 1 where there is a value.
+/// Returns the definition levels of a column: 1 for a value, 0 for none.
 fn levels<T>(cells: &[Option<T>]) -> Vec<i16> {
     cells.iter().map(|cell| i16::from(cell.is_some())).collect()
 }

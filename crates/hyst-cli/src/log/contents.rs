@@ -1,4 +1,4 @@
-//! What stands in a log: the run, its samples and their schema.
+//! Contents of a log: description of the run, samples, events and their schemas.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use serde::{Serialize, Serializer};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-/// What a log says about the whole run.
+/// Description of a run in its log.
 #[derive(Clone, Copy, Debug)]
 pub struct RunInfo<'a> {
-    /// What the device calls itself.
+    /// Name of the device.
     pub device: &'a str,
     /// Unit of output, reference and error.
     pub output: OutputUnit,
     /// Samples per second \[Hz\].
     pub sample_rate_hz: f64,
-    /// The model that computed the drive, if one did.
+    /// The model that computed the drive; `None` for a drive that was played unchanged.
     pub model: Option<LoggedModel<'a>>,
 }
 
@@ -27,18 +27,18 @@ pub struct RunInfo<'a> {
 pub struct LoggedModel<'a> {
     /// The model.
     pub model: &'a Model,
-    /// Its file's text.
+    /// Text of its file.
     pub json: &'a str,
 }
 
 /// One sample of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoggedSample {
-    /// Lab clock \[s\].
+    /// Time of the device's clock \[s\].
     pub time_s: f64,
     /// Segment, from 0.
     pub segment: usize,
-    /// What the sample is part of.
+    /// Phase of the run: ramp before a segment, segment, or ramp after it.
     #[serde(serialize_with = "phase_name")]
     pub phase: Phase,
     /// Voltage that was applied \[V\].
@@ -51,7 +51,7 @@ pub struct LoggedSample {
     /// Output minus reference \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
-    /// What the model expects \[output unit\].
+    /// Output that the model predicts \[output unit\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted: Option<f64>,
     /// Temperature \[°C\].
@@ -74,7 +74,7 @@ fn phase_name<S: Serializer>(phase: &Phase, to: S) -> Result<S::Ok, S::Error> {
 }
 
 impl LoggedSample {
-    /// A sample as measured; `reference` is what was wanted then, if anything was.
+    /// Creates the sample as it was measured; `reference` is the wanted output at that time.
     pub fn new(segment: usize, phase: Phase, sample: &hyst_hw::Sample, reference: Option<f64>) -> Self {
         Self {
             time_s: sample.time_s,
@@ -92,7 +92,7 @@ impl LoggedSample {
     }
 }
 
-/// What ran, as text by key.
+/// Returns the metadata of a run, as text by key.
 pub(super) fn metadata(info: &RunInfo<'_>) -> BTreeMap<String, String> {
     let mut entries = BTreeMap::from(
         [
@@ -105,7 +105,7 @@ pub(super) fn metadata(info: &RunInfo<'_>) -> BTreeMap<String, String> {
         ]
         .map(|(key, value)| (key.to_owned(), value.to_owned())),
     );
-    // A program that was built without a repository does not know its state.
+    // A program that was built without a repository has no git state.
     entries.retain(|_, value| !value.is_empty());
     entries.insert("sample_rate_hz".to_owned(), info.sample_rate_hz.to_string());
     if let Some(LoggedModel { model, json }) = info.model {
@@ -117,7 +117,7 @@ pub(super) fn metadata(info: &RunInfo<'_>) -> BTreeMap<String, String> {
     entries
 }
 
-/// The JSON schema of [`LoggedSample`].
+/// Returns the JSON schema of [`LoggedSample`].
 pub(super) fn schema(unit: &str) -> serde_json::Value {
     let number = |description: String| json!({ "type": "number", "description": description });
     json!({
@@ -140,7 +140,7 @@ pub(super) fn schema(unit: &str) -> serde_json::Value {
             },
             "reference": number(format!("Wanted output [{unit}]; only in a record that follows a reference")),
             "error": { "type": ["number", "null"], "description": format!("Output minus reference [{unit}]") },
-            "predicted": number(format!("Output that the model expects [{unit}]; only where one runs beside the device")),
+            "predicted": number(format!("Output that the model predicts [{unit}]; only if a model runs in parallel")),
             "temperature_degc": number("Temperature [degC], where it is measured".to_owned()),
             "load_n": number("Load [N], where it is measured".to_owned()),
             "estimated_force_n": number("Force on the output [N], where it is estimated".to_owned())
@@ -149,7 +149,7 @@ pub(super) fn schema(unit: &str) -> serde_json::Value {
     })
 }
 
-/// The unit of every field, by `unit.FIELD`.
+/// Returns the unit of each field, by `unit.FIELD`.
 pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
     let fields = [
         ("time_s", "s"),
@@ -165,23 +165,23 @@ pub(super) fn units(unit: &str) -> BTreeMap<String, String> {
     fields.into_iter().map(|(field, unit)| (format!("unit.{field}"), unit.to_owned())).collect()
 }
 
-/// As [`units`], of an event.
+/// Returns the units of the fields of an event, as [`units`] does.
 pub(super) fn event_units() -> BTreeMap<String, String> {
     BTreeMap::from([("unit.time_s".to_owned(), "s".to_owned())])
 }
 
-/// Something that happened on the way.
+/// An event during a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoggedEvent {
-    /// Lab clock \[s\].
+    /// Time of the device's clock \[s\].
     pub time_s: f64,
-    /// What, in one word for programs: `model-lost`, `model-found`, `fault`, `cancelled`, `gap`.
+    /// Kind of the event, for programs: `model-lost`, `model-found`, `fault`, `cancelled`, `gap`.
     pub kind: &'static str,
-    /// What, in a sentence.
+    /// Description in a sentence.
     pub text: String,
 }
 
-/// The JSON schema of [`LoggedEvent`].
+/// Returns the JSON schema of [`LoggedEvent`].
 pub(super) fn event_schema() -> serde_json::Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",

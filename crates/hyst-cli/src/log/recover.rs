@@ -1,4 +1,4 @@
-//! What is left of a log that was cut off.
+//! Recovers the complete parts of a log that was cut off.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -9,14 +9,14 @@ use mcap::records::{Metadata, Record};
 use mcap::{Attachment, McapError};
 
 use super::options;
-use super::sink::said;
+use super::sink::into_io_error;
 
-/// Everything that is whole in an MCAP file, as a closed one.
+/// Returns a closed MCAP file with all complete records of `bytes`.
 ///
 /// # Errors
-/// When the bytes are no MCAP file.
+/// When the bytes are not an MCAP file.
 pub fn recovered(bytes: &[u8]) -> io::Result<Vec<u8>> {
-    rewritten(bytes).map_err(said)
+    rewritten(bytes).map_err(into_io_error)
 }
 
 fn rewritten(bytes: &[u8]) -> Result<Vec<u8>, McapError> {
@@ -62,7 +62,7 @@ mod tests {
     use hyst_hw::{Phase, Sample};
     use hyst_ident::record::OutputUnit;
 
-    /// A log of 20 samples in several chunks.
+    /// Returns a log of 20 samples in several chunks.
     fn log() -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
@@ -103,7 +103,7 @@ mod tests {
         for length in 0..=whole.len() {
             let cut = &whole[..length];
             if length < 8 {
-                recovered(cut).expect_err("no MCAP file");
+                recovered(cut).expect_err("not an MCAP file");
                 continue;
             }
             let again = recovered(cut).unwrap();
@@ -118,17 +118,17 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_chunk_takes_no_other_with_it() {
+    fn other_chunks_of_a_damaged_log_are_recovered() {
         let whole = log();
         let all = messages(&whole);
         let summary = mcap::Summary::read(&whole).unwrap().unwrap();
         for chunk in &summary.chunk_indexes {
             let inside = summary.stream_chunk(&whole, chunk).unwrap().count();
-            // Behind its kind and its length.
+            // After the kind and the length of the record.
             let (from, to) =
                 (chunk.chunk_start_offset as usize + 9, (chunk.chunk_start_offset + chunk.chunk_length) as usize);
             for at in from..to {
-                // The channel stands in the first chunk.
+                // The first chunk holds the channel: if it is damaged, all samples are lost.
                 let mut damaged = whole.clone();
                 damaged[at] ^= 1 << (at % 8);
                 let left = messages(&recovered(&damaged).unwrap());

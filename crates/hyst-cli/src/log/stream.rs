@@ -1,4 +1,4 @@
-//! A run while it goes on, for viewers: Foxglove and Lichtblick connect over a WebSocket and get what a log gets.
+//! Streams a run to viewers (Foxglove, Lichtblick) over a WebSocket, with the messages of the log.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,34 +12,35 @@ use serde::Serialize;
 use super::contents::{LoggedEvent, LoggedSample, event_schema, event_units, schema, units};
 use super::{EVENT_SCHEMA, EVENTS, SAMPLE_SCHEMA, TOPIC};
 
-/// Messages that wait for a viewer; one that is slower misses some, the run waits for none.
+/// Maximum number of messages that wait for a viewer.
+/// A slower viewer misses messages; the run never waits.
 const BACKLOG: usize = 16_384;
 
-/// Viewers cannot be served.
+/// Error of a stream whose address cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("{address}: viewers cannot be served there: {source}; give another address, as --live 127.0.0.1:8766")]
+#[error("{address}: cannot listen for viewers: {source}; give another address, for example --live 127.0.0.1:8766")]
 pub struct StreamError {
     address: SocketAddr,
     source: FoxgloveError,
 }
 
-/// Serves viewers until it is dropped.
+/// Streams a run to viewers until it is dropped.
 pub struct RunStream {
     server: Option<WebSocketServerHandle>,
-    /// Channels live as long as it.
+    /// Keeps the channels alive.
     _context: Arc<Context>,
     url: String,
     samples: Arc<RawChannel>,
     events: Arc<RawChannel>,
-    /// When the device's clock stood at zero \[ns since 1970\], once there was a sample.
+    /// Zero of the device's clock \[ns since 1970\]; `None` before the first sample.
     began: Option<u64>,
 }
 
 impl RunStream {
-    /// Serves at `address` a run whose output has this unit.
+    /// Listens at `address` for viewers of a run; `unit` is the unit of its output.
     ///
     /// # Errors
-    /// When the address cannot be had.
+    /// When the address cannot be opened.
     pub fn at(address: SocketAddr, unit: &str) -> Result<Self, StreamError> {
         let failed = |source| StreamError { address, source };
         let context = Context::new();
@@ -64,27 +65,27 @@ impl RunStream {
         Ok(Self { server: Some(server), _context: context, url, samples, events, began: None })
     }
 
-    /// Where viewers connect to.
+    /// Returns the URL that viewers connect to.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Shows a sample.
+    /// Sends a sample.
     pub fn sample(&mut self, sample: &LoggedSample) {
         self.began.get_or_insert_with(|| {
             let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as u64);
             now.saturating_sub((sample.time_s * 1e9) as u64)
         });
-        self.show(&self.samples, sample.time_s, sample);
+        self.send(&self.samples, sample.time_s, sample);
     }
 
-    /// Shows what has happened.
+    /// Sends an event.
     pub fn event(&self, event: &LoggedEvent) {
-        self.show(&self.events, event.time_s, event);
+        self.send(&self.events, event.time_s, event);
     }
 
-    fn show(&self, channel: &RawChannel, time_s: f64, message: &impl Serialize) {
-        // Nobody looks: nothing is to be done.
+    fn send(&self, channel: &RawChannel, time_s: f64, message: &impl Serialize) {
+        // No viewer is connected.
         if !channel.has_sinks() {
             return;
         }

@@ -1,4 +1,4 @@
-//! Each effect that was named: parameters, evidence, what else was tried.
+//! Section of the named effects: parameters, evidence and alternatives of each.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,23 +8,23 @@ use super::html::{Page, Table, escaped};
 use super::{Contents, figures, words};
 use crate::text::short;
 
-/// A part for each effect.
+/// Writes the section.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
-    page.section("effects", "What the model lacks");
+    page.section("effects", "Missing effects");
     let effects = &c.diagnosis.findings.effects;
     if effects.is_empty() {
-        page.paragraph("", "No effect was named: none of them explains what is left well enough");
+        page.paragraph("", "No effect was named: none explains the residual well enough");
         not_named(page, c);
         return;
     }
     page.paragraph(
         "soft",
-        "Each picture compares the extended model with the same model less that one effect, nothing fitted again: what differs is the \
-         effect's own part. Residuals are measured minus predicted output",
+        "Each plot compares the extended model with the same model without this effect; nothing is fitted again. The difference is the \
+         contribution of the effect. Residuals are measured minus predicted output",
     );
     page.raw(
-        "<p class=\"soft hint\">Drag across a plot to zoom, double-click for the whole of it; with fingers: two zoom, one moves, a double \
-         tap resets.</p>",
+        "<p class=\"soft hint\">Drag across a plot to zoom; double-click to reset. On a touch screen two fingers zoom, one finger moves, \
+         and a double tap resets.</p>",
     );
     for (i, finding) in effects.iter().enumerate() {
         page.raw(&format!("<h3 class=\"effect\">{}</h3>", escaped(finding.name)));
@@ -36,12 +36,14 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         page.raw("</div>");
         for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
             let text = format!(
-                "This record cannot tell {} from {}; the simpler of the two is named, and of two that are equally simple the one with the smaller error. What would tell them apart is said under Next",
+                "This record cannot distinguish {} from {}. The simpler effect is named; of two equally simple effects, \
+                 the one with the smaller error. The end of the section Remainder has a command for a drive that \
+                 distinguishes them",
                 finding.name, other.name
             );
             page.paragraph("note", &text);
         }
-        // A second mode has its pictures with the first.
+        // The pictures of a second mode are those of the first.
         if i == 0 || effects[i - 1].name != finding.name {
             figures::write(page, &figures::of(&c.diagnosis.pictures, Some(finding.name)));
         }
@@ -49,25 +51,28 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     not_named(page, c);
 }
 
-/// What may act too, and what this record would have shown.
+/// Writes suspected effects and limits of detection.
 fn not_named(page: &mut Page, c: &Contents<'_>) {
     let findings = &c.diagnosis.findings;
     let suspects = words::suspects(findings);
     if !suspects.is_empty() {
-        page.raw("<h3>Suspects</h3>");
+        page.raw("<h3>Suspected effects</h3>");
         page.list(&suspects);
     }
     let limits = words::limits(findings);
     if !limits.is_empty() {
-        page.raw("<h3>What this record would have shown</h3>");
-        page.paragraph("soft", "Sizes from which on each effect that was not named would have been");
-        let mut table = Table::new("Limits of detection").words("effect").numbers("size").words("of what");
+        page.raw("<h3>Limits of detection</h3>");
+        page.paragraph(
+            "soft",
+            "For each effect that is not named, the smallest size that this record would have shown",
+        );
+        let mut table = Table::new("Limits of detection").words("effect").numbers("size").words("meaning");
         limits.iter().for_each(|(name, size, of)| table.row(&[name, size, of]));
         page.table(&table);
     }
 }
 
-/// One row a parameter; those that are lists, element by element.
+/// Returns the table of parameters: one row per parameter, or per element of parameters in lists.
 fn parameters(finding: &Finding) -> Table {
     let all = words::parameters(&finding.parameters);
     let element = |name: &str| {
@@ -85,7 +90,7 @@ fn parameters(finding: &Finding) -> Table {
         all.iter().for_each(|(name, value)| table.row(&[*name, value]));
         return table;
     }
-    let head = Table::new("Parameters, with their standard errors").words("element");
+    let head = Table::new("Parameters with standard errors").words("element");
     let mut table = lists.keys().fold(head, |table, list| table.numbers(list));
     let rows = lists.values().flat_map(|list| list.keys().copied()).collect::<BTreeSet<usize>>();
     for i in rows {
@@ -95,14 +100,14 @@ fn parameters(finding: &Finding) -> Table {
     table
 }
 
-/// What stood in its place, by its cross-validated error.
+/// Returns the table of the named effect and its alternatives with their cross-validated errors.
 fn candidates(finding: &Finding, unit: &str) -> Table {
-    let mut table = Table::new("In its place").words("effect").numbers(&format!("cross-validated RMSE [{unit}]"));
-    table.named_row(&[format!("{}, as named", finding.name), short(finding.cv_rmse_after)]);
+    let mut table = Table::new("Alternatives").words("effect").numbers(&format!("cross-validated RMSE [{unit}]"));
+    table.named_row(&[format!("{}, named", finding.name), short(finding.cv_rmse_after)]);
     for other in &finding.alternatives {
         let tie = if other.indistinguishable { ", indistinguishable" } else { "" };
         table.row(&[format!("{}{tie}", other.name), short(other.cv_rmse)]);
     }
-    table.row(&["nothing".to_owned(), short(finding.cv_rmse_before)]);
+    table.row(&["no effect".to_owned(), short(finding.cv_rmse_before)]);
     table
 }

@@ -1,4 +1,4 @@
-//! Pictures: their place in the page, their numbers, and tables of those that have few.
+//! Figures of a page: their frames, their data, and tables of small ones.
 
 use std::collections::BTreeMap;
 
@@ -9,17 +9,17 @@ use serde_json::Value;
 use super::html::{Page, Table, escaped};
 use crate::text::short;
 
-/// Pictures of up to so many points have a table as well.
-const TABLED: usize = 60;
+/// Maximum number of points of a curve in a figure that also has a table.
+const MAX_TABLE_ROWS: usize = 60;
 /// Significant digits of plotted numbers.
 const DIGITS: i32 = 7;
 
-/// The pictures of one effect, or of the whole, each with its place in the list.
+/// Returns the pictures of one effect, or those without an effect, each with its index in the list.
 pub(crate) fn of(pictures: &[Picture], effect: Option<Effect>) -> Vec<(usize, &Picture)> {
     pictures.iter().enumerate().filter(|(_, p)| p.effect == effect).collect()
 }
 
-/// Their places in the page.
+/// Writes the frames of the figures; a script draws the plots into them.
 pub(crate) fn write(page: &mut Page, pictures: &[(usize, &Picture)]) {
     if pictures.is_empty() {
         return;
@@ -58,13 +58,13 @@ fn role(role: Role) -> &'static str {
     }
 }
 
-/// A table of the points of a picture that has few of them.
+/// Returns a table of the points of a small picture, or nothing.
 fn numbers(picture: &Picture) -> String {
-    let few = |p: &Picture| p.curves.iter().all(|c| c.x.len() <= TABLED);
+    let few = |p: &Picture| p.curves.iter().all(|c| c.x.len() <= MAX_TABLE_ROWS);
     if !few(picture) {
         return String::new();
     }
-    // By the bits of x, which are in order for numbers of one sign; those of others are made so.
+    // Sort key: the bits of x. Bits of positive numbers are in order; those of negative numbers are mapped to be.
     let key = |x: f64| {
         let bits = x.to_bits() as i64;
         if bits < 0 { i64::MIN - bits } else { bits }
@@ -88,14 +88,14 @@ fn numbers(picture: &Picture) -> String {
     format!("<details><summary>Numbers</summary>{}</details>\n", table.html())
 }
 
-/// The numbers of all pictures, for the plots.
+/// Returns the data of all pictures as JSON, for the script.
 pub(crate) fn data(pictures: &[Picture]) -> serde_json::Result<String> {
     let mut all = serde_json::to_value(pictures)?;
     round(&mut all);
     serde_json::to_string(&all)
 }
 
-/// Leaves of every number the digits that a plot can show.
+/// Rounds all numbers to [`DIGITS`] significant digits.
 fn round(value: &mut Value) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(round),
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plotted_numbers_are_short() {
+    fn plotted_numbers_are_rounded() {
         let mut value = serde_json::json!({ "x": [1.234_567_891, -0.000_123_456_789_1, 0.0, null, 7], "name": "a" });
         round(&mut value);
         assert_eq!(value.to_string(), r#"{"name":"a","x":[1.234568,-0.0001234568,0.0,null,7.0]}"#);

@@ -1,4 +1,4 @@
-//! The models and the files, so that the report can be checked against them.
+//! Section of models and files with their checksums, so that the report can be verified.
 
 use hyst_ident::record::Record;
 use serde_json::Value;
@@ -7,10 +7,10 @@ use super::Contents;
 use super::html::{Page, Table};
 use crate::text::short;
 
-/// Models, stages, files.
+/// Writes the section.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     page.section("files", "Model and files");
-    let mut table = Table::new("Files").words("as").words("name").numbers("rows").words("SHA-256");
+    let mut table = Table::new("Files").words("use").words("name").numbers("rows").words("SHA-256");
     let model_rows: usize = c.model.fitted_on.iter().map(|f| f.rows + f.settling_rows).sum();
     table.row(&["model", c.model_file, &format!("fitted to {model_rows}"), c.model_sha256]);
     records(&mut table, "training", c.train);
@@ -21,8 +21,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     page.table(&table);
     page.raw("</div>");
 
-    let mut stages =
-        Table::new("Stages of the extended model, in the order of the signal").words("stage").words("parameters");
+    let mut stages = Table::new("Stages of the extended model in signal order").words("stage").words("parameters");
     for stage in c.diagnosis.extended.stages() {
         stages.row(&[stage.get("stage").and_then(Value::as_str).unwrap_or_default().to_owned(), numbers(&stage)]);
     }
@@ -30,7 +29,7 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     page.paragraph(
         "soft",
         &format!(
-            "Written by hystctl {}; the model by {} with seed {}; seed of the bootstrap {}; {} rows a second",
+            "Report by hystctl {}; model by hystctl {} with seed {}; seed of the bootstrap {}; {} samples per second",
             env!("CARGO_PKG_VERSION"),
             c.model.version,
             c.model.seed,
@@ -47,10 +46,10 @@ fn records(table: &mut Table, role: &str, record: &Record) {
     }
 }
 
-/// Numbers of a list that are printed; of longer ones, how many there are.
-const LISTED: usize = 4;
+/// Maximum length of a list that is printed; of a longer list only the length is printed.
+const MAX_LISTED: usize = 4;
 
-/// The numbers of a stage in one line.
+/// Returns the parameters of a stage in one line.
 fn numbers(stage: &Value) -> String {
     let Value::Object(fields) = stage else { return String::new() };
     let own =
@@ -61,7 +60,7 @@ fn numbers(stage: &Value) -> String {
 fn number(value: &Value) -> String {
     match value {
         Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), short),
-        Value::Array(values) if values.len() > LISTED => format!("({} values)", values.len()),
+        Value::Array(values) if values.len() > MAX_LISTED => format!("({} values)", values.len()),
         Value::Array(values) => values.iter().map(number).collect::<Vec<_>>().join(", "),
         Value::Object(fields) => format!("({} fields)", fields.len()),
         Value::String(text) => text.clone(),

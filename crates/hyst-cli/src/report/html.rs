@@ -1,4 +1,4 @@
-//! The frame of the page, and text in it.
+//! HTML pages: frame, sections, paragraphs and tables.
 
 use std::fmt::{Display, Write};
 
@@ -8,7 +8,7 @@ const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
 const UPLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
 
-/// Text where HTML is expected.
+/// Escapes text for HTML.
 pub(crate) fn escaped(text: impl Display) -> String {
     let text = text.to_string();
     let mut safe = String::with_capacity(text.len());
@@ -25,12 +25,12 @@ pub(crate) fn escaped(text: impl Display) -> String {
     safe
 }
 
-/// JSON inside a script element: no `<` is left that could end it or begin a comment.
+/// Escapes JSON for a script element: without `<` it can neither end the element nor begin a comment.
 pub(crate) fn inlined(json: &str) -> String {
     json.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
 }
 
-/// A sentence as prose has it: a capital at its beginning, a full stop at its end.
+/// Returns a sentence as HTML, with a capital letter at its start and a full stop at its end.
 pub(crate) fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
@@ -38,7 +38,7 @@ pub(crate) fn sentence(text: &str) -> String {
     escaped(format!("{first}{}{stop}", letters.as_str()))
 }
 
-/// A page in the making.
+/// A page that is being written.
 pub(crate) struct Page {
     title: String,
     body: String,
@@ -50,7 +50,7 @@ impl Page {
         Self { title: title.into(), body: String::new(), sections: Vec::new() }
     }
 
-    /// Adds HTML as it stands.
+    /// Adds HTML unchanged.
     pub(crate) fn raw(&mut self, html: &str) {
         self.body.push_str(html);
         self.body.push('\n');
@@ -70,7 +70,7 @@ impl Page {
         }
     }
 
-    /// Begins a section.
+    /// Starts a section.
     pub(crate) fn section(&mut self, id: &'static str, heading: &'static str) {
         self.sections.push((id, heading));
         self.raw(&format!("<h2 id=\"{id}\">{}</h2>", escaped(heading)));
@@ -81,12 +81,12 @@ impl Page {
         self.raw(&format!("<pre><code>{}</code></pre>", escaped(line)));
     }
 
-    /// Adds a table that scrolls by itself where the screen is too narrow.
+    /// Adds a table, which scrolls if the screen is too narrow.
     pub(crate) fn table(&mut self, table: &Table) {
         self.raw(&table.html());
     }
 
-    /// The whole file; `data` is the JSON of the plots.
+    /// Returns the complete file; `data` is the JSON of the plots.
     pub(crate) fn finish(self, data: &str) -> serde_json::Result<String> {
         let title = escaped(&self.title);
         let links: String = self
@@ -95,7 +95,7 @@ impl Page {
             .map(|(id, name)| format!("<li><a href=\"#{id}\">{}</a></li>", escaped(name)))
             .collect();
         let license = escaped(UPLOT_LICENSE.trim());
-        // The title, the summary and the way to the sections come first; the sections themselves begin at the first of them.
+        // Order: title, summary, links to the sections, sections. The sections start at the first heading.
         let begin = self.body.find("<h2").unwrap_or(self.body.len());
         let (summary, sections) = self.body.split_at(begin);
         let mut html = String::with_capacity(self.body.len() + data.len() + UPLOT.len() + 40_000);
@@ -112,7 +112,7 @@ impl Page {
             <h1>{title}</h1>\n{summary}<nav aria-label=\"Sections\"><ul>{links}</ul></nav>\n{sections}</main>\n\
             <footer class=\"soft\"><details><summary>Plots: uPlot 1.6.32</summary><pre>{license}</pre></details></footer>\n\
             <script type=\"application/json\" id=\"pictures\">{data}</script>\n\
-            <script>{SHARP}{UPLOT}</script>\n<script>{PLOTS}</script>\n</body>\n</html>\n",
+            <script>{MIN_PIXEL_RATIO}{UPLOT}</script>\n<script>{PLOTS}</script>\n</body>\n</html>\n",
             version = env!("CARGO_PKG_VERSION"),
             data = inlined(data),
         );
@@ -120,11 +120,11 @@ impl Page {
     }
 }
 
-/// uPlot draws as many dots to a pixel as the screen has; with two at least, prints are sharp.
-const SHARP: &str =
+/// Script that raises the pixel ratio for uPlot to 2 or more, so that prints are sharp.
+const MIN_PIXEL_RATIO: &str =
     "Object.defineProperty(window,\"devicePixelRatio\",{value:Math.max(2,window.devicePixelRatio),configurable:true});";
 
-/// A table: the first column names the rows.
+/// A table; its first column has the names of the rows.
 #[derive(Default)]
 pub(crate) struct Table {
     caption: String,
@@ -154,7 +154,7 @@ impl Table {
         self.rows.push((false, cells.iter().map(|c| escaped(c.as_ref())).collect()));
     }
 
-    /// Adds a row of text that stands out.
+    /// Adds a highlighted row of text.
     pub(crate) fn named_row<S: AsRef<str>>(&mut self, cells: &[S]) {
         self.row(cells);
         if let Some(last) = self.rows.last_mut() {
@@ -162,7 +162,7 @@ impl Table {
         }
     }
 
-    /// Adds a row whose last cell is a bar of that share of the column's width.
+    /// Adds a row of text and a bar; `share` is the length of the bar over the width of its column.
     pub(crate) fn bar_row(&mut self, cells: &[&str], share: f64) {
         self.row(cells);
         if let Some((_, cells)) = self.rows.last_mut() {
@@ -171,7 +171,7 @@ impl Table {
         }
     }
 
-    /// Adds a row of text whose last cell is HTML.
+    /// Adds a row of text and a last cell with HTML.
     pub(crate) fn linked_row<S: AsRef<str>>(&mut self, cells: &[S], link: &str) {
         self.row(cells);
         if let Some((_, cells)) = self.rows.last_mut() {
@@ -179,7 +179,7 @@ impl Table {
         }
     }
 
-    /// The table's markup.
+    /// Returns the table as HTML.
     pub(crate) fn html(&self) -> String {
         let class = |number: bool| if number { " class=\"number\"" } else { "" };
         let head: String =
@@ -199,7 +199,7 @@ impl Table {
         }
         let caption =
             if self.caption.is_empty() { String::new() } else { format!("<caption>{}</caption>", self.caption) };
-        // A column of bars says nothing that the others do not.
+        // The bars repeat a number of the row, so their column has no heading.
         let bars = self.rows.iter().any(|(_, cells)| cells.len() > self.head.len());
         let bar = if bars { "<td aria-hidden=\"true\"></td>" } else { "" };
         let label = if self.caption.is_empty() { "Table" } else { &self.caption };
@@ -215,7 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_that_is_written_becomes_markup() {
+    fn text_and_data_are_escaped() {
         let mut page = Page::new("</title><script>alert(1)</script>");
         page.paragraph("", "<img src=x>");
         page.section("a", "A");
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn sentences_begin_and_end_as_such() {
+    fn sentences_get_a_capital_and_a_full_stop() {
         assert_eq!(sentence("explained: a & b"), "Explained: a &amp; b.");
         assert_eq!(["Is it?", "Is it:"].map(sentence), ["Is it?", "Is it:"]);
     }

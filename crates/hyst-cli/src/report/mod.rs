@@ -1,14 +1,14 @@
-//! A diagnosis as a page: one HTML file that needs nothing else, to read, to check and to hand on.
+//! The report of a diagnosis: one self-contained HTML file.
 //!
-//! Tables and sentences are plain HTML. The plots are drawn by uPlot, whose text stands in the page, from numbers that stand
-//! in it too; nothing is loaded from anywhere, and the page forbids it to itself.
+//! Tables and sentences are plain HTML. uPlot draws the plots; its source and the data are part of the page. The page
+//! loads nothing, and its content security policy forbids loading.
 
 mod effects;
 pub(crate) mod figures;
 mod files;
 pub(crate) mod html;
-mod left;
 pub mod next;
+mod remainder;
 mod summary;
 pub mod words;
 
@@ -18,41 +18,41 @@ use hyst_ident::record::Record;
 
 use html::Page;
 
-/// What a report is about.
+/// Contents of a report.
 pub struct Contents<'a> {
-    /// What was found.
+    /// The diagnosis.
     pub diagnosis: &'a Diagnosis,
-    /// The model as it was given.
+    /// The model that was diagnosed.
     pub model: &'a Model,
-    /// The name of the model's file.
+    /// Name of the model file.
     pub model_file: &'a str,
-    /// Its path as it was given.
+    /// Path of the model file as it was given.
     pub model_path: &'a str,
-    /// SHA-256 of the file, in hexadecimal digits.
+    /// SHA-256 of the model file, in hexadecimal digits.
     pub model_sha256: &'a str,
-    /// The file of the extended model, if it is written to one.
+    /// File of the extended model, if it is written to a file.
     pub extended_file: Option<&'a str>,
-    /// The record that was searched.
+    /// Training record.
     pub train: &'a Record,
-    /// The record that was simulated alone.
+    /// Test record, which is only simulated.
     pub test: Option<&'a Record>,
-    /// Options with which the records were read.
+    /// Options that the records were read with, as arguments of a command.
     pub reading: Vec<String>,
     /// Seed of the bootstrap.
     pub seed: u64,
 }
 
 impl Contents<'_> {
-    /// The output's unit as a person writes it.
+    /// Returns the symbol of the output unit, for example `µm`.
     fn unit(&self) -> &str {
         crate::text::symbol(&self.diagnosis.findings.unit)
     }
 }
 
-/// The page: HTML that loads nothing.
+/// Returns the report as one self-contained HTML page.
 ///
 /// # Errors
-/// When a number of its plots has no JSON, which none of a diagnosis is.
+/// When the data of a plot cannot be written as JSON; this does not happen with the data of a diagnosis.
 pub fn page(c: &Contents<'_>) -> serde_json::Result<String> {
     let mut page = Page::new(&format!("Diagnosis of {} on {}", c.model_file, c.train.name()));
     summary::write(&mut page, c);
@@ -60,7 +60,7 @@ pub fn page(c: &Contents<'_>) -> serde_json::Result<String> {
     page.section("model", "The model before and after");
     figures::write(&mut page, &whole);
     effects::write(&mut page, c);
-    left::write(&mut page, c);
+    remainder::write(&mut page, c);
     next::write(&mut page, c);
     files::write(&mut page, c);
     page.finish(&figures::data(&c.diagnosis.pictures)?)

@@ -1,4 +1,4 @@
-//! The experiment or the fit that would tell more, as a command.
+//! Next steps after a diagnosis: experiments and fits, as commands.
 
 use hyst_ident::diagnose::{Change, RemainderKind, Verdict, drive_options};
 use hyst_ident::model::{Effect, Kind};
@@ -9,19 +9,19 @@ use super::html::Page;
 use super::{Contents, words};
 use crate::text::listed;
 
-/// Up to so many noise floors of error there is little left to look for.
-const NEAR_THE_FLOOR: f64 = 2.0;
+/// Maximum ratio of RMS error and noise floor at which further effects bring little.
+const MAX_FLOOR_RATIO: f64 = 2.0;
 
-/// What to do next, and why.
+/// A next step.
 #[derive(Debug)]
 pub struct Advice {
-    /// Why, and what it is for.
+    /// Purpose of the step, with its reason.
     pub text: String,
-    /// Commands, in the order in which they are to be run.
+    /// Commands to run, in this order.
     pub commands: Vec<String>,
 }
 
-/// Writes what to do next.
+/// Writes the next steps.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     let advice = advice(c);
     for Advice { text, commands } in &advice {
@@ -31,11 +31,11 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         }
     }
     if advice.is_empty() {
-        page.paragraph("", "Nothing that another experiment would have to settle");
+        page.paragraph("", "No further experiment is needed");
     }
 }
 
-/// What to do next.
+/// Returns the next steps.
 pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
     let f = &c.diagnosis.findings;
     let mut all = Vec::new();
@@ -44,20 +44,23 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
     for finding in &f.effects {
         for other in finding.alternatives.iter().filter(|a| a.indistinguishable) {
             let text = format!(
-                "This record cannot tell {} from {}. The drive that leaves most of one that the other cannot imitate:",
+                "This record cannot distinguish {} from {}. Record the drive that separates them best:",
                 finding.name, other.name
             );
             advise(&text, &[separate(c, finding.name, other.name)]);
         }
     }
     if words::worse_on_test(f) {
-        advise("Record a drive that shows every effect, and fit and diagnose that:", &[identification(c, "")]);
+        advise(
+            "Record a drive that shows every effect, then fit and diagnose the new record:",
+            &[identification(c, "")],
+        );
     }
-    let drags = f.effects.iter().any(|e| e.name == Effect::RateDependence);
-    let finer = c.model.base.kind() != Kind::Preisach && !drags;
+    let rate_dependent = f.effects.iter().any(|e| e.name == Effect::RateDependence);
+    let finer = c.model.base.kind() != Kind::Preisach && !rate_dependent;
     if f.remainder.slew_limit.is_some() {
         advise(
-            "A drive that the amplifier follows; fit and diagnose its record instead of this one:",
+            "Record a drive that the amplifier follows, then fit and diagnose that record instead of this one:",
             &[identification(c, "")],
         );
     }
@@ -68,7 +71,7 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
             let reading = further(&c.reading);
             let model = quoted(c.model_path);
             advise(
-                "A zero that each record has of its own is taken from its measured output:",
+                "Estimate one sensor zero per record from its measured output:",
                 &[format!("hystctl diagnose {files}{test}{reading} --zero per-record --model {model}")],
             );
         }
@@ -76,22 +79,23 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
             let (files, test) = (files(c.train), test_option(c));
             let (reading, kind) = (further(&c.reading), c.model.base.kind().name());
             advise(
-                "The same kind of model, fitted to what the device is now, and its diagnosis:",
+                "Fit the same kind of model to the changed device and diagnose it:",
                 &[
                     format!("hystctl fit {files}{reading} --model {kind} -o refitted.json"),
                     format!("hystctl diagnose {files}{test}{reading} --model refitted.json -o refitted-extended.json"),
                 ],
             );
             advise(
-                "Where this record does not show every effect, record one that does before:",
+                "If this record does not show every effect, first record a drive that does:",
                 &[identification(c, "")],
             );
         }
-        // A few loops of a run show less than the record of the fit did.
+        // A few loops of a run contain less information than the record of the fit.
         RemainderKind::BaseCapacity if finer && !c.model.fitted_on.is_empty() && !c.model.was_fitted_to(c.train) => {
             let names: Vec<String> = c.model.fitted_on.iter().map(|file| quoted(&file.file)).collect();
             advise(
-                "Most of what is left is the base's own misfit. A finer base is best fitted to what this one was fitted to (from its folder, with the same --map), or to a new record of the whole range:",
+                "Most of the remainder is misfit of the base model. Fit a finer base model to the records that this model was \
+                 fitted to (in their folder, with the same --map) or to a new record of the whole range:",
                 &[format!("hystctl fit {} --model preisach -o finer.json", names.join(" "))],
             );
         }
@@ -99,7 +103,7 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
             let (files, test) = (files(c.train), test_option(c));
             let reading = further(&c.reading);
             advise(
-                "Most of what is left is the base's own misfit. A finer base, and its diagnosis:",
+                "Most of the remainder is misfit of the base model. Fit a finer base model and diagnose it:",
                 &[
                     format!("hystctl fit {files}{reading} --model preisach -o finer.json"),
                     format!(
@@ -109,16 +113,16 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
             );
         }
         RemainderKind::BaseCapacity => {
-            advise(
-                "Most of what is left is the base's own misfit, and there is no finer base that can be diagnosed.",
-                &[],
-            );
+            advise("Most of the remainder is misfit of the base model, and no finer base model can be diagnosed.", &[]);
         }
         RemainderKind::Unexplained
             if f.verdict == Verdict::Explained
-                && f.after.train.is_some_and(|e| e.rmse <= NEAR_THE_FLOOR * f.noise_floor) =>
+                && f.after.train.is_some_and(|e| e.rmse <= MAX_FLOOR_RATIO * f.noise_floor) =>
         {
-            advise("What is left is within twice the noise floor: there is little to gain from looking further.", &[]);
+            advise(
+                "The remainder is within twice the noise floor: further effects would reduce it only a little.",
+                &[],
+            );
         }
         RemainderKind::Unexplained => {
             let missing: Vec<&str> = [
@@ -129,11 +133,11 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
             .filter_map(|(missing, name)| missing.then_some(name))
             .collect();
             if !missing.is_empty() {
-                advise(&format!("Record {} too, and fit and diagnose anew.", listed(&missing)), &[]);
+                advise(&format!("Record {} as well, then fit and diagnose again.", listed(&missing)), &[]);
             }
             advise(
-                "Play the same drive twice. What comes back in both residuals is the device's; what does not is a disturbance that \
-                 no model will take.",
+                "Play the same drive twice and compare the residuals. The part that repeats comes from the device; the part that \
+                 does not repeat is a disturbance that no model can predict.",
                 &[],
             );
         }
@@ -143,36 +147,36 @@ pub fn advice(c: &Contents<'_>) -> Vec<Advice> {
         && f.remainder.slew_limit.is_none()
         && matches!(f.verdict, Verdict::NothingMissing | Verdict::Explained)
     {
-        advise("See what the model is worth on a drive that it has not seen:", &[identification(c, " --test")]);
+        advise("Test the model on a drive that it was not fitted to:", &[identification(c, " --test")]);
     }
     if let (Some(extended), Verdict::Explained | Verdict::NothingMissing) = (c.extended_file, f.verdict)
         && !words::worse_on_test(f)
-        // Its errors say little as long as the amplifier does not follow.
+        // The model is not useful while the amplifier does not follow the drive.
         && f.remainder.slew_limit.is_none()
     {
         let command = format!("hystctl compensate --model {} reference.csv -o drive.csv", quoted(extended));
-        advise("The drive that makes the actuator follow a reference:", &[command]);
+        advise("Compute the drive that makes the actuator follow a reference:", &[command]);
     }
     all
 }
 
-/// Names of the training files, as the command line takes them.
+/// Returns the names of the training files as arguments of a command.
 pub fn files(train: &Record) -> String {
     train.sources().iter().map(|s| quoted(&s.name)).collect::<Vec<_>>().join(" ")
 }
 
-/// The option that names the test file, behind a space.
+/// Returns the option `--test FILE` with a space before it, or nothing.
 fn test_option(c: &Contents<'_>) -> String {
     c.test.map_or_else(String::new, |t| format!(" --test {}", quoted(&t.name())))
 }
 
-/// A word of the command line.
+/// Returns one argument of a command, quoted for a shell if necessary.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:=,@".contains(c);
     if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
-/// Further words of the command line, each behind a space.
+/// Returns arguments of a command, each quoted and with a space before it.
 pub fn further(words: &[String]) -> String {
     words.iter().map(|word| format!(" {}", quoted(word))).collect()
 }
@@ -196,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_of_a_command_stay_words() {
+    fn arguments_are_quoted_for_a_shell() {
         assert_eq!(quoted("train.csv"), "train.csv");
         assert_eq!(quoted("my record;rm.csv"), "'my record;rm.csv'");
         assert_eq!(quoted("it's"), r"'it'\''s'");

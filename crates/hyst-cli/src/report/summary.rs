@@ -1,4 +1,4 @@
-//! The verdict in words, and the errors before and after.
+//! Summary of a report: the verdict, and the errors of the given and the extended model.
 
 use hyst_ident::diagnose::{FoundErrors, OnRecords};
 use hyst_ident::simulate::Zero;
@@ -7,7 +7,7 @@ use super::html::{Page, Table};
 use super::{Contents, words};
 use crate::text::{percent, short};
 
-/// Verdict, what it is worth, table.
+/// Writes the summary.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     let (f, unit) = (&c.diagnosis.findings, c.unit());
     page.paragraph("verdict", &words::verdict(f));
@@ -18,27 +18,30 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
             if f.after.test.is_some() { "the test record, which was never fitted," } else { "the training record" };
         let figure = |e: FoundErrors| format!("{} {unit} ({} of span)", short(e.rmse), percent(e.nrmse_percent));
         if !changed {
-            page.paragraph("", &format!("On {record} the model errs by {} RMS", figure(after)));
+            page.paragraph("", &format!("On {record} the RMS error is {}", figure(after)));
         } else {
-            page.paragraph("", &format!("On {record} the RMS error goes from {} to {}", figure(before), figure(after)));
+            page.paragraph(
+                "",
+                &format!("On {record} the RMS error changes from {} to {}", figure(before), figure(after)),
+            );
         }
     }
     if words::worse_on_test(f) {
         page.paragraph(
             "note",
-            "On the test record the error grew: do not use the extended model. The training record may not show enough to tell \
-             effects apart; record the drive of hystctl excite identification",
+            "On the test record the extended model has a larger error: do not use it. The training record may not be sufficient \
+             to distinguish effects; record the drive of hystctl excite identification",
         );
     }
     let all = [f.before.train, f.after.train, f.before.test, f.after.test];
-    // Where no row is a start-up row, one figure says both.
+    // Without start-up rows both columns would be equal.
     let start_up = all.iter().flatten().any(|e| e.rmse_all_rows != e.rmse);
     let mut table = Table::new("Errors before and after")
         .words("record")
         .words("model")
         .numbers(&format!("RMSE [{unit}]"))
         .numbers("of span")
-        .numbers(&format!("largest [{unit}]"));
+        .numbers(&format!("maximum [{unit}]"));
     if start_up {
         table = table.numbers(&format!("RMSE, all rows [{unit}]"));
     }
@@ -62,8 +65,8 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
         page.paragraph("soft", &plays);
     }
     let zero = match f.zero {
-        Zero::None => "the model's zero holds for every record",
-        Zero::PerRecord => "one constant for each file is taken from its measured output",
+        Zero::None => "the sensor zero of the model is used for all records",
+        Zero::PerRecord => "one sensor zero per file is estimated from its measured output",
     };
     let start_up = if start_up { "; start-up rows of the models count in the last column only" } else { "" };
     let floor = short(f.noise_floor);

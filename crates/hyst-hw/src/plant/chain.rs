@@ -1,4 +1,4 @@
-//! The chain from drive to displacement, computed on a grid finer than the samples.
+//! The chain from drive to displacement, on a time grid finer than the samples.
 
 use std::f64::consts::TAU;
 
@@ -11,15 +11,17 @@ use super::saturation::Stops;
 use super::structure::Structure;
 use super::surroundings::Surroundings;
 
-/// Fewest fine steps in a sample period.
+/// Minimum number of fine steps in a sample period.
 const MIN_STEPS: f64 = 8.0;
-/// Fine step times the fastest rate of the chain (`ω` of a mode, `1/τ` of a lag or creep element).
+/// Maximum of fine step times fastest rate of the chain (`ω` of a mode, `1/τ` of a lag or creep element).
 const MAX_STEP_RATE: f64 = 0.05;
 
-/// Drive → delay → the amplifier's steepest slope → lag → hysteresis, asymmetry → × temperature → + creep → + load → modes → stops, with all their memory.
+/// State of the chain.
+///
+/// Drive → delay → slew limit of the amplifier → lag → hysteresis → asymmetry → × temperature → + creep → + load → modes → stops.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
-    /// Fine steps in a sample period.
+    /// Number of fine steps in a sample period.
     steps: u32,
     input: InputPath,
     hysteresis: Hysteresis,
@@ -27,13 +29,15 @@ pub(crate) struct Chain {
     creep: Option<Creep>,
     structure: Structure,
     stops: Option<Stops>,
-    /// Outputs of the hysteresis with temperature, and with creep and load, at the end of the last fine step.
+    /// Displacement before creep, and with creep and load, at the end of the last fine step.
     before_creep: f64,
     loaded: f64,
 }
 
 impl Chain {
-    /// The chain in the virgin state, for samples at `rate_hz`; [`rest_at`](Self::rest_at) says under which load it rests.
+    /// Returns the chain in the virgin state, for samples at `rate_hz`.
+    ///
+    /// [`rest_at`](Self::rest_at) sets the load at rest.
     pub(crate) fn new(config: &PlantConfig, hysteresis: Hysteresis, rate_hz: f64) -> Self {
         Self::with_steps(config, hysteresis, rate_hz, fine_steps(config, rate_hz))
     }
@@ -60,10 +64,11 @@ impl Chain {
         }
     }
 
-    /// One sample period from lab time `from_s` to `to_s`, in which the drive goes in a straight
-    /// line to `drive_v`; returns the displacement at its end (µm).
+    /// Computes one sample period, from lab time `from_s` to `to_s`; returns the displacement at its end (µm).
+    ///
+    /// The drive changes linearly to `drive_v`.
     pub(crate) fn advance(&mut self, drive_v: f64, around: &Surroundings, from_s: f64, to_s: f64) -> f64 {
-        // The temperature is slow: a straight line within a sample period is true to it.
+        // The temperature changes slowly, so it is interpolated linearly within a sample period.
         let (factor_begin, factor_end) = (around.factor(from_s), around.factor(to_s));
         self.input.push(drive_v);
         let mut from = 0.0;
@@ -84,8 +89,9 @@ impl Chain {
         self.stops.as_ref().map_or(position, |stops| stops.at(position))
     }
 
-    /// Back to the virgin state, where the device has rested for long under the load of lab time `t`. Displacement is
-    /// counted from the virgin rest without load.
+    /// Returns to the virgin state, in equilibrium with the load at lab time `t`.
+    ///
+    /// The displacement is counted from the virgin rest without load.
     pub(crate) fn rest_at(&mut self, around: &Surroundings, t: f64) {
         self.input.reset();
         self.hysteresis.reset();
@@ -98,7 +104,7 @@ impl Chain {
     }
 }
 
-/// The lowest of the amplifier's limits (V/s), if it has one.
+/// Returns the smallest slew limit of the amplifier (V/s), if any.
 fn slew_limit(config: &PlantConfig) -> Option<f64> {
     let limits = config.disturbances.iter().filter_map(|d| match d {
         Disturbance::SlewLimit { v_per_s } => Some(*v_per_s),
@@ -107,13 +113,13 @@ fn slew_limit(config: &PlantConfig) -> Option<f64> {
     limits.min_by(f64::total_cmp)
 }
 
-/// Fine steps in a sample period, so that the fastest motion is well resolved.
+/// Returns the number of fine steps in a sample period that resolves the fastest motion.
 fn fine_steps(config: &PlantConfig, rate_hz: f64) -> u32 {
     let lag = config.lag.iter().map(|lag| 1.0 / lag.seconds);
     let creep = config.creep.iter().map(|creep| 1.0 / creep.tau_min_s);
     let modes = config.modes.iter().map(|mode| TAU * mode.hz);
     let fastest = lag.chain(creep).chain(modes).fold(0.0, f64::max);
-    // The validated ranges keep this below 3e6 at 1 Hz.
+    // For valid descriptions this is below 3e6 at 1 Hz.
     (fastest / (rate_hz * MAX_STEP_RATE)).ceil().max(MIN_STEPS) as u32
 }
 
@@ -124,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fine_grid_resolves_the_fastest_motion() {
+    fn the_fine_grid_resolves_the_fastest_motion() {
         let mut config = clean();
         assert_eq!(fine_steps(&config, 1000.0), 8);
         config.modes = vec![Mode { hz: 350.0, damping: 0.01, gain: 0.1 }];
@@ -135,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_of_nothing_is_the_hysteresis_alone() {
+    fn a_chain_without_effects_equals_the_hysteresis() {
         let mut config = clean();
         config.actuator.loop_share = 0.12;
         let mut alone = Hysteresis::new(config.seed, &config.actuator, None).unwrap();
@@ -158,20 +164,20 @@ mod tests {
                 let v = config.actuator.max_v * (0.5 - 0.5 * (0.05 * f64::from(k)).cos());
                 let difference = chain.advance(v, &Surroundings::default(), 0.0, 0.0)
                     - finer.advance(v, &Surroundings::default(), 0.0, 0.0);
-                // A tenth of the noise that such a plant has.
+                // A tenth of the noise of such a plant.
                 assert!(difference.abs() < 3e-5 * span, "{seed} {k}: {difference}");
             }
         }
     }
 
     #[test]
-    fn ring_down_seen_in_samples_has_the_declared_mode() {
+    fn the_ring_down_in_samples_has_the_declared_frequency_and_damping() {
         let mut config = clean();
         config.modes = vec![Mode { hz: 100.0, damping: 0.02, gain: 1.0 }];
         let hysteresis = Hysteresis::new(1, &config.actuator, None).unwrap();
         let mut chain = Chain::new(&config, hysteresis, 1000.0);
         let y: Vec<f64> = (0..200).map(|_| chain.advance(50.0, &Surroundings::default(), 0.0, 0.0) - 5.0).collect();
-        // Free motion obeys y[n+2] = a y[n+1] - b y[n] exactly; two unknowns by least squares.
+        // Free motion satisfies y[n+2] = a y[n+1] - b y[n] exactly; a and b follow by least squares.
         let (mut s11, mut s12, mut s22, mut r1, mut r2) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for w in y[1..].windows(3) {
             s11 += w[1] * w[1];

@@ -11,7 +11,9 @@ pub use sections::*;
 use super::error::ConfigError;
 use super::validate;
 
-/// A simulated actuator. Every effect is a section of the file; an absent section is an absent effect.
+/// Description of a simulated actuator.
+///
+/// Each effect is a section of the file; without its section it does not act.
 ///
 /// ```
 /// let config = hyst_hw::PlantConfig::from_toml(r#"
@@ -32,16 +34,16 @@ use super::validate;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantConfig {
-    /// Seed of everything random: relay bed, temperature phase, noise. At most 2⁶³ − 1, as TOML integers are signed.
+    /// Seed of all random values: bed, profiles, noise. At most 2⁶³ − 1, because TOML integers are signed.
     pub seed: u64,
-    /// Seed of the noise alone, so that one actuator can be measured again on another day; `seed` if there is none.
+    /// Seed of the noise, for repeated measurements of the same actuator; by default `seed`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_seed: Option<u64>,
     /// The hysteretic element.
     pub actuator: Actuator,
     /// Position sensor and its converter.
     pub sensor: Sensor,
-    /// Drag on the relays or plays.
+    /// Viscous drag on relays or play operators (rate dependence).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub viscosity: Option<Viscosity>,
     /// Dead time between drive and actuator.
@@ -50,37 +52,37 @@ pub struct PlantConfig {
     /// First-order lag of the amplifier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lag: Option<Lag>,
-    /// A curve behind the hysteresis.
+    /// Nonlinear curve after the hysteresis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asymmetry: Option<Asymmetry>,
-    /// Temperature, its effect on the gain and its measurement.
+    /// Temperature profile, its effect on the gain, and its measurement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Temperature>,
-    /// Slow continued motion after a change.
+    /// Slow motion after a change of the drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub creep: Option<Creep>,
-    /// An external force, its effect on the displacement and its measurement.
+    /// External force, its effect on the displacement, and its measurement.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load: Option<Load>,
-    /// Structural modes, `[[mode]]` each; gain that they leave acts at once.
+    /// Structural modes, one section `[[mode]]` each. The rest of the gain acts without dynamics.
     #[serde(default, rename = "mode", skip_serializing_if = "Vec::is_empty")]
     pub modes: Vec<Mode>,
-    /// Stops of the motion.
+    /// Mechanical stops.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<Saturation>,
-    /// Wandering of the sensor's zero with the lab's clock.
+    /// Drift of the sensor's zero with the lab clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drift: Option<Drift>,
-    /// A periodic disturbance of the sensor, on the lab's clock.
+    /// Periodic disturbance of the sensor, on the lab clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interference: Option<Interference>,
-    /// What is none of the effects, `[[disturbance]]` each.
+    /// Disturbances that are not effects, one section `[[disturbance]]` each.
     #[serde(default, rename = "disturbance", skip_serializing_if = "Vec::is_empty")]
     pub disturbances: Vec<Disturbance>,
 }
 
 impl PlantConfig {
-    /// An actuator and its sensor without any effect; those that are wanted are filled in.
+    /// Returns an actuator and its sensor without effects.
     #[must_use]
     pub const fn bare(seed: u64, actuator: Actuator, sensor: Sensor) -> Self {
         Self {
@@ -103,7 +105,7 @@ impl PlantConfig {
         }
     }
 
-    /// Seed of what differs from one measurement to the next.
+    /// Returns the seed of the noise.
     pub(super) fn noise(&self) -> u64 {
         self.noise_seed.unwrap_or(self.seed)
     }
@@ -111,8 +113,8 @@ impl PlantConfig {
     /// Reads and validates a description.
     ///
     /// # Errors
-    /// When the text is not TOML, a field is unknown or missing, or a value makes no sense; the
-    /// message names the field and says what to do.
+    /// If the text is not TOML, a field is unknown or missing, or a value is invalid. The message
+    /// names the field and states what to give instead.
     pub fn from_toml(text: &str) -> Result<Self, ConfigError> {
         let config: Self = toml::from_str(text).map_err(|error| {
             let compact = |line: &str| line.split_whitespace().collect::<String>();
@@ -123,18 +125,18 @@ impl PlantConfig {
                 text.lines().any(alone)
             };
             let several = ["mode", "disturbance"].iter().find(|name| single(name));
-            let hint = several.map(|name| format!("there may be several: write [[{name}]], not [{name}]"));
+            let hint = several
+                .map(|name| format!("a file may have several of these sections: write [[{name}]], not [{name}]"));
             ConfigError::Syntax(format!("{error}{}", hint.unwrap_or_default()))
         })?;
         config.validate()?;
         Ok(config)
     }
 
-    /// Writes the description; reading it back gives the same values to the last bit.
+    /// Returns the description as TOML. Reading it back gives exactly the same values.
     ///
     /// # Errors
-    /// When a value is not valid (see [`validate`](Self::validate)), so that no file is written
-    /// that could not be read.
+    /// If a value is invalid (see [`validate`](Self::validate)).
     pub fn to_toml(&self) -> Result<String, ConfigError> {
         self.validate()?;
         toml::to_string(self).map_err(|e| ConfigError::Syntax(e.to_string()))
@@ -143,13 +145,14 @@ impl PlantConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// On the first value that makes no sense, naming the field and saying what to do.
+    /// On the first invalid value, with its field and what to give instead.
     pub fn validate(&self) -> Result<(), ConfigError> {
         validate::check(self)
     }
 
-    /// Names of the effects that are switched on, in the chain's order. A temperature that is
-    /// recorded but has no influence is no effect; neither are the hysteresis itself and disturbances.
+    /// Returns the names of the active effects, in the order of the chain.
+    ///
+    /// A recorded temperature without influence, the hysteresis itself and disturbances are not effects.
     #[must_use]
     pub fn effects(&self) -> Vec<&'static str> {
         let on = [
@@ -174,7 +177,7 @@ pub(crate) mod tests {
     use super::super::EFFECTS;
     use super::*;
 
-    /// A linear, noiseless plant of 0.1 µm/V with a converter too fine to see: what a test adds is all there is.
+    /// A linear plant with 0.1 µm/V, without noise, and with a converter of negligible quantisation.
     pub(crate) fn clean() -> PlantConfig {
         let actuator = Actuator {
             min_v: 0.0,
@@ -277,7 +280,7 @@ pub(crate) mod tests {
     "#;
 
     #[test]
-    fn every_section_is_read_written_and_read_again_alike() {
+    fn all_sections_survive_writing_and_reading() {
         let config = PlantConfig::from_toml(FULL).unwrap();
         assert_eq!(config.effects(), EFFECTS);
         assert_eq!(config.modes[1].hz, 350.0);
@@ -287,14 +290,14 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn temperature_without_influence_is_no_effect() {
+    fn a_temperature_without_influence_is_not_an_effect() {
         let config = PlantConfig::from_toml(&FULL.replace("per_k = 0.005", "")).unwrap();
         assert!(!config.effects().contains(&"temperature"));
         assert!(config.temperature.unwrap().recorded);
     }
 
     #[test]
-    fn beds_are_relays_unless_told_otherwise() {
+    fn the_default_bed_consists_of_relays() {
         let relays = PlantConfig::from_toml(FULL).unwrap();
         assert_eq!(relays.actuator.bed, Bed::Relays);
         assert!(!relays.to_toml().unwrap().contains("bed"));

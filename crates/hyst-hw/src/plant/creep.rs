@@ -1,23 +1,23 @@
-//! Creep as a broad, nearly continuous spectrum of exponentials.
+//! Creep: a broad, nearly continuous spectrum of exponentials.
 
 use super::config;
 
 /// State of the creep on the fine grid.
 ///
-/// Trapezoidal rule: its error, `(step/τ)²/12`, is small as the grid keeps `step/τ ≤ 0.05`.
+/// The integration is the trapezoidal rule. Its error `(step/τ)²/12` is small, because `step/τ ≤ 0.05` on the fine grid.
 #[derive(Debug, Clone)]
 pub(crate) struct Creep {
-    /// Per element: what a step takes over of the difference to the input.
+    /// For each element: the share of the difference to the input that disappears in a step.
     rate: Vec<f64>,
     weight: Vec<f64>,
     value: Vec<f64>,
 }
 
-/// Elements are summed in this many interleaved sums, a fixed order that the compiler can vectorise.
+/// Number of interleaved sums. The order is fixed, and the compiler can vectorise it.
 const LANES: usize = 4;
 
 impl Creep {
-    /// Elements for the fine step `step_s` (s).
+    /// Returns elements at rest, for the fine step `step_s` (s).
     pub(crate) fn new(config: &config::Creep, step_s: f64) -> Self {
         let spectrum = spectrum(config);
         let padded = spectrum.len().next_multiple_of(LANES);
@@ -29,7 +29,7 @@ impl Creep {
         Self { rate, weight, value: vec![0.0; padded] }
     }
 
-    /// One fine step in which the input moves from `from` to `to`; returns the creep at its end.
+    /// Computes one fine step with the input from `from` to `to` and returns the creep at its end.
     pub(crate) fn advance(&mut self, from: f64, to: f64) -> f64 {
         let middle = 0.5 * (from + to);
         let mut sums = [0.0; LANES];
@@ -48,7 +48,7 @@ impl Creep {
     }
 }
 
-/// Time constants (s) and weights.
+/// Returns time constants (s) and weights.
 fn spectrum(config: &config::Creep) -> Vec<(f64, f64)> {
     let (low, high) = (libm::log(config.tau_min_s), libm::log(config.tau_max_s));
     let last = (config.elements - 1) as f64;
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn step_response_is_the_sum_of_exponentials() {
+    fn the_step_response_is_a_sum_of_exponentials() {
         let step = 0.05 * 0.05;
         let mut creep = Creep::new(&config(), step);
         let spectrum = spectrum(&config());
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_follow_the_power_and_sum_to_the_strength() {
+    fn weights_follow_the_exponent_and_have_the_strength_as_sum() {
         let spectrum = spectrum(&config());
         let sum: f64 = spectrum.iter().map(|(_, w)| w).sum();
         assert!((sum - 0.09).abs() < 1e-12);
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn settled_creep_is_the_strength() {
+    fn creep_converges_to_the_strength() {
         let mut creep = Creep::new(&config::Creep { tau_max_s: 1.0, ..config() }, 0.0025);
         let out = (0..10_000).map(|_| creep.advance(1.0, 1.0)).last().unwrap();
         assert!((out - 0.09).abs() < 1e-8, "{out}");

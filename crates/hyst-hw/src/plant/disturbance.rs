@@ -1,4 +1,4 @@
-//! What happens to the reading and is none of the effects on a diagnosis' list.
+//! Disturbances of the reading that are not effects.
 
 use super::config::{Disturbance, PlantConfig};
 use super::rng::{Draws, Purpose};
@@ -21,7 +21,7 @@ struct Bursts {
     noise: f64,
     seconds: f64,
     every_s: f64,
-    /// Beginning of each burst after that of its time `every_s` (s); the first follows the last.
+    /// Begin of each burst within its interval `every_s` (s); after the last one they repeat.
     begins: Vec<f64>,
     draws: Draws,
 }
@@ -30,12 +30,12 @@ struct Bursts {
 struct Slip {
     um: f64,
     at_v: f64,
-    /// Where the mount is (µm).
-    place: f64,
+    /// Position of the mount (µm).
+    position: f64,
     draws: Draws,
 }
 
-/// So many bursts are drawn; their moments come again after the last one.
+/// Number of bursts with different times; after the last one the times repeat.
 const BURSTS: usize = 64;
 
 impl Disturbances {
@@ -44,14 +44,16 @@ impl Disturbances {
         Self(numbered.filter_map(|(k, disturbance)| Active::new(config, k, disturbance)).collect())
     }
 
-    /// What they add to the reading at lab time `t`, after the drive went from `from_v` to `to_v` (µm).
+    /// Returns the sum of the disturbances at lab time `t` (µm).
+    ///
+    /// The drive has just changed from `from_v` to `to_v`.
     pub(crate) fn advance(&mut self, t: f64, from_v: f64, to_v: f64) -> f64 {
         self.0.iter_mut().map(|active| active.advance(t, from_v, to_v)).sum()
     }
 }
 
 impl Active {
-    /// The disturbance of number `k`; none if it does not act on the reading.
+    /// Returns disturbance number `k`; `None` if it does not act on the reading.
     fn new(config: &PlantConfig, k: u32, disturbance: &Disturbance) -> Option<Self> {
         let draws = |purpose| Draws::numbered(config.seed, purpose, k);
         Some(match *disturbance {
@@ -71,7 +73,7 @@ impl Active {
             Disturbance::Wander { um, period_s } => {
                 Self::Wander(Waves::walk(&mut draws(Purpose::SensorWander), um, period_s))
             }
-            Disturbance::Slip { um, at_v } => Self::Slip(Slip { um, at_v, place: 0.0, draws: draws(Purpose::Slip) }),
+            Disturbance::Slip { um, at_v } => Self::Slip(Slip { um, at_v, position: 0.0, draws: draws(Purpose::Slip) }),
         })
     }
 
@@ -93,8 +95,8 @@ impl Active {
 
 impl Bursts {
     fn advance(&mut self, t: f64) -> f64 {
-        let turn = (t / self.every_s).floor();
-        let since = t - turn * self.every_s - self.begins[turn as usize % BURSTS];
+        let interval = (t / self.every_s).floor();
+        let since = t - interval * self.every_s - self.begins[interval as usize % BURSTS];
         if (0.0..self.seconds).contains(&since) { self.noise * self.draws.normal() } else { 0.0 }
     }
 }
@@ -102,9 +104,9 @@ impl Bursts {
 impl Slip {
     fn advance(&mut self, from_v: f64, to_v: f64) -> f64 {
         if from_v < self.at_v && to_v >= self.at_v {
-            self.place = self.draws.between(-self.um, self.um);
+            self.position = self.draws.between(-self.um, self.um);
         }
-        self.place
+        self.position
     }
 }
 
@@ -117,39 +119,39 @@ mod tests {
         Disturbances::new(&PlantConfig { disturbances: of.to_vec(), ..clean() })
     }
 
-    /// What is added in `seconds` at 1 kHz while the drive stands.
+    /// Returns a disturbance over `seconds` at 1 kHz, with a constant drive.
     fn course(of: Disturbance, seconds: u32) -> Vec<f64> {
         let mut disturbances = disturbances(&[of]);
         (0..seconds * 1000).map(|k| disturbances.advance(0.001 * f64::from(k), 0.0, 0.0)).collect()
     }
 
     #[test]
-    fn a_jump_stays() {
+    fn a_step_is_permanent() {
         let course = course(Disturbance::Jump { um: -0.3, at_s: 1.5 }, 3);
         assert!(course[..1500].iter().all(|y| *y == 0.0) && course[1500..].iter().all(|y| *y == -0.3));
     }
 
     #[test]
-    fn each_time_has_one_burst_of_the_declared_length_and_noise() {
+    fn each_interval_has_one_burst_with_the_declared_duration_and_noise() {
         let course = course(Disturbance::Bursts { um: 0.2, seconds: 0.25, every_s: 2.0 }, 200);
-        for turn in course.chunks(2000) {
-            let noisy = turn.iter().filter(|y| **y != 0.0).count();
+        for interval in course.chunks(2000) {
+            let noisy = interval.iter().filter(|y| **y != 0.0).count();
             assert!((249..=251).contains(&noisy), "{noisy}");
-            let first = turn.iter().position(|y| *y != 0.0).unwrap();
-            assert!(turn[first..first + noisy].iter().all(|y| *y != 0.0));
+            let first = interval.iter().position(|y| *y != 0.0).unwrap();
+            assert!(interval[first..first + noisy].iter().all(|y| *y != 0.0));
         }
         let rms = (course.iter().map(|y| y * y).sum::<f64>() / 25_000.0).sqrt();
         assert!((rms / 0.2 - 1.0).abs() < 0.02, "{rms}");
-        let begins: Vec<_> = course.chunks(2000).map(|turn| turn.iter().position(|y| *y != 0.0)).collect();
+        let begins: Vec<_> = course.chunks(2000).map(|interval| interval.iter().position(|y| *y != 0.0)).collect();
         assert!(begins.windows(2).filter(|pair| pair[0] != pair[1]).count() > 90);
     }
 
     #[test]
-    fn a_wander_stays_within_its_amplitude_and_is_no_sine() {
+    fn a_random_walk_stays_within_its_amplitude_and_is_not_periodic() {
         let course = course(Disturbance::Wander { um: 0.5, period_s: 10.0 }, 300);
         let (low, high) = course.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
         assert!(low >= -0.5 && high <= 0.5 && high - low > 0.4, "{low} {high}");
-        // A sine of any period has y(t + T) = y(t - T) at all t for some T; here no shift brings it back.
+        // A periodic signal equals itself after a shift by its period; here no shift does.
         let rms = |v: &mut dyn Iterator<Item = f64>| v.map(|y| y * y).sum::<f64>().sqrt();
         let whole = rms(&mut course.iter().copied());
         for shift in (5_000..20_000).step_by(500) {
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mount_slips_when_the_drive_rises_past_its_voltage() {
+    fn a_mount_slips_when_the_drive_rises_above_its_voltage() {
         let mut slip = disturbances(&[Disturbance::Slip { um: 0.4, at_v: 50.0 }]);
         let mut places = Vec::new();
         for _ in 0..50 {
@@ -173,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn two_of_a_kind_differ_and_add_up() {
+    fn two_disturbances_of_a_kind_differ_and_add_up() {
         let wander = Disturbance::Wander { um: 0.5, period_s: 10.0 };
         let one = disturbances(std::slice::from_ref(&wander)).advance(3.0, 0.0, 0.0);
         let two = disturbances(&[wander.clone(), wander]).advance(3.0, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Actuators with something that no diagnosis can name, drawn from a seed.
+//! Random actuators with a disturbance that is not an effect.
 
 use super::config::{Disturbance, Load, LoadShape, PlantConfig, Temperature, TemperatureShape};
 use super::error::ConfigError;
@@ -6,22 +6,22 @@ use super::random::{rounded, sign};
 use super::rng::{Draws, Purpose};
 
 impl PlantConfig {
-    /// The actuator of [`random_with`](Self::random_with) without effects, but with one disturbance of the kind given.
+    /// Returns the actuator of [`random_with`](Self::random_with) with one disturbance and no effects.
     ///
     /// # Errors
-    /// When the kind is not in [`DISTURBANCES`](crate::DISTURBANCES).
+    /// If the kind is not in [`DISTURBANCES`](crate::DISTURBANCES).
     pub fn disturbed(seed: u64, kind: &str) -> Result<Self, ConfigError> {
         Self::random_with(seed, &[])?.with_disturbance(kind)
     }
 
-    /// Adds a disturbance of ordinary strength, well above the noise: 0.5 to 3 % of the span. A jump and a step of the gain
-    /// come 8 to 28 s after lab time 0; an amplifier's slope is limited to 12 to 40 strokes a second.
+    /// Adds a disturbance of typical strength, well above the noise: 0.5 to 3 % of the span.
     ///
-    /// It is drawn from the plant's seed; values are drawn for every kind, so that the moments of a jump and of a step are the
-    /// same. A hidden load or temperature takes the place of one that the plant has.
+    /// A jump and a step of the gain occur 8 to 28 s after lab time 0. A slew limit is 12 to 40 voltage spans per second.
+    /// The values come from the plant's seed and are drawn for every kind, so a jump and a step of the gain have the same time.
+    /// A hidden load or temperature replaces that of the plant.
     ///
     /// # Errors
-    /// When the kind is not in [`DISTURBANCES`](crate::DISTURBANCES).
+    /// If the kind is not in [`DISTURBANCES`](crate::DISTURBANCES).
     pub fn with_disturbance(mut self, kind: &str) -> Result<Self, ConfigError> {
         let mut draws = Draws::new(self.seed, Purpose::Disturbance);
         let mut between = |low, high| draws.between(low, high);
@@ -40,7 +40,7 @@ impl PlantConfig {
         let disturbance = match kind {
             "jump" => Disturbance::Jump { um: way * um, at_s },
             "gain-step" => Disturbance::GainStep { share, at_s },
-            // Noise reaches three times its standard deviation.
+            // Noise reaches about three times its standard deviation.
             "bursts" => Disturbance::Bursts { um: rounded(0.5 * um), seconds, every_s },
             "wander" => Disturbance::Wander { um, period_s: wander_s },
             "slip" => Disturbance::Slip { um, at_v },
@@ -54,7 +54,7 @@ impl PlantConfig {
             "hidden-temperature" => {
                 let mean = self.temperature.map_or(22.0, |temperature| temperature.mean_degc);
                 self.temperature = Some(Temperature {
-                    // Over the whole swing the top of the stroke moves by twice the disturbance.
+                    // The whole swing changes the displacement at the top of the stroke by twice `um`.
                     per_k: rounded(2.0 * um / (span * swing_k)),
                     reference_degc: mean,
                     mean_degc: mean,
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::{Daq, Sample};
 
-    /// 36 s of 1 Hz sines over all voltages, and then 1 s of 20 Hz, at 200 Hz.
+    /// Returns a record at 200 Hz: 36 s of a sine of 1 Hz over the whole range, then 1 s of 20 Hz.
     fn record(config: &PlantConfig) -> Vec<Sample> {
         let mut plant = Plant::new(config.clone()).unwrap();
         plant.start(200.0).unwrap();
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_stands_out_of_the_noise_and_has_no_name() {
+    fn every_kind_exceeds_the_noise_and_is_not_an_effect() {
         for (seed, kind) in (0..6).flat_map(|seed| DISTURBANCES.map(|kind| (seed, kind))) {
             let disturbed = PlantConfig::disturbed(seed, kind).unwrap();
             assert_eq!(PlantConfig::from_toml(&disturbed.to_toml().unwrap()).unwrap(), disturbed);
@@ -103,12 +103,12 @@ mod tests {
             let span = calm.actuator.gain_um_per_v * calm.actuator.max_v;
             let (with, without) = (record(&disturbed), record(&calm));
             let added: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a.output - b.output).collect();
-            // A constant offset or gain would be fitted away: what counts is what changes.
+            // A fit removes a constant offset, so only changes count.
             let mean = added.iter().sum::<f64>() / added.len() as f64;
             let rms = (added.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>() / added.len() as f64).sqrt();
             let most = added.iter().fold(0.0, |most: f64, y| most.max((y - mean).abs()));
             assert!(rms > 2.0 * calm.sensor.noise_um, "{kind}, seed {seed}: {} of the span", rms / span);
-            // Far behind, an amplifier is off by what the drive has done since.
+            // The error of a slew-limited amplifier may be larger, because it is far behind the drive.
             assert!(
                 kind == "slew-limit" || (0.003..0.08).contains(&(most / span)),
                 "{kind}, seed {seed}: {}",
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disturbance_goes_with_effects_and_with_another_one() {
+    fn a_plant_may_have_effects_and_several_disturbances() {
         let config = PlantConfig::random_with(4, &["creep", "load"]).unwrap();
         let config = config.with_disturbance("jump").unwrap().with_disturbance("wander").unwrap();
         assert_eq!((config.effects(), config.disturbances.len()), (vec!["creep", "load"], 2));

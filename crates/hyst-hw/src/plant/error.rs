@@ -1,30 +1,32 @@
-//! What can be wrong with a plant's description, and what the plant refuses.
+//! Errors of a plant's description, and errors of the plant.
 
-/// What is wrong with a description of a plant.
+/// Errors of a plant's description.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// Not TOML, or a field is unknown, missing or of the wrong type; the text shows the line.
+    /// The text is not TOML, or a field is unknown, missing or of the wrong type.
+    ///
+    /// The message shows the line.
     #[error("{0}")]
     Syntax(String),
-    /// A value makes no sense.
+    /// A value is invalid.
     #[error("{field} = {value}: {advice}")]
     Value {
         /// Section and name, such as `creep.tau_min_s`.
         field: String,
         /// The offending value.
         value: String,
-        /// What to write instead.
+        /// What to give instead.
         advice: String,
     },
-    /// An effect's name that the plant does not know.
-    #[error("no effect named `{name}`; choose among {}", super::EFFECTS.join(", "))]
+    /// The plant has no effect of this name.
+    #[error("no effect is named `{name}`; give one of {}", super::EFFECTS.join(", "))]
     UnknownEffect {
         /// The name as given.
         name: String,
     },
-    /// A kind of disturbance that the plant does not know.
-    #[error("no disturbance of the kind `{kind}`; choose among {}", super::DISTURBANCES.join(", "))]
+    /// The plant has no disturbance of this kind.
+    #[error("no disturbance is of the kind `{kind}`; give one of {}", super::DISTURBANCES.join(", "))]
     UnknownDisturbance {
         /// The kind as given.
         kind: String,
@@ -37,17 +39,17 @@ impl ConfigError {
     }
 }
 
-/// What the simulated plant refuses or cannot do.
+/// Errors of the simulated plant.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlantError {
-    /// The description makes no sense.
+    /// The description is invalid.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The sample clock cannot run at this rate.
-    #[error("cannot sample at {asked_hz} Hz: choose a rate from {min_hz} to {max_hz} Hz")]
+    /// The sample rate is out of range.
+    #[error("cannot sample at {asked_hz} Hz: give a rate from {min_hz} to {max_hz} Hz")]
     Rate {
-        /// Rate asked for (Hz).
+        /// Requested rate (Hz).
         asked_hz: f64,
         /// Slowest rate (Hz).
         min_hz: f64,
@@ -55,13 +57,13 @@ pub enum PlantError {
         max_hz: f64,
     },
     /// `start` while the sample clock runs.
-    #[error("the sample clock runs already: stop it first")]
+    #[error("the sample clock already runs: stop it first")]
     Running,
-    /// `exchange` while the sample clock stands.
+    /// `exchange` while the sample clock does not run.
     #[error("the sample clock does not run: start it first")]
     NotRunning,
     /// A drive sample is not a finite number; nothing of the block was applied.
-    #[error("drive sample {index} is {volts}: not a finite voltage; nothing was applied")]
+    #[error("drive sample {index} is {volts}, not a finite voltage; nothing of the block was applied")]
     NonFinite {
         /// Position in the block.
         index: usize,
@@ -69,7 +71,7 @@ pub enum PlantError {
         volts: f64,
     },
     /// A drive sample is out of range; nothing of the block was applied.
-    #[error("drive sample {index} is {volts} V, outside {min_v} to {max_v} V; nothing was applied")]
+    #[error("drive sample {index} is {volts} V, outside {min_v} to {max_v} V; nothing of the block was applied")]
     OutOfRange {
         /// Position in the block.
         index: usize,
@@ -80,20 +82,21 @@ pub enum PlantError {
         /// Highest voltage (V).
         max_v: f64,
     },
-    /// A rest of no possible duration.
+    /// The duration of a rest is invalid.
     #[error("cannot rest for {seconds} s: give a finite time of 0 s or more")]
     Rest {
-        /// Duration asked for (s).
+        /// Requested duration (s).
         seconds: f64,
     },
-    /// The displacement left the range of the sensor's converter.
+    /// The displacement is outside the range of the sensor's converter.
     #[error(
-        "at {time_s:.4} s the sensor would have to show {value_um:.4} um: widen sensor.range_um in the plant's file, or lower the drive"
+        "at {time_s:.4} s the displacement {value_um:.4} um is outside the sensor's range: \
+         widen sensor.range_um in the plant's file, or reduce the drive"
     )]
     SensorRange {
-        /// Time on the lab's clock (s).
+        /// Time on the lab clock (s).
         time_s: f64,
-        /// Value that cannot be shown (µm).
+        /// Displacement with the errors of the sensor (µm).
         value_um: f64,
     },
 }
@@ -103,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_name_the_value_and_say_what_to_do() {
+    fn messages_contain_the_value_and_what_to_do() {
         let value = ConfigError::value("lag.seconds", -1.0, "give a time constant");
         assert_eq!(value.to_string(), "lag.seconds = -1: give a time constant");
         assert_eq!(PlantError::from(value.clone()).to_string(), value.to_string());

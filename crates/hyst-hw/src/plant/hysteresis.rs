@@ -1,4 +1,4 @@
-//! The hysteretic element: a bed of many small elements and a reversible linear part.
+//! The hysteresis: a bed of many elements and a reversible linear part.
 
 use super::config::{Actuator, Bed, Viscosity};
 use super::error::ConfigError;
@@ -8,7 +8,7 @@ use super::rng::{Draws, Purpose};
 use super::viscous::ViscousBed;
 use super::viscous_plays::ViscousPlays;
 
-/// Elements that follow at once, or take their time.
+/// Beds of elements, rate-independent or viscous.
 #[derive(Debug, Clone)]
 enum Elements {
     Relays(RelayBed),
@@ -18,7 +18,7 @@ enum Elements {
 }
 
 impl Elements {
-    /// The virgin bed that `seed` draws.
+    /// Returns the bed of `seed` in the virgin state.
     fn new(seed: u64, actuator: &Actuator, viscosity: Option<&Viscosity>) -> Self {
         let &Actuator { min_v, max_v, rest_v, relays: elements, .. } = actuator;
         match actuator.bed {
@@ -40,8 +40,9 @@ impl Elements {
         }
     }
 
-    /// Moves the input monotonically to `v`, in one step; returns the bed's output: relays that are up, or the weighted
-    /// sum of all plays.
+    /// Moves the input monotonically to `v` in one step and returns the output of the bed.
+    ///
+    /// The output is the number of relays that are up, or the weighted sum of all play operators.
     fn move_to(&mut self, v: f64) -> f64 {
         match self {
             Self::Relays(bed) => {
@@ -75,22 +76,23 @@ impl Elements {
     }
 }
 
-/// Bed and linear part, scaled to the span and opening that they have when they are driven slowly.
+/// Bed and linear part, scaled to span and opening of the loop at low rates.
 #[derive(Debug, Clone)]
 pub(crate) struct Hysteresis {
-    /// None without hysteresis.
+    /// `None` without hysteresis.
     bed: Option<Elements>,
     rest_v: f64,
     linear_um_per_v: f64,
-    /// Displacement by a unit of the bed's output.
+    /// Displacement per unit of the bed's output.
     um_per_unit: f64,
-    /// The bed's output in the virgin state: displacement is 0 there.
+    /// Output of the bed in the virgin state, where the displacement is 0.
     virgin: f64,
 }
 
 impl Hysteresis {
-    /// Draws the bed and scales it: the major loop spans `gain · (max - min)` and opens by
-    /// `loop_share` of that at its widest.
+    /// Draws the bed and scales it.
+    ///
+    /// The major loop has the span `gain · (max - min)` and the largest opening `loop_share` times this span.
     pub(crate) fn new(seed: u64, actuator: &Actuator, viscosity: Option<&Viscosity>) -> Result<Self, ConfigError> {
         let &Actuator { min_v, max_v, rest_v, gain_um_per_v: gain, loop_share, .. } = actuator;
         if loop_share == 0.0 {
@@ -99,11 +101,11 @@ impl Hysteresis {
         let mut bed = Elements::new(seed, actuator, None);
         let virgin = bed.move_to(rest_v);
         let (swing, opening) = major_loop(&mut bed, min_v, max_v);
-        // Share of the span that the bed must carry for the asked opening.
+        // Share of the span in the bed that gives the requested opening.
         let share = loop_share * swing / opening;
         if !(share > 0.0 && share <= 1.0) {
             let advice =
-                format!("the bed of this seed opens by {:.3} at most: give less, or another seed", opening / swing);
+                format!("the loop of this seed opens by at most {:.3}: give less, or another seed", opening / swing);
             return Err(ConfigError::value("actuator.loop_share", loop_share, advice));
         }
         if viscosity.is_some() {
@@ -120,14 +122,14 @@ impl Hysteresis {
         })
     }
 
-    /// Sets how long a move takes (s); elements that follow at once do not care.
+    /// Sets the duration of a move (s); it has no effect on rate-independent elements.
     pub(crate) fn set_step(&mut self, step_s: f64) {
         if let Some(bed) = &mut self.bed {
             bed.set_step(step_s);
         }
     }
 
-    /// Moves the input monotonically to `v` (V), in one step; returns the displacement from the virgin rest (µm).
+    /// Moves the input monotonically to `v` (V) in one step; returns the displacement from rest (µm).
     pub(crate) fn move_to(&mut self, v: f64) -> f64 {
         let output = self.bed.as_mut().map_or(0.0, |bed| bed.move_to(v));
         self.linear_um_per_v * (v - self.rest_v) + self.um_per_unit * (output - self.virgin)
@@ -140,7 +142,7 @@ impl Hysteresis {
     }
 }
 
-/// Span and greatest opening of the loop between `min` and `max`, in units of the bed's output.
+/// Returns span and largest opening of the loop between `min` and `max`, in units of the bed's output.
 fn major_loop(bed: &mut Elements, min: f64, max: f64) -> (f64, f64) {
     const STEPS: u32 = 400;
     let mut visit = |k: u32| bed.move_to(min + (max - min) * f64::from(k) / f64::from(STEPS));
@@ -177,14 +179,14 @@ mod tests {
 
     #[test]
     fn return_point_memory_and_wiping_out() {
-        // Relays are counted: their memory is exact.
+        // The output of relays is a count, so it is exact.
         for (bed, rounding) in [(Bed::Relays, 0.0), (Bed::Plays, 1e-12)] {
             let mut h = element(9, bed);
             let outer = play(&mut h, &[80.0, 20.0]);
             let inner = play(&mut h, &[60.0, 35.0]);
-            // A minor loop closes exactly where it began.
+            // A minor loop closes at its start.
             assert!((play(&mut h, &[50.0, 35.0]) - inner).abs() <= rounding);
-            // The input that passes the outer extremes leaves no trace of what was inside.
+            // An input beyond the outer extremes wipes out the inner ones.
             assert!((play(&mut h, &[60.0, 20.0]) - outer).abs() <= rounding);
             let mut plain = element(9, bed);
             play(&mut plain, &[90.0, 10.0]);
@@ -194,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn output_does_not_depend_on_the_steps_of_a_monotone_move() {
+    fn the_output_does_not_depend_on_the_steps_of_a_monotone_move() {
         for bed in BEDS {
             let mut coarse = element(2, bed);
             let mut fine = coarse.clone();
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn reset_is_as_good_as_new() {
+    fn a_reset_bed_equals_a_new_one() {
         let drag = Viscosity { volt_seconds: 1e-3 };
         for (bed, viscosity) in BEDS.into_iter().flat_map(|bed| [(bed, None), (bed, Some(&drag))]) {
             let mut new = Hysteresis::new(4, &actuator(bed), viscosity).unwrap();
@@ -221,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn span_and_opening_are_the_declared_ones_for_many_seeds() {
+    fn span_and_opening_are_as_declared_for_many_seeds() {
         for (seed, bed) in (0..40).flat_map(|seed| BEDS.map(|bed| (seed, bed))) {
             let mut h = element(seed, bed);
             assert!(h.linear_um_per_v > 0.0);
@@ -232,13 +234,13 @@ mod tests {
             let falling: Vec<f64> = (0..=100).rev().map(|k| h.move_to(f64::from(k))).collect();
             let opening = opening(&rising, &falling);
             assert!((opening / 10.0 - 0.12).abs() < 0.002, "{bed:?}, seed {seed}: {opening}");
-            // Both branches rise with the input.
+            // Both branches increase with the input.
             assert!(rising.is_sorted() && falling.is_sorted_by(|a, b| a >= b));
         }
     }
 
     #[test]
-    fn loops_of_plays_are_symmetric_and_those_of_relays_are_not() {
+    fn loops_of_play_operators_are_symmetric_and_those_of_relays_are_not() {
         let skew = |bed| {
             let mut h = element(6, bed);
             play(&mut h, &[100.0, 0.0]);
@@ -251,7 +253,9 @@ mod tests {
         assert!(skew(Bed::Relays) > 0.02, "{}", skew(Bed::Relays));
     }
 
-    /// Opening of a 0 to 100 V loop at a rate (V/s), over its span when slow, and the highest output.
+    /// Returns opening and highest output of a loop from 0 to 100 V at a rate (V/s).
+    ///
+    /// The opening is a share of the span at low rates.
     fn loop_at(rate: f64, bed: Bed, viscosity: Option<&Viscosity>) -> (f64, f64) {
         let actuator = Actuator { relays: 2000, ..actuator(bed) };
         let mut h = Hysteresis::new(3, &actuator, viscosity).unwrap();
@@ -268,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn viscous_loops_widen_with_the_rate_and_are_the_quick_ones_when_slow() {
+    fn viscous_loops_widen_with_rate_and_equal_the_rate_independent_ones_at_low_rates() {
         let drag = Viscosity { volt_seconds: 4e-4 };
         for bed in BEDS {
             let quick = loop_at(500.0, bed, None);

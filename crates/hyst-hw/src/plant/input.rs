@@ -1,12 +1,11 @@
-//! Between the drive samples and the actuator: interpolating amplifier, dead time, limited slope, first-order lag.
+//! The path from drive samples to the actuator: interpolation, dead time, slew limit, first-order lag.
 
-/// The drive as the actuator sees it at any phase of the running sample period.
+/// The drive at the actuator, at any phase of the present sample period.
 ///
-/// The amplifier joins the drive samples by straight lines, so the dead time is exact: the line is
-/// read further back.
+/// The amplifier interpolates linearly between drive samples. A dead time reads this line at an earlier time, so it is exact.
 #[derive(Debug, Clone)]
 pub(crate) struct InputPath {
-    /// Drive samples, a ring; `newest` is the one that the running period ends at.
+    /// Ring buffer of drive samples; `newest` is the sample at the end of the present period.
     knots: Vec<f64>,
     newest: usize,
     delay_periods: f64,
@@ -17,35 +16,38 @@ pub(crate) struct InputPath {
 
 #[derive(Debug, Clone, Copy)]
 struct Slope {
-    /// What the amplifier's output changes by in a fine step at most (V).
+    /// Maximum change of the amplifier's output in a fine step (V).
     most: f64,
     value: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Lag {
-    /// One integration step over the time constant.
+    /// Integration step divided by the time constant.
     step: f64,
     value: f64,
 }
 
 impl InputPath {
-    /// Dead time in sample periods, largest change in a step of the fine grid (V), that step over the lag's time constant.
+    /// Returns the path at rest.
+    ///
+    /// `delay_periods`: dead time in sample periods; `most`: maximum change in a fine step (V); `lag_step`: fine step divided by the
+    /// lag's time constant.
     pub(crate) fn new(rest_v: f64, delay_periods: f64, most: Option<f64>, lag_step: Option<f64>) -> Self {
-        // Read from age 0 to 1 + delay and one knot further to interpolate; one more for rounding.
+        // Ages from 0 to 1 + delay are read, one more for the interpolation, and one more for rounding.
         let knots = vec![rest_v; delay_periods as usize + 4];
         let slope = most.map(|most| Slope { most, value: rest_v });
         let lag = lag_step.map(|step| Lag { step, value: rest_v });
         Self { knots, newest: 0, delay_periods, slope, lag, rest_v }
     }
 
-    /// Begins a sample period that ends at drive `v`.
+    /// Begins a sample period with the drive `v` at its end.
     pub(crate) fn push(&mut self, v: f64) {
         self.newest = if self.newest == 0 { self.knots.len() - 1 } else { self.newest - 1 };
         self.knots[self.newest] = v;
     }
 
-    /// Delayed drive at `phase` (0 to 1) of the running period.
+    /// Returns the delayed drive at `phase` (0 to 1) of the present period.
     fn delayed(&self, phase: f64) -> f64 {
         let age = (1.0 - phase) + self.delay_periods;
         let whole = age as usize;
@@ -58,7 +60,7 @@ impl InputPath {
         self.knots[if index >= self.knots.len() { index - self.knots.len() } else { index }]
     }
 
-    /// Integrates the fine step from phase `from` to phase `to`; returns the voltage at its end.
+    /// Integrates the fine step from phase `from` to `to` and returns the voltage at its end.
     pub(crate) fn advance(&mut self, from: f64, to: f64) -> f64 {
         let (begin, middle, end) = self.followed(from, to);
         let Some(lag) = self.lag else { return end };
@@ -67,7 +69,7 @@ impl InputPath {
         lag.value
     }
 
-    /// What the amplifier puts out at begin, middle and end of a fine step.
+    /// Returns the output of the amplifier at begin, middle and end of a fine step.
     fn followed(&mut self, from: f64, to: f64) -> (f64, f64, f64) {
         let end = self.delayed(to);
         let Some(slope) = &mut self.slope else {
@@ -90,7 +92,7 @@ impl InputPath {
 }
 
 impl Lag {
-    /// Classical Runge-Kutta step of `x' = (u - x) / τ`, the input given at begin, middle and end.
+    /// Computes a classical Runge-Kutta step of `x' = (u - x) / τ` from the input at begin, middle and end.
     fn advance(self, begin: f64, middle: f64, end: f64) -> Self {
         let (x, h) = (self.value, self.step);
         let k1 = begin - x;
@@ -114,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn no_delay_and_no_lag_pass_the_drive_through() {
+    fn without_delay_and_lag_the_drive_is_unchanged() {
         let mut path = InputPath::new(0.0, 0.0, None, None);
         for v in [1.0, 5.0, -2.0] {
             assert_eq!(run_period(&mut path, v), v);
@@ -122,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn delay_is_exact_between_samples_too() {
+    fn a_delay_of_fractional_samples_is_exact() {
         let drive = |k: f64| 3.0 * k + 7.0 * (0.3 * k).sin();
         for delay in [0.25, 1.0, 2.6, 5.0] {
             let mut path = InputPath::new(0.0, delay, None, None);
@@ -139,8 +141,8 @@ mod tests {
     }
 
     #[test]
-    fn lag_follows_its_step_response() {
-        // One period of ramp, then constant: 1 - tau/h (e^(h/tau) - 1) e^(-t/tau) from the ramp's end on.
+    fn the_lag_has_its_step_response() {
+        // A ramp of one period, then constant: 1 - tau/h (e^(h/tau) - 1) e^(-t/tau) after the ramp.
         let (period, tau) = (1.0, 2.5);
         let mut path = InputPath::new(0.0, 0.0, None, Some(period / f64::from(STEPS) / tau));
         for k in 1..40 {
@@ -152,9 +154,9 @@ mod tests {
     }
 
     #[test]
-    fn a_limited_slope_lags_behind_a_jump_and_not_behind_what_is_slower() {
+    fn the_slew_limit_delays_a_step_but_not_a_slower_drive() {
         let mut path = InputPath::new(0.0, 0.0, Some(0.5 / f64::from(STEPS)), None);
-        // A jump of 2 takes four periods, whichever way.
+        // A step of 2 V takes four periods.
         for (k, expected) in [0.5, 1.0, 1.5, 2.0, 2.0].into_iter().enumerate() {
             assert!((run_period(&mut path, 2.0) - expected).abs() < 1e-12, "{k}");
         }
@@ -167,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn reset_forgets() {
+    fn a_reset_restores_the_initial_state() {
         let mut path = InputPath::new(2.0, 1.5, Some(0.03), Some(0.02));
         let first: Vec<f64> = (0..5).map(|k| run_period(&mut path, f64::from(k))).collect();
         path.reset();

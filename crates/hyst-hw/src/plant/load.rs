@@ -1,10 +1,10 @@
-//! The external force on the actuator and what the force sensor reads of it.
+//! The external force on the actuator, and its measurement.
 
 use super::config::{self, LoadShape};
 use super::rng::{Draws, Purpose};
 use super::waves::Waves;
 
-/// Force as a function of the lab's time, and the noise of its measurement.
+/// Force as a function of the lab time, and the noise of its measurement.
 #[derive(Debug, Clone)]
 pub(crate) struct AppliedLoad {
     um_per_n: f64,
@@ -15,7 +15,9 @@ pub(crate) struct AppliedLoad {
 #[derive(Debug, Clone)]
 enum Profile {
     Waves(Waves),
-    /// Levels (N), each held for `period` (s); `phase` periods of the first have passed at lab time 0.
+    /// Levels (N), each held for `period` (s).
+    ///
+    /// At lab time 0, `phase` periods of the first level have passed.
     Steps {
         levels: Vec<f64>,
         period: f64,
@@ -29,7 +31,7 @@ struct LoadCell {
     draws: Draws,
 }
 
-/// So many levels are drawn; they come again after the last one.
+/// Number of random levels; after the last one they repeat.
 const LEVELS: usize = 64;
 
 impl AppliedLoad {
@@ -50,7 +52,7 @@ impl AppliedLoad {
         Self { um_per_n, profile, cell }
     }
 
-    /// With the force sensor's noise from another seed.
+    /// Sets another seed for the force sensor's noise.
     pub(crate) fn with_noise(mut self, seed: u64) -> Self {
         if let Some(cell) = &mut self.cell {
             cell.draws = Draws::new(seed, Purpose::LoadNoise);
@@ -58,7 +60,7 @@ impl AppliedLoad {
         self
     }
 
-    /// True force at lab time `t` (N).
+    /// Returns the true force at lab time `t` (N).
     pub(crate) fn at(&self, t: f64) -> f64 {
         match &self.profile {
             Profile::Waves(waves) => waves.on(0.0, t),
@@ -66,12 +68,12 @@ impl AppliedLoad {
         }
     }
 
-    /// How far the actuator yields at lab time `t` (µm).
+    /// Returns the displacement by the force at lab time `t` (µm).
     pub(crate) fn deflection(&self, t: f64) -> f64 {
         self.um_per_n * self.at(t)
     }
 
-    /// What is recorded at lab time `t` (N).
+    /// Returns the measured force at lab time `t` (N); `None` if it is not recorded.
     pub(crate) fn measure(&mut self, t: f64) -> Option<f64> {
         let truth = self.at(t);
         self.cell.as_mut().map(|cell| truth + cell.noise * cell.draws.normal())
@@ -95,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn every_shape_stays_within_its_amplitude_and_uses_much_of_it() {
+    fn every_shape_stays_within_its_amplitude_and_uses_most_of_it() {
         for shape in [LoadShape::Sine, LoadShape::Wander, LoadShape::Steps] {
             for seed in 0..20 {
                 let course = course(&AppliedLoad::new(seed, &config(shape)), 200);
@@ -106,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_returns_and_steps_hold() {
+    fn a_sine_is_periodic_and_steps_hold_their_level() {
         let sine = AppliedLoad::new(4, &config(LoadShape::Sine));
         assert!((sine.at(1.3) - sine.at(6.3)).abs() < 1e-12);
         assert!((sine.deflection(1.3) - 0.1 * sine.at(1.3)).abs() < 1e-15);
@@ -117,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn recorded_or_not() {
+    fn a_load_is_measured_with_noise_only_if_it_is_recorded() {
         let hidden = config::Load { recorded: false, ..config(LoadShape::Wander) };
         assert_eq!(AppliedLoad::new(3, &hidden).measure(1.0), None);
         let mut noisy = AppliedLoad::new(3, &config::Load { noise_n: 0.02, ..config(LoadShape::Wander) });

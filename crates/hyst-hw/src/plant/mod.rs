@@ -1,9 +1,9 @@
-//! A simulated actuator with its amplifier and sensor, as a [`Daq`].
+//! A simulated actuator with its amplifier and sensor, with the interface [`Daq`].
 //!
-//! The plant is made to be identified, so it shares no equation and no discretisation with models
-//! of hysteresis that are fitted to records: relays with random thresholds, and differential
-//! equations integrated on a grid finer than the samples. The other bed is of plays, as
-//! Prandtl-Ishlinskii models are, but of a thousand and more with random thresholds and weights.
+//! The plant is a test object for identification. It shares no equation and no discretisation with the
+//! models that are fitted to its records: it has relays with random thresholds, and differential
+//! equations that are integrated on a grid finer than the samples. The alternative bed consists of play
+//! operators, like Prandtl-Ishlinskii models, but of a thousand or more with random thresholds and weights.
 
 mod asymmetry;
 mod chain;
@@ -40,7 +40,7 @@ use hysteresis::Hysteresis;
 use sensor::PositionSensor;
 use surroundings::Surroundings;
 
-/// Names of the effects that a plant can have, in the order of the chain.
+/// Names of the effects of a plant, in the order of the chain.
 pub const EFFECTS: [&str; 11] = [
     "delay",
     "lag",
@@ -55,17 +55,17 @@ pub const EFFECTS: [&str; 11] = [
     "interference",
 ];
 
-/// Kinds of disturbance that [`PlantConfig::disturbed`] knows: those of the file's `[[disturbance]]`, and a load and a
-/// temperature that act but are not recorded.
+/// Kinds of disturbance for [`PlantConfig::disturbed`].
+///
+/// They are those of the section `[[disturbance]]`, and a load and a temperature that act but are not recorded.
 pub const DISTURBANCES: [&str; 8] =
     ["jump", "gain-step", "bursts", "wander", "slip", "slew-limit", "hidden-load", "hidden-temperature"];
 
 /// A simulated actuator with amplifier, sensor and lab clock.
 ///
-/// The plant depends on its description alone: the same description gives the same samples to the
-/// last bit, whatever the block size. The lab's clock starts at 0, goes on in segments and rests and
-/// stands while the plant is stopped. [`start`](Daq::start) finds the device in the virgin state at the
-/// rest voltage; [`rest`](Daq::rest) and [`stop`](Daq::stop) bring it back there at once.
+/// The same description gives the same samples, bit by bit, for every block size. The lab clock starts at 0.
+/// It runs during segments and rests, and is halted while the plant is stopped. [`start`](Daq::start) begins in the
+/// virgin state at the rest voltage; [`rest`](Daq::rest) and [`stop`](Daq::stop) return to this state at once.
 #[derive(Debug, Clone)]
 pub struct Plant {
     config: PlantConfig,
@@ -84,9 +84,9 @@ pub struct Plant {
 struct Stream {
     chain: Chain,
     rate_hz: f64,
-    /// Lab time at which the segment began (s).
+    /// Lab time at the begin of the segment (s).
     begin_s: f64,
-    /// Samples since then: time is counted, not summed up, so it stays even.
+    /// Samples since then. The time is computed from this count, so rounding errors do not add up.
     samples: u64,
 }
 
@@ -94,7 +94,7 @@ impl Plant {
     /// Builds the plant, stopped and at rest.
     ///
     /// # Errors
-    /// When the description is not valid.
+    /// If the description is not valid.
     pub fn new(config: PlantConfig) -> Result<Self, PlantError> {
         config.validate()?;
         let hysteresis = Hysteresis::new(config.seed, &config.actuator, config.viscosity.as_ref())?;
@@ -129,13 +129,13 @@ impl Plant {
         })
     }
 
-    /// The description that the plant was built from.
+    /// Returns the description of the plant.
     #[must_use]
     pub fn config(&self) -> &PlantConfig {
         &self.config
     }
 
-    /// Time on the lab's clock (s).
+    /// Returns the time of the lab clock (s).
     #[must_use]
     pub fn lab_time_s(&self) -> f64 {
         self.lab_time_s

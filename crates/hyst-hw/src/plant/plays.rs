@@ -1,26 +1,26 @@
-//! A bed of many independent plays with random thresholds and weights: the other kind of hysteresis.
+//! A bed of many independent play operators with random thresholds and weights.
 //!
-//! A play follows its input where it is pushed, `|u − p| ≤ r`. Loops of a bed of plays are symmetric about their centre and
-//! their branches are curves of the travel since the last turn alone; those of relays are neither.
+//! A play operator keeps `|u − p| ≤ r`. Unlike loops of relays, loops of play operators are symmetric about their centre, and their
+//! branches depend only on the travel since the last reversal.
 
 use super::rng::Draws;
 
-/// A play: threshold \[V\], weight.
+/// A play operator: threshold \[V\] and weight.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Play {
     pub(crate) threshold: f64,
     pub(crate) weight: f64,
 }
 
-/// Plays that follow at once, in one sum `Σ w p`.
+/// Rate-independent play operators with the output `Σ w p`.
 ///
-/// On a branch, the plays that the input pushes are always those of the smallest thresholds: a branch moves a mark and
-/// touches no play, and only a turn writes down where those below the mark have been left.
+/// On a branch, the play operators in motion are always those with the smallest thresholds. So a branch only moves the index
+/// `pushed`, and a reversal stores the positions of the play operators below it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlayBed {
     /// Ascending in the threshold.
     plays: Vec<Play>,
-    /// Over the first 0, 1, … n plays: sums of `w` and of `w r`.
+    /// Sums of `w` and of `w r` over the first 0, 1, … n play operators.
     weights: Vec<f64>,
     moments: Vec<f64>,
     rest: f64,
@@ -30,19 +30,19 @@ pub(crate) struct PlayBed {
 
 #[derive(Debug, Clone)]
 struct Memory {
-    /// Where each play has been left, counted from rest \[V\]; those that are pushed now have an old value.
-    left: Vec<f64>,
-    /// Sums of `w p` from the play 0, 1, … n on, over those that are not pushed.
+    /// Positions, counted from rest \[V\]; outdated for the play operators in motion.
+    positions: Vec<f64>,
+    /// Sums of `w p` from play operator 0, 1, … n on, over those that are not in motion.
     beyond: Vec<f64>,
-    /// `plays[..pushed]` are pushed.
+    /// `plays[..pushed]` are in motion.
     pushed: usize,
-    /// Input, counted from rest \[V\], and which way it went: 1 up, −1 down.
+    /// Input, counted from rest \[V\], and its direction: 1 up, −1 down.
     input: f64,
-    way: f64,
+    direction: f64,
 }
 
 impl PlayBed {
-    /// Plays in ascending order of their thresholds, all centred on the input `rest`.
+    /// Returns a virgin bed of play operators in ascending order of their thresholds, at the input `rest`.
     pub(crate) fn new(plays: &[Play], rest: f64) -> Self {
         let sums = |term: fn(&Play) -> f64| {
             let rising = plays.iter().scan(0.0, |sum, play| {
@@ -52,7 +52,8 @@ impl PlayBed {
             std::iter::once(0.0).chain(rising).collect()
         };
         let n = plays.len();
-        let virgin = Memory { left: vec![0.0; n], beyond: vec![0.0; n + 1], pushed: 0, input: 0.0, way: 1.0 };
+        let virgin =
+            Memory { positions: vec![0.0; n], beyond: vec![0.0; n + 1], pushed: 0, input: 0.0, direction: 1.0 };
         Self {
             plays: plays.to_vec(),
             weights: sums(|play| play.weight),
@@ -63,40 +64,42 @@ impl PlayBed {
         }
     }
 
-    /// Moves the input monotonically to `v`; returns `Σ w p`, counted from rest.
+    /// Moves the input monotonically to `v` and returns `Σ w p`, counted from rest.
     pub(crate) fn move_to(&mut self, v: f64) -> f64 {
         let u = v - self.rest;
-        let way = if u < self.now.input { -1.0 } else { 1.0 };
-        if way != self.now.way && u != self.now.input {
-            self.turn();
-            self.now.way = way;
+        let direction = if u < self.now.input { -1.0 } else { 1.0 };
+        if direction != self.now.direction && u != self.now.input {
+            self.reverse();
+            self.now.direction = direction;
         }
         let now = &mut self.now;
         now.input = u;
-        let ahead = self.plays.iter().zip(&now.left).skip(now.pushed);
-        now.pushed += ahead.take_while(|(play, left)| now.way * (u - **left) > play.threshold).count();
-        u * self.weights[now.pushed] - now.way * self.moments[now.pushed] + now.beyond[now.pushed]
+        let ahead = self.plays.iter().zip(&now.positions).skip(now.pushed);
+        now.pushed += ahead.take_while(|(play, position)| now.direction * (u - **position) > play.threshold).count();
+        u * self.weights[now.pushed] - now.direction * self.moments[now.pushed] + now.beyond[now.pushed]
     }
 
-    /// Writes down where the pushed plays are left.
-    fn turn(&mut self) {
-        let Memory { left, beyond, pushed, input, way } = &mut self.now;
+    /// Stores the positions of the play operators in motion.
+    fn reverse(&mut self) {
+        let Memory { positions, beyond, pushed, input, direction } = &mut self.now;
         for i in (0..*pushed).rev() {
             let play = self.plays[i];
-            left[i] = *input - *way * play.threshold;
-            beyond[i] = beyond[i + 1] + play.weight * left[i];
+            positions[i] = *input - *direction * play.threshold;
+            beyond[i] = beyond[i + 1] + play.weight * positions[i];
         }
         *pushed = 0;
     }
 
-    /// Back to the virgin state.
+    /// Returns to the virgin state.
     pub(crate) fn reset(&mut self) {
         self.now.clone_from(&self.virgin);
     }
 }
 
-/// Draws plays for a span of voltages, in ascending order of their thresholds. The shape of the density comes from the
-/// stream too: a narrow law and a wide one that reaches beyond half the span, and weights that grow or shrink along it.
+/// Draws play operators for a voltage span, in ascending order of their thresholds.
+///
+/// The shape of the density is also random: thresholds from a narrow distribution and a wide one that reaches beyond half the
+/// span, and weights that increase or decrease with the threshold.
 pub(crate) fn draw_plays(draws: &mut Draws, plays: usize, span: f64) -> Vec<Play> {
     let narrow_share = draws.between(0.3, 0.6);
     let narrow = draws.between(0.04, 0.09);
@@ -120,13 +123,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mark_agrees_with_asking_every_play() {
+    fn the_bed_agrees_with_a_sum_over_all_play_operators() {
         let mut draws = Draws::new(5, Purpose::Plays);
         let plays = draw_plays(&mut draws, 400, 100.0);
         let mut bed = PlayBed::new(&plays, 20.0);
         let mut positions = vec![0.0_f64; plays.len()];
         for k in 0..3000 {
-            // Also where nothing moves, and back to the voltage before.
+            // Also without motion, and back to the previous voltage.
             let v = if k % 7 == 0 { 50.0 } else { draws.between(-10.0, 110.0) };
             for v in [v, v, v + 1.0] {
                 let output = bed.move_to(v);
@@ -142,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn thresholds_rise_and_weights_are_positive() {
+    fn thresholds_are_sorted_and_weights_are_positive() {
         for seed in 0..20 {
             let plays = draw_plays(&mut Draws::new(seed, Purpose::Plays), 3000, 120.0);
             assert!(plays.is_sorted_by(|a, b| a.threshold <= b.threshold));

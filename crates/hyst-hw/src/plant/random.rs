@@ -1,4 +1,4 @@
-//! Actuators of an ordinary kind, drawn from a seed.
+//! Random actuators with typical parameters.
 
 use super::EFFECTS;
 use super::asymmetry::Curve;
@@ -10,46 +10,51 @@ use super::error::ConfigError;
 use super::hysteresis::Hysteresis;
 use super::rng::{Draws, Purpose};
 
-/// What [`PlantConfig::random`] draws among: never another list, or its seeds would become other plants.
-pub(super) const HIDDEN: [&str; 7] = ["delay", "lag", "temperature", "creep", "resonance", "drift", "interference"];
+/// The effects among which [`PlantConfig::random`] chooses.
+///
+/// A change of this list would change the plants of all seeds.
+pub(super) const RANDOM_EFFECTS: [&str; 7] =
+    ["delay", "lag", "temperature", "creep", "resonance", "drift", "interference"];
 
 impl PlantConfig {
-    /// An ordinary piezo actuator with one effect, or two in one case of five; seed by seed the same for ever. Asymmetry,
-    /// rate-dependence, load and saturation are not among them.
+    /// Returns a typical piezo actuator with one effect (in 80 % of the cases) or two.
     ///
-    /// The number and kind of the effects come from a stream of their own; everything else is as
-    /// in [`random_with`](Self::random_with).
+    /// A seed always gives the same actuator.
+    ///
+    /// Asymmetry, rate dependence, load and saturation are not among the effects. Number and kind of the effects have their own
+    /// random stream; all other values are as in [`random_with`](Self::random_with).
     #[must_use]
     pub fn random(seed: u64) -> Self {
         let mut draws = Draws::new(plant_seed(seed), Purpose::Effects);
         let two = draws.unit() < 0.2;
-        let first = draws.index(HIDDEN.len());
-        // A step of 1 to 6 around the list of 7 is never the first again.
-        let second = (first + 1 + draws.index(HIDDEN.len() - 1)) % HIDDEN.len();
-        draw(Bed::Relays, seed, |name| name == HIDDEN[first] || (two && name == HIDDEN[second]))
+        let first = draws.index(RANDOM_EFFECTS.len());
+        // A step of 1 to 6 in the list of 7 never returns to the first effect.
+        let second = (first + 1 + draws.index(RANDOM_EFFECTS.len() - 1)) % RANDOM_EFFECTS.len();
+        draw(Bed::Relays, seed, |name| name == RANDOM_EFFECTS[first] || (two && name == RANDOM_EFFECTS[second]))
     }
 
-    /// An ordinary piezo actuator with the effects of the names given, in any order; none is allowed.
+    /// Returns a typical piezo actuator with the named effects, in any order; the list may be empty.
     ///
-    /// 100 to 150 V, 10 to 40 µm, a loop that opens by 10 to 15 % of the span, noise of 0.03 % of
-    /// the span at 16 bits. Strengths are ordinary and well above the noise. All values are drawn for every
-    /// set, in a fixed order, and those of absent effects put aside: the same seed is the same actuator
-    /// whatever its effects. The plant's seed is `seed` without its top bit, which TOML cannot hold.
+    /// The actuator has 100 to 150 V, 10 to 40 µm, a loop with an opening of 10 to 15 % of the span, and noise of 0.03 % of
+    /// the span at 16 bits. The effects have typical strengths, well above the noise. All values are always drawn in the same
+    /// order, and those of absent effects are discarded. So a seed gives the same actuator for every list of effects.
+    /// The plant's seed is `seed` without its highest bit, because TOML integers are signed.
     ///
-    /// The temperature is recorded when it is among the effects, and in half of the other cases,
-    /// where it wanders by a few kelvin without influence.
+    /// The temperature is recorded if it is among the effects, and in half of the other cases. There it varies by a few
+    /// kelvin without influence.
     ///
     /// # Errors
-    /// When a name is not in [`EFFECTS`].
+    /// If a name is not in [`EFFECTS`].
     pub fn random_with(seed: u64, effects: &[&str]) -> Result<Self, ConfigError> {
         Self::random_on(Bed::Relays, seed, effects)
     }
 
-    /// The actuator of [`random_with`](Self::random_with) with its hysteresis on a bed of the kind given; of plays there are
-    /// a tenth as many.
+    /// Returns the actuator of [`random_with`](Self::random_with) with another bed.
+    ///
+    /// A bed of play operators has a tenth as many elements as one of relays.
     ///
     /// # Errors
-    /// When a name is not in [`EFFECTS`].
+    /// If a name is not in [`EFFECTS`].
     pub fn random_on(bed: Bed, seed: u64, effects: &[&str]) -> Result<Self, ConfigError> {
         match effects.iter().find(|name| !EFFECTS.contains(name)) {
             Some(name) => Err(ConfigError::UnknownEffect { name: (*name).to_owned() }),
@@ -62,8 +67,9 @@ fn plant_seed(seed: u64) -> u64 {
     seed & (u64::MAX >> 1)
 }
 
-/// Draws every parameter, in an order that is part of the promise "same seed, same plant": new
-/// draws are added at the end only.
+/// Draws all parameters.
+///
+/// The order of the draws must not change, so that a seed always gives the same plant. Add new draws only at the end.
 fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
     let seed = plant_seed(seed);
     let mut draws = Draws::new(seed, Purpose::Parameters);
@@ -82,7 +88,7 @@ fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
         relays: if bed == Bed::Plays { relays / 10 } else { relays },
     };
     let sensor = Sensor {
-        // Room for overshoot and for minutes of drift either way.
+        // Room for overshoot, and for some minutes of drift in both directions.
         range_um: [rounded(-0.8 * span), rounded(1.8 * span)],
         bits: 16,
         noise_um: rounded(0.0003 * span),
@@ -115,7 +121,7 @@ fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
         reference_degc,
         mean_degc: rounded(reference_degc + between(-2.0, 2.0)),
         swing_k: between(8.0, 12.0),
-        // Within a record of 40 s the temperature runs through most of its swing.
+        // Within a record of 40 s, the temperature covers most of its swing.
         period_s: Some(between(30.0, 60.0)),
         shape: if between(0.0, 1.0) < 0.5 { TemperatureShape::Sine } else { TemperatureShape::Wander },
         recorded: true,
@@ -135,13 +141,13 @@ fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
     let hook = between(-0.03, 0.03);
     let hooked = between(0.0, 1.0) < 0.5;
     let asymmetry = Asymmetry { bend, hook: if hooked { hook } else { 0.0 } };
-    // Of the stroke's voltage at 20 Hz: loops over all of it open by a fifth to three fifths more than slow ones.
+    // As a share of the voltage span at 20 Hz: the major loop opens 20 to 60 % wider than at low rates.
     let drag = between(0.0265, 0.05);
     let viscosity = Viscosity { volt_seconds: rounded(max_v / 20.0 * drag * drag) };
     let newtons = between(1.0, 5.0);
     let load = Load {
         newtons,
-        // Half a percent of the span at least: above the noise.
+        // At least 0.5 % of the span, which is above the noise.
         um_per_n: f64::max(between(0.02, 0.2), rounded(0.005 * span / newtons)),
         period_s: between(3.0, 20.0),
         shape: [LoadShape::Sine, LoadShape::Wander, LoadShape::Steps][between(0.0, 3.0) as usize % 3],
@@ -177,17 +183,19 @@ fn draw(bed: Bed, seed: u64, has: impl Fn(&str) -> bool) -> PlantConfig {
     }
 }
 
-/// Lower and upper end of the slow major loop (µm).
+/// Returns the lower and upper end of the slow major loop (µm).
 fn stroke(seed: u64, actuator: &Actuator, asymmetry: Option<&Asymmetry>) -> (f64, f64) {
     let end = |v| asymmetry.map_or(v, |asymmetry| Curve::new(asymmetry, actuator).at(v));
-    // A bed that cannot be built is refused where the plant is.
+    // `Plant::new` reports a bed that cannot be built.
     Hysteresis::new(seed, actuator, None).map_or((0.0, 0.0), |mut hysteresis| {
         let top = hysteresis.move_to(actuator.max_v);
         (end(hysteresis.move_to(actuator.min_v)), end(top))
     })
 }
 
-/// Four significant digits, so that the file is pleasant to read; decimal text and back is exact.
+/// Rounds to four significant digits, so that the file is short.
+///
+/// Reading the decimal text gives exactly the same value.
 pub(super) fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
@@ -202,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_seed_is_a_valid_plant_that_its_file_reproduces() {
+    fn every_seed_gives_a_valid_plant_that_its_file_reproduces() {
         for seed in (0..150).chain([u64::MAX]) {
             let config = PlantConfig::random(seed);
             Plant::new(config.clone()).unwrap();
@@ -212,9 +220,9 @@ mod tests {
     }
 
     #[test]
-    fn every_effect_and_pairs_come_up() {
+    fn every_effect_and_pairs_occur() {
         let drawn: Vec<_> = (0..300).map(|seed| PlantConfig::random(seed).effects()).collect();
-        for name in HIDDEN {
+        for name in RANDOM_EFFECTS {
             let count = drawn.iter().filter(|effects| effects.contains(&name)).count();
             assert!(count > 20, "{name}: {count}");
         }
@@ -223,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn effects_are_as_asked_and_change_nothing_else() {
+    fn the_requested_effects_are_active_and_change_nothing_else() {
         let bare = PlantConfig::random_with(12, &[]).unwrap();
         assert!(bare.effects().is_empty());
         let all = PlantConfig::random_with(12, &EFFECTS).unwrap();
@@ -239,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn strengths_are_ordinary_ones_and_all_kinds_come_up() {
+    fn strengths_are_typical_and_all_kinds_occur() {
         let drawn: Vec<_> = (0..200).map(|seed| PlantConfig::random_with(seed, &EFFECTS).unwrap()).collect();
         for config in &drawn {
             config.validate().unwrap();
@@ -267,7 +275,9 @@ mod tests {
         }
     }
 
-    /// Displacement over two sines of a frequency (Hz) through all voltages: from the lowest to the highest and back.
+    /// Returns the rising and the falling branch of the major loop at a frequency (Hz).
+    ///
+    /// The loop is the second period of a sine.
     fn full_loop(config: &PlantConfig, hz: f64) -> (Vec<f64>, Vec<f64>) {
         let mut h = Hysteresis::new(config.seed, &config.actuator, config.viscosity.as_ref()).unwrap();
         let steps = 2000;
@@ -281,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn loops_at_20_hz_are_wider_by_a_fifth_to_three_fifths() {
+    fn loops_at_20_hz_are_20_to_60_percent_wider() {
         for (seed, bed) in (0..15).flat_map(|seed| [(seed, Bed::Relays), (seed, Bed::Plays)]) {
             let config = PlantConfig::random_on(bed, seed, &["rate-dependence"]).unwrap();
             let opening = |hz| {
@@ -294,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn stops_cut_a_part_of_the_stroke_off() {
+    fn stops_limit_a_part_of_the_stroke() {
         for (seed, bed) in (0..30).flat_map(|seed| [(seed, Bed::Relays), (seed, Bed::Plays)]) {
             let config = PlantConfig::random_on(bed, seed, &["asymmetry", "saturation"]).unwrap();
             let stops = config.saturation.as_ref().unwrap();
@@ -306,7 +316,7 @@ mod tests {
         }
     }
 
-    /// Files of plants of many seeds, as one number.
+    /// Returns a hash of the files of plants of many seeds.
     fn digest(plant: impl Fn(u64) -> PlantConfig) -> u64 {
         let texts = (0..60).map(|seed| plant(seed).to_toml().unwrap());
         texts
@@ -315,20 +325,20 @@ mod tests {
     }
 
     #[test]
-    fn seeds_are_pinned() {
-        // Plants of before stay what they were: `demo --seed` and every study that names a seed rely on it.
+    fn the_plants_of_seeds_do_not_change() {
+        // The plants of earlier versions must not change: `demo --seed` and every study with a seed depend on them.
         assert_eq!(digest(PlantConfig::random), 4_215_076_879_974_643_906);
-        assert_eq!(digest(|seed| PlantConfig::random_with(seed, &HIDDEN).unwrap()), 17_307_077_536_925_047_092);
+        assert_eq!(digest(|seed| PlantConfig::random_with(seed, &RANDOM_EFFECTS).unwrap()), 17_307_077_536_925_047_092);
     }
 
     #[test]
-    fn unknown_effect_is_named_with_the_choice() {
+    fn an_unknown_effect_is_reported_with_the_valid_names() {
         let error = PlantConfig::random_with(1, &["creep", "magic"]).unwrap_err().to_string();
         assert!(error.contains("magic") && error.contains("interference"), "{error}");
     }
 
     #[test]
-    fn temperature_is_recorded_with_its_effect_and_in_half_of_the_other_cases() {
+    fn the_temperature_is_recorded_with_its_effect_and_in_half_of_the_other_cases() {
         let idle = (0..200).filter(|s| PlantConfig::random_with(*s, &["lag"]).unwrap().temperature.is_some());
         assert!((70..=130).contains(&idle.count()));
         assert!(

@@ -1,14 +1,13 @@
 //! A bed of many independent relays with random thresholds.
 //!
-//! Nothing here is a play operator or a threshold grid: the models that are fitted to the plant
-//! cannot be right by construction.
+//! There are no play operators and no threshold grid here, so that no fitted model is exact by construction.
 
 use super::rng::Draws;
 
-/// Relays that go up when the input reaches `alpha` and down when it reaches `beta < alpha`.
+/// Relays that switch up when the input reaches `alpha`, and down when it reaches `beta < alpha`.
 #[derive(Debug, Clone)]
 pub(crate) struct RelayBed {
-    /// Upper thresholds, ascending; the position here is the relay's number.
+    /// Upper thresholds, ascending; the index is the relay's number.
     alpha: Vec<f64>,
     /// Lower thresholds, ascending, with the relay's number.
     beta: Vec<(f64, u32)>,
@@ -19,7 +18,7 @@ pub(crate) struct RelayBed {
 #[derive(Debug, Clone)]
 struct BedState {
     up: Vec<bool>,
-    /// How many relays are up.
+    /// Number of relays that are up.
     count: usize,
     /// `alpha[..reached]` are at or below the input.
     reached: usize,
@@ -28,7 +27,9 @@ struct BedState {
 }
 
 impl RelayBed {
-    /// A virgin bed of relays `(alpha, beta)`, ascending in alpha, at input `rest`: those centred below `rest` are up.
+    /// Returns a virgin bed of relays `(alpha, beta)`, ascending in alpha, at the input `rest`.
+    ///
+    /// Relays centred below `rest` are up.
     pub(crate) fn new(thresholds: &[(f64, f64)], rest: f64) -> Self {
         let alpha: Vec<f64> = thresholds.iter().map(|t| t.0).collect();
         let mut beta: Vec<(f64, u32)> = (0_u32..).zip(thresholds).map(|(i, t)| (t.1, i)).collect();
@@ -43,7 +44,7 @@ impl RelayBed {
         Self { alpha, beta, now: virgin.clone(), virgin }
     }
 
-    /// Moves the input monotonically to `u`; visits only relays whose threshold lies on the way.
+    /// Moves the input monotonically to `u`; visits only relays with a threshold in between.
     pub(crate) fn move_to(&mut self, u: f64) {
         let now = &mut self.now;
         while now.reached < self.alpha.len() && self.alpha[now.reached] <= u {
@@ -58,7 +59,7 @@ impl RelayBed {
             now.count -= usize::from(*up);
             *up = false;
         }
-        // The marks that the input left behind in the other direction only follow.
+        // Update the indices for the other direction.
         while now.reached > 0 && self.alpha[now.reached - 1] > u {
             now.reached -= 1;
         }
@@ -67,20 +68,23 @@ impl RelayBed {
         }
     }
 
-    /// How many relays are up: all weights are equal, so the memory is exact and no rounding builds up.
+    /// Returns the number of relays that are up.
+    ///
+    /// All weights are equal, so the output is exact, without rounding errors.
     pub(crate) fn count(&self) -> usize {
         self.now.count
     }
 
-    /// Back to the virgin state.
+    /// Returns to the virgin state.
     pub(crate) fn reset(&mut self) {
         self.now.clone_from(&self.virgin);
     }
 }
 
-/// Draws `(alpha, beta)` pairs over `min..max`, ascending in alpha. The shape of the density comes from the stream too:
-/// half-widths from a mixture of an exponential and a gamma law, centres from a uniform law that
-/// reaches beyond the range plus a broad bump, and half-widths that grow or shrink along the range.
+/// Draws pairs `(alpha, beta)` over `min..max`, ascending in alpha.
+///
+/// The shape of the density is also random. Half-widths have a mixture of an exponential and a gamma distribution, and increase or
+/// decrease along the range. Centres have a mixture of a uniform distribution, which reaches beyond the range, and a broad peak.
 pub(crate) fn draw_thresholds(draws: &mut Draws, relays: usize, min: f64, max: f64) -> Vec<(f64, f64)> {
     let narrow_share = draws.between(0.25, 0.5);
     let narrow = draws.between(0.05, 0.09);
@@ -111,7 +115,9 @@ pub(crate) fn draw_thresholds(draws: &mut Draws, relays: usize, min: f64, max: f
     thresholds
 }
 
-/// As [`draw_thresholds`], but most relays stand in two clumps, each of which centres round one voltage and has a narrow and a wide part.
+/// Draws pairs like [`draw_thresholds`], but most of them in two clusters.
+///
+/// Each cluster is around one voltage and has a narrow and a wide part.
 pub(crate) fn draw_clumps(draws: &mut Draws, relays: usize, min: f64, max: f64) -> Vec<(f64, f64)> {
     let scattered = draws.between(0.15, 0.3);
     let first_share = draws.between(0.4, 0.6);
@@ -140,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sorted_walk_agrees_with_asking_every_relay() {
+    fn the_bed_agrees_with_a_count_over_all_relays() {
         let mut draws = Draws::new(5, Purpose::Relays);
         let thresholds = draw_thresholds(&mut draws, 500, 0.0, 100.0);
         let mut bed = RelayBed::new(&thresholds, 0.0);

@@ -1,11 +1,11 @@
-//! What the position sensor makes of the true displacement.
+//! The position sensor.
 
 use std::f64::consts::TAU;
 
 use super::config::PlantConfig;
 use super::rng::{Draws, Purpose};
 
-/// Zero, drift, interference, noise and converter.
+/// Zero, drift, interference, noise and converter of the position sensor.
 #[derive(Debug, Clone)]
 pub(crate) struct PositionSensor {
     offset: f64,
@@ -36,13 +36,13 @@ impl PositionSensor {
         }
     }
 
-    /// Reading of displacement `position` at lab time `t` (µm).
+    /// Returns the reading for the displacement `position` at lab time `t` (µm).
     ///
     /// # Errors
-    /// With the value that the converter cannot show.
+    /// The value, if it is outside the range of the converter.
     pub(crate) fn read(&mut self, position: f64, t: f64) -> Result<f64, f64> {
         let wave = self.wave.map_or(0.0, |(amplitude, w, phase)| amplitude * libm::sin(w * t + phase));
-        // One draw a sample, whatever else is on: an effect does not change the noise.
+        // One draw per sample, so that effects do not change the noise.
         let noise = self.noise * self.draws.normal();
         let value = position + self.offset + self.drift_um_per_s * t + wave + noise;
         let code = ((value - self.low) / self.quantum).round();
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn converter_has_two_to_the_bits_levels_over_its_range() {
+    fn the_converter_has_two_to_the_power_of_bits_levels() {
         let mut config = clean();
         config.sensor.range_um = [-8.0, 8.0];
         config.sensor.bits = 4;
@@ -66,13 +66,13 @@ mod tests {
         assert_eq!(sensor.read(0.6, 0.0), Ok(1.0));
         assert_eq!(sensor.read(-8.0, 0.0), Ok(-8.0));
         assert_eq!(sensor.read(7.4, 0.0), Ok(7.0));
-        // Beyond the last level there is no reading.
+        // Above the last level there is no reading.
         assert_eq!(sensor.read(7.6, 0.0), Err(7.6));
         assert_eq!(sensor.read(-8.6, 0.0), Err(-8.6));
     }
 
     #[test]
-    fn drift_interference_and_zero_add_up_on_the_labs_clock() {
+    fn drift_interference_and_zero_add_up_on_the_lab_clock() {
         let mut config = clean();
         config.sensor.offset_um = -3.0;
         config.drift = Some(Drift { um_per_s: 0.01 });
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_the_declared_size_and_does_not_depend_on_effects() {
+    fn the_noise_has_the_declared_size_and_does_not_depend_on_effects() {
         let mut config = clean();
         config.sensor.noise_um = 0.01;
         let mut plain = PositionSensor::new(&config);

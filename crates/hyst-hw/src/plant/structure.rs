@@ -1,11 +1,11 @@
-//! Structural modes, integrated as differential equations on the fine grid.
+//! Structural modes: differential equations integrated on the fine grid.
 
 use super::config;
 
-/// Modal sum `y = Σ gᵢ qᵢ + (1 - Σ gᵢ) x`, with `q'' + 2ζω q' + ω² q = ω² x`.
+/// Modal sum `y = Σ gᵢ qᵢ + (1 - Σ gᵢ) x` with `q'' + 2ζω q' + ω² q = ω² x`.
 ///
-/// Classical Runge-Kutta: at `ω·step ≤ 0.05` its own damping is `(ω·step)⁵/144 ≈ 2·10⁻⁹` and its
-/// frequency error `(ω·step)⁴/120 ≈ 5·10⁻⁸`, so the declared damping and frequency hold.
+/// The integration is classical Runge-Kutta. For `ω·step ≤ 0.05` its numerical damping is `(ω·step)⁵/144 ≈ 2·10⁻⁹` and its
+/// frequency error `(ω·step)⁴/120 ≈ 5·10⁻⁸`, both negligible.
 #[derive(Debug, Clone)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
@@ -14,17 +14,17 @@ pub(crate) struct Structure {
 
 #[derive(Debug, Clone)]
 struct Mode {
-    /// `ω · step`: time is counted in radians of this mode.
+    /// `ω · step`: the step in radians of this mode.
     step: f64,
     twice_damping: f64,
     gain: f64,
     position: f64,
-    /// Velocity over ω, so that it has the position's unit and size.
+    /// Velocity divided by ω, so that it has the unit of a position.
     velocity: f64,
 }
 
 impl Structure {
-    /// Modes at rest, for the fine step `step_s` (s).
+    /// Returns modes at rest, for the fine step `step_s` (s).
     pub(crate) fn new(modes: &[config::Mode], step_s: f64) -> Self {
         let direct = 1.0 - modes.iter().map(|mode| mode.gain).sum::<f64>();
         let modes = modes
@@ -40,7 +40,7 @@ impl Structure {
         Self { modes, direct }
     }
 
-    /// One fine step in which the input moves from `from` to `to`; returns the output at its end.
+    /// Computes one fine step with the input from `from` to `to` and returns the output at its end.
     pub(crate) fn advance(&mut self, from: f64, to: f64) -> f64 {
         self.modes.iter_mut().fold(self.direct * to, |sum, mode| {
             mode.advance(from, to);
@@ -48,7 +48,7 @@ impl Structure {
         })
     }
 
-    /// At rest under an input that has stood at `input` for long.
+    /// Sets all modes to the equilibrium with the constant input `input`.
     pub(crate) fn rest_at(&mut self, input: f64) {
         for mode in &mut self.modes {
             mode.position = input;
@@ -76,8 +76,9 @@ impl Mode {
 mod tests {
     use super::*;
 
-    /// Frequency of the damped motion and logarithmic decrement of a ring-down, from the upward
-    /// zero crossings of the position and the velocity there.
+    /// Returns the frequency of the damped motion and the logarithmic decrement of a ring-down.
+    ///
+    /// Both follow from the upward zero crossings of the position, and from the velocity there.
     fn ring_down(hz: f64, damping: f64, step_s: f64) -> (f64, f64) {
         let mode = config::Mode { hz, damping, gain: 1.0 };
         let mut structure = Structure::new(&[mode], step_s);
@@ -102,9 +103,9 @@ mod tests {
     }
 
     #[test]
-    fn ring_down_has_the_declared_frequency_and_damping() {
+    fn the_ring_down_has_the_declared_frequency_and_damping() {
         for (hz, damping) in [(100.0, 0.01), (100.0, 0.02), (350.0, 0.06), (80.0, 0.2)] {
-            // The coarsest step that the plant ever takes.
+            // The coarsest step of the plant.
             let step = 0.05 / (std::f64::consts::TAU * hz);
             let (measured_hz, decrement) = ring_down(hz, damping, step);
             let root = (1.0 - damping * damping).sqrt();
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_sum_to_one_at_rest_and_the_remainder_is_direct() {
+    fn the_static_gain_is_one_and_the_rest_of_the_gain_acts_at_once() {
         let modes =
             [config::Mode { hz: 100.0, damping: 0.3, gain: 0.7 }, config::Mode { hz: 300.0, damping: 0.3, gain: 0.1 }];
         let mut structure = Structure::new(&modes, 1e-5);
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn no_mode_passes_the_input_through() {
+    fn without_modes_the_output_equals_the_input() {
         assert_eq!(Structure::new(&[], 1e-4).advance(0.2, 0.7), 0.7);
     }
 }

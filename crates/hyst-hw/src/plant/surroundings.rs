@@ -1,15 +1,15 @@
-//! What acts on the actuator besides its drive, as a function of the lab's time.
+//! The influences on the actuator other than its drive, as functions of the lab time.
 
 use super::config::{Disturbance, PlantConfig};
 use super::load::AppliedLoad;
 use super::temperature::Climate;
 
-/// Temperature, load and what changes the gain, where there is any.
+/// Temperature, load and steps of the gain, if any.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Surroundings {
     climate: Option<Climate>,
     load: Option<AppliedLoad>,
-    /// Relative changes of the gain, and when they come (s).
+    /// Relative changes of the gain, and their times (s).
     gain_steps: Vec<(f64, f64)>,
 }
 
@@ -30,28 +30,28 @@ impl Surroundings {
         }
     }
 
-    /// Factor of the temperature on the displacement at lab time `t`.
+    /// Returns the temperature's factor on the displacement at lab time `t`.
     pub(crate) fn factor(&self, t: f64) -> f64 {
         self.climate.as_ref().map_or(1.0, |climate| climate.factor(t))
     }
 
-    /// Factor of all steps of the gain until lab time `t`.
+    /// Returns the factor of all steps of the gain up to lab time `t`.
     pub(crate) fn gain(&self, t: f64) -> f64 {
         self.gain_steps.iter().filter(|(_, at_s)| t >= *at_s).fold(1.0, |gain, (share, _)| gain * (1.0 + share))
     }
 
-    /// How far the actuator yields under the load at lab time `t` (µm).
+    /// Returns the displacement by the load at lab time `t` (µm).
     pub(crate) fn deflection(&self, t: f64) -> f64 {
         self.load.as_ref().map_or(0.0, |load| load.deflection(t))
     }
 
-    /// Temperature (°C) and load (N) that are recorded at lab time `t`.
+    /// Returns the measured temperature (°C) and load (N) at lab time `t`.
     pub(crate) fn measure(&mut self, t: f64) -> (Option<f64>, Option<f64>) {
         let temperature = self.climate.as_mut().and_then(|climate| climate.measure(t));
         (temperature, self.load.as_mut().and_then(|load| load.measure(t)))
     }
 
-    /// Whether samples hold a temperature, and a load.
+    /// Returns whether samples contain a temperature, and whether they contain a load.
     pub(crate) fn recorded(&self) -> (bool, bool) {
         let temperature = self.climate.as_ref().is_some_and(Climate::is_recorded);
         (temperature, self.load.as_ref().is_some_and(AppliedLoad::is_recorded))

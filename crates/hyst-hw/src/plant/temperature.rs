@@ -1,10 +1,10 @@
-//! The temperature's course in the lab and what the thermometer reads of it.
+//! The temperature of the lab, and its measurement.
 
 use super::config::{self, TemperatureShape};
 use super::rng::{Draws, Purpose};
 use super::waves::Waves;
 
-/// Temperature as a function of the lab's time, and the noise of its measurement.
+/// Temperature as a function of the lab time, and the noise of its measurement.
 #[derive(Debug, Clone)]
 pub(crate) struct Climate {
     mean: f64,
@@ -35,7 +35,7 @@ impl Climate {
         Self { mean: config.mean_degc, reference: config.reference_degc, per_k: config.per_k, waves, thermometer }
     }
 
-    /// With the thermometer's noise from another seed.
+    /// Sets another seed for the thermometer's noise.
     pub(crate) fn with_noise(mut self, seed: u64) -> Self {
         if let Some(thermometer) = &mut self.thermometer {
             thermometer.draws = Draws::new(seed, Purpose::TemperatureNoise);
@@ -43,17 +43,17 @@ impl Climate {
         self
     }
 
-    /// True temperature at lab time `t` (°C).
+    /// Returns the true temperature at lab time `t` (°C).
     pub(crate) fn at(&self, t: f64) -> f64 {
         self.waves.on(self.mean, t)
     }
 
-    /// Factor on the displacement at lab time `t`.
+    /// Returns the factor on the displacement at lab time `t`.
     pub(crate) fn factor(&self, t: f64) -> f64 {
         if self.per_k == 0.0 { 1.0 } else { 1.0 + self.per_k * (self.at(t) - self.reference) }
     }
 
-    /// What is recorded at lab time `t` (°C).
+    /// Returns the measured temperature at lab time `t` (°C); `None` if it is not recorded.
     pub(crate) fn measure(&mut self, t: f64) -> Option<f64> {
         let truth = self.at(t);
         self.thermometer.as_mut().map(|thermometer| truth + thermometer.noise * thermometer.draws.normal())
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn sine_swings_as_declared_and_returns_after_its_period() {
+    fn a_sine_has_the_declared_swing_and_period() {
         let climate = Climate::new(3, &config());
         let (low, high) = extremes(&climate, 40);
         assert!((high - low - 10.0).abs() < 0.01 && (high + low - 48.0).abs() < 0.01, "{low} {high}");
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn wander_stays_within_its_swing_and_uses_much_of_it() {
+    fn a_wandering_temperature_stays_within_its_swing_and_uses_most_of_it() {
         for seed in 0..20 {
             let climate = Climate::new(seed, &config::Temperature { shape: TemperatureShape::Wander, ..config() });
             let (low, high) = extremes(&climate, 400);
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn recorded_or_not_effective_or_not() {
+    fn recording_and_effect_of_the_temperature_are_independent() {
         let hidden = config::Temperature { recorded: false, ..config() };
         assert_eq!(Climate::new(3, &hidden).measure(1.0), None);
         let idle = config::Temperature { per_k: 0.0, noise_k: 0.02, ..config() };

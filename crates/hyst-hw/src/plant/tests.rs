@@ -1,4 +1,4 @@
-//! The whole actuator: clock, bits, effects in their order.
+//! Tests of the whole actuator: clock, reproducibility, order of the effects.
 
 use super::*;
 use config::tests::clean;
@@ -8,7 +8,7 @@ fn everything() -> PlantConfig {
     PlantConfig::random_with(5, &EFFECTS).unwrap()
 }
 
-/// All effects on the other bed, and every disturbance within the first second.
+/// All effects on a bed of play operators, and the disturbances within the first second.
 fn disturbed() -> PlantConfig {
     let mut config = PlantConfig::random_on(Bed::Plays, 5, &EFFECTS).unwrap();
     let slip = Disturbance::Slip { um: 0.3, at_v: 40.0 };
@@ -23,7 +23,7 @@ fn disturbed() -> PlantConfig {
     config
 }
 
-/// One number for all that samples hold.
+/// Returns a hash of all values of samples.
 fn digest(samples: &[Sample]) -> u64 {
     let values = samples.iter().flat_map(|s| [Some(s.output), s.temperature_degc, s.load_n]).flatten();
     values.map(f64::to_bits).fold(0, |sum: u64, word| sum.rotate_left(5).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word)
@@ -42,7 +42,7 @@ fn play(plant: &mut Plant, drive: &[f64], block: usize) -> Vec<Sample> {
 }
 
 #[test]
-fn another_noise_is_all_that_another_noise_seed_makes() {
+fn the_noise_seed_changes_only_the_noise() {
     let quiet = |mut config: PlantConfig| {
         config.sensor.noise_um = 0.0;
         config.temperature.iter_mut().for_each(|t| t.noise_k = 0.0);
@@ -61,7 +61,7 @@ fn another_noise_is_all_that_another_noise_seed_makes() {
     assert!(one.iter().zip(&other).filter(|(a, b)| a.output != b.output).count() > 300);
     let [one, other] = [None, Some(9)].map(|noise_seed| run(quiet(PlantConfig { noise_seed, ..noisy.clone() })));
     assert_eq!(one, other);
-    // Of the disturbances the noise of bursts alone is another one.
+    // Among the disturbances, only the noise of bursts changes.
     let without_bursts = |mut config: PlantConfig| {
         config.disturbances.retain(|d| !matches!(d, Disturbance::Bursts { .. }));
         config
@@ -75,7 +75,7 @@ fn another_noise_is_all_that_another_noise_seed_makes() {
 }
 
 #[test]
-fn same_seed_same_bits_in_any_block_size() {
+fn a_seed_gives_the_same_bits_in_any_block_size() {
     let mut slow = everything();
     slow.disturbances = vec![Disturbance::SlewLimit { v_per_s: 300.0 }];
     for config in [everything(), disturbed(), slow] {
@@ -101,21 +101,21 @@ fn same_seed_same_bits_in_any_block_size() {
 }
 
 #[test]
-fn samples_are_pinned() {
-    // A change here changes every simulated record of every user: it needs a very good reason.
+fn samples_of_seeds_do_not_change() {
+    // A change of these numbers changes all simulated records of all users.
     let sampled = |config| {
         let mut plant = Plant::new(config).unwrap();
         plant.start(1000.0).unwrap();
         digest(&play(&mut plant, &triangle(700, 100.0), 700))
     };
-    assert_eq!(sampled(PlantConfig::random_with(5, &random::HIDDEN).unwrap()), 15_705_684_028_673_275_075);
+    assert_eq!(sampled(PlantConfig::random_with(5, &random::RANDOM_EFFECTS).unwrap()), 15_705_684_028_673_275_075);
     assert_eq!(sampled(everything()), 7_009_439_930_234_241_464);
     assert_eq!(sampled(disturbed()), 6_038_666_987_784_956_480);
     assert_eq!(sampled(PlantConfig::random_on(Bed::Plays, 5, &[]).unwrap()), 17_178_083_900_747_677_374);
 }
 
 #[test]
-fn clock_goes_on_while_the_device_becomes_virgin_again() {
+fn a_rest_resets_the_actuator_but_not_the_clock() {
     let mut config = clean();
     config.actuator.loop_share = 0.13;
     config.lag = Some(config::Lag { seconds: 0.004 });
@@ -139,7 +139,7 @@ fn clock_goes_on_while_the_device_becomes_virgin_again() {
 }
 
 #[test]
-fn refused_drive_changes_nothing() {
+fn a_refused_drive_changes_nothing() {
     let drive = triangle(300, everything().actuator.max_v);
     let mut plant = Plant::new(everything()).unwrap();
     let mut calm = plant.clone();
@@ -170,7 +170,7 @@ fn rates_outside_the_capabilities_are_refused() {
 }
 
 #[test]
-fn delay_shifts_the_record_by_whole_samples() {
+fn a_delay_of_whole_samples_shifts_the_record() {
     let mut config = clean();
     config.actuator.loop_share = 0.12;
     let drive = triangle(900, 90.0);
@@ -186,7 +186,7 @@ fn delay_shifts_the_record_by_whole_samples() {
     }
 }
 
-/// 1 % per K above 20 °C, at a temperature \[°C\] that stays.
+/// 1 % per kelvin above 20 °C, at a constant temperature \[°C\].
 fn steady(degc: f64) -> config::Temperature {
     config::Temperature {
         per_k: 0.01,
@@ -201,7 +201,7 @@ fn steady(degc: f64) -> config::Temperature {
 }
 
 #[test]
-fn asymmetry_bends_the_displacement_before_it_is_scaled() {
+fn asymmetry_acts_before_the_temperature() {
     let mut config = clean();
     config.actuator.rest_v = 20.0;
     config.asymmetry = Some(config::Asymmetry { bend: 0.08, hook: 0.0 });
@@ -212,7 +212,7 @@ fn asymmetry_bends_the_displacement_before_it_is_scaled() {
         play(&mut plant, &[20.0, 0.0, 50.0, 100.0], 4).try_into().map(|s: [Sample; 4]| s.map(|s| s.output)).unwrap();
     assert!(rest.abs() < 1e-9);
     assert!((high - low - 10.0 * 1.1).abs() < 1e-9, "{low} {high}");
-    // Of the stroke's 10 µm, bend/8 less in the lower half.
+    // The displacement at half voltage is bend/8 of the stroke of 10 µm lower.
     let sag = 0.5 * (low + high) - middle;
     assert!((sag / (10.0 * 1.1 * 0.08 / 8.0) - 1.0).abs() < 1e-3, "{sag}");
 }
@@ -257,7 +257,7 @@ fn a_load_adds_its_deflection_and_is_recorded() {
 }
 
 #[test]
-fn the_structure_rests_under_the_load_that_is_there() {
+fn a_rest_begins_in_equilibrium_with_the_present_load() {
     let mut config = loaded(config::LoadShape::Sine, true);
     config.modes = vec![config::Mode { hz: 50.0, damping: 0.01, gain: 1.0 }];
     let mut plant = Plant::new(config).unwrap();
@@ -265,14 +265,14 @@ fn the_structure_rests_under_the_load_that_is_there() {
     for seconds in [0.0, 0.4, 1.0] {
         plant.rest(seconds).unwrap();
         for sample in play(&mut plant, &[0.0; 200], 200) {
-            // A load that came at once would ring with twice its deflection.
+            // A load step would excite the mode to twice its deflection.
             assert!((sample.output - 0.1 * sample.load_n.unwrap()).abs() < 0.003, "{sample:?}");
         }
     }
 }
 
 #[test]
-fn stops_hold_the_motion_but_not_the_drift_of_its_sensor() {
+fn stops_limit_the_motion_but_not_the_drift_of_the_sensor() {
     let mut config = clean();
     config.saturation = Some(config::Saturation { low_um: Some(1.0), high_um: Some(8.0), knee_um: 0.0 });
     config.drift = Some(config::Drift { um_per_s: 0.5 });
@@ -286,7 +286,7 @@ fn stops_hold_the_motion_but_not_the_drift_of_its_sensor() {
 }
 
 #[test]
-fn disturbances_come_on_the_labs_clock() {
+fn disturbances_follow_the_lab_clock() {
     let mut config = clean();
     config.disturbances = vec![
         Disturbance::GainStep { share: 0.1, at_s: 2.05 },
@@ -307,7 +307,7 @@ fn disturbances_come_on_the_labs_clock() {
 }
 
 #[test]
-fn an_amplifier_follows_no_faster_than_its_limit() {
+fn the_smallest_slew_limit_of_the_amplifier_applies() {
     let mut config = clean();
     config.disturbances = [400.0, 250.0].map(|v_per_s| Disturbance::SlewLimit { v_per_s }).to_vec();
     let mut plant = Plant::new(config).unwrap();
@@ -319,7 +319,7 @@ fn an_amplifier_follows_no_faster_than_its_limit() {
 }
 
 #[test]
-fn displacement_beyond_the_converter_is_an_error() {
+fn a_displacement_outside_the_converters_range_is_an_error() {
     let mut config = clean();
     config.sensor.range_um = [-1.0, 5.0];
     let mut plant = Plant::new(config).unwrap();
@@ -327,6 +327,6 @@ fn displacement_beyond_the_converter_is_an_error() {
     let mut samples = Vec::new();
     let error = plant.exchange(&[10.0, 80.0], &mut samples).unwrap_err();
     assert!(error.to_string().contains("sensor.range_um"), "{error}");
-    // What was measured before is kept.
+    // The sample before the error is kept.
     assert_eq!(samples.len(), 1);
 }

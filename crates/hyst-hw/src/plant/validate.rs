@@ -1,4 +1,4 @@
-//! Which descriptions of a plant make sense, and what to say of those that do not.
+//! Checks of a plant's description, with a message for each invalid value.
 
 use super::config::{
     Actuator, Asymmetry, Creep, Disturbance, Load, Mode, PlantConfig, Saturation, Sensor, Temperature,
@@ -7,7 +7,7 @@ use super::error::ConfigError;
 
 type Checked = Result<(), ConfigError>;
 
-/// Refuses `value` unless it is finite and `fits`.
+/// Returns an error unless `value` is finite and `fits` is true.
 fn demand(field: &str, value: f64, fits: bool, advice: &str) -> Checked {
     if value.is_finite() && fits { Ok(()) } else { Err(ConfigError::value(field, value, advice)) }
 }
@@ -25,7 +25,7 @@ fn count_within(field: &str, value: usize, low: usize, high: usize, what: &str) 
     }
 }
 
-/// First error of a whole description.
+/// Returns the first error of a description.
 pub(crate) fn check(config: &PlantConfig) -> Checked {
     for (field, seed) in [("seed", Some(config.seed)), ("noise_seed", config.noise_seed)] {
         if let Some(seed) = seed.filter(|seed| i64::try_from(*seed).is_err()) {
@@ -83,7 +83,7 @@ fn actuator(a: &Actuator) -> Checked {
     let rest_fits = (a.min_v..=a.max_v).contains(&a.rest_v);
     demand("actuator.rest_v", a.rest_v, rest_fits, "give a voltage from actuator.min_v to actuator.max_v")?;
     demand("actuator.gain_um_per_v", a.gain_um_per_v, a.gain_um_per_v > 0.0, "give a gain in um/V above 0")?;
-    within("actuator.loop_share", a.loop_share, 0.0, 0.3, "the loop's opening as a share of the span")?;
+    within("actuator.loop_share", a.loop_share, 0.0, 0.3, "the largest opening of the loop as a share of its span")?;
     count_within("actuator.relays", a.relays, 1000, 500_000, "a number of relays (or plays)")
 }
 
@@ -99,7 +99,7 @@ fn sensor(s: &Sensor) -> Checked {
 }
 
 fn asymmetry(a: &Asymmetry) -> Checked {
-    // Within these limits the curve rises everywhere, far beyond the stroke too.
+    // Within these limits the curve increases everywhere, also beyond the stroke.
     within("asymmetry.bend", a.bend, -1.0, 1.0, "a difference of slope over the mean slope")?;
     within("asymmetry.hook", a.hook, -0.5, 0.5, "a difference of slope over the mean slope")?;
     let advice = "give a difference of slope that is not 0 (or asymmetry.hook), or remove the section [asymmetry]";
@@ -114,7 +114,7 @@ fn temperature(t: &Temperature) -> Checked {
     match t.period_s {
         Some(period) => demand("temperature.period_s", period, period >= 0.1, "give a period of 0.1 s or more")?,
         None if t.swing_k > 0.0 => {
-            let advice = "a temperature that swings needs temperature.period_s: give a period in s, or remove swing_k";
+            let advice = "a swing needs temperature.period_s: give a period in s, or remove temperature.swing_k";
             return Err(ConfigError::value("temperature.swing_k", t.swing_k, advice));
         }
         None => {}
@@ -122,7 +122,7 @@ fn temperature(t: &Temperature) -> Checked {
     demand("temperature.noise_k", t.noise_k, t.noise_k >= 0.0, "give a standard deviation in K, 0 or more")?;
     if t.per_k == 0.0 && !t.recorded {
         let advice =
-            "neither recorded nor of any influence: give temperature.per_k, or remove the section [temperature]";
+            "a temperature that is not recorded must have an effect: give temperature.per_k, or remove [temperature]";
         return Err(ConfigError::value("temperature.recorded", false, advice));
     }
     Ok(())
@@ -156,8 +156,8 @@ fn modes(modes: &[Mode]) -> Checked {
         demand(&name("gain"), mode.gain, useful, "give a share that is not 0, or remove this [[mode]]")?;
     }
     let sum: f64 = modes.iter().map(|mode| mode.gain).sum();
-    // A hair above 1 is rounding of shares written in decimals.
-    demand("mode[].gain (sum)", sum, sum <= 1.0 + 1e-9, "let the gains of all [[mode]] sum to 1 or less")
+    // The tolerance allows for the rounding of decimal shares.
+    demand("mode[].gain (sum)", sum, sum <= 1.0 + 1e-9, "give gains of all [[mode]] with a sum of 1 or less")
 }
 
 fn saturation(s: &Saturation) -> Checked {
@@ -181,7 +181,7 @@ fn disturbances(config: &PlantConfig) -> Checked {
         match *disturbance {
             Disturbance::Jump { um, at_s } => {
                 is("um", um, um != 0.0, "a jump in um that is not 0, or remove this [[disturbance]]")?;
-                is("at_s", at_s, at_s >= 0.0, "a time of the lab's clock in s, 0 or more")?;
+                is("at_s", at_s, at_s >= 0.0, "a time on the lab clock in s, 0 or more")?;
             }
             Disturbance::GainStep { share, at_s } => {
                 let fits = share != 0.0 && (-0.9..=9.0).contains(&share);
@@ -191,12 +191,12 @@ fn disturbances(config: &PlantConfig) -> Checked {
                     fits,
                     "a relative change from -0.9 to 9 that is not 0, or remove this [[disturbance]]",
                 )?;
-                is("at_s", at_s, at_s >= 0.0, "a time of the lab's clock in s, 0 or more")?;
+                is("at_s", at_s, at_s >= 0.0, "a time on the lab clock in s, 0 or more")?;
             }
             Disturbance::Bursts { um, seconds, every_s } => {
                 is("um", um, um > 0.0, "a standard deviation in um above 0")?;
                 is("seconds", seconds, seconds > 0.0, "a duration in s above 0")?;
-                is("every_s", every_s, every_s > seconds, "a time in s that is longer than a burst")?;
+                is("every_s", every_s, every_s > seconds, "an interval in s that is longer than disturbance.seconds")?;
             }
             Disturbance::Wander { um, period_s } => {
                 is("um", um, um > 0.0, "an amplitude in um above 0")?;
@@ -219,7 +219,7 @@ mod tests {
     use super::super::config::{Delay, Drift, Interference, Lag, LoadShape, TemperatureShape};
     use super::*;
 
-    fn complains(field: &str, change: impl FnOnce(&mut PlantConfig)) {
+    fn assert_invalid(field: &str, change: impl FnOnce(&mut PlantConfig)) {
         let mut config = clean();
         change(&mut config);
         match config.validate() {
@@ -229,7 +229,7 @@ mod tests {
             }
             other => panic!("{field}: {other:?}"),
         }
-        assert!(config.to_toml().is_err(), "{field}: written although not valid");
+        assert!(config.to_toml().is_err(), "{field}: written although invalid");
     }
 
     fn warm() -> Temperature {
@@ -246,68 +246,68 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_field() {
+    fn errors_contain_the_field() {
         clean().validate().unwrap();
-        complains("seed", |c| c.seed = u64::MAX);
-        complains("noise_seed", |c| c.noise_seed = Some(u64::MAX));
-        complains("actuator.max_v", |c| c.actuator.max_v = c.actuator.min_v);
-        complains("actuator.rest_v", |c| c.actuator.rest_v = -1.0);
-        complains("actuator.gain_um_per_v", |c| {
+        assert_invalid("seed", |c| c.seed = u64::MAX);
+        assert_invalid("noise_seed", |c| c.noise_seed = Some(u64::MAX));
+        assert_invalid("actuator.max_v", |c| c.actuator.max_v = c.actuator.min_v);
+        assert_invalid("actuator.rest_v", |c| c.actuator.rest_v = -1.0);
+        assert_invalid("actuator.gain_um_per_v", |c| {
             c.actuator.gain_um_per_v = f64::NAN;
         });
-        complains("actuator.loop_share", |c| c.actuator.loop_share = 0.9);
-        complains("actuator.relays", |c| c.actuator.relays = 3);
-        complains("sensor.range_um[1]", |c| c.sensor.range_um = [5.0, 5.0]);
-        complains("sensor.offset_um", |c| c.sensor.offset_um = 100.0);
-        complains("sensor.bits", |c| c.sensor.bits = 1);
-        complains("sensor.noise_um", |c| c.sensor.noise_um = -1.0);
-        complains("delay.seconds", |c| c.delay = Some(Delay { seconds: 0.0 }));
-        complains("lag.seconds", |c| {
+        assert_invalid("actuator.loop_share", |c| c.actuator.loop_share = 0.9);
+        assert_invalid("actuator.relays", |c| c.actuator.relays = 3);
+        assert_invalid("sensor.range_um[1]", |c| c.sensor.range_um = [5.0, 5.0]);
+        assert_invalid("sensor.offset_um", |c| c.sensor.offset_um = 100.0);
+        assert_invalid("sensor.bits", |c| c.sensor.bits = 1);
+        assert_invalid("sensor.noise_um", |c| c.sensor.noise_um = -1.0);
+        assert_invalid("delay.seconds", |c| c.delay = Some(Delay { seconds: 0.0 }));
+        assert_invalid("lag.seconds", |c| {
             c.lag = Some(Lag { seconds: f64::INFINITY });
         });
-        complains("asymmetry.bend", |c| c.asymmetry = Some(Asymmetry { bend: 0.0, hook: 0.0 }));
-        complains("asymmetry.hook", |c| c.asymmetry = Some(Asymmetry { bend: 0.1, hook: 0.6 }));
-        complains("drift.um_per_s", |c| {
+        assert_invalid("asymmetry.bend", |c| c.asymmetry = Some(Asymmetry { bend: 0.0, hook: 0.0 }));
+        assert_invalid("asymmetry.hook", |c| c.asymmetry = Some(Asymmetry { bend: 0.1, hook: 0.6 }));
+        assert_invalid("drift.um_per_s", |c| {
             c.drift = Some(Drift { um_per_s: 0.0 });
         });
-        complains("interference.hz", |c| {
+        assert_invalid("interference.hz", |c| {
             c.interference = Some(Interference { amplitude_um: 1.0, hz: 0.0, phase_rad: 0.0 });
         });
-        complains("temperature.swing_k", |c| {
+        assert_invalid("temperature.swing_k", |c| {
             c.temperature = Some(Temperature { swing_k: 3.0, ..warm() });
         });
-        complains("temperature.recorded", |c| {
+        assert_invalid("temperature.recorded", |c| {
             c.temperature = Some(Temperature { per_k: 0.0, recorded: false, ..warm() });
         });
-        complains("creep.tau_max_s", |c| {
+        assert_invalid("creep.tau_max_s", |c| {
             c.creep = Some(Creep { strength: 0.1, tau_min_s: 1.0, tau_max_s: 0.5, exponent: 0.0, elements: 60 });
         });
         let load = |newtons, um_per_n, period_s| {
             Some(Load { newtons, um_per_n, period_s, shape: LoadShape::Sine, recorded: true, noise_n: 0.0 })
         };
-        complains("load.newtons", |c| c.load = load(0.0, 0.1, 1.0));
-        complains("load.um_per_n", |c| c.load = load(1.0, 0.0, 1.0));
-        complains("load.period_s", |c| c.load = load(1.0, 0.1, 0.0));
-        complains("mode[1].damping", |c| {
+        assert_invalid("load.newtons", |c| c.load = load(0.0, 0.1, 1.0));
+        assert_invalid("load.um_per_n", |c| c.load = load(1.0, 0.0, 1.0));
+        assert_invalid("load.period_s", |c| c.load = load(1.0, 0.1, 0.0));
+        assert_invalid("mode[1].damping", |c| {
             c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.5 }, Mode { hz: 300.0, damping: 0.0, gain: 0.5 }];
         });
         let stops = |low_um, high_um, knee_um| Some(Saturation { low_um, high_um, knee_um });
-        complains("saturation.high_um", |c| c.saturation = stops(None, None, 0.0));
-        complains("saturation.high_um", |c| c.saturation = stops(Some(2.0), Some(3.0), 0.5));
-        complains("saturation.low_um", |c| c.saturation = stops(Some(f64::NAN), None, 0.0));
-        complains("saturation.knee_um", |c| c.saturation = stops(None, Some(3.0), -1.0));
-        complains("disturbance[0].um", |c| c.disturbances = vec![Disturbance::Jump { um: 0.0, at_s: 1.0 }]);
-        complains("disturbance[1].at_s", |c| {
+        assert_invalid("saturation.high_um", |c| c.saturation = stops(None, None, 0.0));
+        assert_invalid("saturation.high_um", |c| c.saturation = stops(Some(2.0), Some(3.0), 0.5));
+        assert_invalid("saturation.low_um", |c| c.saturation = stops(Some(f64::NAN), None, 0.0));
+        assert_invalid("saturation.knee_um", |c| c.saturation = stops(None, Some(3.0), -1.0));
+        assert_invalid("disturbance[0].um", |c| c.disturbances = vec![Disturbance::Jump { um: 0.0, at_s: 1.0 }]);
+        assert_invalid("disturbance[1].at_s", |c| {
             c.disturbances = [1.0, -1.0].map(|at_s| Disturbance::GainStep { share: 0.1, at_s }).to_vec();
         });
-        complains("disturbance[0].every_s", |c| {
+        assert_invalid("disturbance[0].every_s", |c| {
             c.disturbances = vec![Disturbance::Bursts { um: 0.1, seconds: 0.3, every_s: 0.2 }];
         });
-        complains("disturbance[0].period_s", |c| {
+        assert_invalid("disturbance[0].period_s", |c| {
             c.disturbances = vec![Disturbance::Wander { um: 0.1, period_s: f64::NAN }];
         });
-        complains("disturbance[0].at_v", |c| c.disturbances = vec![Disturbance::Slip { um: 0.1, at_v: 0.0 }]);
-        complains("mode[].gain (sum)", |c| {
+        assert_invalid("disturbance[0].at_v", |c| c.disturbances = vec![Disturbance::Slip { um: 0.1, at_v: 0.0 }]);
+        assert_invalid("mode[].gain (sum)", |c| {
             c.modes = vec![Mode { hz: 100.0, damping: 0.1, gain: 0.7 }; 2];
         });
     }

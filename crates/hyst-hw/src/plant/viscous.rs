@@ -1,28 +1,28 @@
-//! Relays that take time to turn: rate-dependent hysteresis.
+//! Viscous relays: rate-dependent hysteresis.
 //!
-//! Each relay is a wall that an overdrive pushes against a viscous drag (Bertotti's dynamic Preisach bed): above its upper
-//! threshold its state φ rises, below its lower one it falls, in between it stays,
+//! Each relay is a domain wall that moves against a viscous drag (dynamic Preisach model of Bertotti). Its state φ increases above
+//! the upper threshold α, decreases below the lower threshold β, and is constant in between:
 //!
 //! ```text
 //! φ' = (u − α) / J  for u > α,    φ' = (u − β) / J  for u < β,    0 ≤ φ ≤ 1.
 //! ```
 //!
-//! J \[V·s\] is the overdrive over time that turns the relay, different for each. Loops widen with about the root of the rate
-//! and the output at the peaks falls. Nothing here is a function of a branch's rate or swing.
+//! J \[V·s\], different for each relay, is the time integral of the overdrive that switches it. The loop widens approximately with the
+//! root of the rate, and the output at the peaks decreases.
 
 use super::config::Viscosity;
 use super::rng::{Draws, Purpose};
 
-/// A bed of viscous relays; thresholds are in `relays.rs`.
+/// A bed of viscous relays; `relays.rs` draws the thresholds.
 #[derive(Debug, Clone)]
 pub(crate) struct ViscousBed {
-    /// Upper thresholds, ascending; the position is the relay's number.
+    /// Upper thresholds, ascending; the index is the relay's number.
     alpha: Vec<f64>,
     /// Lower thresholds, ascending, with the relay's number.
     beta: Vec<(f64, u32)>,
     /// The lower threshold of each relay.
     lower: Vec<f64>,
-    /// Fine step over J of each relay \[1/V\].
+    /// Fine step divided by J, for each relay \[1/V\].
     per_volt: Vec<f64>,
     impulse: Vec<f64>,
     now: Walls,
@@ -32,7 +32,7 @@ pub(crate) struct ViscousBed {
 #[derive(Debug, Clone)]
 struct Walls {
     phi: Vec<f64>,
-    /// Relays that may be moving, and whether a relay is among them.
+    /// Relays that may be in motion, and whether each relay is in this list.
     moving: Vec<u32>,
     listed: Vec<bool>,
     /// Sum of all φ.
@@ -45,13 +45,15 @@ struct Walls {
 }
 
 impl ViscousBed {
-    /// A virgin bed of relays `(alpha, beta)`, ascending in alpha, at input `rest`: those centred below `rest` are up.
+    /// Returns a virgin bed of relays `(alpha, beta)`, ascending in alpha, at the input `rest`.
+    ///
+    /// Relays centred below `rest` are up.
     pub(crate) fn new(seed: u64, thresholds: &[(f64, f64)], rest: f64, viscosity: &Viscosity) -> Self {
         let mut draws = Draws::new(seed, Purpose::Viscosity);
         let alpha: Vec<f64> = thresholds.iter().map(|t| t.0).collect();
         let mut beta: Vec<(f64, u32)> = (0_u32..).zip(thresholds).map(|(i, t)| (t.1, i)).collect();
         beta.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        // A fifth of the drag is every relay's, the rest is spread as lifetimes are.
+        // 20 % of the mean drag is the same for all; the rest has an exponential distribution.
         let impulse = thresholds.iter().map(|_| viscosity.volt_seconds * (0.2 + 0.8 * draws.exponential())).collect();
         let phi: Vec<f64> = thresholds.iter().map(|t| if t.0 + t.1 < 2.0 * rest { 1.0 } else { 0.0 }).collect();
         let virgin = Walls {
@@ -79,7 +81,7 @@ impl ViscousBed {
         self.per_volt = self.impulse.iter().map(|j| step_s / j).collect();
     }
 
-    /// One step in which the input moves in a straight line to `u`; the walls feel its middle.
+    /// Computes one step to the input `u`. The input at mid-step acts on the relays.
     pub(crate) fn move_to(&mut self, u: f64) {
         let Self { alpha, beta, lower, per_volt, now, .. } = self;
         let middle = 0.5 * (now.u + u);
@@ -97,7 +99,7 @@ impl ViscousBed {
             now.passed -= 1;
             list(&mut now.moving, &mut now.listed, beta[now.passed].1);
         }
-        // The marks that the input left behind in the other direction only follow.
+        // Update the indices for the other direction.
         while now.reached > 0 && alpha[now.reached - 1] >= middle {
             now.reached -= 1;
         }
@@ -111,19 +113,19 @@ impl ViscousBed {
             let moved = (phi[i] + over * per_volt[i]).clamp(0.0, 1.0);
             *sum += moved - phi[i];
             phi[i] = moved;
-            // One that no threshold drives, or that has arrived, is listed again at the next crossing.
-            let goes_on = (over > 0.0 && moved < 1.0) || (over < 0.0 && moved > 0.0);
-            listed[i] = goes_on;
-            goes_on
+            // A relay without overdrive, or at its end state, leaves the list until the next crossing.
+            let moves = (over > 0.0 && moved < 1.0) || (over < 0.0 && moved > 0.0);
+            listed[i] = moves;
+            moves
         });
     }
 
-    /// Sum of all φ: how many relays are up, in parts.
+    /// Returns the sum of all φ.
     pub(crate) fn count(&self) -> f64 {
         self.now.sum
     }
 
-    /// Back to the virgin state.
+    /// Returns to the virgin state.
     pub(crate) fn reset(&mut self) {
         self.now.clone_from(&self.virgin);
     }
@@ -136,7 +138,7 @@ mod tests {
     const DRAG: Viscosity = Viscosity { volt_seconds: 1e-3 };
 
     #[test]
-    fn one_relay_turns_when_the_overdrive_has_done_its_work() {
+    fn a_relay_switches_with_the_time_integral_of_its_overdrive() {
         let mut bed = ViscousBed::new(3, &[(10.0, 4.0)], 0.0, &DRAG);
         let step = 1e-7;
         bed.set_step(step);
@@ -150,7 +152,7 @@ mod tests {
             let expected = (0.5 * rate * t * t / j).min(1.0);
             assert!((bed.count() - expected).abs() < 1e-4, "{u}: {} {expected}", bed.count());
         }
-        // Between the thresholds it stays, below the lower one it falls.
+        // It is constant between the thresholds and decreases below the lower one.
         (0..1000).for_each(|_| bed.move_to(7.0));
         let held = bed.count();
         assert!(held > 0.5);
@@ -161,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn the_walk_over_moving_walls_agrees_with_asking_every_wall() {
+    fn the_bed_agrees_with_a_sum_over_all_relays() {
         let mut draws = Draws::new(5, Purpose::Relays);
         let mut thresholds: Vec<(f64, f64)> = (0..400)
             .map(|_| {

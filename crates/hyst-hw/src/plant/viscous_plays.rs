@@ -1,39 +1,39 @@
-//! Plays that take time to follow: rate-dependent hysteresis of the other bed.
+//! Viscous play operators: rate-dependent hysteresis.
 //!
-//! Where a play is overdriven by `o = |u − p| − r > 0`, it follows at the rate
+//! A play operator with the overdrive `o = |u − p| − r > 0` follows at the rate
 //!
 //! ```text
 //! |p'| = o² / J,
 //! ```
 //!
-//! J \[V·s\] different for each: on a ramp it lags by the root of J times the rate, as a wall of relays does.
+//! with a different J \[V·s\] for each. On a ramp it lags by the root of J times the rate, like viscous relays.
 
 use super::config::Viscosity;
 use super::plays::Play;
 use super::rng::{Draws, Purpose};
 
-/// Plays are moved and summed in this many interleaved lanes, a fixed order that the compiler can vectorise.
+/// Number of interleaved sums. The order is fixed, and the compiler can vectorise it.
 const LANES: usize = 4;
 
-/// A bed of viscous plays, with the output `Σ w p`.
+/// A bed of viscous play operators with the output `Σ w p`.
 #[derive(Debug, Clone)]
 pub(crate) struct ViscousPlays {
     thresholds: Vec<f64>,
     weights: Vec<f64>,
     impulses: Vec<f64>,
-    /// Step over J of each play \[1/V\].
+    /// Step divided by J, for each play operator \[1/V\].
     per_volt: Vec<f64>,
     rest: f64,
-    /// Of each play, counted from rest \[V\].
+    /// Positions, counted from rest \[V\].
     positions: Vec<f64>,
     input: f64,
 }
 
 impl ViscousPlays {
-    /// Plays that are all centred on the input `rest`.
+    /// Returns a virgin bed at the input `rest`.
     pub(crate) fn new(seed: u64, plays: &[Play], rest: f64, viscosity: &Viscosity) -> Self {
         let mut draws = Draws::new(seed, Purpose::Viscosity);
-        // Plays without weight fill the last group.
+        // Play operators with weight 0 fill the last group.
         let padded = plays.len().next_multiple_of(LANES);
         let filled = |of: fn(&Play) -> f64| -> Vec<f64> {
             plays.iter().map(of).chain(std::iter::repeat(0.0)).take(padded).collect()
@@ -41,7 +41,7 @@ impl ViscousPlays {
         Self {
             thresholds: filled(|play| play.threshold),
             weights: filled(|play| play.weight),
-            // A fifth of the drag is every play's, the rest is spread as lifetimes are.
+            // 20 % of the mean drag is the same for all; the rest has an exponential distribution.
             impulses: (0..padded).map(|_| viscosity.volt_seconds * (0.2 + 0.8 * draws.exponential())).collect(),
             per_volt: vec![0.0; padded],
             rest,
@@ -55,7 +55,9 @@ impl ViscousPlays {
         self.per_volt = self.impulses.iter().map(|j| step_s / j).collect();
     }
 
-    /// One step in which the input moves in a straight line to `v`; the plays feel its middle. Returns `Σ w p`.
+    /// Computes one step to the input `v` and returns `Σ w p`.
+    ///
+    /// The input at mid-step acts on the play operators.
     pub(crate) fn move_to(&mut self, v: f64) -> f64 {
         let u = v - self.rest;
         let middle = 0.5 * (self.input + u);
@@ -67,7 +69,7 @@ impl ViscousPlays {
             for lane in 0..LANES {
                 let apart = middle - positions[lane];
                 let over = (apart.abs() - thresholds[lane]).max(0.0);
-                // Exact for an input that stands: o' = −o² / J has the solution o / (1 + o t / J).
+                // Exact for a constant input: o' = −o² / J has the solution o / (1 + o t / J).
                 let decay = over * rates[lane];
                 positions[lane] += (over * decay / (1.0 + decay)).copysign(apart);
                 sums[lane] += weights[lane] * positions[lane];
@@ -76,7 +78,7 @@ impl ViscousPlays {
         (sums[0] + sums[1]) + (sums[2] + sums[3])
     }
 
-    /// Back to the virgin state.
+    /// Returns to the virgin state.
     pub(crate) fn reset(&mut self) {
         self.positions.fill(0.0);
         self.input = 0.0;
@@ -90,7 +92,7 @@ mod tests {
     const DRAG: Viscosity = Viscosity { volt_seconds: 1e-3 };
 
     #[test]
-    fn a_play_follows_a_ramp_with_the_lag_of_its_drag() {
+    fn a_play_operator_follows_a_ramp_with_the_lag_of_its_drag() {
         let play = Play { threshold: 10.0, weight: 1.0 };
         let mut bed = ViscousPlays::new(3, &[play], 5.0, &DRAG);
         let (step, rate) = (1e-6, 1000.0);
@@ -103,7 +105,7 @@ mod tests {
             let expected = (u - 10.0).max(0.0) - lag * ((u - 10.0).max(0.0) / lag).tanh();
             assert!((p - expected).abs() < 2e-3, "{u}: {p} {expected}");
         }
-        // It stays between its thresholds, and catches up with an input that stands.
+        // It does not move between its thresholds, and it converges for a constant input.
         let held = bed.move_to(97.0);
         assert_eq!(bed.move_to(95.0), held);
         let caught = (0..2_000_000).map(|_| bed.move_to(105.0)).last().unwrap();

@@ -1,4 +1,4 @@
-//! A CAN bus as a line: messages in several frames, by ISO-TP.
+//! A CAN bus as a line: ISO-TP splits messages into frames.
 
 use std::collections::VecDeque;
 use std::io;
@@ -8,33 +8,35 @@ use std::time::{Duration, Instant};
 use super::Line;
 use crate::wire::{CanData, IsoTp, IsoTpError, MAX_FRAME};
 
-/// Identifier of the frames to a device, unless another one was agreed on.
+/// Default identifier of the frames to a device.
 pub const TO_DEVICE: u32 = 0x6a0;
-/// Identifier of the frames from it.
+/// Default identifier of the frames from a device.
 pub const FROM_DEVICE: u32 = 0x6a1;
 
-/// Largest identifier of 11 bits, and of 29.
-pub(super) const SHORT: u32 = 0x7ff;
-pub(super) const LARGEST: u32 = 0x1fff_ffff;
+/// Largest standard identifier (11 bits).
+pub(super) const MAX_STANDARD_ID: u32 = 0x7ff;
+/// Largest extended identifier (29 bits).
+pub(super) const MAX_EXTENDED_ID: u32 = 0x1fff_ffff;
 
-/// How long the other end may take to allow the next frames, unless told otherwise. The standard says a second; who asked has asked again
-/// by then.
-const ALLOWS: Duration = Duration::from_millis(100);
-
-/// A bus that carries frames, classic ones and of CAN FD.
+/// Default time to wait for a flow-control frame of the receiver.
 ///
-/// Identifiers up to 0x7ff are those of 11 bits, greater ones those of 29; a frame of 29 bits with a smaller one is passed over.
+/// The standard has 1 s (N_Bs), but by then the host repeats the request.
+const FLOW_CONTROL_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// A CAN bus that carries classic frames and CAN FD frames.
+///
+/// Identifiers up to 0x7ff are standard (11 bits), larger ones are extended (29 bits). An extended frame with an identifier up to 0x7ff is ignored.
 pub trait Bus {
     /// Sends a frame.
     ///
     /// # Errors
-    /// When the bus is gone.
+    /// If the connection to the bus is lost.
     fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()>;
 
-    /// Waits for a frame for at most `patience`; none is no error.
+    /// Waits for a frame for at most `patience`; returns `None` if none arrives.
     ///
     /// # Errors
-    /// When the bus is gone.
+    /// If the connection to the bus is lost.
     fn receive(&mut self, patience: Duration) -> io::Result<Option<(u32, CanData)>>;
 }
 
@@ -43,47 +45,59 @@ pub trait Bus {
 pub struct CanLine<B> {
     bus: B,
     tp: IsoTp<MAX_FRAME>,
-    /// Identifier of frames to the device, and of those from it.
+    /// Identifiers of frames to and from the device.
     to: u32,
     from: u32,
-    allows: Duration,
-    came: VecDeque<u8>,
+    flow_control_timeout: Duration,
+    received: VecDeque<u8>,
 }
 
 impl<B: Bus> CanLine<B> {
-    /// To the device that listens to the identifier `to` and speaks with `from`, over classic frames or those of CAN FD.
-    /// A device is at the other end: it has the two the other way round.
+    /// Returns the connection to the device that receives identifier `to` and sends `from`.
+    ///
+    /// `fd`: with CAN FD frames.
+    ///
+    /// At the device's end of a connection, exchange the two identifiers.
     pub fn new(bus: B, to: u32, from: u32, fd: bool) -> Self {
-        Self { bus, tp: IsoTp::new(fd), to, from, allows: ALLOWS, came: VecDeque::new() }
+        Self {
+            bus,
+            tp: IsoTp::new(fd),
+            to,
+            from,
+            flow_control_timeout: FLOW_CONTROL_TIMEOUT,
+            received: VecDeque::new(),
+        }
     }
 
-    /// The same, to another end that may take so long to allow the next frames of a message.
+    /// Sets the time to wait for a flow-control frame.
     #[must_use]
-    pub fn patient(self, allows: Duration) -> Self {
-        Self { allows, ..self }
+    pub fn patient(self, flow_control_timeout: Duration) -> Self {
+        Self { flow_control_timeout, ..self }
     }
 
-    /// The bus.
+    /// Returns the bus.
     pub fn bus_mut(&mut self) -> &mut B {
         &mut self.bus
     }
 
-    /// Waits for a frame and sends what may be sent after it; whether it allowed to go on.
-    fn hear(&mut self, patience: Duration) -> io::Result<bool> {
+    /// Receives a frame and sends the frames that are then permitted.
+    ///
+    /// Returns whether a flow-control frame arrived.
+    fn receive_frame(&mut self, patience: Duration) -> io::Result<bool> {
         let waited = self.tp.waits();
         if let Some((id, data)) = self.bus.receive(patience)?
             && id == self.from
             && let Some(message) = self.tp.take(&data)
         {
-            self.came.extend(message);
+            self.received.extend(message);
         }
         let allowed = waited && !self.tp.waits();
-        self.speak()?;
+        self.send_frames()?;
         Ok(allowed)
     }
 
-    /// Sends all that may be sent.
-    fn speak(&mut self) -> io::Result<()> {
+    /// Sends all frames that are permitted now.
+    fn send_frames(&mut self) -> io::Result<()> {
         while let Some(frame) = self.tp.frame() {
             self.bus.send(self.to, &frame)?;
             if self.tp.busy() && !self.tp.waits() {
@@ -98,18 +112,20 @@ impl<B: Bus> Line for CanLine<B> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.tp.give_up();
         self.tp.send(bytes).map_err(|error| match error {
-            IsoTpError::TooLong => io::Error::new(io::ErrorKind::InvalidInput, "more bytes than a message may have"),
-            IsoTpError::Busy => io::Error::new(io::ErrorKind::ResourceBusy, "another message is on its way"),
+            IsoTpError::TooLong => {
+                io::Error::new(io::ErrorKind::InvalidInput, "the message is longer than ISO-TP allows")
+            }
+            IsoTpError::Busy => io::Error::new(io::ErrorKind::ResourceBusy, "another message is still being sent"),
         })?;
-        self.speak()?;
+        self.send_frames()?;
         let mut last = Instant::now();
         while self.tp.busy() {
-            let Some(left) = self.allows.checked_sub(last.elapsed()) else {
-                // Who asked will ask again.
+            let Some(left) = self.flow_control_timeout.checked_sub(last.elapsed()) else {
+                // The host repeats the request.
                 self.tp.give_up();
                 break;
             };
-            if self.hear(left)? {
+            if self.receive_frame(left)? {
                 last = Instant::now();
             }
         }
@@ -118,16 +134,16 @@ impl<B: Bus> Line for CanLine<B> {
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
         let began = Instant::now();
-        while self.came.is_empty() {
-            // Who has no patience gets what is there.
+        while self.received.is_empty() {
+            // Without patience, only frames that have already arrived.
             let left = patience.saturating_sub(began.elapsed());
-            self.hear(left)?;
+            self.receive_frame(left)?;
             if left.is_zero() {
                 break;
             }
         }
-        let count = self.came.len().min(bytes.len());
-        for (place, byte) in bytes.iter_mut().zip(self.came.drain(..count)) {
+        let count = self.received.len().min(bytes.len());
+        for (place, byte) in bytes.iter_mut().zip(self.received.drain(..count)) {
             *place = byte;
         }
         Ok(count)
@@ -138,7 +154,7 @@ impl<B: Bus> Line for CanLine<B> {
 mod tests {
     use super::*;
 
-    /// A device that allows one frame at a time, and takes its time over it.
+    /// A device that permits one frame at a time, after a delay.
     struct Slow {
         frames: Vec<(u32, CanData)>,
         takes: Duration,
@@ -156,21 +172,21 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_device_gets_all_of_a_message() {
-        let bus = Slow { frames: Vec::new(), takes: ALLOWS * 2 / 5 };
+    fn a_device_with_slow_flow_control_receives_the_whole_message() {
+        let bus = Slow { frames: Vec::new(), takes: FLOW_CONTROL_TIMEOUT * 2 / 5 };
         let mut line = CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false);
-        // A first frame of 6 bytes and four of 7.
+        // A first frame with 6 bytes and four with 7 bytes.
         line.send(&[7; 34]).unwrap();
         let heads: Vec<(u32, u8)> = line.bus_mut().frames.iter().map(|(id, data)| (*id, data[0])).collect();
         assert_eq!(heads, [0x10, 0x21, 0x22, 0x23, 0x24].map(|head| (TO_DEVICE, head)));
     }
 
     #[test]
-    fn what_is_there_is_heard_without_patience() {
+    fn frames_that_have_arrived_are_received_without_patience() {
         let bus = Slow { frames: Vec::new(), takes: Duration::ZERO };
         let mut line = CanLine::new(bus, TO_DEVICE, FROM_DEVICE, false);
         line.tp.send(&[7; 34]).unwrap();
-        line.speak().unwrap();
+        line.send_frames().unwrap();
         assert_eq!(line.receive(&mut [0; 10], Duration::ZERO).unwrap(), 0);
         assert_eq!(line.bus_mut().frames.len(), 2);
     }

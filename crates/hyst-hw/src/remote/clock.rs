@@ -1,89 +1,95 @@
-//! A device's clock against this computer's.
+//! Comparison of a device's clock with this computer's clock.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Round trips that are kept: the quickest one of each of so many stretches of time.
-const STRETCHES: usize = 64;
-/// How long a stretch is at first \[s\]; twice as long whenever there are too many.
-const SHORTEST_S: f64 = 0.05;
+/// Maximum number of stored readings: the one with the shortest round trip of each time interval.
+const MAX_READINGS: usize = 64;
+/// First length of an interval \[s\]. It doubles whenever there are too many readings.
+const FIRST_INTERVAL_S: f64 = 0.05;
 
-/// When a run began by this computer's clock, and how fast the device's is.
+/// Begin of a run on this computer's clock, and rate error of the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClockFit {
-    /// When period 0 of the run began \[s since 1970-01-01 UTC\].
+    /// Begin of period 0 of the run \[s since 1970-01-01 UTC\].
     pub began_unix_s: f64,
-    /// By how much the device's clock is faster than this computer's; `None` for a run that was too short to tell \[ppm\].
+    /// Rate of the device's clock relative to this computer's, minus 1 \[ppm\].
+    ///
+    /// `None` if the run is too short to measure it.
     pub faster_ppm: Option<f64>,
-    /// To what the beginning is known: half of the quickest round trip and half a period \[s\].
+    /// Uncertainty of the begin: half of the shortest round trip and half a period \[s\].
     pub uncertainty_s: f64,
 }
 
-/// A period that a device told in an answer.
+/// A reading of the device's clock, from an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Told {
-    /// Middle between question and answer, after the start \[s\].
+struct Reading {
+    /// Middle between request and answer, since the start \[s\].
     host_s: f64,
-    /// From question to answer \[s\].
+    /// Time from request to answer \[s\].
     round_trip_s: f64,
     /// Device's clock \[s\].
     device_s: f64,
 }
 
-/// What was told of a device's clock during a run: of a question and its answer, the device answered about halfway (as in Mills 1991), the more
-/// surely the quicker the answer was.
+/// Readings of a device's clock during a run.
+///
+/// The device is assumed to answer halfway between request and answer (Mills 1991). The error is at most half the round trip.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
     began: Instant,
     wall: SystemTime,
     period_s: f64,
-    stretch_s: f64,
-    told: Vec<Told>,
+    interval_s: f64,
+    readings: Vec<Reading>,
 }
 
 impl Clock {
-    /// Of a run that begins now, as the line has it, with this sample period \[s\].
+    /// Returns the clock of a run with this sample period \[s\].
+    ///
+    /// `began` is the begin of the run on the line's clock.
     pub(super) fn new(period_s: f64, began: Instant) -> Self {
         Self {
             began,
             wall: SystemTime::now(),
             period_s,
-            stretch_s: SHORTEST_S,
-            told: Vec::with_capacity(STRETCHES + 1),
+            interval_s: FIRST_INTERVAL_S,
+            readings: Vec::with_capacity(MAX_READINGS + 1),
         }
     }
 
-    /// A device has said how many periods had passed.
-    pub(super) fn tell(&mut self, asked: Instant, answered: Instant, periods: u64) {
+    /// Adds a reading: the device has counted this many periods.
+    pub(super) fn add_reading(&mut self, asked: Instant, answered: Instant, periods: u64) {
         let since = |then: Instant| then.saturating_duration_since(self.began).as_secs_f64();
         let (asked, answered) = (since(asked), since(answered));
-        // The period that runs is half over, on the average.
+        // On average, half of the present period has passed.
         let device_s = (periods as f64 + 0.5) * self.period_s;
-        self.take(Told { host_s: 0.5 * (asked + answered), round_trip_s: answered - asked, device_s });
+        self.keep(Reading { host_s: 0.5 * (asked + answered), round_trip_s: answered - asked, device_s });
     }
 
-    fn take(&mut self, told: Told) {
-        let stretch = |told: &Told| (told.host_s / self.stretch_s).floor();
-        match self.told.last_mut() {
-            Some(last) if stretch(last) == stretch(&told) => *last = quicker(*last, told),
-            _ => self.told.push(told),
+    /// Adds a reading, or keeps the better one of its interval.
+    fn keep(&mut self, reading: Reading) {
+        let interval = |reading: &Reading| (reading.host_s / self.interval_s).floor();
+        match self.readings.last_mut() {
+            Some(last) if interval(last) == interval(&reading) => *last = shorter_round_trip(*last, reading),
+            _ => self.readings.push(reading),
         }
-        if self.told.len() > STRETCHES {
-            self.stretch_s *= 2.0;
-            let all = std::mem::take(&mut self.told);
-            all.into_iter().for_each(|told| self.take(told));
+        if self.readings.len() > MAX_READINGS {
+            self.interval_s *= 2.0;
+            let all = std::mem::take(&mut self.readings);
+            all.into_iter().for_each(|reading| self.keep(reading));
         }
     }
 
-    /// The line through what was told; `None` if nothing was.
+    /// Fits a straight line to the readings; `None` without readings.
     pub(super) fn fit(&self) -> Option<ClockFit> {
-        let count = self.told.len() as f64;
-        let mean = |of: &dyn Fn(&Told) -> f64| self.told.iter().map(of).sum::<f64>() / count;
-        let quickest = self.told.iter().map(|t| t.round_trip_s).fold(f64::INFINITY, f64::min);
+        let count = self.readings.len() as f64;
+        let mean = |of: &dyn Fn(&Reading) -> f64| self.readings.iter().map(of).sum::<f64>() / count;
+        let quickest = self.readings.iter().map(|t| t.round_trip_s).fold(f64::INFINITY, f64::min);
         let uncertainty_s = 0.5 * (quickest + self.period_s);
         let (host, device) = (mean(&|t| t.host_s), mean(&|t| t.device_s));
         let spread = mean(&|t| (t.host_s - host).powi(2));
         let slope = mean(&|t| (t.host_s - host) * (t.device_s - device)) / spread;
-        // A slope is worth something once the run was much longer than what its ends are known to.
+        // The slope is significant only if the run is much longer than the uncertainty of a reading.
         let long = spread.sqrt() > 100.0 * uncertainty_s;
         let slope = if long { slope } else { 1.0 };
         let began_s = host - device / slope;
@@ -96,7 +102,7 @@ impl Clock {
     }
 }
 
-fn quicker(a: Told, b: Told) -> Told {
+fn shorter_round_trip(a: Reading, b: Reading) -> Reading {
     if b.round_trip_s < a.round_trip_s { b } else { a }
 }
 
@@ -104,8 +110,10 @@ fn quicker(a: Told, b: Told) -> Told {
 mod tests {
     use super::*;
 
-    /// A device whose clock of 1 kHz began after 20 ms and is 150 ppm fast, asked 200 times a second over a line with a tail.
-    fn told(seconds: f64) -> Clock {
+    /// Returns readings of a clock of 1 kHz that began after 20 ms and is 150 ppm fast.
+    ///
+    /// There are 200 requests per second, over a line with some late answers.
+    fn readings(seconds: f64) -> Clock {
         let mut clock = Clock::new(1e-3, Instant::now());
         let mut luck = 1u32;
         for k in 0..(200.0 * seconds) as u32 {
@@ -118,24 +126,24 @@ mod tests {
                 continue;
             }
             let at = |s: f64| clock.began + Duration::from_secs_f64(s);
-            clock.tell(at(asked), at(asked + there + back), (device / 1e-3) as u64);
+            clock.add_reading(at(asked), at(asked + there + back), (device / 1e-3) as u64);
         }
         clock
     }
 
     #[test]
-    fn beginning_and_rate_are_found_behind_a_line_that_is_sometimes_slow() {
-        let clock = told(60.0);
+    fn begin_and_rate_are_found_over_a_line_with_late_answers() {
+        let clock = readings(60.0);
         let fit = clock.fit().unwrap();
         let wall = clock.wall.duration_since(UNIX_EPOCH).unwrap().as_secs_f64();
         assert!((fit.faster_ppm.unwrap() - 150.0).abs() < 10.0, "{fit:?}");
         assert!((fit.began_unix_s - wall - 0.02).abs() < fit.uncertainty_s, "{fit:?}");
-        assert!(fit.uncertainty_s < 1e-3 && clock.told.len() <= STRETCHES, "{fit:?}");
+        assert!(fit.uncertainty_s < 1e-3 && clock.readings.len() <= MAX_READINGS, "{fit:?}");
     }
 
     #[test]
-    fn a_short_run_tells_no_rate_and_an_empty_one_nothing() {
-        let fit = told(0.1).fit().unwrap();
+    fn a_short_run_has_no_rate_and_an_empty_one_has_no_fit() {
+        let fit = readings(0.1).fit().unwrap();
         assert_eq!(fit.faster_ppm, None);
         assert_eq!(Clock::new(1e-3, Instant::now()).fit(), None);
     }

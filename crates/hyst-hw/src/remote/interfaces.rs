@@ -1,41 +1,41 @@
-//! CAN interfaces, as Linux lists them.
+//! The CAN interfaces that Linux lists.
 
 use std::fs;
 use std::path::Path;
 
-/// Where the system describes its network interfaces.
-const NETWORK: &str = "/sys/class/net";
-/// What it says of those that are CAN.
-const CAN: &str = "280";
-/// Bytes of a frame of CAN FD with its head; of a classic one 16.
-const FD: u32 = 72;
+/// Folder in which Linux describes its network interfaces.
+const INTERFACES_FOLDER: &str = "/sys/class/net";
+/// Type of a CAN interface (`ARPHRD_CAN`).
+const CAN_TYPE: &str = "280";
+/// MTU of an interface with CAN FD: bytes of a frame with its header. It is 16 without CAN FD.
+const FD_MTU: u32 = 72;
 
 /// A CAN interface of this machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Interface {
-    /// What the system calls it.
+    /// Name of the interface in the operating system.
     pub name: String,
-    /// Whether it carries frames now.
+    /// Whether the interface is up.
     pub up: bool,
-    /// Whether these may be of CAN FD.
+    /// Whether the interface carries CAN FD frames.
     pub fd: bool,
 }
 
-/// The CAN interfaces of this machine, by name; none on other systems than Linux.
+/// Returns the CAN interfaces of this machine, sorted by name; none on other systems than Linux.
 pub fn interfaces() -> Vec<Interface> {
-    under(Path::new(NETWORK))
+    interfaces_in(Path::new(INTERFACES_FOLDER))
 }
 
-fn under(folder: &Path) -> Vec<Interface> {
+fn interfaces_in(folder: &Path) -> Vec<Interface> {
     let mut found: Vec<Interface> = fs::read_dir(folder).into_iter().flatten().flatten().filter_map(read).collect();
     found.sort_by(|a, b| a.name.cmp(&b.name));
     found
 }
 
-/// The interface that a folder describes, if it is of CAN.
+/// Reads the folder of an interface; `None` if it is not a CAN interface.
 fn read(entry: fs::DirEntry) -> Option<Interface> {
     let text = |name: &str| fs::read_to_string(entry.path().join(name)).ok().map(|text| text.trim().to_owned());
-    if text("type")? != CAN {
+    if text("type")? != CAN_TYPE {
         return None;
     }
     let flags = text("flags").and_then(|flags| u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok());
@@ -43,7 +43,7 @@ fn read(entry: fs::DirEntry) -> Option<Interface> {
     Some(Interface {
         name: entry.file_name().into_string().ok()?,
         up: flags.is_some_and(|flags| flags & 1 == 1),
-        fd: bytes.is_some_and(|bytes: u32| bytes >= FD),
+        fd: bytes.is_some_and(|bytes: u32| bytes >= FD_MTU),
     })
 }
 
@@ -63,12 +63,12 @@ mod tests {
                 fs::write(folder.join(file), format!("{text}\n")).unwrap();
             }
         }
-        // Not an interface at all.
+        // A file, not an interface.
         fs::write(folder.join("bonding_masters"), "").unwrap();
-        let found = under(&folder);
+        let found = interfaces_in(&folder);
         fs::remove_dir_all(&folder).unwrap();
         let interface = |name: &str, up, fd| Interface { name: name.to_owned(), up, fd };
         assert_eq!(found, [interface("can0", true, true), interface("can1", false, false)]);
-        assert_eq!(under(&folder), []);
+        assert_eq!(interfaces_in(&folder), []);
     }
 }

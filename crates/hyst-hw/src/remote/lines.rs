@@ -9,17 +9,17 @@ use serialport::{ErrorKind as ErrorKindOfPort, SerialPort, SerialPortType};
 
 use super::Line;
 
-/// Shortest wait that the systems know.
-const SHORTEST: Duration = Duration::from_millis(1);
-/// How long a frame may take to be taken: one of 600 bytes at 9600 baud takes 0.6 s.
-const LONGEST_WRITE: Duration = Duration::from_secs(2);
-/// How long to try to reach a host.
-const REACH: Duration = Duration::from_secs(5);
+/// Shortest timeout that the operating systems support.
+const MIN_TIMEOUT: Duration = Duration::from_millis(1);
+/// Time limit for writing a frame. A frame of 600 bytes takes 0.6 s at 9600 baud.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time limit for connecting to a host.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// What `read` came to; that nothing has come yet is no error, that nothing will is one.
-fn came(read: io::Result<usize>) -> io::Result<usize> {
+/// Returns the number of bytes read; 0 if none has arrived yet. The end of the connection is an error.
+fn received(read: io::Result<usize>) -> io::Result<usize> {
     match read {
-        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other end closed it")),
+        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other end closed the connection")),
         Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
             Ok(0)
         }
@@ -27,23 +27,23 @@ fn came(read: io::Result<usize>) -> io::Result<usize> {
     }
 }
 
-/// A socket: a simulator, a bridge to a bus.
+/// A TCP connection, for example to a simulator or a bridge to a bus.
 #[derive(Debug)]
 pub struct Tcp {
     stream: TcpStream,
-    /// The wait that the system was told last.
+    /// Read timeout that is set at present.
     patience: Duration,
 }
 
 impl Tcp {
-    /// Connects to `address`, as `host:port`.
+    /// Connects to `address`, given as `host:port`.
     ///
     /// # Errors
-    /// When nobody listens there.
+    /// If no program listens there.
     pub fn connect(address: impl ToSocketAddrs) -> io::Result<Self> {
-        let mut last = io::Error::new(ErrorKind::InvalidInput, "the address leads nowhere");
+        let mut last = io::Error::new(ErrorKind::InvalidInput, "the address has no IP address");
         for address in address.to_socket_addrs()? {
-            match TcpStream::connect_timeout(&address, REACH) {
+            match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
                 Ok(stream) => return Self::over(stream),
                 Err(error) => last = error,
             }
@@ -51,15 +51,15 @@ impl Tcp {
         Err(last)
     }
 
-    /// Over a socket that is there.
+    /// Uses an open socket.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// If the operating system refuses the options of the socket.
     pub fn over(stream: TcpStream) -> io::Result<Self> {
-        // A request is one small packet that waits for its answer.
+        // A request is one small packet, which must not wait for others.
         stream.set_nodelay(true)?;
-        stream.set_read_timeout(Some(SHORTEST))?;
-        Ok(Self { stream, patience: SHORTEST })
+        stream.set_read_timeout(Some(MIN_TIMEOUT))?;
+        Ok(Self { stream, patience: MIN_TIMEOUT })
     }
 }
 
@@ -69,75 +69,79 @@ impl Line for Tcp {
     }
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let patience = patience.max(SHORTEST);
+        let patience = patience.max(MIN_TIMEOUT);
         if patience != self.patience {
             self.stream.set_read_timeout(Some(patience))?;
             self.patience = patience;
         }
-        came(self.stream.read(bytes))
+        received(self.stream.read(bytes))
     }
 }
 
-/// A serial port: a UART, a USB device that shows itself as one, a pseudo terminal.
+/// A serial port: a UART, a USB serial device or a pseudo terminal.
 #[derive(Debug)]
 pub struct Serial {
     port: Box<dyn SerialPort>,
 }
 
-/// Why a serial port cannot be opened.
+/// Errors on opening a serial port.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// There is none of this name.
+    /// There is no port of this name.
     #[error("{port}: there is no such port{}", found(there))]
     Absent {
         /// The port.
         port: String,
-        /// Ports that are there.
+        /// Ports of this computer.
         there: Vec<String>,
     },
-    /// Another program has it.
-    #[error("{port}: another program holds the port; end that first")]
+    /// Another program uses the port.
+    #[error("{port}: another program uses the port; close it first")]
     Busy {
         /// The port.
         port: String,
     },
-    /// The user may not.
+    /// The user has no permission.
     #[error("{port}: permission denied; on Linux add yourself to the port's group (often dialout) and log in again")]
     Denied {
         /// The port.
         port: String,
     },
-    /// Something else.
+    /// Another error of the operating system.
     #[error("{port}: cannot be opened: {source}")]
     Other {
         /// The port.
         port: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: serialport::Error,
     },
 }
 
 fn found(there: &[String]) -> String {
-    if there.is_empty() { "; none is connected".to_owned() } else { format!("; there are {}", there.join(", ")) }
+    if there.is_empty() {
+        "; this computer has none".to_owned()
+    } else {
+        format!("; this computer has {}", there.join(", "))
+    }
 }
 
 impl Serial {
-    /// Over a port that is open.
+    /// Uses an open port.
     pub fn over(port: Box<dyn SerialPort>) -> Self {
         Self { port }
     }
 
-    /// Opens the port `name` at `baud` bits a second, for this program alone.
+    /// Opens the port `name` at `baud` bit/s, for exclusive use.
     ///
     /// # Errors
-    /// When it is not there, another program has it, or the user may not.
+    /// If the port does not exist, another program uses it, or the user has no permission.
     pub fn open(name: &str, baud: u32) -> Result<Self, OpenError> {
         let port = || name.to_owned();
-        serialport::new(name, baud).timeout(SHORTEST).open().map(|port| Self { port }).map_err(|source| {
+        serialport::new(name, baud).timeout(MIN_TIMEOUT).open().map(|port| Self { port }).map_err(|source| {
             let text = source.to_string().to_lowercase();
             match source.kind() {
-                // A port that is there but cannot be had is told as no device, too.
+                // The library reports a busy port as a missing device, too.
                 ErrorKindOfPort::NoDevice if Path::new(name).exists() => OpenError::Busy { port: port() },
                 _ if text.contains("busy") => OpenError::Busy { port: port() },
                 ErrorKindOfPort::Io(ErrorKind::PermissionDenied) => OpenError::Denied { port: port() },
@@ -152,32 +156,32 @@ impl Serial {
 
 impl Line for Serial {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // The port's one wait holds for both directions: a full buffer that empties at the line's speed is no end of the line.
-        if self.port.timeout() != LONGEST_WRITE {
-            self.port.set_timeout(LONGEST_WRITE)?;
+        // The port has one timeout for both directions. Writing needs more: a full buffer empties at the baud rate.
+        if self.port.timeout() != WRITE_TIMEOUT {
+            self.port.set_timeout(WRITE_TIMEOUT)?;
         }
         self.port.write_all(bytes)
     }
 
     fn receive(&mut self, bytes: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let patience = patience.max(SHORTEST);
+        let patience = patience.max(MIN_TIMEOUT);
         if patience != self.port.timeout() {
             self.port.set_timeout(patience)?;
         }
-        came(self.port.read(bytes))
+        received(self.port.read(bytes))
     }
 }
 
-/// A serial port that is there.
+/// A serial port of this computer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Port {
-    /// What the system calls it.
+    /// Name of the port in the operating system.
     pub name: String,
-    /// What is known of the device behind it.
+    /// Description of the device at the port, if known.
     pub what: String,
 }
 
-/// The serial ports that are there.
+/// Returns the serial ports of this computer.
 pub fn ports() -> Vec<Port> {
     let what = |kind: SerialPortType| match kind {
         SerialPortType::UsbPort(usb) => {

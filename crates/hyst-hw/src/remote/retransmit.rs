@@ -1,52 +1,58 @@
-//! How long to wait for an answer before a request is sent again.
+//! The time to wait for an answer before a request is sent again.
 
 use std::time::Duration;
 
-/// Requests that are looked back on.
-const LATELY: usize = 4;
-/// By how much longer than the quickest of them the next one may take.
-const SLOWER: u32 = 2;
+/// Number of recent requests whose answer times are kept.
+const ROUND_TRIPS: usize = 4;
+/// Wait for an answer, as a multiple of the shortest of the recent answer times.
+const TIMEOUT_FACTOR: u32 = 2;
 
-/// What the last answers took.
+/// Recent answer times of a line.
 ///
-/// A line that takes longer for an answer than the wait would be filled with requests that nobody needs, each with an answer of its own. Those
-/// are how it is known: what was sent twice and answered once was lost on the way, which says nothing of how long an answer takes (Karn's rule
-/// in RFC 6298), and a wait that lost frames made longer would lose more time with each. What was answered twice was waited for too shortly.
-/// Until the next answer has come, by which all of the line's others have, a request that was sent twice counts as waited for too shortly.
+/// If the wait is shorter than the answer time, the line fills with repeated requests and their answers. A request that was
+/// sent twice is ambiguous:
+///
+/// - One answer: a frame was lost. The measured time says nothing about the answer time (Karn's rule, RFC 6298) and is
+///   dropped. Otherwise the wait would grow with each lost frame.
+/// - Two answers: the wait was too short, and the measured time is kept.
+///
+/// The second answer, if there is one, arrives before the answer to the next request. Until then the measured time is kept.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Retransmit {
-    round_trips: [Duration; LATELY],
+    round_trips: [Duration; ROUND_TRIPS],
     next: usize,
-    doubtful: Option<Doubtful>,
+    ambiguous: Option<Ambiguous>,
 }
 
-/// A request that was sent more than once, and what stood where it was put down.
+/// A request that was sent more than once, and the answer time that its own replaced.
 #[derive(Clone, Copy, Debug)]
-struct Doubtful {
+struct Ambiguous {
     number: u32,
-    before: Duration,
+    replaced: Duration,
 }
 
 impl Retransmit {
-    /// An answer came so long after its request was first sent, after it was sent so often.
+    /// Records the first answer to a request that was sent `sent` times.
+    ///
+    /// `took`: time since it was first sent.
     pub(super) fn answered(&mut self, number: u32, sent: u32, took: Duration) {
-        if let Some(lost) = self.doubtful.take() {
-            self.next = (self.next + LATELY - 1) % LATELY;
-            self.round_trips[self.next] = lost.before;
+        if let Some(lost) = self.ambiguous.take() {
+            self.next = (self.next + ROUND_TRIPS - 1) % ROUND_TRIPS;
+            self.round_trips[self.next] = lost.replaced;
         }
-        self.doubtful = (sent > 1).then_some(Doubtful { number, before: self.round_trips[self.next] });
+        self.ambiguous = (sent > 1).then_some(Ambiguous { number, replaced: self.round_trips[self.next] });
         self.round_trips[self.next] = took;
-        self.next = (self.next + 1) % LATELY;
+        self.next = (self.next + 1) % ROUND_TRIPS;
     }
 
-    /// An answer came to a request that had one already.
+    /// Records a second answer to a request.
     pub(super) fn answered_again(&mut self, number: u32) {
-        self.doubtful = self.doubtful.filter(|doubtful| doubtful.number != number);
+        self.ambiguous = self.ambiguous.filter(|ambiguous| ambiguous.number != number);
     }
 
-    /// How long to wait first: `usual` on a quick line, and no longer than `most`.
+    /// Returns the first wait for an answer: at least `usual`, and otherwise at most `most`.
     pub(super) fn first(&self, usual: Duration, most: Duration) -> Duration {
         let quickest = self.round_trips.iter().min().copied().unwrap_or_default();
-        (SLOWER * quickest).min(most).max(usual)
+        (TIMEOUT_FACTOR * quickest).min(most).max(usual)
     }
 }

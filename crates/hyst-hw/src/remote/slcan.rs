@@ -1,68 +1,72 @@
-//! CAN over a serial line: the text protocol of the LAWICEL CANUSB and CAN232 ("slcan"), with the letters for CAN FD that others have
-//! added to it.
+//! CAN over a serial line: the text protocol of the LAWICEL CANUSB and CAN232 ("slcan").
 //!
-//! | text | what |
+//! It includes the usual extension for CAN FD.
+//!
+//! | text | meaning |
 //! |---|---|
-//! | `S6\r` | 500 kbit/s (0 … 8: 10, 20, 50, 100, 125, 250, 500, 800, 1000) |
-//! | `O\r`, `C\r` | open, close |
+//! | `S6\r` | bit rate 500 kbit/s (0 … 8: 10, 20, 50, 100, 125, 250, 500, 800, 1000 kbit/s) |
+//! | `O\r`, `C\r` | open the bus, close the bus |
 //! | `tIIILDD…\r` | frame: identifier of 11 bits, length, data, all hexadecimal |
-//! | `TIIIIIIIILDD…\r` | the same with 29 bits |
-//! | `dIIILDD…\r`, `DIIIIIIIILDD…\r` | of CAN FD; `b`, `B` at the higher rate |
+//! | `TIIIIIIIILDD…\r` | frame with an identifier of 29 bits |
+//! | `dIIILDD…\r`, `DIIIIIIIILDD…\r` | CAN FD frames; `b`, `B`: with bit-rate switching |
 
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
 
 use super::Line;
-use super::can::{Bus, LARGEST, SHORT};
+use super::can::{Bus, MAX_EXTENDED_ID, MAX_STANDARD_ID};
 use crate::wire::CanData;
 
-/// Bits a second that the adapters know, in the order of their numbers.
+/// Bit rates of the adapters \[bit/s\]; the index is the number in the `S` command.
 const RATES: [u32; 9] = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
-/// Lengths of a frame by their code.
+/// Lengths of a frame; the index is the length code.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
-/// Most characters of a line; what is longer is noise.
-const LONGEST: usize = 160;
-/// An adapter at the end of a serial line.
+/// Maximum length of a line; the rest of a longer line is ignored.
+const MAX_LINE: usize = 160;
+/// A CAN adapter on a serial line.
 #[derive(Debug)]
 pub struct Slcan<L> {
     line: L,
     text: Vec<u8>,
-    came: VecDeque<(u32, CanData)>,
+    received: VecDeque<(u32, CanData)>,
 }
 
 impl<L: Line> Slcan<L> {
-    /// Opens the bus at so many bits a second.
+    /// Opens the bus with this bit rate.
     ///
     /// # Errors
-    /// When the adapters do not know that rate, or the line is gone.
+    /// If the adapters do not support the bit rate, or if the connection is lost.
     pub fn open(mut line: L, bits_per_s: u32) -> io::Result<Self> {
         let rate = RATES.iter().position(|rate| *rate == bits_per_s).ok_or_else(|| {
             let known: Vec<String> = RATES.iter().map(u32::to_string).collect();
-            let advice = format!("a CAN adapter knows no {bits_per_s} bit/s; it knows {}", known.join(", "));
+            let advice = format!("CAN adapters do not support {bits_per_s} bit/s; give one of {}", known.join(", "));
             io::Error::new(io::ErrorKind::InvalidInput, advice)
         })?;
-        // What another program has left of a line is ended, and the bus closed first: an open one takes no rate.
+        // End an incomplete line of another program, and close the bus: the bit rate can only be set on a closed bus.
         line.send(format!("\r\rC\rS{rate}\rO\r").as_bytes())?;
-        Ok(Self { line, text: Vec::new(), came: VecDeque::new() })
+        Ok(Self { line, text: Vec::new(), received: VecDeque::new() })
     }
 
-    /// The serial line.
+    /// Returns the serial line.
     pub fn line_mut(&mut self) -> &mut L {
         &mut self.line
     }
 }
 
-/// A frame as text. Frames of more than 8 bytes are of CAN FD; their lengths are those that it knows.
-fn written(id: u32, data: &[u8]) -> Option<String> {
-    let code = LENGTHS.iter().position(|length| *length == data.len()).filter(|_| id <= LARGEST)?;
-    let letter = match (code > 8, id > SHORT) {
+/// Formats a frame as text; `None` for an invalid identifier or length.
+///
+/// Frames with more than 8 bytes are CAN FD frames.
+fn format_frame(id: u32, data: &[u8]) -> Option<String> {
+    let code = LENGTHS.iter().position(|length| *length == data.len()).filter(|_| id <= MAX_EXTENDED_ID)?;
+    let letter = match (code > 8, id > MAX_STANDARD_ID) {
         (false, false) => 't',
         (false, true) => 'T',
         (true, false) => 'd',
         (true, true) => 'D',
     };
-    let mut text = if id > SHORT { format!("{letter}{id:08X}{code:X}") } else { format!("{letter}{id:03X}{code:X}") };
+    let mut text =
+        if id > MAX_STANDARD_ID { format!("{letter}{id:08X}{code:X}") } else { format!("{letter}{id:03X}{code:X}") };
     for byte in data {
         text.push_str(&format!("{byte:02X}"));
     }
@@ -70,36 +74,36 @@ fn written(id: u32, data: &[u8]) -> Option<String> {
     Some(text)
 }
 
-/// What hexadecimal digits, and nothing but them, stand for.
+/// Parses hexadecimal digits; `None` for other characters.
 fn number(digits: &str) -> Option<u32> {
     let all = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
     u32::from_str_radix(digits, 16).ok().filter(|_| all)
 }
 
-/// The frame that a line of text holds, if it holds one.
+/// Parses a line of text; `None` if it is not a frame.
 fn read(text: &[u8]) -> Option<(u32, CanData)> {
-    // An answer to what was sent before may stand in front.
+    // The answer to an earlier command may precede the frame.
     let text = std::str::from_utf8(text).ok()?.trim_start_matches(['z', 'Z', '\u{7}']);
     let (digits, ids, fd) = match text.chars().next()? {
-        't' => (3, 0..=SHORT, false),
-        'T' => (8, SHORT + 1..=LARGEST, false),
-        'd' | 'b' => (3, 0..=SHORT, true),
-        'D' | 'B' => (8, SHORT + 1..=LARGEST, true),
+        't' => (3, 0..=MAX_STANDARD_ID, false),
+        'T' => (8, MAX_STANDARD_ID + 1..=MAX_EXTENDED_ID, false),
+        'd' | 'b' => (3, 0..=MAX_STANDARD_ID, true),
+        'D' | 'B' => (8, MAX_STANDARD_ID + 1..=MAX_EXTENDED_ID, true),
         _ => return None,
     };
     let id = number(text.get(1..=digits)?).filter(|id| ids.contains(id))?;
     let code = number(text.get(digits + 1..digits + 2)?)?;
     let length = *LENGTHS.get(code as usize).filter(|_| fd || code <= 8)?;
     let hex = text.get(digits + 2..)?;
-    // Some adapters add a time.
+    // Some adapters append a time stamp.
     let byte = |i: usize| Some(number(hex.get(2 * i..2 * i + 2)?)? as u8);
     Some((id, (0..length).map(byte).collect::<Option<CanData>>()?))
 }
 
 impl<L: Line> Bus for Slcan<L> {
     fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()> {
-        let text = written(id, data).ok_or_else(|| {
-            io::Error::new(io::ErrorKind::InvalidInput, "no CAN frame is of that identifier and length")
+        let text = format_frame(id, data).ok_or_else(|| {
+            io::Error::new(io::ErrorKind::InvalidInput, "not a CAN frame: identifier above 29 bits, or invalid length")
         })?;
         self.line.send(text.as_bytes())
     }
@@ -107,16 +111,16 @@ impl<L: Line> Bus for Slcan<L> {
     fn receive(&mut self, patience: Duration) -> io::Result<Option<(u32, CanData)>> {
         let began = Instant::now();
         let mut bytes = [0; 1024];
-        while self.came.is_empty() {
+        while self.received.is_empty() {
             let left = patience.saturating_sub(began.elapsed());
             let count = self.line.receive(&mut bytes, left)?;
             for byte in &bytes[..count] {
                 match byte {
                     b'\r' => {
-                        self.came.extend(read(&self.text));
+                        self.received.extend(read(&self.text));
                         self.text.clear();
                     }
-                    _ if self.text.len() < LONGEST => self.text.push(*byte),
+                    _ if self.text.len() < MAX_LINE => self.text.push(*byte),
                     _ => {}
                 }
             }
@@ -124,7 +128,7 @@ impl<L: Line> Bus for Slcan<L> {
                 break;
             }
         }
-        Ok(self.came.pop_front())
+        Ok(self.received.pop_front())
     }
 }
 
@@ -135,35 +139,35 @@ mod tests {
 
     #[test]
     fn frames_are_written_as_adapters_read_them() {
-        assert_eq!(written(0x123, &[0x11, 0xAB]).unwrap(), "t123211AB\r");
-        assert_eq!(written(0x1ABCDEF, &[]).unwrap(), "T01ABCDEF0\r");
-        let fd = written(0x7ff, &[0xCC; 12]).unwrap();
+        assert_eq!(format_frame(0x123, &[0x11, 0xAB]).unwrap(), "t123211AB\r");
+        assert_eq!(format_frame(0x1ABCDEF, &[]).unwrap(), "T01ABCDEF0\r");
+        let fd = format_frame(0x7ff, &[0xCC; 12]).unwrap();
         assert_eq!(fd, format!("d7FF9{}\r", "CC".repeat(12)));
-        assert_eq!(written(1, &[0; 9]), None);
-        assert_eq!(written(0x2000_0000, &[]), None);
+        assert_eq!(format_frame(1, &[0; 9]), None);
+        assert_eq!(format_frame(0x2000_0000, &[]), None);
     }
 
     #[test]
-    fn what_is_no_frame_is_passed_over() {
+    fn text_that_is_not_a_frame_is_ignored() {
         let foreign = [&b"T000001230"[..], b"t8000", b"T200000000", b"r1230"];
         let odd =
             [&b""[..], b"z", b"\x07", b"t", b"t12", b"t1239", b"t1232A", b"txyz0", b"t1231+1", b"V1013", b"N\xff"];
         for text in odd.into_iter().chain(foreign) {
             assert_eq!(read(text), None, "{text:?}");
         }
-        assert_eq!(read(b"zt12301"), Some((0x123, CanData::new())), "an answer, a frame and a time");
+        assert_eq!(read(b"zt12301"), Some((0x123, CanData::new())), "an answer, a frame and a time stamp");
     }
 
     proptest! {
         #[test]
-        fn a_frame_comes_back(id in 0u32..0x2000_0000, code in 0usize..16, seed: u8) {
+        fn a_frame_is_read_back_from_its_text(id in 0u32..0x2000_0000, code in 0usize..16, seed: u8) {
             let data: CanData = (0..LENGTHS[code]).map(|i| seed.wrapping_mul(i as u8 + 3)).collect();
-            let text = written(id, &data).unwrap();
+            let text = format_frame(id, &data).unwrap();
             prop_assert_eq!(read(text.trim_end().as_bytes()), Some((id, data)));
         }
 
         #[test]
-        fn whatever_comes_does_no_harm(bytes: Vec<u8>) {
+        fn arbitrary_bytes_do_not_panic(bytes: Vec<u8>) {
             let _ = read(&bytes);
         }
     }

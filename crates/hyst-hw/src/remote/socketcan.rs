@@ -1,4 +1,4 @@
-//! CAN through the sockets of Linux (SocketCAN): any adapter that has a driver there, and virtual buses.
+//! CAN through the sockets of Linux (SocketCAN): adapters with a Linux driver, and virtual buses.
 
 use std::io::{self, ErrorKind};
 use std::thread::sleep;
@@ -9,138 +9,139 @@ use socketcan::{
     StandardId, frame::FdFlags,
 };
 
-use super::can::{Bus, LARGEST, SHORT};
+use super::can::{Bus, MAX_EXTENDED_ID, MAX_STANDARD_ID};
 use super::interfaces::{Interface, interfaces};
 use crate::wire::CanData;
 
-/// How long the frames that wait to be sent may block the next one.
-const FULL: Duration = Duration::from_millis(500);
-/// How long to wait before it is tried again.
-const AGAIN: Duration = Duration::from_micros(200);
+/// Time limit for sending a frame while the send queue is full.
+const SEND_TIMEOUT: Duration = Duration::from_millis(500);
+/// Time between two attempts to send a frame.
+const RETRY_INTERVAL: Duration = Duration::from_micros(200);
 
 /// A CAN interface of this machine.
 #[derive(Debug)]
 pub struct SocketCan {
-    socket: Either,
+    socket: AnySocket,
 }
 
-/// Classic frames alone, or those of CAN FD too.
+/// A socket for classic frames, or one for CAN FD frames too.
 #[derive(Debug)]
-enum Either {
+enum AnySocket {
     Classic(CanSocket),
     Fd(socketcan::CanFdSocket),
 }
 
-/// Why a CAN interface cannot be opened.
+/// Errors on opening a CAN interface.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SocketCanError {
-    /// There is none of this name.
+    /// There is no CAN interface of this name.
     #[error("{interface}: there is no such CAN interface{}", found(there))]
     Absent {
         /// The interface.
         interface: String,
-        /// CAN interfaces that are there.
+        /// CAN interfaces of this computer.
         there: Vec<String>,
     },
-    /// It is not up.
-    #[error("{interface}: the interface is down; set it up as root: {}", up(interface, *fd))]
+    /// The interface is not up.
+    #[error("{interface}: the interface is down; set it up as root: {}", up_command(interface, *fd))]
     Down {
         /// The interface.
         interface: String,
-        /// Whether CAN FD was asked for.
+        /// Whether CAN FD was requested.
         fd: bool,
     },
-    /// It carries classic frames only.
+    /// The interface carries only classic frames.
     #[error(
-        "{interface}: the interface carries no CAN FD; leave out \",fd\", or set it up again as root, if the adapter can: {}",
-        up(interface, true)
+        "{interface}: the interface carries no CAN FD; leave out \",fd\", or, if the adapter supports CAN FD, set it up again as root: {}",
+        up_command(interface, true)
     )]
     ClassicOnly {
         /// The interface.
         interface: String,
     },
-    /// The user may not.
+    /// The user has no permission.
     #[error(
-        "{interface}: permission denied; anyone may use CAN on plain Linux, so a container or a sandbox forbids it: start outside of it"
+        "{interface}: permission denied; Linux lets every user open CAN, so a container or a sandbox blocks it: start hystctl outside of it"
     )]
     Denied {
         /// The interface.
         interface: String,
     },
-    /// The system knows no CAN.
+    /// The operating system has no CAN sockets.
     #[error(
-        "{interface}: this Linux knows no CAN sockets; load them as root (modprobe can-raw), or start a kernel that has them; an adapter at a serial port works without (slcan:PORT)"
+        "{interface}: this Linux kernel has no CAN sockets; load the module as root (modprobe can-raw), or boot a kernel that has it; \
+         an adapter at a serial port works without it (slcan:PORT)"
     )]
     NoCan {
         /// The interface.
         interface: String,
     },
-    /// Something else.
+    /// Another error of the operating system.
     #[error("{interface}: cannot be opened: {source}")]
     Other {
         /// The interface.
         interface: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
 fn found(there: &[String]) -> String {
     if there.is_empty() {
-        "; none is there: is the adapter connected, and does `ip link` show it?".to_owned()
+        "; this computer has none: connect the adapter and check that `ip link` shows it".to_owned()
     } else {
-        format!("; there are {}", there.join(", "))
+        format!("; this computer has {}", there.join(", "))
     }
 }
 
-/// The command that sets an interface up, at usual rates.
-fn up(interface: &str, fd: bool) -> String {
+/// Returns the command that sets an interface up, with the usual bit rates.
+fn up_command(interface: &str, fd: bool) -> String {
     let faster = if fd { " dbitrate 2000000 fd on" } else { "" };
     format!("ip link set {interface} down; ip link set {interface} up type can bitrate 500000{faster}")
 }
 
 impl SocketCan {
-    /// Opens the interface `name`, for frames of CAN FD too if `fd`. Other programs may have it open as well.
+    /// Opens the interface `name`; `fd`: with CAN FD frames. Other programs may use it at the same time.
     ///
     /// # Errors
-    /// When it is not there, down, or carries no such frames, or when the system knows no CAN.
+    /// If the interface does not exist, is down or has no CAN FD, or if the operating system has no CAN sockets.
     pub fn open(name: &str, fd: bool) -> Result<Self, SocketCanError> {
         let interface = || name.to_owned();
-        // The system tells a missing interface before it tells that it knows no CAN at all.
+        // Check for CAN sockets first: otherwise the operating system only reports a missing interface.
         CanSocket::open_iface(0).map_err(|error| reason(error, name, fd))?;
         let socket = if fd {
             if interfaces().contains(&Interface { name: interface(), up: true, fd: false }) {
                 return Err(SocketCanError::ClassicOnly { interface: interface() });
             }
-            socketcan::CanFdSocket::open(name).map(Either::Fd)
+            socketcan::CanFdSocket::open(name).map(AnySocket::Fd)
         } else {
-            CanSocket::open(name).map(Either::Classic)
+            CanSocket::open(name).map(AnySocket::Classic)
         };
         let socket = socket.map_err(|error| reason(error, name, fd))?;
-        // It can be opened while it is down, and says so only now.
-        match socket.refused() {
+        // An interface that is down can be opened; the error appears only here.
+        match socket.pending_error() {
             Ok(None) => Ok(Self { socket }),
             Ok(Some(error)) | Err(error) => Err(reason(error, name, fd)),
         }
     }
 
-    /// Hears frames with this identifier only: the others do not wake the program.
+    /// Receives only frames with this identifier; other frames do not wake the program.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// If the operating system refuses the filter.
     pub fn hear_only(&self, id: u32) -> io::Result<()> {
-        let long = if id > SHORT { libc::CAN_EFF_FLAG } else { 0 };
+        let long = if id > MAX_STANDARD_ID { libc::CAN_EFF_FLAG } else { 0 };
         let exactly = libc::CAN_EFF_MASK | libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;
         let filters = [CanFilter::new(id | long, exactly)];
         match &self.socket {
-            Either::Classic(socket) => socket.set_filters(&filters),
-            Either::Fd(socket) => socket.set_filters(&filters),
+            AnySocket::Classic(socket) => socket.set_filters(&filters),
+            AnySocket::Fd(socket) => socket.set_filters(&filters),
         }
     }
 }
 
-/// What the system's word means.
+/// Returns the meaning of an error of the operating system.
 fn reason(error: io::Error, name: &str, fd: bool) -> SocketCanError {
     let interface = name.to_owned();
     match error.raw_os_error() {
@@ -154,9 +155,9 @@ fn reason(error: io::Error, name: &str, fd: bool) -> SocketCanError {
     }
 }
 
-impl Either {
-    /// What the system says of the interface since it was opened.
-    fn refused(&self) -> io::Result<Option<io::Error>> {
+impl AnySocket {
+    /// Returns the error of the interface since it was opened, if any.
+    fn pending_error(&self) -> io::Result<Option<io::Error>> {
         match self {
             Self::Classic(socket) => socket.as_raw_socket().take_error(),
             Self::Fd(socket) => socket.as_raw_socket().take_error(),
@@ -164,10 +165,10 @@ impl Either {
     }
 
     fn write(&self, id: Id, data: &[u8]) -> io::Result<()> {
-        let odd = || io::Error::new(ErrorKind::InvalidInput, "no CAN frame has that many bytes");
+        let odd = || io::Error::new(ErrorKind::InvalidInput, "a CAN frame cannot have this number of bytes");
         match self {
             Self::Classic(socket) => socket.write_frame(&CanFrame::new(id, data).ok_or_else(odd)?),
-            // At the higher rate: that is what an interface is set to FD for.
+            // With bit-rate switching, which is the purpose of CAN FD.
             Self::Fd(socket) => {
                 let frame = CanFdFrame::with_flags(id, data, FdFlags::BRS).ok_or_else(odd)?;
                 socket.write_frame(&frame)
@@ -186,29 +187,28 @@ impl Either {
 impl Bus for SocketCan {
     fn send(&mut self, id: u32, data: &[u8]) -> io::Result<()> {
         let id = match id {
-            0..=SHORT => StandardId::new(id as u16).map(Id::from),
+            0..=MAX_STANDARD_ID => StandardId::new(id as u16).map(Id::from),
             _ => ExtendedId::new(id).map(Id::from),
         };
-        let id = id.ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "no CAN frame has that identifier"))?;
+        let id = id.ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "the identifier is larger than 29 bits"))?;
         let began = Instant::now();
         loop {
             let full = match self.socket.write(id, data) {
-                // The frames before wait for the bus.
+                // The send queue is full.
                 Err(error) if error.raw_os_error() == Some(libc::ENOBUFS) => error,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 other => return other,
             };
-            if began.elapsed() > FULL {
-                let advice =
-                    "the bus takes no frames: is another device on it, at the same bit rate, and is it terminated?";
+            if began.elapsed() > SEND_TIMEOUT {
+                let advice = "the bus accepts no frames: check that another device is on it, at the same bit rate, and that it is terminated";
                 return Err(io::Error::new(full.kind(), advice));
             }
-            sleep(AGAIN);
+            sleep(RETRY_INTERVAL);
         }
     }
 
     fn receive(&mut self, patience: Duration) -> io::Result<Option<(u32, CanData)>> {
-        // The system counts milliseconds; less than one would be none.
+        // The system counts whole milliseconds, so round up.
         let patience = Duration::from_millis(patience.as_nanos().div_ceil(1_000_000) as u64);
         let frame = match self.socket.read(patience) {
             Ok(frame) => frame,
@@ -226,7 +226,7 @@ impl Bus for SocketCan {
         };
         let id = match id {
             Id::Standard(id) => Some(u32::from(id.as_raw())),
-            Id::Extended(id) => Some(id.as_raw()).filter(|id| (SHORT + 1..=LARGEST).contains(id)),
+            Id::Extended(id) => Some(id.as_raw()).filter(|id| (MAX_STANDARD_ID + 1..=MAX_EXTENDED_ID).contains(id)),
         };
         Ok(id.and_then(|id| Some((id, CanData::from_slice(data).ok()?))))
     }
@@ -237,12 +237,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_refusal_says_what_to_do() {
+    fn every_error_says_what_to_do() {
         for (code, advice) in [
             (libc::ENODEV, "ip link"),
             (libc::ENETDOWN, "ip link set can7 up type can bitrate 500000 dbitrate 2000000 fd on"),
-            (libc::EPERM, "start outside of it"),
-            (libc::EACCES, "start outside of it"),
+            (libc::EPERM, "outside of it"),
+            (libc::EACCES, "outside of it"),
             (libc::EAFNOSUPPORT, "modprobe can-raw"),
             (libc::EPROTONOSUPPORT, "modprobe can-raw"),
             (libc::ENOMEM, "cannot be opened"),
@@ -252,13 +252,13 @@ mod tests {
         }
         let there = vec!["can0".to_owned(), "vcan0".to_owned()];
         let message = SocketCanError::Absent { interface: "can7".to_owned(), there }.to_string();
-        assert_eq!(message, "can7: there is no such CAN interface; there are can0, vcan0");
+        assert_eq!(message, "can7: there is no such CAN interface; this computer has can0, vcan0");
         let message = SocketCanError::ClassicOnly { interface: "can7".to_owned() }.to_string();
         assert!(message.contains("leave out \",fd\"") && message.contains("fd on"), "{message}");
     }
 
     #[test]
-    fn an_interface_that_is_not_there_is_told() {
+    fn a_missing_interface_is_reported() {
         for fd in [false, true] {
             match SocketCan::open("can-of-nobody", fd).unwrap_err() {
                 SocketCanError::Absent { interface, .. }

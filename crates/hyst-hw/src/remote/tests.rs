@@ -1,16 +1,18 @@
-//! A device over a line that loses, changes, doubles and swaps what it carries.
+//! A device over a line that loses, changes, duplicates and reorders frames.
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
 use super::*;
-use crate::runner::STOPPABLE_S;
+use crate::runner::STOP_CHECK_S;
 use crate::wire::{Board, CanData, Device, Open, Shown};
 use crate::{Cause, RecordOptions, record};
 use proptest::prelude::*;
 
-/// An amplifier whose sensor shows what the period before put out, and that remembers all of it.
+/// An amplifier whose sensor shows half the voltage of the previous period.
+///
+/// It stores all output voltages.
 #[derive(Debug, Default)]
 struct Echo {
     volts: f32,
@@ -45,12 +47,12 @@ fn identity() -> Identity {
     }
 }
 
-/// What happens to frames on their way, each time with the next of these numbers.
+/// Random numbers for the faults of the line.
 #[derive(Debug)]
 struct Luck(u64);
 
 impl Luck {
-    /// A number below `n`.
+    /// Returns a random number below `n`.
     fn below(&mut self, n: u64) -> u64 {
         // SplitMix64 (Steele, Lea and Flood 2014).
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -60,29 +62,29 @@ impl Luck {
     }
 }
 
-/// A device and the line to it. Time goes on with each look at the line.
+/// A device and the line to it. Each `receive` advances the time.
 struct Bench {
     device: Device<Open, 128, 0>,
     board: Echo,
     deframer: Deframer,
-    /// One frame in so many has an accident; none if zero.
-    accident: u64,
+    /// One frame in this number is faulty; none if zero.
+    fault_interval: u64,
     luck: Luck,
-    /// Frames that are late.
+    /// Delayed frames.
     late: Vec<Vec<u8>>,
     answers: VecDeque<u8>,
     cut: bool,
-    /// Its clock stands: it answers and does nothing.
+    /// Its clock has stopped: it answers, but does nothing else.
     frozen: bool,
 }
 
 impl Bench {
-    fn new(accident: u64, seed: u64) -> Self {
+    fn new(fault_interval: u64, seed: u64) -> Self {
         Self {
             device: Device::new(identity(), Open),
             board: Echo::default(),
             deframer: Deframer::new(),
-            accident,
+            fault_interval,
             luck: Luck(seed),
             late: Vec::new(),
             answers: VecDeque::new(),
@@ -96,10 +98,10 @@ impl Bench {
         (0..periods).for_each(|_| self.device.tick(&mut self.board));
     }
 
-    /// What arrives of a frame.
+    /// Returns the bytes of a frame that arrive.
     fn carried(&mut self, frame: &[u8]) -> Vec<u8> {
         let mut bytes = frame.to_vec();
-        if self.accident == 0 || self.luck.below(self.accident) > 0 {
+        if self.fault_interval == 0 || self.luck.below(self.fault_interval) > 0 {
             return bytes;
         }
         let at = self.luck.below(bytes.len() as u64) as usize;
@@ -109,7 +111,7 @@ impl Bench {
             2 => bytes.truncate(at),
             3 => bytes.extend_from_slice(frame),
             4 => {
-                // It comes after a later one, once or twice.
+                // It arrives after a later frame, once or twice.
                 self.late.push(bytes.clone());
                 bytes.clear();
             }
@@ -164,7 +166,7 @@ impl Line for &mut Bench {
 fn options() -> RemoteOptions {
     RemoteOptions {
         repeat: Duration::from_millis(1),
-        // Time is what the test makes of it.
+        // The test controls the time, so the watchdog must not end the run.
         silence_s: 50.0,
         ..RemoteOptions::with_session(7)
     }
@@ -174,8 +176,8 @@ fn wave(n: usize) -> Vec<f64> {
     (0..n).map(|k| 50.0 - 50.0 * (k as f64 * 0.01).cos()).collect()
 }
 
-/// Plays two segments and compares what comes back with what was sent.
-fn all_is_played(bench: &mut Bench) {
+/// Plays two segments and compares the samples with the drives.
+fn check_complete_run(bench: &mut Bench) {
     let mut remote = Remote::open(&mut *bench, "bench", options()).unwrap();
     let drive = [wave(700), wave(300)];
     let recording = record(&mut remote, &drive, &RecordOptions { rest_s: 0.1, ..RecordOptions::at(1000.0) }, |_| {
@@ -186,7 +188,7 @@ fn all_is_played(bench: &mut Bench) {
         assert_eq!(segment.samples.len(), drive.len());
         for (sample, volts) in segment.samples.iter().zip(drive) {
             assert_eq!(sample.drive_v, f64::from(*volts as f32));
-            // What was put out is shown one period later, when it is measured.
+            // The output is measured one period after the drive.
             assert_eq!(sample.output, f64::from(0.5 * *volts as f32));
             assert_eq!(sample.temperature_degc, Some(20.0));
         }
@@ -198,19 +200,19 @@ fn all_is_played(bench: &mut Bench) {
 }
 
 #[test]
-fn a_run_over_a_sound_line() {
-    all_is_played(&mut Bench::new(0, 1));
+fn a_run_over_a_line_without_faults_is_complete() {
+    check_complete_run(&mut Bench::new(0, 1));
 }
 
 #[test]
-fn a_run_over_a_line_with_accidents_is_the_same() {
+fn a_run_over_a_line_with_faults_is_complete() {
     for seed in 0..20 {
-        all_is_played(&mut Bench::new(4, seed));
+        check_complete_run(&mut Bench::new(4, seed));
     }
 }
 
 #[test]
-fn silence_brings_the_device_to_rest_within_its_slew() {
+fn the_watchdog_ramps_the_device_to_rest_within_the_slew_limit() {
     let mut bench = Bench::new(0, 1);
     let mut remote =
         Remote::open(&mut bench, "bench", RemoteOptions { silence_s: 0.1, slew_v_per_s: Some(1000.0), ..options() })
@@ -231,16 +233,16 @@ fn silence_brings_the_device_to_rest_within_its_slew() {
     assert_eq!(bench.board.volts, 0.0);
     assert!(bench.board.put_out.windows(2).all(|w| (w[1] - w[0]).abs() <= 1.001), "{:?}", bench.board.put_out);
 
-    // Another program finds a device that says why, and starts once that is cleared.
+    // Another program gets the reason, and can start after it has cleared the fault.
     let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { session: 99, ..options() }).unwrap();
     let message = remote.start(1000.0).unwrap_err().to_string();
-    assert!(message.contains("clear it"), "{message}");
+    assert!(message.contains("stop --clear"), "{message}");
     remote.clear().unwrap();
     assert_eq!(remote.start(1000.0).unwrap(), 1000.0);
 }
 
 #[test]
-fn an_emergency_stop_holds_until_it_is_cleared() {
+fn the_device_does_not_start_before_an_emergency_stop_is_cleared() {
     let mut bench = Bench::new(0, 1);
     let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
     remote.start(1000.0).unwrap();
@@ -258,7 +260,7 @@ fn an_emergency_stop_holds_until_it_is_cleared() {
 }
 
 #[test]
-fn what_a_device_refuses_is_said() {
+fn refusals_of_the_device_are_reported() {
     let mut bench = Bench::new(0, 1);
     let mut remote =
         Remote::open(&mut bench, "bench", RemoteOptions { voltage: Some((0.0, 200.0)), ..options() }).unwrap();
@@ -279,46 +281,51 @@ fn what_a_device_refuses_is_said() {
 }
 
 #[test]
-fn a_stop_by_somebody_else_is_told() {
+fn a_stop_by_another_program_is_reported() {
     let mut bench = Bench::new(0, 1);
     let mut remote = Remote::open(&mut bench, "bench", options()).unwrap();
     remote.start(1000.0).unwrap();
     remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap();
     remote.line_mut().device.answer(&Request { number: 1, ask: Ask::Stop });
     let error = loop {
-        // What had been measured by then comes first.
+        // The samples up to the stop arrive first.
         if let Err(error) = remote.exchange(&[30.0; 20], &mut Vec::new()) {
             break error;
         }
     };
-    assert!(matches!(error, RemoteError::Stopped { .. }) && error.to_string().contains("told to stop"), "{error}");
+    assert!(
+        matches!(error, RemoteError::Stopped { .. }) && error.to_string().contains("another program stopped"),
+        "{error}"
+    );
     remote.stop().unwrap();
     assert_eq!((bench.device.state(), bench.board.volts), (State::Idle, 0.0));
 }
 
 #[test]
-fn a_line_that_is_cut_is_told_and_the_device_comes_to_rest() {
+fn a_lost_connection_is_reported_and_the_device_comes_to_rest() {
     let mut bench = Bench::new(0, 1);
     let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { silence_s: 0.05, ..options() }).unwrap();
     remote.start(1000.0).unwrap();
     remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap();
     remote.line_mut().cut = true;
     let message = remote.exchange(&[30.0; 20], &mut Vec::new()).unwrap_err().to_string();
-    assert!(message.contains("the line is gone"), "{message}");
+    assert!(message.contains("the connection is lost"), "{message}");
     remote.stop().unwrap_err();
     bench.pass(200);
     assert_eq!((bench.device.state(), bench.board.volts), (State::Fault(Fault::Silence), 0.0));
 }
 
-/// A serial line, slow both ways: what is sent stands in a queue until all before it has gone through.
+/// A serial line that is slow in both directions.
+///
+/// Bytes wait in a queue until all earlier bytes are transmitted.
 struct Slow {
     bench: Bench,
     bytes_per_s: f64,
     now: Duration,
     began: Instant,
-    /// When the device was given its last period.
+    /// Time of the device's last period.
     lived: Duration,
-    /// What is on its way, and when it arrives.
+    /// Bytes in transmission, and their times of arrival.
     there: VecDeque<(Duration, Vec<u8>)>,
     back: VecDeque<(Duration, u8)>,
     busy: [Duration; 2],
@@ -380,9 +387,9 @@ impl Line for &mut Slow {
 }
 
 impl Slow {
-    fn new(baud: f64, accident: u64, seed: u64) -> Self {
+    fn new(baud: f64, fault_interval: u64, seed: u64) -> Self {
         Self {
-            bench: Bench::new(accident, seed),
+            bench: Bench::new(fault_interval, seed),
             bytes_per_s: baud / 10.0,
             now: Duration::ZERO,
             began: Instant::now(),
@@ -395,7 +402,7 @@ impl Slow {
         }
     }
 
-    /// Ten seconds at a rate; gives the periods that were gaps.
+    /// Runs for 10 s and returns the number of periods in gaps.
     fn run(&mut self, rate_hz: f64, lost_s: f64) -> f64 {
         let options = RemoteOptions {
             lost: Duration::from_secs_f64(4.0 * lost_s),
@@ -404,7 +411,7 @@ impl Slow {
         };
         let mut remote = Remote::open(self, "slow", options).unwrap();
         let drive = wave((10.0 * rate_hz) as usize);
-        // How slow the line is shows in the first second.
+        // The host measures the answer times during the first second.
         let options = RecordOptions { settle_s: 1.0, ..RecordOptions::at(rate_hz) };
         let recording = record(&mut remote, &[&drive], &options, |_| ControlFlow::Continue(()));
         let samples = &recording.unwrap().segments[0].samples;
@@ -415,7 +422,7 @@ impl Slow {
 
 #[test]
 fn a_slow_line_is_not_filled_with_requests() {
-    // What fits through a line of 19,200 and one of 38,400 baud.
+    // The largest rates for lines of 19,200 and 38,400 baud.
     for (baud, rate_hz) in [(19_200.0, 50.0), (38_400.0, 100.0)] {
         let mut slow = Slow::new(baud, 0, 1);
         assert_eq!(slow.run(rate_hz, 0.5), 0.0, "{baud}");
@@ -424,7 +431,7 @@ fn a_slow_line_is_not_filled_with_requests() {
 }
 
 #[test]
-fn a_slow_line_with_accidents_costs_gaps_and_no_run() {
+fn faults_on_a_slow_line_cause_gaps_but_do_not_end_the_run() {
     for seed in 0..10 {
         let mut slow = Slow::new(38_400.0, 20, seed);
         let gaps = slow.run(50.0, 0.5);
@@ -432,17 +439,19 @@ fn a_slow_line_with_accidents_costs_gaps_and_no_run() {
     }
 }
 
-/// A line with hardly room for the rate, and an answer takes most of the time for which the device may hear nothing.
+/// The line is nearly too slow for the rate: an answer takes most of the watchdog time.
 #[test]
-fn a_lost_frame_on_a_line_that_is_nearly_too_slow_costs_gaps_and_no_run() {
+fn lost_frames_on_a_nearly_too_slow_line_do_not_end_the_run() {
     for seed in 0..10 {
         Slow::new(19_200.0, 30, seed).run(50.0, 0.5);
     }
 }
 
-/// A wait that lost frames made long would lose more time with each frame that is lost, until the line counts as cut.
+/// Lost frames must not lengthen the wait for answers.
+///
+/// Otherwise each lost frame would cost more time, until the connection counts as lost.
 #[test]
-fn a_line_that_loses_most_frames_is_asked_as_quickly_as_before() {
+fn lost_frames_do_not_lengthen_the_wait_for_answers() {
     for seed in 0..20 {
         let mut lossy = Slow::new(1e6, 2, seed);
         lossy.run(100.0, 5.0);
@@ -450,7 +459,7 @@ fn a_line_that_loses_most_frames_is_asked_as_quickly_as_before() {
     }
 }
 
-/// Slices of a rest are whole periods, also where a period is longer than they are to be.
+/// The slices of a rest are whole periods, even if a period is longer than the nominal slice.
 #[test]
 fn a_rest_is_as_long_as_asked_for_at_any_rate() {
     for (rate_hz, rest_s) in [(1.0, 20.0), (3.0, 7.0), (10.0, 5.0), (1000.0, 2.0)] {
@@ -461,15 +470,15 @@ fn a_rest_is_as_long_as_asked_for_at_any_rate() {
         let recording = record(&mut remote, &drive, &options, |_| ControlFlow::Continue(())).unwrap();
         let [first, second] = [0, 1].map(|k| &recording.segments[k].samples);
         let rested = second[0].time_s - first[2].time_s;
-        // The bench's time goes on while it is talked to.
-        let talk = 10.0 * (1.0 + rest_s / STOPPABLE_S.max(1.0 / rate_hz)) / rate_hz;
+        // Each exchange advances the time of the bench.
+        let talk = 10.0 * (1.0 + rest_s / STOP_CHECK_S.max(1.0 / rate_hz)) / rate_hz;
         assert!((rest_s..rest_s + talk).contains(&rested), "{rate_hz} Hz: {rested} s for {rest_s}");
     }
 }
 
-/// A run is prepared while its host waits; what the clock has counted meanwhile is not the host's silence.
+/// The host waits for the answer to its start request. This time does not count as silence of the host.
 #[test]
-fn the_time_that_a_start_takes_wakes_no_watchdog() {
+fn a_slow_start_does_not_trigger_the_watchdog() {
     let mut bench = Bench::new(0, 1);
     let start = Start {
         session: 1,
@@ -492,7 +501,7 @@ fn the_time_that_a_start_takes_wakes_no_watchdog() {
     assert_eq!(bench.device.state(), State::Fault(Fault::Silence));
 }
 
-/// A run that has reached 30 V.
+/// Starts a run and drives it to 30 V.
 fn driven_to_30_v(slow: &mut Slow, slew_v_per_s: f64) -> Remote<&mut Slow> {
     let options = RemoteOptions { slew_v_per_s: Some(slew_v_per_s), ..RemoteOptions::with_session(7) };
     let mut remote = Remote::open(slow, "slow", options).unwrap();
@@ -504,20 +513,20 @@ fn driven_to_30_v(slow: &mut Slow, slew_v_per_s: f64) -> Remote<&mut Slow> {
 }
 
 #[test]
-fn a_fault_is_cleared_after_the_slowest_ramp_and_said() {
+fn clear_waits_for_a_slow_ramp_and_returns_the_fault() {
     let mut slow = Slow::new(115_200.0, 0, 1);
     let mut remote = driven_to_30_v(&mut slow, 1.0);
     remote.emergency_stop().unwrap();
-    // Half a minute at the slew of that run, which another program does not know.
+    // The ramp takes 30 s; the other program does not know the slew limit of the run.
     let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
     assert_eq!(remote.clear().unwrap(), Some(Fault::Emergency));
     assert_eq!(remote.clear().unwrap(), None);
     assert_eq!(slow.bench.board.volts, 0.0);
 }
 
-/// Who has seen one fault, or none, does not clear an emergency stop that came after it.
+/// A program that has read an earlier fault, or none, does not clear a later emergency stop.
 #[test]
-fn an_emergency_stop_is_cleared_by_nobody_who_has_not_seen_it() {
+fn an_emergency_stop_is_cleared_only_by_a_program_that_has_read_it() {
     let mut bench = Bench::new(0, 1);
     let cool = RemoteOptions { hottest_degc: 10.0, ..options() };
     let mut remote = Remote::open(&mut bench, "bench", cool).unwrap();
@@ -526,23 +535,23 @@ fn an_emergency_stop_is_cleared_by_nobody_who_has_not_seen_it() {
     let RemoteError::Fault { fault, .. } = failed else { panic!("{failed}") };
     remote.emergency_stop().unwrap();
     remote.line_mut().pass(200);
-    let refused = remote.stated(Ask::Clear(fault)).unwrap_err();
+    let refused = remote.ask_status(Ask::Clear(fault)).unwrap_err();
     assert!(matches!(refused, RemoteError::Standing { fault: Fault::Emergency, .. }), "{refused}");
     assert_eq!(remote.clear().unwrap(), Some(Fault::Emergency));
     let mut remote = Remote::open(&mut bench, "bench", RemoteOptions { session: 8, ..options() }).unwrap();
     remote.start(1000.0).unwrap();
-    // A device that runs has nothing to clear, and nobody waits for the end of its run.
+    // On a running device, clear fails at once instead of waiting for the end of the run.
     let refused = Remote::open(&mut bench, "bench", options()).unwrap().clear().unwrap_err();
     assert!(matches!(refused, RemoteError::Refused { refusal: Refusal::State, .. }), "{refused}");
     assert_eq!(bench.device.state(), State::Running);
 }
 
 #[test]
-fn a_device_that_comes_to_rest_is_waited_for_before_it_is_cleared() {
+fn clear_waits_until_a_stopping_device_is_at_rest() {
     let mut slow = Slow::new(115_200.0, 0, 1);
     let mut remote = driven_to_30_v(&mut slow, 10.0);
-    // The host is gone while its stop is under way.
-    remote.stated(Ask::Stop).unwrap();
+    // The host disappears while the device is stopping.
+    remote.ask_status(Ask::Stop).unwrap();
     let mut remote = Remote::open(&mut slow, "slow", RemoteOptions::with_session(99)).unwrap();
     assert_eq!(remote.status().unwrap().state, State::Stopping);
     assert_eq!(remote.clear().unwrap(), None);
@@ -550,7 +559,7 @@ fn a_device_that_comes_to_rest_is_waited_for_before_it_is_cleared() {
 }
 
 #[test]
-fn a_rest_on_a_device_whose_clock_has_stopped_ends() {
+fn a_rest_on_a_device_with_a_stopped_clock_fails() {
     let mut bench = Bench::new(0, 1);
     let hasty = RemoteOptions { lost: Duration::from_millis(50), ..options() };
     let mut remote = Remote::open(&mut bench, "bench", hasty).unwrap();
@@ -562,7 +571,7 @@ fn a_rest_on_a_device_whose_clock_has_stopped_ends() {
 }
 
 #[test]
-fn nobody_at_the_other_end_is_told() {
+fn a_line_without_a_device_is_reported() {
     struct Deaf;
     impl Line for Deaf {
         fn send(&mut self, _: &[u8]) -> io::Result<()> {
@@ -575,25 +584,29 @@ fn nobody_at_the_other_end_is_told() {
     }
     let options = RemoteOptions { lost: Duration::from_millis(20), ..options() };
     let message = Remote::open(Deaf, "/dev/ttyX", options).err().unwrap().to_string();
-    assert!(message.contains("/dev/ttyX") && message.contains("right port"), "{message}");
+    assert!(message.contains("/dev/ttyX") && message.contains("check the port"), "{message}");
 }
 
-/// A device on its own clock behind `line`, until the host is gone, and how it stands then and shortly after.
+/// Serves a device on its own clock until the host disconnects.
+///
+/// Returns its state after 24,000 more periods.
 fn served(mut line: impl Line + Send + 'static) -> std::thread::JoinHandle<(Device<Open, 128, 0>, Echo)> {
     std::thread::spawn(move || {
         let (mut device, mut board) = (Device::new(identity(), Open), Echo::default());
-        // The end of the line is no error here.
+        // The end of the connection is expected here.
         let _ = crate::serve(&mut device, &mut board, &mut line, || false);
         (0..24_000).for_each(|_| device.tick(&mut board));
         (device, board)
     })
 }
 
-/// What was sent comes back over a real line, on the device's own clock; a host that is gone leaves it to its watchdog.
-fn over(host: impl Line, device: impl Line + Send + 'static) {
+/// Plays a run over a real line, on the device's own clock.
+///
+/// Then the host disconnects, and the watchdog brings the device to rest.
+fn run_over(host: impl Line, device: impl Line + Send + 'static) {
     let device = served(device);
     let options = RemoteOptions {
-        // A busy machine may keep a thread waiting.
+        // A busy computer may delay a thread.
         silence_s: 10.0,
         repeat: Duration::from_millis(200),
         lost: Duration::from_secs(20),
@@ -615,20 +628,20 @@ fn over(host: impl Line, device: impl Line + Send + 'static) {
 }
 
 #[test]
-fn a_run_over_a_socket() {
+fn a_run_over_a_tcp_connection() {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let host = Tcp::connect(listener.local_addr().unwrap()).unwrap();
-    over(host, Tcp::over(listener.accept().unwrap().0).unwrap());
+    run_over(host, Tcp::over(listener.accept().unwrap().0).unwrap());
 }
 
 #[cfg(unix)]
 #[test]
 fn a_run_over_a_pseudo_terminal() {
     let (host, device) = serialport::TTYPort::pair().unwrap();
-    over(Serial::over(Box::new(host)), Serial::over(Box::new(device)));
+    run_over(Serial::over(Box::new(host)), Serial::over(Box::new(device)));
 }
 
-/// One end of a bus of two, whose frames must not be longer than its kind has.
+/// One end of a bus with two nodes; it checks the length of frames.
 struct Wire {
     out: Sender<(u32, CanData)>,
     into: Receiver<(u32, CanData)>,
@@ -650,28 +663,28 @@ impl Bus for Wire {
 }
 
 #[test]
-fn a_run_over_a_bus() {
+fn a_run_over_a_can_bus() {
     for (fd, longest) in [(false, 8), (true, 64)] {
         let ((there, from_host), (back, from_device)) = (channel(), channel());
         let host = Wire { out: there, into: from_device, longest };
         let device = Wire { out: back, into: from_host, longest };
-        over(CanLine::new(host, TO_DEVICE, FROM_DEVICE, fd), CanLine::new(device, FROM_DEVICE, TO_DEVICE, fd));
+        run_over(CanLine::new(host, TO_DEVICE, FROM_DEVICE, fd), CanLine::new(device, FROM_DEVICE, TO_DEVICE, fd));
     }
 }
 
 #[test]
-fn ports_that_are_not_there_are_told() {
+fn missing_ports_are_reported() {
     let message = Serial::open("/dev/tty-of-nobody", 115_200).unwrap_err().to_string();
     assert!(message.starts_with("/dev/tty-of-nobody: there is no such port"), "{message}");
-    // Nobody listens at a port that was just given back.
+    // No program listens at a port that was just closed.
     let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     Tcp::connect(address).unwrap_err();
 }
 
 proptest! {
-    /// Whatever requests a device gets, its output stays within its range and its slew.
+    /// Arbitrary requests do not move the output beyond its range or slew limit.
     #[test]
-    fn no_request_moves_a_device_beyond_its_limits(seed in any::<u64>()) {
+    fn arbitrary_requests_keep_the_output_within_its_limits(seed in any::<u64>()) {
         let mut luck = Luck(seed);
         let mut bench = Bench::new(0, seed);
         let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, 0.0, 50.0, 99.0, 101.0, -11.0];

@@ -1,8 +1,8 @@
-//! Why a recording is not complete, and what there is of it.
+//! The reason why a recording is incomplete, and the samples measured until then.
 
 use super::Recording;
 
-/// Why a recording is not complete; `E` is the device's error.
+/// Reason why a recording is incomplete; `E` is the error type of the device.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Cause<E> {
@@ -10,7 +10,7 @@ pub enum Cause<E> {
     #[error("nothing to play: give at least one drive segment")]
     NoSegment,
     /// A drive segment has no sample.
-    #[error("drive segment {segment} is empty")]
+    #[error("drive segment {segment} is empty: give at least one sample")]
     EmptySegment {
         /// Segment, from 0.
         segment: usize,
@@ -39,7 +39,7 @@ pub enum Cause<E> {
         /// Highest voltage of the device (V).
         max_v: f64,
     },
-    /// A value in [`RecordOptions`](super::RecordOptions) makes no sense; nothing was played.
+    /// A value in [`RecordOptions`](super::RecordOptions) is invalid; nothing was played.
     #[error("{name} = {value}: {advice}")]
     Option {
         /// Field of [`RecordOptions`](super::RecordOptions).
@@ -49,44 +49,52 @@ pub enum Cause<E> {
         /// What to give instead.
         advice: &'static str,
     },
-    /// The device does not run at the rate that the drive is meant for; nothing was played.
-    #[error("asked for {asked_hz} Hz, the device runs at {actual_hz} Hz: resample the drive or choose another rate")]
+    /// The device does not run at the requested rate; nothing was played.
+    #[error("the device runs at {actual_hz} Hz instead of {asked_hz} Hz: resample the drive or choose another rate")]
     Rate {
-        /// Rate asked for (Hz).
+        /// Requested rate (Hz).
         asked_hz: f64,
-        /// Rate of the device (Hz).
+        /// Actual rate of the device (Hz).
         actual_hz: f64,
     },
-    /// The device neither takes nor returns samples.
-    #[error("the device stalls: {outstanding} samples have not come back")]
+    /// The device neither accepts drives nor returns samples.
+    #[error(
+        "the device stalls: it accepts no drive and returns no samples ({outstanding} are missing); check the device, then run again"
+    )]
     Stalled {
-        /// Samples accepted but not measured.
+        /// Number of accepted drive samples without a measurement.
         outstanding: usize,
     },
-    /// The device broke the contract of [`Daq::exchange`](crate::Daq::exchange): more samples than it was given.
-    #[error("the device returns samples for drive that it was not given")]
+    /// The device returns more samples than [`Daq::exchange`](crate::Daq::exchange) permits.
+    #[error(
+        "the device returned more samples than it was given drive samples; correct its driver: one sample for each drive sample"
+    )]
     Surplus,
-    /// The progress callback asked to stop; the device was ramped to rest.
+    /// The progress callback requested a stop; the device was ramped to rest.
     #[error("stopped on request")]
     Cancelled,
-    /// All was played and measured, but the device could not be stopped.
-    #[error("the record is complete, but the device could not be stopped and may still be driven: {0}")]
+    /// The record is complete, but the device could not be stopped.
+    #[error(
+        "the record is complete, but the device could not be stopped and may still be driven; switch its amplifier off: {0}"
+    )]
     Stop(E),
-    /// The device's own error.
+    /// Error of the device.
     #[error(transparent)]
     Device(E),
 }
 
-/// An incomplete recording: why, and what was measured until then.
+/// An incomplete recording: the reason, and the samples measured until then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failure<E> {
-    /// Why the recording is not complete.
+    /// Reason why the recording is incomplete.
     pub cause: Cause<E>,
-    /// What was measured until then; the last segment may be incomplete.
+    /// Samples measured until then; the last segment may be incomplete.
     pub partial: Recording,
-    /// The device's error when, after the cause, it could not be stopped either: its drive may still be on.
+    /// Error of the device if it also could not be stopped: its drive may still be on.
     pub not_stopped: Option<E>,
-    /// Whether the device may have left its rest: it stood elsewhere, or something else was put to it.
+    /// Whether the device may have left its rest voltage.
+    ///
+    /// This is true if it was not at rest at the start, or if it was sent another drive.
     pub driven: bool,
 }
 
@@ -95,17 +103,17 @@ impl<E: std::error::Error> std::fmt::Display for Failure<E> {
         if let (Cause::Stop(error), false) = (&self.cause, self.driven) {
             return write!(
                 f,
-                "the record is complete, but the device did not take the stop; nothing was driven: {error}"
+                "the record is complete, but the device did not confirm the stop; it was never driven: {error}"
             );
         }
         self.cause.fmt(f)?;
         let Some(error) = &self.not_stopped else { return Ok(()) };
         f.write_str(if self.driven {
-            "; the device could not be stopped and may still be driven"
+            "; the device could not be stopped and may still be driven; switch its amplifier off"
         } else {
-            "; the device did not take the stop, nothing was driven"
+            "; the device did not confirm the stop, but it was never driven"
         })?;
-        // What is gone is gone for the stop too.
+        // After a lost connection, the stop often fails with the same error.
         let (why, error) = (self.cause.to_string(), error.to_string());
         if error == why { Ok(()) } else { write!(f, ": {error}") }
     }
@@ -123,7 +131,7 @@ mod tests {
     use std::error::Error;
 
     #[test]
-    fn failure_speaks_with_its_causes_voice() {
+    fn a_failure_prints_its_cause_and_whether_the_device_is_driven() {
         #[derive(Debug, thiserror::Error)]
         #[error("cable out")]
         struct CableOut(#[source] std::fmt::Error);
@@ -142,14 +150,20 @@ mod tests {
             not_stopped: None,
             driven: true,
         };
-        assert_eq!(segment.to_string(), "drive segment 2 is empty");
+        assert_eq!(segment.to_string(), "drive segment 2 is empty: give at least one sample");
         let driven = Failure { not_stopped: Some(CableOut(std::fmt::Error)), ..segment };
-        assert!(driven.to_string().ends_with("may still be driven: cable out"), "{driven}");
+        assert!(driven.to_string().ends_with("may still be driven; switch its amplifier off: cable out"), "{driven}");
         let twice = Failure { cause: Cause::Device(CableOut(std::fmt::Error)), ..driven };
-        assert_eq!(twice.to_string(), "cable out; the device could not be stopped and may still be driven");
+        assert_eq!(
+            twice.to_string(),
+            "cable out; the device could not be stopped and may still be driven; switch its amplifier off"
+        );
         let resting = Failure { driven: false, ..twice };
-        assert_eq!(resting.to_string(), "cable out; the device did not take the stop, nothing was driven");
+        assert_eq!(resting.to_string(), "cable out; the device did not confirm the stop, but it was never driven");
         let complete = Failure { cause: Cause::Stop(CableOut(std::fmt::Error)), not_stopped: None, ..resting };
-        assert!(complete.to_string().ends_with("did not take the stop; nothing was driven: cable out"), "{complete}");
+        assert!(
+            complete.to_string().ends_with("did not confirm the stop; it was never driven: cable out"),
+            "{complete}"
+        );
     }
 }

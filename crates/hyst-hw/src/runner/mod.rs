@@ -1,4 +1,4 @@
-//! Plays drive segments on any device and brings it back to rest, whatever happens.
+//! Plays drive segments on any device and brings it back to rest in every case.
 
 mod failure;
 mod plan;
@@ -7,101 +7,106 @@ use std::ops::{ControlFlow, Range};
 
 use crate::daq::{Daq, Sample};
 pub use failure::{Cause, Failure};
-use plan::{Place, Plan};
+use plan::{Plan, RevisionContext};
 
-/// How long a device rests without asking whether the run is still wanted, in whole periods \[s\].
-pub(crate) const STOPPABLE_S: f64 = 0.25;
+/// Time between two stop checks during a rest on a device with a queue \[s\], rounded to whole periods.
+pub(crate) const STOP_CHECK_S: f64 = 0.25;
 
-/// How to play segments.
+/// Options of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordOptions {
     /// Sample rate (Hz).
     pub rate_hz: f64,
-    /// Steepness of the ramps to the first value of a drive and from its last value to rest (V/s).
+    /// Slew rate of the ramps to the first value of a drive and from its last value to rest (V/s).
     pub slew_v_per_s: f64,
-    /// Hold at the first value of a drive before its record begins (s).
+    /// Hold time at the first value of a drive before its record begins (s).
     pub settle_s: f64,
-    /// Rest between two segments (s).
+    /// Rest time between two segments (s).
     pub rest_s: f64,
-    /// Drive samples per exchange; the device's own limit holds too.
+    /// Maximum number of drive samples per exchange; the limit of the device also applies.
     pub block: usize,
-    /// Greatest relative difference between the rate asked for and the one that the device runs at.
+    /// Largest permitted relative difference between requested and actual rate.
     pub rate_tolerance: f64,
 }
 
 impl RecordOptions {
-    /// Ramps of 100 V/s, no settling, rests of 1 s, blocks of 256 samples, rate true to 0.1 %.
+    /// Returns the default options for a rate (Hz).
+    ///
+    /// Ramps of 100 V/s, no hold, rests of 1 s, blocks of 256 samples, a rate tolerance of 0.1 %.
     #[must_use]
     pub fn at(rate_hz: f64) -> Self {
         Self { rate_hz, slew_v_per_s: 100.0, settle_s: 0.0, rest_s: 1.0, block: 256, rate_tolerance: 1e-3 }
     }
 }
 
-/// What a sample is part of.
+/// Phase of a segment to which a sample belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// On the way to the first value of the drive, and settling there; not part of the record.
+    /// Ramp to the first value of the drive, and hold there; not part of the record.
     Approach,
-    /// The drive as asked for.
+    /// The requested drive.
     Record,
-    /// On the way back to rest; not part of the record.
+    /// Ramp back to rest; not part of the record.
     Retreat,
 }
 
-/// News for the progress callback: samples that have come in, all of one phase.
+/// Argument of the progress callback: newly received samples, all of one phase.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
-    /// Running segment, from 0.
+    /// Present segment, counted from 0.
     pub segment: usize,
     /// Number of segments.
     pub segments: usize,
-    /// What the new samples are part of.
+    /// Phase of the new samples.
     pub phase: Phase,
-    /// The new samples, in order: a log that takes them all is complete whatever happens later. None during a rest.
+    /// The new samples, in order; empty during a rest.
+    ///
+    /// A log that stores them is complete even if a later step fails.
     pub samples: &'a [Sample],
-    /// Record samples so far, over all segments.
+    /// Number of record samples so far, over all segments.
     pub done: usize,
-    /// Record samples in all.
+    /// Total number of record samples.
     pub total: usize,
 }
 
-/// One segment as measured.
+/// Measured samples of one segment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SegmentRecord {
-    /// One sample per drive sample, time on the device's clock: the first one period after what came before it, because the
-    /// drive moves to a sample within one period and is measured there.
+    /// One sample per drive sample, with the time of the device's clock.
+    ///
+    /// The drive reaches a sample within one period and is measured then, so the first sample is one period after the preceding one.
     pub samples: Vec<Sample>,
-    /// Ramp and settling before the record; the device's history, but not part of the record.
+    /// Ramp and hold before the record. They are part of the actuator's history, but not of the record.
     pub approach: Vec<Sample>,
     /// Ramp to rest after the record; not part of it.
     pub retreat: Vec<Sample>,
 }
 
-/// All segments as measured.
+/// Measured samples of all segments.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
-    /// Rate that the device really ran at (Hz); 0 when it never started.
+    /// Actual rate of the device (Hz); 0 if it never started.
     pub rate_hz: f64,
-    /// Segments in the order played.
+    /// Segments in the order of the drive.
     pub segments: Vec<SegmentRecord>,
 }
 
-/// A piece of drive about to be sent, with what is known by now.
+/// A block of the drive before it is sent, with the newest measurement.
 #[derive(Debug)]
 pub struct Revision<'a> {
-    /// Running segment, from 0.
+    /// Present segment, counted from 0.
     pub segment: usize,
-    /// Rows of the segment's drive that the piece covers; each row comes exactly once, in order.
+    /// Rows of the segment's drive in this block. Each row is passed exactly once, in order.
     pub rows: Range<usize>,
-    /// The drive of those rows (V), to be changed at will.
+    /// Drive of these rows (V); the callback may change it.
     pub drive_v: &'a mut [f64],
-    /// The newest sample measured, approach included.
+    /// The newest measured sample, approach included.
     pub latest: Option<&'a Sample>,
 }
 
-/// Plays drive segments (V) on a device and returns what was measured.
+/// Plays drive segments (V) on a device and returns the measured samples.
 ///
-/// As [`record_with`], the drive being played as it stands.
+/// The same as [`record_with`], without changes to the drive.
 ///
 /// # Errors
 /// As [`record_with`].
@@ -114,24 +119,22 @@ pub fn record<D: Daq + ?Sized>(
     record_with(daq, segments, options, |_| {}, progress)
 }
 
-/// Plays drive segments (V) on a device, each block revised just before it is sent, and returns what was
-/// measured.
+/// Plays drive segments (V) on a device, with a callback before each block; returns the measured samples.
 ///
-/// `revise` may change what was planned, by what has been measured since (temperature, …). What it
-/// gives is not checked again here: the device refuses what is outside its range.
+/// `revise` may change the planned drive, for example depending on the measured temperature. Its
+/// result is not checked here; the device refuses values outside its range.
 ///
 /// All drives are checked against the device's range before anything moves. Then the sample clock
-/// starts, and every segment is played: a ramp of the stated slew from the present voltage to the drive's
-/// first value and the settling time there (`approach`), the drive (`samples`, one per drive
-/// sample), a ramp back to the rest voltage (`retreat`). Between segments the device rests for
-/// `rest_s`. At the end it is stopped.
+/// starts, and every segment is played: a ramp from the present voltage to the drive's first value
+/// and the hold there (`approach`), the drive (`samples`, one per drive sample), a ramp back to the
+/// rest voltage (`retreat`). Between segments the device rests for `rest_s`. At the end it is stopped.
 ///
-/// `progress` is called with all samples as they come in. When it returns [`ControlFlow::Break`], the
+/// `progress` is called with all received samples. If it returns [`ControlFlow::Break`], the
 /// device is ramped to rest and the recording ends as [`Cause::Cancelled`].
 ///
 /// # Errors
-/// A [`Failure`] with the cause and what was measured until then. The device is stopped in any
-/// case, also after an error of its own; only a request that was refused before anything moved leaves it alone.
+/// A [`Failure`] with the cause and the samples measured until then. The device is stopped in every
+/// case, also after an error of the device. Only if the request is refused before anything moves, nothing is sent.
 pub fn record_with<D: Daq + ?Sized>(
     daq: &mut D,
     segments: &[impl AsRef<[f64]>],
@@ -143,7 +146,7 @@ pub fn record_with<D: Daq + ?Sized>(
     if let Err(cause) = plan::check(segments, daq.capabilities().voltage, options) {
         return Err(Failure { cause, partial: recording, not_stopped: None, driven: false });
     }
-    let daq = Driven(daq);
+    let daq = StopOnPanic(daq);
     let mut driven = daq.0.present_v() != daq.0.capabilities().voltage.rest_v;
     let played = start_and_play(&mut *daq.0, segments, options, revise, progress, (&mut recording, &mut driven));
     match (played, daq.0.stop()) {
@@ -151,18 +154,18 @@ pub fn record_with<D: Daq + ?Sized>(
         (Ok(()), Err(error)) => {
             Err(Failure { cause: Cause::Stop(error), partial: recording, not_stopped: None, driven })
         }
-        // The first error says what happened; that the device is still driven must not be lost over it.
+        // The first error is the cause. The failed stop is reported too, because the device may still be driven.
         (Err(cause), stopped) => Err(Failure { cause, partial: recording, not_stopped: stopped.err(), driven }),
     }
 }
 
-/// A device that is stopped even if what looks at its samples panics.
-struct Driven<'a, D: Daq + ?Sized>(&'a mut D);
+/// Stops the device even if a callback panics.
+struct StopOnPanic<'a, D: Daq + ?Sized>(&'a mut D);
 
-impl<D: Daq + ?Sized> Drop for Driven<'_, D> {
+impl<D: Daq + ?Sized> Drop for StopOnPanic<'_, D> {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            // What goes wrong here as well, its watchdog finds.
+            // If this fails too, the watchdog of the device stops it.
             let _ = self.0.stop();
         }
     }
@@ -179,7 +182,7 @@ fn start_and_play<D: Daq + ?Sized>(
     let rest_v = daq.capabilities().voltage.rest_v;
     let actual_hz = daq.start(options.rate_hz).map_err(Cause::Device)?;
     let difference = (actual_hz / options.rate_hz - 1.0).abs();
-    // A rate that is not a number is refused as well.
+    // Also refuses a rate that is NaN.
     if !difference.le(&options.rate_tolerance) {
         return Err(Cause::Rate { asked_hz: options.rate_hz, actual_hz });
     }
@@ -201,16 +204,16 @@ fn start_and_play<D: Daq + ?Sized>(
     segments.iter().enumerate().try_for_each(|(k, drive)| run.segment(k, drive.as_ref()))
 }
 
-/// A recording under way.
+/// State of a recording.
 struct Run<'a, D: ?Sized, R, F> {
     daq: &'a mut D,
     options: &'a RecordOptions,
     revise: R,
     progress: F,
     recording: &'a mut Recording,
-    /// Whether anything but rest was put to the device, taken or not.
+    /// Whether the device was sent any drive other than the rest voltage, accepted or not.
     driven: &'a mut bool,
-    /// Where it rested before it was started \[V\].
+    /// Rest voltage before the start \[V\].
     rest_v: f64,
     segments: usize,
     done: usize,
@@ -236,12 +239,12 @@ where
         let mut fresh = Vec::with_capacity(block);
         while received < plan.drive_v.len() {
             if !cancelled {
-                let segment = Place { segment, latest: self.latest.as_ref() };
+                let segment = RevisionContext { segment, latest: self.latest.as_ref() };
                 plan.revise(sent + block, segment, rest_v, self.options, &mut self.revise);
             }
             let end = plan.drive_v.len().min(sent + block);
             let offered = &plan.drive_v[sent..end];
-            // A device that is given references rests at one, and makes the drive itself.
+            // A device that follows references computes the drive itself, and its rest value is a reference.
             *self.driven |= rest_v != self.rest_v || offered.iter().any(|u| *u != self.rest_v);
             let outcome = self.daq.exchange(offered, &mut fresh);
             let accepted = *outcome.as_ref().unwrap_or(&0);
@@ -250,7 +253,7 @@ where
             }
             sent += accepted;
             self.latest = fresh.last().copied().or(self.latest);
-            let wish = self.deliver(segment, &plan, received, &fresh);
+            let flow = self.deliver(segment, &plan, received, &fresh);
             received += fresh.len();
             let idle = accepted == 0 && fresh.is_empty();
             fresh.clear();
@@ -258,7 +261,7 @@ where
             if idle {
                 return Err(Cause::Stalled { outstanding: sent - received });
             }
-            if wish.is_break() && !cancelled {
+            if flow.is_break() && !cancelled {
                 cancelled = true;
                 plan.cut(sent, rest_v, self.options);
             }
@@ -266,13 +269,13 @@ where
         if cancelled { Err(Cause::Cancelled) } else { Ok(()) }
     }
 
-    /// Rests before a segment; its samples are nobody's.
+    /// Rests before a segment; the samples of the rest are discarded.
     fn rest(&mut self, segment: usize) -> Result<(), Cause<D::Error>> {
         let mut left = self.options.rest_s;
-        // On a device that takes its time somebody may change their mind.
+        // On a real device the rest takes time, so check for a stop request in between.
         let rate_hz = self.recording.rate_hz;
         let longest = if self.daq.capabilities().queued {
-            (STOPPABLE_S * rate_hz).round().max(1.0) / rate_hz
+            (STOP_CHECK_S * rate_hz).round().max(1.0) / rate_hz
         } else {
             f64::INFINITY
         };
@@ -291,10 +294,10 @@ where
         }
     }
 
-    /// Sorts new samples, the first of which is number `first` of the plan, into the recording.
+    /// Adds new samples to the recording; the first of them is number `first` of the plan.
     fn deliver(&mut self, segment: usize, plan: &Plan, first: usize, fresh: &[Sample]) -> ControlFlow<()> {
         let (mut rest, mut index) = (fresh, first);
-        let mut wish = ControlFlow::Continue(());
+        let mut flow = ControlFlow::Continue(());
         while !rest.is_empty() {
             let (phase, end) = plan.phase(index);
             let (samples, later) = rest.split_at(rest.len().min(end.saturating_sub(index).max(1)));
@@ -307,11 +310,11 @@ where
             }
             self.done += if phase == Phase::Record { samples.len() } else { 0 };
             let &mut Self { segments, done, total, .. } = self;
-            let said = (self.progress)(&Progress { segment, segments, phase, samples, done, total });
-            wish = if said.is_break() { said } else { wish };
+            let request = (self.progress)(&Progress { segment, segments, phase, samples, done, total });
+            flow = if request.is_break() { request } else { flow };
             (rest, index) = (later, index + samples.len());
         }
-        wish
+        flow
     }
 }
 

@@ -1,35 +1,37 @@
-//! What a segment's drive becomes on the device: approach, record, retreat.
+//! The drive of a segment on the device: approach, record, retreat.
 
 use crate::daq::VoltageRange;
 
 use super::{Cause, Phase, RecordOptions, Revision};
 use crate::daq::Sample;
 
-/// Ramps and settling are laid out in memory; longer ones are a slip of the unit.
+/// Longest ramp and hold. They are stored in memory; longer ones are probably a wrong unit.
 const LONGEST_RAMP_S: f64 = 600.0;
 const LONGEST_SETTLE_S: f64 = 3600.0;
 
-/// All drive samples of one segment, in one piece, so that a device with a queue never runs dry within it.
+/// All drive samples of one segment.
+///
+/// They are in one array, so that a device with a queue does not run empty within a segment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Plan {
     pub(super) drive_v: Vec<f64>,
-    /// Where the record begins.
+    /// First sample of the record.
     record: usize,
-    /// Where the retreat begins.
+    /// First sample of the retreat.
     retreat: usize,
-    /// Up to where the record has been revised.
+    /// First sample that is not yet revised.
     revised: usize,
 }
 
-/// Where a revision takes place, and what is known by then.
+/// Segment of a revision, and the newest measurement.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct RevisionContext<'a> {
     pub(super) segment: usize,
     pub(super) latest: Option<&'a Sample>,
 }
 
 impl Plan {
-    /// From `present_v` to the drive's first value, the drive, and from its last value to `rest_v`.
+    /// Returns the plan of a drive: ramp from `present_v`, hold, drive, ramp to `rest_v`.
     pub(super) fn new(drive: &[f64], present_v: f64, rest_v: f64, options: &RecordOptions) -> Self {
         let step_v = options.slew_v_per_s / options.rate_hz;
         let mut drive_v = Vec::new();
@@ -46,12 +48,13 @@ impl Plan {
         plan
     }
 
-    /// Lets `revise` change the record up to sample `end` of the plan, each of its samples once. When the
-    /// last one is through, the retreat is laid out anew from where the drive now ends.
+    /// Calls `revise` for the record up to sample `end` of the plan, once for each sample.
+    ///
+    /// After the last sample, the retreat is computed again from the new end of the drive.
     pub(super) fn revise(
         &mut self,
         end: usize,
-        place: Place<'_>,
+        context: RevisionContext<'_>,
         rest_v: f64,
         options: &RecordOptions,
         revise: &mut impl FnMut(&mut Revision<'_>),
@@ -60,7 +63,7 @@ impl Plan {
         if self.revised >= end {
             return;
         }
-        let Place { segment, latest } = place;
+        let RevisionContext { segment, latest } = context;
         let rows = self.revised - self.record..end - self.record;
         revise(&mut Revision { segment, rows, drive_v: &mut self.drive_v[self.revised..end], latest });
         self.revised = end;
@@ -70,7 +73,7 @@ impl Plan {
         }
     }
 
-    /// Gives up all but the first `sent` samples and retreats from there.
+    /// Drops all samples after the first `sent` ones and retreats from there.
     pub(super) fn cut(&mut self, sent: usize, rest_v: f64, options: &RecordOptions) {
         if sent < self.retreat {
             self.drive_v.truncate(sent);
@@ -87,7 +90,7 @@ impl Plan {
         }
     }
 
-    /// Phase of sample `index`, and the index at which that phase ends.
+    /// Returns the phase of sample `index`, and the index at which this phase ends.
     pub(super) fn phase(&self, index: usize) -> (Phase, usize) {
         if index < self.record {
             (Phase::Approach, self.record)
@@ -99,13 +102,13 @@ impl Plan {
     }
 }
 
-/// Values strictly between `from` and `to`, evenly spaced by no more than `step_v`.
+/// Appends values strictly between `from` and `to`, evenly spaced by at most `step_v`.
 fn ramp(drive_v: &mut Vec<f64>, from: f64, to: f64, step_v: f64) {
     let steps = ((to - from).abs() / step_v).ceil() as usize;
     drive_v.extend((1..steps).map(|k| from + (to - from) * k as f64 / steps as f64));
 }
 
-/// Refuses what must not start: before anything moves, and over all segments.
+/// Checks options and all segments before anything moves.
 pub(super) fn check<E>(
     segments: &[impl AsRef<[f64]>],
     range: VoltageRange,
@@ -117,7 +120,7 @@ pub(super) fn check<E>(
     demand("rate_hz", options.rate_hz, options.rate_hz > 0.0, "give a rate above 0 Hz")?;
     let longest_ramp_s = (range.max_v - range.min_v) / options.slew_v_per_s;
     let slew_fits = options.slew_v_per_s > 0.0 && longest_ramp_s <= LONGEST_RAMP_S;
-    let advice = "give a slew above 0 V/s that crosses the voltage range within ten minutes";
+    let advice = "give a slew rate in V/s above 0 that crosses the voltage range within 600 s";
     demand("slew_v_per_s", options.slew_v_per_s, slew_fits, advice)?;
     let settle_fits = (0.0..=LONGEST_SETTLE_S).contains(&options.settle_s);
     demand("settle_s", options.settle_s, settle_fits, "give a time from 0 to 3600 s")?;
@@ -157,23 +160,23 @@ mod tests {
     }
 
     #[test]
-    fn ramps_keep_to_the_slew_and_stay_out_of_the_record() {
+    fn ramps_keep_the_slew_rate_and_are_not_part_of_the_record() {
         let plan = Plan::new(&[5.0, 6.0, 2.5], 0.0, 0.0, &options());
-        // 1, 2, 3, 4 and two samples of settling; the record; 1.67, 0.83, 0.
+        // 1, 2, 3, 4 and two samples of the hold; the record; 1.67, 0.83, 0.
         assert_eq!(phases(&plan), (6, 3, 3));
         assert_eq!(plan.drive_v[..9], [1.0, 2.0, 3.0, 4.0, 5.0, 5.0, 5.0, 6.0, 2.5]);
         assert_eq!(plan.drive_v.last(), Some(&0.0));
     }
 
     #[test]
-    fn drive_from_rest_to_rest_needs_no_ramp() {
+    fn a_drive_from_rest_to_rest_has_no_ramps() {
         let plan = Plan::new(&[0.0, 3.0, 0.0], 0.0, 0.0, &RecordOptions { settle_s: 0.0, ..options() });
         assert_eq!(plan.drive_v, [0.0, 3.0, 0.0]);
         assert_eq!(phases(&plan), (0, 3, 0));
     }
 
     #[test]
-    fn cut_retreats_from_where_the_device_is() {
+    fn a_cut_plan_retreats_from_the_present_voltage() {
         let mut plan = Plan::new(&[5.0, 6.0, 2.5], 0.0, 0.0, &options());
         plan.cut(3, 0.0, &options());
         assert_eq!(plan.drive_v, [1.0, 2.0, 3.0, 2.0, 1.0, 0.0]);
@@ -181,7 +184,7 @@ mod tests {
         let mut plan = Plan::new(&[5.0, 6.0, 2.5], 0.0, 0.0, &options());
         plan.cut(8, 0.0, &options());
         assert_eq!(phases(&plan), (6, 2, 6));
-        // A retreat that is on its way is left alone.
+        // A retreat that has begun is not changed.
         let before = plan.clone();
         plan.cut(10, 0.0, &options());
         assert_eq!(plan, before);

@@ -4,14 +4,14 @@ use super::*;
 use crate::daq::{Capabilities, OutputUnit, VoltageRange};
 use crate::{Plant, PlantConfig, PlantError};
 
-/// A device with a short queue that measures late, as one on a serial line does.
+/// A device with a short queue and late measurements, like a device on a serial line.
 struct Queued {
     capabilities: Capabilities,
     queue: VecDeque<f64>,
     room: usize,
     present_v: f64,
     count: u32,
-    /// Fails at this exchange.
+    /// Number of the exchange that fails.
     fails_at: Option<u32>,
     stuck: bool,
     exchanges: u32,
@@ -67,14 +67,14 @@ impl Daq for Queued {
 
     fn start(&mut self, rate_hz: f64) -> Result<f64, CableOut> {
         self.running = true;
-        // A clock of 1 MHz divided by an integer.
+        // A clock of 1 MHz with an integer divider.
         Ok(1e6 / (1e6 / rate_hz).round())
     }
 
     fn exchange(&mut self, drive_v: &[f64], measured: &mut Vec<Sample>) -> Result<usize, CableOut> {
         assert!(drive_v.len() <= self.capabilities.max_block);
         self.exchanges += 1;
-        // Two samples a call at most: measurements lag behind the drive.
+        // At most two samples per call, so that measurements lag behind the drive.
         for _ in 0..2 {
             if !self.mute
                 && let Some(volts) = self.queue.pop_front()
@@ -134,7 +134,7 @@ fn drive_of(samples: &[Sample]) -> Vec<f64> {
 }
 
 #[test]
-fn queued_device_gives_every_drive_sample_its_measurement() {
+fn a_queued_device_measures_every_drive_sample() {
     for (room, block) in [(5, 256), (1, 3), (100, 1)] {
         let mut device = Queued::new(room);
         let (mut reported, mut last) = (0, 0);
@@ -152,7 +152,7 @@ fn queued_device_gives_every_drive_sample_its_measurement() {
         }
         let ramps: usize = recording.segments.iter().map(|s| s.approach.len() + s.retreat.len()).sum();
         assert_eq!((reported, last), (65 + ramps, 65));
-        // 0.5 V a sample: 0.5 to 3.5 on the way to 4 V.
+        // 0.5 V per sample: from 0.5 to 3.5 V on the ramp to 4 V.
         assert_eq!(drive_of(&recording.segments[1].approach), [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]);
         assert_eq!(recording.segments[1].retreat.last().unwrap().drive_v, 0.0);
         assert_eq!((device.rests.iter().sum::<f64>(), device.running), (3.0, false));
@@ -172,7 +172,7 @@ fn a_rest_can_be_stopped() {
 }
 
 #[test]
-fn a_panic_of_who_looks_on_leaves_no_device_driven() {
+fn a_panic_in_the_callback_stops_the_device() {
     let mut device = Queued::new(5);
     let looking = std::panic::AssertUnwindSafe(|| {
         record(&mut device, &drives(), &options(), |p| {
@@ -185,7 +185,7 @@ fn a_panic_of_who_looks_on_leaves_no_device_driven() {
 }
 
 #[test]
-fn refusals_come_before_anything_moves() {
+fn invalid_requests_are_refused_before_anything_moves() {
     let mut device = Queued::new(5);
     let mut refuse = |segments: &[Vec<f64>], options: &RecordOptions| {
         let failure = record(&mut device, segments, options, on).unwrap_err();
@@ -203,7 +203,7 @@ fn refusals_come_before_anything_moves() {
 }
 
 #[test]
-fn device_that_runs_at_another_rate_is_stopped() {
+fn a_device_that_runs_at_another_rate_is_stopped() {
     let mut device = Queued::new(5);
     let near = RecordOptions { rate_hz: 750.0, ..options() };
     let recording = record(&mut device, &drives(), &near, on).unwrap();
@@ -214,24 +214,24 @@ fn device_that_runs_at_another_rate_is_stopped() {
 }
 
 #[test]
-fn lost_device_leaves_what_was_measured_and_is_told_to_stop() {
+fn after_a_lost_device_the_samples_are_kept_and_a_stop_is_sent() {
     let mut device = Queued::new(5);
     device.fails_at = Some(12);
     let failure = record(&mut device, &drives(), &options(), on).unwrap_err();
     assert_eq!(failure.cause, Cause::Device(CableOut));
     assert_eq!(failure.to_string(), "cable out");
-    // Two samples per call but the first, those that came with the error included.
+    // Two samples per call after the first, including those that arrived with the error.
     assert_eq!(drive_of(&failure.partial.segments[0].samples), drives()[0][..22]);
     assert!(!device.running);
 }
 
 #[test]
-fn device_that_cannot_be_stopped_is_reported_beside_the_cause() {
+fn a_failed_stop_is_reported_in_addition_to_the_cause() {
     let mut device = Queued::new(5);
     device.stuck = true;
     let failure = record(&mut device, &drives(), &options(), on).unwrap_err();
     assert_eq!((failure.cause, failure.not_stopped.is_none()), (Cause::Stop(CableOut), true));
-    // All was measured by then.
+    // The record is complete.
     assert_eq!(drive_of(&failure.partial.segments[1].samples), drives()[1]);
     let cancelled = record(&mut device, &drives(), &options(), |_| ControlFlow::Break(())).unwrap_err();
     assert_eq!((cancelled.cause, cancelled.not_stopped), (Cause::Cancelled, Some(CableOut)));
@@ -239,17 +239,17 @@ fn device_that_cannot_be_stopped_is_reported_beside_the_cause() {
 }
 
 #[test]
-fn device_that_was_only_looked_at_is_not_called_driven() {
+fn a_device_that_stayed_at_rest_is_not_reported_as_driven() {
     let rest = [[0.0; 20]];
     let stuck = || Queued { stuck: true, ..Queued::new(5) };
     assert!(!record(&mut stuck(), &rest, &options(), on).unwrap_err().driven);
-    // What was planned need not be what was asked for.
+    // The callback may change the requested drive.
     let raise = |revision: &mut Revision<'_>| revision.drive_v.fill(1.0);
     assert!(record_with(&mut stuck(), &rest, &options(), raise, on).unwrap_err().driven);
-    // A drive that was sent may have been taken, though nothing came back.
+    // The device may have accepted a drive although nothing was returned.
     let mut lost = Queued { stuck: true, fails_at: Some(1), ..Queued::new(5) };
     assert!(record(&mut lost, &[[3.0; 20]], &options(), on).unwrap_err().driven);
-    // It stood elsewhere when it was found.
+    // The device was not at rest at the start.
     let mut raised = Queued { stuck: true, present_v: 2.0, ..Queued::new(5) };
     assert!(record(&mut raised, &rest, &options(), on).unwrap_err().driven);
     // Refused before anything moved.
@@ -258,7 +258,7 @@ fn device_that_was_only_looked_at_is_not_called_driven() {
 }
 
 #[test]
-fn device_that_goes_mute_is_a_stall() {
+fn a_device_that_returns_no_samples_is_reported_as_stalled() {
     let mut device = Queued::new(5);
     device.mute = true;
     let failure = record(&mut device, &drives(), &options(), on).unwrap_err();
@@ -267,7 +267,7 @@ fn device_that_goes_mute_is_a_stall() {
 }
 
 #[test]
-fn cancelling_ramps_to_rest_and_keeps_the_record_so_far() {
+fn a_cancelled_run_ramps_to_rest_and_keeps_its_samples() {
     let mut device = Queued::new(5);
     let failure = record(&mut device, &drives()[1..], &options(), |p| {
         if p.done >= 10 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -284,7 +284,7 @@ fn cancelling_ramps_to_rest_and_keeps_the_record_so_far() {
 }
 
 #[test]
-fn simulated_plant_records_on_one_clock_in_any_block_size() {
+fn the_block_size_does_not_change_a_record_of_the_simulated_plant() {
     let config = PlantConfig::random_with(8, &["creep", "lag", "temperature"]).unwrap();
     let drives: Vec<Vec<f64>> = vec![(0..300).map(|k| 0.2 * f64::from(k)).collect(), vec![40.0; 100]];
     let run = |block| {
@@ -307,7 +307,7 @@ fn simulated_plant_records_on_one_clock_in_any_block_size() {
 }
 
 #[test]
-fn error_of_the_plant_comes_through() {
+fn an_error_of_the_plant_is_returned() {
     let config = PlantConfig::random_with(8, &[]).unwrap();
     let mut plant = Plant::new(config).unwrap();
     let failure = record(&mut plant, &drives()[1..], &RecordOptions::at(1e6), on).unwrap_err();
@@ -315,7 +315,7 @@ fn error_of_the_plant_comes_through() {
 }
 
 #[test]
-fn each_row_is_revised_once_with_the_newest_sample_and_the_retreat_follows() {
+fn each_row_is_revised_once_and_the_retreat_begins_at_the_revised_end() {
     let mut daq = Queued::new(3);
     let (mut rows, mut known) = (Vec::new(), false);
     let revise = |r: &mut Revision<'_>| {
@@ -327,7 +327,7 @@ fn each_row_is_revised_once_with_the_newest_sample_and_the_retreat_follows() {
     let recording =
         record_with(&mut daq, &[&drive], &RecordOptions::at(100.0), revise, |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(rows, (0..20).collect::<Vec<_>>());
-    assert!(known, "the last block knows of samples of the first");
+    assert!(known, "the last block has a sample of the first");
     let played: Vec<f64> = recording.segments[0].samples.iter().map(|s| s.drive_v).collect();
     assert_eq!(played, drive.iter().map(|v| 2.0 * v).collect::<Vec<_>>());
     let retreat = &recording.segments[0].retreat;

@@ -1,5 +1,6 @@
-//! The device's side: what it does with requests and with each period of its clock. No bytes, no clock and no pins: firmware brings
-//! those, tests bring others.
+//! The device's side of the protocol: answers to requests, and the work in each period of the clock.
+//!
+//! There is no line, no clock and no pin here. Firmware and tests provide their own.
 
 use heapless::{Deque, Vec};
 
@@ -9,49 +10,57 @@ use super::message::{
     Start, State, Status, Tell, model_sum,
 };
 
-/// What the sensors show.
+/// Sensor readings.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shown {
     /// The output, in the device's unit.
     pub output: f32,
-    /// Temperature \[°C\]; zero where there is none.
+    /// Temperature \[°C\]; 0 without a sensor.
     pub temperature_degc: f32,
-    /// Load \[N\]; zero where there is none.
+    /// Load \[N\]; 0 without a sensor.
     pub load_n: f32,
 }
 
 /// The amplifier and the sensors.
 pub trait Board {
-    /// What the sensors show now.
+    /// Reads the sensors.
     fn measure(&mut self) -> Shown;
-    /// Puts out a voltage \[V\].
+    /// Sets the output voltage \[V\].
     fn put_out(&mut self, volts: f32);
 }
 
-/// What follows a reference: an inverse, a controller, both.
+/// A controller that follows references: an inverse, a feedback, or both.
 pub trait Control {
-    /// Takes a model, as [`hyst-core`'s block](https://docs.rs/hyst-core) of bytes. Gives whether it can run it.
+    /// Loads a model, a [block of `hyst-core`](https://docs.rs/hyst-core).
+    ///
+    /// Returns whether the controller can run it.
     fn load(&mut self, block: &[u8]) -> bool;
-    /// Whether there is a model to follow with.
+    /// Returns whether a model is loaded.
     fn ready(&self) -> bool;
-    /// Prepares a run of this period \[s\] that begins at rest: all that takes time is done here. With `force` the external force is
-    /// estimated in each period, from none now at `volts` on. Gives whether references can be followed.
+    /// Prepares a run with this period \[s\] that begins at rest; returns whether it can follow references.
+    ///
+    /// All slow work is done here. With `force`, the external force is estimated in each period; the present force, at drive `volts`,
+    /// counts as zero.
     fn prepare(&mut self, period: f32, shown: &Shown, volts: f32, force: bool) -> bool;
-    /// Force on the output \[N\], from what was put out for this period and what is shown at its end; `None` without an observer.
+    /// Returns the external force \[N\] from the voltage of this period and the readings at its end.
+    ///
+    /// `None` without an observer.
     fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32>;
-    /// Begins to follow, at the first reference, from what is shown and put out.
+    /// Begins at the first reference, from the present readings and voltage.
     fn begin(&mut self, reference: f32, shown: &Shown, volts: f32);
-    /// The drive that the reference asks for \[V\], which the limits may still change.
+    /// Returns the drive for the reference \[V\], before the limits of the run.
     fn step(&mut self, reference: f32, shown: &Shown) -> f32;
-    /// What limits made of that drive \[V\].
+    /// Reports the applied drive, after the limits of the run \[V\].
     fn applied(&mut self, volts: f32);
-    /// Whether a limit keeps the output away from its reference.
+    /// Returns whether a limit keeps the output away from the reference.
     fn limited(&self) -> bool;
-    /// The reference at which the output should be when it is measured next: what looks ahead is given references before they are due.
+    /// Returns the reference for the next measured output.
+    ///
+    /// A controller with preview gets references before they are due.
     fn due(&self) -> Option<f32>;
 }
 
-/// Without a model: a device that only plays voltages.
+/// No controller: the device only plays voltages.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Open;
 
@@ -81,47 +90,50 @@ impl Control for Open {
     }
 }
 
-/// How long the drive may stand at a limit, or the output be away from the reference, before that is a fault \[s\]; on a device as on its host.
+/// Time after which a saturated drive or a too large tracking error is a fault \[s\].
+///
+/// Devices and hosts use the same value.
 pub const PATIENCE_S: f32 = 0.5;
-/// Longest silence that a run may allow \[s\].
-const LONGEST_SILENCE_S: f32 = 60.0;
+/// Longest watchdog time of a run \[s\].
+const MAX_SILENCE_S: f32 = 60.0;
 
-/// A device with room for `Q` drives and samples, and for `M` bytes of a model.
+/// A device with room for `Q` drives and samples and for `M` bytes of a model.
 #[derive(Debug)]
 pub struct Device<C, const Q: usize, const M: usize> {
     identity: Identity,
     control: C,
     model: Vec<u8, M>,
-    /// Check sum and length of the model whose parts come.
+    /// Checksum and length of the model that is being received.
     sum: u32,
     total: u32,
-    /// Whether all bytes of the model have come and are one that runs.
+    /// Whether the model is complete and the controller can run it.
     loaded: bool,
     state: State,
     run: Start,
-    /// Whether there was a run.
+    /// Whether there was a run since power-up.
     started: bool,
     tick: u32,
     present_v: f32,
-    /// What the sensors showed last.
+    /// Last sensor readings.
     shown: Shown,
-    /// Drives that wait.
+    /// Drives that are not yet played.
     queue: Deque<f32, Q>,
     received: u32,
-    /// Samples that the host has not heard yet, the last of them number `measured - 1`.
+    /// Samples that the host does not have yet; the last one has number `measured - 1`.
     history: Deque<Measured, Q>,
     measured: u32,
-    /// A drive was put out that has not been measured yet.
+    /// Whether a drive was applied but not yet measured.
     out: bool,
-    /// The reference that is followed now.
+    /// The present reference.
     reference: Option<f32>,
-    quiet: u32,
+    /// Periods without a valid request of the host.
+    silent_periods: u32,
     saturated: Lasting,
-    astray: Lasting,
+    off_reference: Lasting,
 }
 
 impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
-    /// At rest.
+    /// Returns a device at rest.
     pub fn new(identity: Identity, control: C) -> Self {
         let present_v = identity.rest_v;
         let (follows, rate_hz) = (identity.follows, identity.max_rate_hz);
@@ -156,25 +168,27 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             measured: 0,
             out: false,
             reference: None,
-            quiet: 0,
+            silent_periods: 0,
             saturated: Lasting::default(),
-            astray: Lasting::default(),
+            off_reference: Lasting::default(),
         }
     }
 
-    /// What it does.
+    /// Returns the state.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Rate at which [`tick`](Self::tick) has to come \[Hz\]: that of the last run, before it the fastest. Where the identity leaves a choice, the clock has to follow.
+    /// Returns the rate at which [`tick`](Self::tick) must be called \[Hz\].
+    ///
+    /// It is the rate of the last run, or the largest rate before the first run.
     pub fn rate_hz(&self) -> f32 {
         self.run.rate_hz
     }
 
-    /// How it stands.
+    /// Returns the status.
     pub fn status(&self) -> Status {
-        // A drive needs a place in the queue now and one in the history later.
+        // A drive needs a place in the queue, and later one in the history.
         let waiting = self.queue.len() + self.history.len() + usize::from(self.out);
         let free = Q.saturating_sub(waiting) as u32;
         Status {
@@ -189,7 +203,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         }
     }
 
-    /// One period of the clock: what the last drive made is measured, the next one is put out.
+    /// Runs one period of the clock: measures the effect of the last drive and applies the next one.
     pub fn tick(&mut self, board: &mut impl Board) {
         let shown = board.measure();
         self.shown = shown;
@@ -200,7 +214,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
             let Shown { output, temperature_degc, load_n } = shown;
             let sample =
                 Measured { tick: self.tick, drive_v: self.present_v, output, temperature_degc, load_n, force_n };
-            // There is room: a drive is only taken where there is.
+            // There is room: a drive is accepted only if there is room for its sample.
             let _ = self.history.push_back(sample);
             self.measured = self.measured.wrapping_add(1);
         }
@@ -212,14 +226,16 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         }
     }
 
-    /// Periods that have passed without a [`tick`](Self::tick), because something else took too long: nothing is put out for them, but they count.
-    /// Those in which a run was being prepared do not: its host waited for the answer.
+    /// Counts periods that have passed without a [`tick`](Self::tick), because other work took too long.
+    ///
+    /// No drive is applied for them, but time and watchdog count them. Periods during the preparation of a run are not counted: the
+    /// host waits for the answer then.
     pub fn missed(&mut self, periods: u32) {
         if self.state == State::Running && self.tick == 0 {
             return;
         }
         self.tick = self.tick.wrapping_add(periods);
-        self.quiet = self.quiet.saturating_add(periods);
+        self.silent_periods = self.silent_periods.saturating_add(periods);
     }
 
     fn step_v(&self) -> f32 {
@@ -230,19 +246,19 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         if self.state != State::Running {
             return;
         }
-        self.quiet = self.quiet.saturating_add(1);
+        self.silent_periods = self.silent_periods.saturating_add(1);
         let patience = PATIENCE_S * self.run.rate_hz;
         let has_number = shown.output.is_finite() && shown.temperature_degc.is_finite() && shown.load_n.is_finite();
         let fault = if !has_number {
             Some(Fault::Sensor)
         } else if self.identity.temperature && shown.temperature_degc > self.run.hottest_degc {
             Some(Fault::Temperature)
-        } else if self.quiet as f32 > (self.run.silence_s * self.run.rate_hz).max(2.0) {
+        } else if self.silent_periods as f32 > (self.run.silence_s * self.run.rate_hz).max(2.0) {
             Some(Fault::Silence)
         } else {
             self.reference.and_then(|_| self.control.due()).and_then(|reference| {
                 let away = (reference - shown.output).abs() > self.run.error;
-                self.astray.step(away, patience).then_some(Fault::TrackingError)
+                self.off_reference.step(away, patience).then_some(Fault::TrackingError)
             })
         };
         if let Some(fault) = fault {
@@ -256,7 +272,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.reference = None;
     }
 
-    /// The next drive; without one the last voltage, or reference, is held.
+    /// Applies the next drive; without one, holds the last voltage or reference.
     fn play(&mut self, board: &mut impl Board, shown: &Shown) {
         let next = self.queue.pop_front();
         let wanted = match (self.run.mode, next, self.reference) {
@@ -304,21 +320,21 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         let tell = match &request.ask {
             Ask::Hello => Tell::Version(PROTOCOL),
             Ask::Describe => Tell::Identity(self.identity.clone()),
-            Ask::Start(start) => self.told(|device| device.start(start)),
+            Ask::Start(start) => self.with_status(|device| device.start(start)),
             Ask::Exchange(exchange) => match self.exchange(exchange) {
                 Ok(tell) => tell,
                 Err(refusal) => Tell::Refused(refusal, self.status()),
             },
-            Ask::Stop => self.told(|device| {
+            Ask::Stop => self.with_status(|device| {
                 device.stop();
                 Ok(())
             }),
-            Ask::Emergency => self.told(|device| {
-                // Over another fault too: who has seen that one is not to clear this.
+            Ask::Emergency => self.with_status(|device| {
+                // It replaces an earlier fault: a host that has read only that one must not clear the emergency stop.
                 device.fail(Fault::Emergency);
                 Ok(())
             }),
-            Ask::Clear(fault) => self.told(|device| device.clear(*fault)),
+            Ask::Clear(fault) => self.with_status(|device| device.clear(*fault)),
             Ask::Status => Tell::Status(self.status()),
             Ask::Model(chunk) => match self.take_model(chunk) {
                 Ok(bytes) => Tell::ModelBytes(bytes),
@@ -328,8 +344,9 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         Reply { number: request.number, tell }
     }
 
-    fn told(&mut self, does: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Tell {
-        match does(self) {
+    /// Runs an action and answers with the status.
+    fn with_status(&mut self, action: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Tell {
+        match action(self) {
             Ok(()) => Tell::Status(self.status()),
             Err(refusal) => Tell::Refused(refusal, self.status()),
         }
@@ -337,7 +354,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
 
     fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         if self.started && start.session == self.run.session {
-            // Asked twice. A run that is over does not begin again.
+            // A repeated request. A run that has ended does not begin again.
             let same = self.state == State::Running && self.run == *start;
             return if same { Ok(()) } else { Err(Refusal::Session) };
         }
@@ -356,7 +373,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
                 Field::Voltage,
             ),
             (start.slew_v_per_s > 0.0 && start.slew_v_per_s <= i.max_slew_v_per_s, Field::Slew),
-            (start.silence_s > 0.0 && start.silence_s <= LONGEST_SILENCE_S, Field::Silence),
+            (start.silence_s > 0.0 && start.silence_s <= MAX_SILENCE_S, Field::Silence),
             (!start.hottest_degc.is_nan(), Field::Temperature),
             (start.error > 0.0, Field::Error),
         ] {
@@ -377,8 +394,8 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         self.state = State::Running;
         self.queue.clear();
         self.history.clear();
-        (self.tick, self.received, self.measured, self.quiet) = (0, 0, 0, 0);
-        (self.saturated, self.astray) = (Lasting::default(), Lasting::default());
+        (self.tick, self.received, self.measured, self.silent_periods) = (0, 0, 0, 0);
+        (self.saturated, self.off_reference) = (Lasting::default(), Lasting::default());
         (self.out, self.reference) = (false, None);
         Ok(())
     }
@@ -393,7 +410,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
 
     fn clear(&mut self, fault: Fault) -> Result<(), Refusal> {
         match self.state {
-            State::Fault(stands) if stands == fault && self.present_v == self.identity.rest_v => {
+            State::Fault(present) if present == fault && self.present_v == self.identity.rest_v => {
                 self.state = State::Idle;
             }
             State::Idle => {}
@@ -406,15 +423,15 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         if !self.started || exchange.session != self.run.session {
             return Err(Refusal::Session);
         }
-        // What it hears no more it need not keep; the host cannot have heard what was not measured.
+        // Drop the samples that the host has, up to the last measured one.
         let kept = self.measured.wrapping_sub(self.history.len() as u32);
         for _ in kept..exchange.heard.min(self.measured) {
             self.history.pop_front();
         }
         if self.state == State::Running {
             self.take_drives(exchange)?;
-            // Who asks for nothing but what is refused is no host that looks after its run.
-            self.quiet = 0;
+            // Only an accepted request resets the watchdog.
+            self.silent_periods = 0;
         }
         let first = self.measured.wrapping_sub(self.history.len() as u32);
         let samples = self.history.iter().take(MOST_SAMPLES).copied().collect();
@@ -422,7 +439,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
     }
 
     fn take_drives(&mut self, exchange: &Exchange) -> Result<(), Refusal> {
-        // Those that came before are passed over; after a gap nothing is taken.
+        // Skip drives that are already received; after a gap, accept none.
         let Some(known) = self.received.checked_sub(exchange.first) else { return Ok(()) };
         let Some(fresh) = exchange.drives.get(known as usize..) else { return Ok(()) };
         let (low, high) = match self.run.mode {
@@ -449,7 +466,7 @@ impl<C: Control, const Q: usize, const M: usize> Device<C, Q, M> {
         if chunk.total as usize > M || !self.identity.follows {
             return Err(Refusal::ModelSize);
         }
-        // A part of another model than the last one begins it anew; of the same one what comes twice is passed over.
+        // A part of another model restarts the upload. Repeated parts of the same model are skipped.
         if chunk.sum != self.sum || chunk.total != self.total {
             self.model.clear();
             (self.loaded, self.sum, self.total) = (false, chunk.sum, chunk.total);

@@ -1,4 +1,6 @@
-//! A model's inverse in front, a PID behind it and a force observer beside it: how a device follows references.
+//! The controller of a device: feedforward with the inverse of a model.
+//!
+//! A PID and a force observer are optional.
 
 use heapless::Deque;
 use hyst_core::{
@@ -9,85 +11,93 @@ use hyst_core::{
 use super::device::{Control, Shown};
 use super::recipe::{self, MOST_ELEMENTS, MOST_PLAYS, Recipe};
 
-/// Samples of dead time that a device has room for.
-const DELAY: usize = 32;
-/// Taps of a preview filter that a device has room for.
-const TAPS: usize = 257;
-/// Samples by which a device may lag behind the references, because its inverse looks ahead.
-const LEAD: usize = 320;
+/// Maximum dead time of a model on a device (samples).
+const MAX_DELAY: usize = 32;
+/// Maximum number of taps of a preview filter on a device.
+const MAX_TAPS: usize = 257;
+/// Maximum delay between reference and output, caused by the preview of the inverse (samples).
+const MAX_LEAD: usize = 320;
 
-type Actuator = Chain<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS>;
-type Inverse = Compensator<f32, Pi<f32, MOST_PLAYS>, DELAY, MOST_ELEMENTS, TAPS>;
-type Loop = Tracking<f32, Inverse, LEAD>;
+type Actuator = Chain<f32, Pi<f32, MOST_PLAYS>, MAX_DELAY, MOST_ELEMENTS>;
+type Inverse = Compensator<f32, Pi<f32, MOST_PLAYS>, MAX_DELAY, MOST_ELEMENTS, MAX_TAPS>;
+type Loop = Tracking<f32, Inverse, MAX_LEAD>;
 type Observer = ForceObserver<f32, Actuator>;
 
-/// Follows references with a model of plays and what surrounds them. All arithmetic is `f32`, in `hyst-core`: a host gets the same bits.
+/// Follows references with a model of play operators and effects.
+///
+/// All arithmetic is `f32`, in `hyst-core`, so a host computes the same bits.
 #[derive(Debug, Default)]
 pub struct Follower {
     recipe: Option<Recipe>,
     running: Option<Running>,
-    watching: Option<Watching>,
+    force_estimate: Option<ForceEstimate>,
 }
 
 #[derive(Debug)]
-struct Watching {
+struct ForceEstimate {
     observer: Observer,
     state: <Actuator as Stage<f32>>::State,
-    /// What the observer says before anything acts: the sensor's zero of today \[N\].
-    at_rest: f32,
+    /// Force estimate at the begin of the run, which counts as zero \[N\].
+    zero_force: f32,
 }
 
-impl Watching {
+impl ForceEstimate {
     fn new(recipe: &Recipe, period: f32) -> Option<Self> {
         let chain = actuator(recipe, &Sampling { period: f64::from(period) })?;
         let state = chain.state();
-        Some(Self { observer: recipe.force?.observer(chain).ok()?, state, at_rest: 0.0 })
+        Some(Self { observer: recipe.force?.observer(chain).ok()?, state, zero_force: 0.0 })
     }
 }
 
 #[derive(Debug)]
 struct Running {
     tracking: Loop,
-    state: TrackingState<f32, <Inverse as Stage<f32>>::State, LEAD>,
+    state: TrackingState<f32, <Inverse as Stage<f32>>::State, MAX_LEAD>,
     lead: usize,
-    /// References that are not due yet: the output that is measured with one of them belongs to the one before.
-    early: Deque<f32, LEAD>,
+    /// References that are not yet due.
+    ///
+    /// An output that is measured together with a reference belongs to the previous reference.
+    pending: Deque<f32, MAX_LEAD>,
     due: f32,
-    /// A limit that leaves less than this is of no account: references may touch the ends of the range \[output unit\].
+    /// Largest error that does not count as saturation \[output unit\]; see [`SATURATION_TOLERANCE`].
     tolerance: f32,
     limited: bool,
 }
 
-/// What a limit may leave of an error as of no account, as a share of the model's travel: references may touch the ends of the range.
+/// Error that does not count as saturation, as a share of the model's travel.
+///
+/// References may reach the ends of the range.
 pub const SATURATION_TOLERANCE: f64 = 0.02;
 
 impl Running {
-    /// The loop at a sample period \[s\], before its first reference.
+    /// Builds the loop for a sample period \[s\], before its first reference.
     fn new(recipe: &Recipe, period: f32) -> Option<Self> {
-        let (tracking, lead) = Follower::built(recipe, period)?;
+        let (tracking, lead) = Follower::build_loop(recipe, period)?;
         let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
         let [low, high] = recipe.model.input;
         let slope = pi.gain + pi.weights.iter().sum::<f64>();
         let tolerance = (SATURATION_TOLERANCE * (slope * (high - low)).abs()) as f32;
         let state = tracking.state();
-        Some(Self { tracking, state, lead, early: Deque::new(), due: 0.0, tolerance, limited: false })
+        Some(Self { tracking, state, lead, pending: Deque::new(), due: 0.0, tolerance, limited: false })
     }
 }
 
 impl Follower {
-    /// Without a model.
+    /// Returns a follower without a model.
     pub const fn new() -> Self {
-        Self { recipe: None, running: None, watching: None }
+        Self { recipe: None, running: None, force_estimate: None }
     }
 
-    /// The loop at a sample period \[s\]. `None` where this device has no room for it, or where there is no such loop.
-    fn built(recipe: &Recipe, period: f32) -> Option<(Loop, usize)> {
+    /// Builds the loop for a sample period \[s\].
+    ///
+    /// `None` if it is too large for this device, or if no such loop exists.
+    fn build_loop(recipe: &Recipe, period: f32) -> Option<(Loop, usize)> {
         let sampling = Sampling { period: f64::from(period) };
         let chain = actuator(recipe, &sampling)?;
         let inverse: Inverse = chain.compensator(&sampling, &CompensatorOptions::default()).ok()?;
         let lead = inverse.lead();
         let [low, high] = recipe.model.input;
-        let still = PidParams {
+        let no_feedback = PidParams {
             proportional: 0.0,
             integral: 0.0,
             derivative: 0.0,
@@ -98,38 +108,39 @@ impl Follower {
             low,
             high,
         };
-        let pid = recipe.pid.unwrap_or(still).build(&sampling).ok()?;
-        // What is measured at the end of a period is what the drive of the period before has made.
+        let pid = recipe.pid.unwrap_or(no_feedback).build(&sampling).ok()?;
+        // The output at the end of a period is the effect of the previous drive.
         Some((Tracking::new(inverse, lead + 1, pid).ok()?, lead))
     }
 }
 
-/// The model at a sample period. `None` where this device has no room for it.
+/// Builds the model for a sample period; `None` if it is too large for this device.
 fn actuator(recipe: &Recipe, sampling: &Sampling) -> Option<Actuator> {
     let OperatorParams::Pi(pi) = &recipe.model.operator else { return None };
     let pi: Pi<f32, MOST_PLAYS> = pi.build(&()).ok()?;
     recipe.model.around(pi, sampling).ok()
 }
 
-/// Samples by which the output is later than the references: the inverse of what these bytes describe looks ahead. `None` where no device of this kind can
-/// follow with it at a sample period \[s\].
+/// Returns the delay between reference and output (samples), caused by the preview of the inverse.
+///
+/// `bytes` is a recipe, `period` the sample period \[s\]. `None` if a device of this kind cannot run it.
 pub fn lateness(bytes: &[u8], period: f32) -> Option<usize> {
     let recipe = recipe::read(bytes).ok()?;
-    Follower::built(&recipe, period).map(|(_, lead)| lead)
+    Follower::build_loop(&recipe, period).map(|(_, lead)| lead)
 }
 
 fn env(shown: &Shown) -> Env<f32> {
     Env { time: 0.0, temperature: shown.temperature_degc, load: shown.load_n }
 }
 
-/// As [`env()`], free: a measured load is what the observer is to find.
-fn free(shown: &Shown) -> Env<f32> {
+/// The same as [`env()`] without load, because the observer estimates the load.
+fn unloaded_env(shown: &Shown) -> Env<f32> {
     Env { load: 0.0, ..env(shown) }
 }
 
 impl Control for Follower {
     fn load(&mut self, bytes: &[u8]) -> bool {
-        (self.running, self.watching) = (None, None);
+        (self.running, self.force_estimate) = (None, None);
         self.recipe = recipe::read(bytes).ok().filter(|r| matches!(r.model.operator, OperatorParams::Pi(_)));
         self.recipe.is_some()
     }
@@ -139,17 +150,18 @@ impl Control for Follower {
     }
 
     fn prepare(&mut self, period: f32, shown: &Shown, volts: f32, force: bool) -> bool {
-        self.watching = self.recipe.as_ref().filter(|_| force).and_then(|recipe| Watching::new(recipe, period));
-        if let Some(Watching { observer, state, at_rest }) = &mut self.watching {
-            *at_rest = observer.reset(state, &free(shown), volts, shown.output);
+        self.force_estimate =
+            self.recipe.as_ref().filter(|_| force).and_then(|recipe| ForceEstimate::new(recipe, period));
+        if let Some(ForceEstimate { observer, state, zero_force }) = &mut self.force_estimate {
+            *zero_force = observer.reset(state, &unloaded_env(shown), volts, shown.output);
         }
         self.running = self.recipe.as_ref().and_then(|recipe| Running::new(recipe, period));
         self.running.is_some()
     }
 
     fn force(&mut self, volts: f32, shown: &Shown) -> Option<f32> {
-        let Watching { observer, state, at_rest } = self.watching.as_mut()?;
-        Some(observer.step(state, &free(shown), volts, shown.output) - *at_rest)
+        let ForceEstimate { observer, state, zero_force } = self.force_estimate.as_mut()?;
+        Some(observer.step(state, &unloaded_env(shown), volts, shown.output) - *zero_force)
     }
 
     fn begin(&mut self, reference: f32, shown: &Shown, volts: f32) {
@@ -158,7 +170,7 @@ impl Control for Follower {
         if corrects {
             tracking.reset(state, &env(shown), reference, shown.output, volts);
         } else {
-            // Without a PID nothing would ever take a first difference back: the drive goes where the model has it, at the slew limit.
+            // Without a PID an initial offset would remain. So the drive goes to the feedforward value, at the slew limit.
             tracking.reset_to_feedforward(state, &env(shown), reference);
         }
         *due = reference;
@@ -166,10 +178,10 @@ impl Control for Follower {
 
     fn step(&mut self, reference: f32, shown: &Shown) -> f32 {
         let Some(run) = &mut self.running else { return f32::NAN };
-        // There is room: no loop is built that looks further ahead.
-        let _ = run.early.push_back(reference);
-        if run.early.len() > run.lead + 1 {
-            run.due = run.early.pop_front().unwrap_or(run.due);
+        // There is room: the preview of a loop is at most `MAX_LEAD`.
+        let _ = run.pending.push_back(reference);
+        if run.pending.len() > run.lead + 1 {
+            run.due = run.pending.pop_front().unwrap_or(run.due);
         }
         let drive = run.tracking.step(&mut run.state, &env(shown), reference, shown.output);
         let away = (run.due - shown.output).abs() > run.tolerance;
@@ -189,8 +201,8 @@ impl Control for Follower {
 
     fn due(&self) -> Option<f32> {
         let run = self.running.as_ref()?;
-        // The one that comes due now, once there are as many as the inverse looks ahead.
-        Some(run.early.front().filter(|_| run.early.len() > run.lead).copied().unwrap_or(run.due))
+        // The reference that becomes due now, once the queue is as long as the preview.
+        Some(run.pending.front().filter(|_| run.pending.len() > run.lead).copied().unwrap_or(run.due))
     }
 }
 
@@ -208,12 +220,12 @@ mod tests {
 
     const GAIN: f32 = 0.2;
 
-    /// An actuator that does what the model says: a gain behind a dead time.
+    /// An actuator that equals its model: a dead time and a gain.
     struct Perfect {
         waiting: VecDeque<f32>,
         dead: usize,
-        /// What its sensor adds \[µm\].
-        beside: f32,
+        /// Error of its sensor \[µm\].
+        sensor_error: f32,
     }
 
     impl Board for Perfect {
@@ -221,7 +233,7 @@ mod tests {
             if self.waiting.len() > self.dead + 1 {
                 self.waiting.pop_front();
             }
-            Shown { output: GAIN * self.waiting[0] + self.beside, temperature_degc: 0.0, load_n: 0.0 }
+            Shown { output: GAIN * self.waiting[0] + self.sensor_error, temperature_degc: 0.0, load_n: 0.0 }
         }
         fn put_out(&mut self, volts: f32) {
             self.waiting.push_back(volts);
@@ -246,9 +258,10 @@ mod tests {
         }
     }
 
-    /// How a run ends that follows one period of 5 Hz at most `error` away, on an actuator with so many samples of dead time and a sensor that is off
-    /// by `beside`.
-    fn ended(dead: usize, error: f32, beside: f32) -> State {
+    /// Returns the state after 2 s of a run that follows 5 Hz with a permitted tracking error `error`.
+    ///
+    /// The actuator has a dead time of `dead` samples, and the sensor an offset of `sensor_error` \[µm\].
+    fn ended(dead: usize, error: f32, sensor_error: f32) -> State {
         let model: ChainParams<Vec<f64>> = ChainParams {
             falls: false,
             operator: OperatorParams::Pi(PiParams {
@@ -273,7 +286,7 @@ mod tests {
                 crate::wire::Chunk { offset, total: bytes.len() as u32, sum, bytes: part.iter().copied().collect() };
             device.answer(&Request { number: 1, ask: Ask::Model(chunk) });
         }
-        let mut board = Perfect { waiting: core::iter::repeat_n(0.0, dead + 1).collect(), dead, beside };
+        let mut board = Perfect { waiting: core::iter::repeat_n(0.0, dead + 1).collect(), dead, sensor_error };
         let start = Start {
             session: 1,
             mode: Mode::Reference,
@@ -290,7 +303,7 @@ mod tests {
             panic!("it starts")
         };
         for k in 0..2000_u16 {
-            // The device is given what it has room for, one by one.
+            // The references are sent one by one, as the device has room for them.
             let reference = 8.0 - 8.0 * (core::f32::consts::TAU * 5.0 * 1e-3 * f32::from(k)).cos();
             let heard = u32::from(k.saturating_sub(1));
             let drives = core::iter::once(reference).collect();
@@ -304,9 +317,11 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
 
-        /// An output is held against the reference whose drive it answers: a period earlier or later would be 0.25 µm off.
+        /// An output is compared with the reference that caused it.
+        ///
+        /// One period earlier or later would be an error of 0.25 µm.
         #[test]
-        fn what_follows_perfectly_has_no_tracking_error(dead in 0..20_usize) {
+        fn an_exact_model_has_no_tracking_error(dead in 0..20_usize) {
             prop_assert_eq!(ended(dead, 0.01, 0.0), State::Running);
             prop_assert_eq!(ended(dead, 0.01, 0.02), State::Fault(Fault::TrackingError));
         }

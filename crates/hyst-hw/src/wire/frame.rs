@@ -1,58 +1,59 @@
-//! Frames on a stream of bytes.
+//! Frames on a byte stream.
 //!
-//! A frame is a message in [postcard](https://postcard.jamesmunns.com), its CRC-32 (ISO-HDLC, least byte first), both stuffed so that no
-//! byte of them is zero (COBS; Cheshire and Baker 1999), and a zero byte. So a receiver that comes in late, or has lost bytes, is
-//! right again after the next zero; what was changed on the way is taken for a message once in 2³² times at most.
+//! A frame is a message in [postcard](https://postcard.jamesmunns.com) and its CRC-32 (ISO-HDLC, least significant byte first), both
+//! with COBS encoding (Cheshire and Baker 1999), which contains no zero bytes, and a final zero byte. After lost bytes, a receiver
+//! is synchronised again at the next zero. The CRC fails to detect a damaged frame with a probability of about 2⁻³².
 
 use core::fmt;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Most bytes of a message in postcard.
+/// Maximum number of bytes of a message in postcard.
 pub const MAX_PAYLOAD: usize = 512;
-/// Bytes of the check sum.
+/// Bytes of the checksum.
 const SUM: usize = 4;
-/// Most bytes of a frame: message and check sum stuffed, and the zero.
+/// Maximum number of bytes of a frame: encoded message and checksum, and the zero.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PAYLOAD + SUM) + 1;
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Why bytes are no message, or a message no frame.
+/// Errors of encoding and decoding frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
-    /// More bytes than any frame has.
+    /// The message or frame is too long.
     TooLong,
-    /// The stuffing is broken: bytes were lost or added.
+    /// Invalid COBS encoding: bytes were lost or added.
     Stuffing,
-    /// Fewer bytes than a check sum.
+    /// The frame is shorter than a checksum.
     TooShort,
-    /// The check sum is another one: bytes were changed.
+    /// The checksum does not match: bytes were changed.
     Sum,
-    /// The bytes arrived as they were sent, but are no message of this protocol.
+    /// The checksum matches, but the bytes are not a message of this protocol.
     Message,
 }
 
 impl fmt::Display for FrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::TooLong => "the message is longer than a frame can be",
-            Self::Stuffing => "bytes of the frame were lost on the way",
-            Self::TooShort => "the frame has no check sum",
-            Self::Sum => "bytes of the frame were changed on the way",
-            Self::Message => "the frame holds no message of this version of the protocol",
+            Self::TooLong => "the message is too long for a frame",
+            Self::Stuffing => "bytes of the frame were lost or added in transmission",
+            Self::TooShort => "the frame has no checksum",
+            Self::Sum => "bytes of the frame were changed in transmission",
+            Self::Message => "the frame does not contain a message of this version of the protocol",
         })
     }
 }
 
 impl core::error::Error for FrameError {}
 
-/// Writes a message as a frame to the beginning of a buffer, and gives that part of it. [`MAX_FRAME`] bytes hold any frame; the message is
-/// put together in as many on the stack.
+/// Writes a message as a frame to the start of a buffer and returns that part of the buffer.
+///
+/// A buffer of [`MAX_FRAME`] bytes is large enough for every frame. The function needs about as many bytes of stack.
 ///
 /// # Errors
-/// [`FrameError::TooLong`] if the message has more than [`MAX_PAYLOAD`] bytes, or the buffer no room for it;
-/// [`FrameError::Message`] if postcard has no form for it.
+/// [`FrameError::TooLong`] if the message has more than [`MAX_PAYLOAD`] bytes, or if the buffer is too small;
+/// [`FrameError::Message`] if postcard cannot encode the message.
 pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b [u8], FrameError> {
     let mut bytes = [0; MAX_PAYLOAD + SUM];
     let (payload, _) = bytes.split_at_mut(MAX_PAYLOAD);
@@ -65,13 +66,13 @@ pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b 
     bytes[length..length + SUM].copy_from_slice(&sum);
     let room = buffer.len().saturating_sub(1);
     let stuffed = cobs::try_encode(&bytes[..length + SUM], &mut buffer[..room]).map_err(|_| FrameError::TooLong)?;
-    // Without room for its last byte the stuffing is told to be one longer than the room, if that byte is a zero.
+    // If the buffer is one byte too short and the last byte is zero, `try_encode` returns a length above the buffer's.
     let frame = buffer.get_mut(..=stuffed).ok_or(FrameError::TooLong)?;
     frame[stuffed] = 0;
     Ok(frame)
 }
 
-/// Collects bytes until a frame is whole.
+/// Collects bytes until a frame is complete.
 ///
 /// ```
 /// use hyst_hw::wire::{Deframer, MAX_FRAME, encode};
@@ -90,7 +91,7 @@ pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b 
 #[derive(Debug, Clone)]
 pub struct Deframer {
     bytes: [u8; MAX_FRAME],
-    /// Bytes since the last zero; one more than there is room for, however many more have come.
+    /// Bytes since the last zero; at most one more than the buffer holds.
     length: usize,
 }
 
@@ -101,13 +102,16 @@ impl Default for Deframer {
 }
 
 impl Deframer {
-    /// At the beginning of a frame.
+    /// Returns a deframer at the start of a frame.
     pub const fn new() -> Self {
         Self { bytes: [0; MAX_FRAME], length: 0 }
     }
 
-    /// Takes bytes from the front of `input` up to the end of a frame, and gives its message; `None` if all are taken before one has
-    /// ended. Zeros without anything before them are passed over: a sender may begin with one to end what was left before.
+    /// Takes bytes from the front of `input` up to the end of a frame and returns its message.
+    ///
+    /// `None` if no frame ends.
+    ///
+    /// Zeros at the start of a frame are ignored, so a sender may begin with a zero to end an incomplete frame.
     pub fn next<M: DeserializeOwned>(&mut self, input: &mut &[u8]) -> Option<Result<M, FrameError>> {
         while let Some((byte, rest)) = input.split_first() {
             *input = rest;
@@ -155,7 +159,7 @@ mod tests {
         encode(message, &mut [0; MAX_FRAME]).unwrap().to_vec()
     }
 
-    /// What arrives of some bytes that come in pieces of this size.
+    /// Returns the messages in bytes that arrive in pieces of this size.
     fn received(bytes: &[u8], piece: usize) -> Vec<Result<Message, FrameError>> {
         let mut deframer = Deframer::new();
         let mut all = Vec::new();
@@ -175,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_of_a_frame_are_those_of_the_standards() {
+    fn the_bytes_of_a_frame_follow_the_standards() {
         // Postcard: variant 1, varint 300, two values; CRC-32 of these bytes; COBS.
         let payload = [1, 0xac, 0x02, 2, 0, 0, 0x80, 0x3f, 0, 0, 0, 0];
         let sum = CRC.checksum(&payload).to_le_bytes();
@@ -189,11 +193,11 @@ mod tests {
     #[test]
     fn a_message_or_a_buffer_of_the_wrong_size_is_refused() {
         let values = |count: usize| Message::Values { first: 1, values: vec![f32::from_bits(0x1111_1111); count] };
-        // Variant, first, count (a byte each, two from 128 on), four for each value.
+        // Variant, first and count take one byte each (two from 128 on), each value four.
         assert_eq!(frame(&values(127)).len(), cobs::max_encoding_length(511 + SUM) + 1);
         assert_eq!(encode(&values(128), &mut [0; 2 * MAX_FRAME]), Err(FrameError::TooLong));
         for byte in 0..=u8::MAX {
-            // A byte, its sum, one that COBS adds, the zero: some sums end in a zero.
+            // One byte, four of its checksum, one that COBS adds, the zero. Some checksums end in a zero.
             for room in 0..7 {
                 assert_eq!(encode(&byte, &mut vec![0; room]), Err(FrameError::TooLong), "{byte} {room}");
             }
@@ -202,32 +206,32 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_frame_is_told_and_the_next_one_arrives() {
+    fn invalid_frames_are_reported_and_the_next_frame_arrives() {
         let good = frame(&Message::Quiet);
         let after = |bad: &[u8]| received(&[bad, &good].concat(), 3);
-        let told = |error| vec![Err(error), Ok(Message::Quiet)];
-        assert_eq!(after(&[5, 1, 0]), told(FrameError::Stuffing));
-        assert_eq!(after(&[2, 1, 0]), told(FrameError::TooShort));
-        assert_eq!(after(&[6, 1, 1, 1, 1, 1, 0]), told(FrameError::Sum));
-        assert_eq!(after(&[[7; 2 * MAX_FRAME].as_slice(), &[0]].concat()), told(FrameError::TooLong));
-        // A whole frame of something else, and one with more than a message.
+        let expected = |error| vec![Err(error), Ok(Message::Quiet)];
+        assert_eq!(after(&[5, 1, 0]), expected(FrameError::Stuffing));
+        assert_eq!(after(&[2, 1, 0]), expected(FrameError::TooShort));
+        assert_eq!(after(&[6, 1, 1, 1, 1, 1, 0]), expected(FrameError::Sum));
+        assert_eq!(after(&[[7; 2 * MAX_FRAME].as_slice(), &[0]].concat()), expected(FrameError::TooLong));
+        // A valid frame with another content, and one with bytes after the message.
         for other in [encode(&9u8, &mut [0; 9]).unwrap(), encode(&(0u8, 0u8), &mut [0; 9]).unwrap()] {
-            assert_eq!(after(other), told(FrameError::Message));
+            assert_eq!(after(other), expected(FrameError::Message));
         }
         assert_eq!(after(&[0, 0, 0]), vec![Ok(Message::Quiet)]);
     }
 
     proptest! {
         #[test]
-        fn messages_arrive_in_whatever_pieces(sent in proptest::collection::vec(messages(), 1..5), piece in 1usize..700) {
+        fn messages_arrive_in_pieces_of_any_size(sent in proptest::collection::vec(messages(), 1..5), piece in 1usize..700) {
             let bytes: Vec<u8> = sent.iter().flat_map(frame).collect();
             let arrived: Vec<Message> = received(&bytes, piece).into_iter().map(Result::unwrap).collect();
             prop_assert_eq!(arrived, sent);
         }
 
-        /// Of a stream with one changed, lost or added byte all messages arrive but those that it touched, and nothing else.
+        /// After one changed, lost or added byte, only the messages that contain it are lost.
         #[test]
-        fn one_bad_byte_costs_two_messages_at_most(
+        fn one_bad_byte_damages_at_most_two_messages(
             sent in proptest::collection::vec(messages(), 1..6),
             place in any::<prop::sample::Index>(),
             byte in any::<u8>(),
@@ -247,7 +251,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..2000), piece in 1usize..2000) {
+        fn a_frame_after_arbitrary_bytes_arrives(bytes in proptest::collection::vec(any::<u8>(), 0..2000), piece in 1usize..2000) {
             let good = frame(&Message::Quiet);
             let arrived = received(&[&bytes[..], &[0], &good].concat(), piece);
             prop_assert_eq!(arrived.last(), Some(&Ok(Message::Quiet)));

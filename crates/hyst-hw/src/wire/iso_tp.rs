@@ -1,72 +1,72 @@
 //! Messages over a CAN bus: ISO 15765-2 (ISO-TP), classic frames of 8 bytes and FD frames of up to 64.
 //!
-//! No bus and no clock: [`IsoTp::frame`] gives the frames that are to be sent, [`IsoTp::take`] takes those that came, and who has a clock
-//! waits for [`IsoTp::pause`] between them. A message that lost a frame is given up; who wants it asks again.
+//! There is no bus and no clock here: [`IsoTp::frame`] returns the frames to send, [`IsoTp::take`] takes the received frames. A sender with
+//! a clock waits for [`IsoTp::pause`] between frames. A message with a lost frame is dropped; the host repeats its request.
 
 use core::time::Duration;
 
 use heapless::Vec;
 
-/// Most bytes of a CAN frame.
+/// Maximum number of bytes of a CAN frame.
 pub const MOST_CAN: usize = 64;
-/// Most bytes of a message whose length fits in a first frame of the usual form.
-const MOST_LENGTH: usize = 0xfff;
-/// What one end tells the other about its message: go on, wait, there is no room for it.
-const GO_ON: u8 = 0x30;
+/// Maximum length of a message (bytes): 12 bits in the first frame.
+const MAX_LENGTH: usize = 0xfff;
+/// Flow-control frames: continue to send, wait, overflow.
+const CONTINUE: u8 = 0x30;
 const WAIT: u8 = 0x31;
-const NO_ROOM: u8 = 0x32;
+const OVERFLOW: u8 = 0x32;
 
 /// Data of one CAN frame.
 pub type CanData = Vec<u8, MOST_CAN>;
 
-/// Lengths that a frame can have: all up to 8, beyond that those of CAN FD.
+/// Lengths of CAN FD frames above 8 bytes.
 const LENGTHS: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
-/// What fills a frame up to such a length.
-const FILL: u8 = 0xcc;
+/// Padding byte.
+const PADDING: u8 = 0xcc;
 
-/// Why a message is not sent.
+/// Errors on sending a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IsoTpError {
-    /// The last one is not out yet.
+    /// The previous message is not completely sent.
     Busy,
-    /// More bytes than there is room for.
+    /// The message is too long.
     TooLong,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sending {
     Nothing,
-    /// All in one frame.
+    /// Single frame.
     Single,
     First,
-    /// The other end has to say that it may go on.
+    /// Waiting for a flow-control frame.
     Waiting,
-    Going,
+    Consecutive,
 }
 
-/// One end of a connection, for messages of up to `N` bytes (4095 at most).
+/// One end of a connection, for messages of up to `N` bytes (at most 4095).
 #[derive(Debug, Clone)]
 pub struct IsoTp<const N: usize> {
-    /// Bytes of a frame: 8, or 64.
+    /// Maximum number of bytes of a frame: 8 or 64.
     width: usize,
     sending: Sending,
     out: Vec<u8, N>,
     sent: usize,
     number: u8,
-    /// Frames that may go before the other end has to be heard again; none if it does not matter.
-    block: Option<u8>,
-    /// What it wants between two frames.
+    /// Number of frames until the next flow-control frame is needed; `None` if none is needed.
+    block_left: Option<u8>,
+    /// Minimum time between two frames, from the flow-control frame.
     pause: Duration,
-    /// What the other end is to be told about its message.
-    answer: Option<u8>,
+    /// Flow-control frame to send.
+    flow_control: Option<u8>,
     into: Vec<u8, N>,
-    /// Bytes of the message that comes; zero if none does.
+    /// Length of the message that is being received; 0 if none is.
     expected: usize,
     next: u8,
 }
 
 impl<const N: usize> IsoTp<N> {
-    /// Over classic frames, or over those of CAN FD.
+    /// Returns an end of a connection; `fd`: with CAN FD frames.
     pub const fn new(fd: bool) -> Self {
         Self {
             width: if fd { MOST_CAN } else { 8 },
@@ -74,31 +74,31 @@ impl<const N: usize> IsoTp<N> {
             out: Vec::new(),
             sent: 0,
             number: 0,
-            block: None,
+            block_left: None,
             pause: Duration::ZERO,
-            answer: None,
+            flow_control: None,
             into: Vec::new(),
             expected: 0,
             next: 0,
         }
     }
 
-    /// Whether a message is on its way out.
+    /// Returns whether a message is being sent.
     pub fn busy(&self) -> bool {
         self.sending != Sending::Nothing
     }
 
-    /// Whether the other end has to allow what is still to be sent.
+    /// Returns whether the rest of the message waits for a flow-control frame.
     pub fn waits(&self) -> bool {
         self.sending == Sending::Waiting
     }
 
-    /// How long the other end wants to have between two frames of a message.
+    /// Returns the minimum time between two frames of a message, as required by the receiver.
     pub fn pause(&self) -> Duration {
         self.pause
     }
 
-    /// Gives up what is on its way out: the other end does not answer.
+    /// Drops the message that is being sent, because the receiver does not answer.
     pub fn give_up(&mut self) {
         self.sending = Sending::Nothing;
     }
@@ -106,29 +106,29 @@ impl<const N: usize> IsoTp<N> {
     /// Begins to send a message.
     ///
     /// # Errors
-    /// When another one is on its way, or it is too long.
+    /// If the previous message is not completely sent, or if the message is too long.
     pub fn send(&mut self, message: &[u8]) -> Result<(), IsoTpError> {
         if self.busy() {
             return Err(IsoTpError::Busy);
         }
         self.out.clear();
-        if message.len() > MOST_LENGTH || self.out.extend_from_slice(message).is_err() {
+        if message.len() > MAX_LENGTH || self.out.extend_from_slice(message).is_err() {
             return Err(IsoTpError::TooLong);
         }
         self.sent = 0;
-        self.sending = if message.len() <= self.most_single() { Sending::Single } else { Sending::First };
+        self.sending = if message.len() <= self.max_single() { Sending::Single } else { Sending::First };
         Ok(())
     }
 
-    fn most_single(&self) -> usize {
+    fn max_single(&self) -> usize {
         if self.width == 8 { 7 } else { self.width - 2 }
     }
 
-    /// The next frame to send; none if there is nothing to send, or the other end has to be heard first.
+    /// Returns the next frame to send; `None` if there is none, or if a flow-control frame is needed first.
     pub fn frame(&mut self) -> Option<CanData> {
-        if let Some(answer) = self.answer.take() {
-            // All of it in one go, without pauses.
-            return Some(filled(&[answer, 0, 0], &[]));
+        if let Some(flow_control) = self.flow_control.take() {
+            // Block size 0 and pause 0: the sender may send all frames at once.
+            return Some(padded(&[flow_control, 0, 0], &[]));
         }
         let length = self.out.len();
         match self.sending {
@@ -136,24 +136,24 @@ impl<const N: usize> IsoTp<N> {
             Sending::Single => {
                 self.sending = Sending::Nothing;
                 Some(match u8::try_from(length) {
-                    Ok(short @ ..=7) => filled(&[short], &self.out),
-                    _ => filled(&[0, length as u8], &self.out),
+                    Ok(short @ ..=7) => padded(&[short], &self.out),
+                    _ => padded(&[0, length as u8], &self.out),
                 })
             }
             Sending::First => {
                 self.sent = self.width - 2;
                 self.number = 1;
                 self.sending = Sending::Waiting;
-                Some(filled(&[0x10 | (length >> 8) as u8, length as u8], &self.out[..self.sent]))
+                Some(padded(&[0x10 | (length >> 8) as u8, length as u8], &self.out[..self.sent]))
             }
-            Sending::Going => {
+            Sending::Consecutive => {
                 let end = length.min(self.sent + self.width - 1);
-                let frame = filled(&[0x20 | self.number], &self.out[self.sent..end]);
+                let frame = padded(&[0x20 | self.number], &self.out[self.sent..end]);
                 self.number = (self.number + 1) & 0xf;
                 self.sent = end;
                 if end == length {
                     self.sending = Sending::Nothing;
-                } else if let Some(left) = &mut self.block {
+                } else if let Some(left) = &mut self.block_left {
                     *left -= 1;
                     if *left == 0 {
                         self.sending = Sending::Waiting;
@@ -164,12 +164,12 @@ impl<const N: usize> IsoTp<N> {
         }
     }
 
-    /// Takes a frame that came; gives a message that is whole with it.
+    /// Takes a received frame; returns the message if the frame completes one.
     pub fn take(&mut self, data: &[u8]) -> Option<&[u8]> {
         let (&head, rest) = data.split_first()?;
         match head >> 4 {
             0 => {
-                // A length of its own byte comes with CAN FD.
+                // In long CAN FD frames, the length has its own byte.
                 let (length, bytes) = match head & 0xf {
                     0 if data.len() > 8 => {
                         let (&length, bytes) = rest.split_first()?;
@@ -188,17 +188,17 @@ impl<const N: usize> IsoTp<N> {
                 let length = usize::from(head & 0xf) << 8 | usize::from(low);
                 self.expected = 0;
                 self.into.clear();
-                // Zero announces a length of four bytes.
+                // A length of 0 announces a length field of four bytes, which is too long here.
                 if length > N || length == 0 {
-                    self.answer = Some(NO_ROOM);
+                    self.flow_control = Some(OVERFLOW);
                     return None;
                 }
-                // One that fits in a single frame does not come in several.
+                // A message that fits in a single frame must not begin with a first frame.
                 if length <= bytes.len() {
                     return None;
                 }
                 self.into.extend_from_slice(bytes).ok()?;
-                (self.expected, self.next, self.answer) = (length, 1, Some(GO_ON));
+                (self.expected, self.next, self.flow_control) = (length, 1, Some(CONTINUE));
                 None
             }
             2 if self.expected > 0 => {
@@ -217,9 +217,9 @@ impl<const N: usize> IsoTp<N> {
             }
             3 if self.sending == Sending::Waiting => {
                 match head {
-                    GO_ON => {
-                        self.sending = Sending::Going;
-                        self.block = rest.first().copied().filter(|frames| *frames > 0);
+                    CONTINUE => {
+                        self.sending = Sending::Consecutive;
+                        self.block_left = rest.first().copied().filter(|frames| *frames > 0);
                         self.pause = rest.get(1).copied().map_or(Duration::ZERO, pause);
                     }
                     WAIT => {}
@@ -232,24 +232,24 @@ impl<const N: usize> IsoTp<N> {
     }
 }
 
-/// The time that a byte stands for: milliseconds, or tenths of them.
+/// Decodes the minimum separation time (STmin): milliseconds, or tenths of milliseconds.
 const fn pause(byte: u8) -> Duration {
     match byte {
         0..=0x7f => Duration::from_millis(byte as u64),
         0xf1..=0xf9 => Duration::from_micros(100 * (byte - 0xf0) as u64),
-        // The standard has nothing for these; it takes them for the longest.
+        // Reserved values count as the longest time, as in the standard.
         _ => Duration::from_millis(0x7f),
     }
 }
 
-/// Head and bytes, filled up to a length that a frame can have.
-fn filled(head: &[u8], bytes: &[u8]) -> CanData {
+/// Joins head and bytes, and pads them to a valid frame length.
+fn padded(head: &[u8], bytes: &[u8]) -> CanData {
     let mut data = CanData::new();
-    // Both together are a frame at most.
+    // Both together fit in a frame.
     let _ = data.extend_from_slice(head);
     let _ = data.extend_from_slice(bytes);
     let length = LENGTHS.iter().copied().find(|length| data.len() <= *length).unwrap_or(MOST_CAN);
-    let _ = data.resize(if data.len() <= 8 { 8 } else { length }, FILL);
+    let _ = data.resize(if data.len() <= 8 { 8 } else { length }, PADDING);
     data
 }
 
@@ -260,7 +260,7 @@ mod tests {
 
     type End = IsoTp<1024>;
 
-    /// Frames go both ways until nobody has any; each is lost if `lost` says so.
+    /// Exchanges frames until both ends have none; a frame is lost if `lost` returns true.
     fn pass(from: &mut End, to: &mut End, lost: &mut impl FnMut() -> bool) -> std::vec::Vec<std::vec::Vec<u8>> {
         let mut arrived = std::vec::Vec::new();
         loop {
@@ -286,18 +286,18 @@ mod tests {
     }
 
     #[test]
-    fn the_frames_are_those_of_the_standard() {
+    fn the_frames_follow_the_standard() {
         let mut end = End::new(false);
         end.send(&[1, 2, 3]).unwrap();
         assert_eq!(end.send(&[4]), Err(IsoTpError::Busy));
-        assert_eq!(end.frame().unwrap(), [3, 1, 2, 3, FILL, FILL, FILL, FILL]);
+        assert_eq!(end.frame().unwrap(), [3, 1, 2, 3, PADDING, PADDING, PADDING, PADDING]);
         assert_eq!(end.frame(), None);
         let message: std::vec::Vec<u8> = (0..20).collect();
         end.send(&message).unwrap();
         assert_eq!(end.frame().unwrap(), [0x10, 20, 0, 1, 2, 3, 4, 5]);
         assert_eq!(end.frame(), None);
         assert!(end.waits());
-        // One frame, then another word; wait; go on.
+        // Continue with one frame; wait; continue.
         end.take(&[0x30, 1, 0]);
         assert_eq!(end.frame().unwrap(), [0x21, 6, 7, 8, 9, 10, 11, 12]);
         assert_eq!(end.frame(), None);
@@ -306,7 +306,7 @@ mod tests {
         end.take(&[0x30, 0, 0]);
         assert_eq!(end.frame().unwrap(), [0x22, 13, 14, 15, 16, 17, 18, 19]);
         assert!(!end.busy());
-        // Of CAN FD.
+        // CAN FD frames.
         let mut end = End::new(true);
         end.send(&message).unwrap();
         let frame = end.frame().unwrap();
@@ -315,32 +315,32 @@ mod tests {
     }
 
     #[test]
-    fn the_other_end_says_how_fast() {
+    fn the_receiver_sets_the_time_between_frames() {
         let mut end = End::new(false);
         for (byte, micros) in [(0, 0), (20, 20_000), (0x7f, 127_000), (0xf1, 100), (0xf9, 900), (0x80, 127_000)] {
             end.give_up();
             end.send(&[0; 100]).unwrap();
             end.frame().unwrap();
-            end.take(&[GO_ON, 0, byte]);
+            end.take(&[CONTINUE, 0, byte]);
             assert_eq!(end.pause(), Duration::from_micros(micros), "{byte:#x}");
         }
     }
 
     #[test]
-    fn a_message_without_room_is_refused() {
+    fn a_message_that_is_too_long_is_refused() {
         let mut end = End::new(false);
-        // 1025 bytes, and a length in four more bytes.
+        // A length of 1025 bytes, and a length field of four bytes.
         for first in [[0x14, 1, 0, 1, 2, 3, 4, 5], [0x10, 0, 0, 0, 0x20, 0, 1, 2]] {
             assert_eq!(end.take(&first), None);
-            assert_eq!(end.frame().unwrap()[..3], [NO_ROOM, 0, 0]);
+            assert_eq!(end.frame().unwrap()[..3], [OVERFLOW, 0, 0]);
             assert_eq!(end.take(&[0x21, 6, 7, 8, 9, 10, 11, 12]), None);
         }
-        // Who is told so gives up.
+        // The sender drops the message after an overflow frame.
         end.send(&[0; 100]).unwrap();
         end.frame().unwrap();
-        end.take(&[NO_ROOM, 0, 0]);
+        end.take(&[OVERFLOW, 0, 0]);
         assert!(!end.busy() && end.frame().is_none());
-        // A length of its own byte is of long frames.
+        // A length in its own byte is invalid in a short frame.
         assert_eq!(end.take(&[0, 2, 1, 2, 0, 0, 0, 0]), None);
     }
 
@@ -353,9 +353,9 @@ mod tests {
             prop_assert!(!from.busy());
         }
 
-        /// What arrives over a bus that loses frames is whole.
+        /// Over a bus that loses frames, only complete messages arrive.
         #[test]
-        fn nothing_arrives_in_part(
+        fn only_complete_messages_arrive(
             messages in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 1..300), 1..6),
             losses in proptest::collection::vec(0u8..10, 1..60),
         ) {
@@ -371,7 +371,7 @@ mod tests {
         }
 
         #[test]
-        fn any_frames_are_survived(frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..65), 0..60)) {
+        fn arbitrary_frames_do_not_panic(frames in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..65), 0..60)) {
             let mut end = End::new(true);
             let _ = end.send(&[7; 500]);
             for frame in &frames {

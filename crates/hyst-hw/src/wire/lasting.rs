@@ -1,21 +1,25 @@
-//! Something that goes on for a while.
+//! The duration of a condition.
 
-/// Breaks of up to this share of the patience do not end it: an error that swings through zero is there all the time.
-const BREAK: f32 = 0.2;
+/// Longest interruption that does not reset the duration, as a share of the patience.
+///
+/// An oscillating error crosses zero, but is still too large.
+const MAX_INTERRUPTION: f32 = 0.2;
 
-/// For how long something has been so.
+/// Measures how long a condition has lasted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lasting {
     periods: u32,
-    /// Periods of a break that may end it.
-    without: u32,
+    /// Periods of the present interruption.
+    interruption: u32,
 }
 
 impl Lasting {
-    /// Takes whether it is so in the next period; gives whether it has been for more than `patience` periods.
+    /// Takes the condition in the next period.
+    ///
+    /// Returns whether it has lasted for more than `patience` periods.
     pub fn step(&mut self, is: bool, patience: f32) -> bool {
-        self.without = if is { 0 } else { self.without.saturating_add(1) };
-        if self.without as f32 > BREAK * patience {
+        self.interruption = if is { 0 } else { self.interruption.saturating_add(1) };
+        if self.interruption as f32 > MAX_INTERRUPTION * patience {
             self.periods = 0;
         } else if is || self.periods > 0 {
             self.periods = self.periods.saturating_add(1);
@@ -29,14 +33,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn short_breaks_do_not_count_and_long_ones_do() {
+    fn short_interruptions_do_not_reset_the_duration_and_long_ones_do() {
         let ends = |pattern: &dyn Fn(u32) -> bool| {
             let mut lasting = Lasting::default();
             (0..1000).find(|k| lasting.step(pattern(*k), 50.0))
         };
         assert_eq!(ends(&|_| true), Some(50));
         assert_eq!(ends(&|_| false), None);
-        // Ten periods of a break are a fifth of fifty, eleven are more. It ends while it is so.
+        // An interruption of 10 of 50 periods does not reset the duration, one of 11 does. The result is true only while the condition holds.
         assert_eq!(ends(&|k| k % 20 >= 10), Some(70));
         assert_eq!(ends(&|k| k % 22 >= 11), None);
     }

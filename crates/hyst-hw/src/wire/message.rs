@@ -1,100 +1,102 @@
-//! What host and device say to each other.
+//! Requests of the host and answers of the device.
 //!
-//! The host asks, the device answers; each request has a number, which its answer repeats. Everything that moves is numbered
-//! from the start of a run: drive `k` of the run, sample `k` that was measured with it. A request that is lost, comes twice or
-//! comes late therefore does no harm: the host asks again, and what the device has had already it passes over. To stop needs no number
-//! of a run, so that anybody may: a late request for it ends at rest what it was not meant for.
+//! The host sends requests, the device answers. The answer repeats the number of its request. Drives and samples are numbered from
+//! the start of a run; sample `k` is measured with drive `k`. So lost, duplicated and late requests do no harm: the host repeats a
+//! request, and the device ignores drives that it already has. A stop request does not contain the number of the run, so that
+//! every host may stop the device. A late stop request therefore also stops a newer run.
 
 use core::fmt;
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Version of these messages. A host and a device of different ones do not talk.
+/// Version of these messages. Host and device must have the same version.
 pub const PROTOCOL: u16 = 2;
-/// Most drives in a request.
+/// Maximum number of drives in a request.
 pub const MOST_DRIVES: usize = 64;
-/// Most samples in an answer.
+/// Maximum number of samples in an answer.
 pub const MOST_SAMPLES: usize = 17;
-/// Most bytes of a name.
+/// Maximum length of a name (bytes).
 pub const MOST_NAME: usize = 32;
-/// Most bytes of a model in a request.
+/// Maximum number of bytes of a model in a request.
 pub const MOST_CHUNK: usize = 256;
 
 /// A request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// The answer repeats it.
+    /// Number of the request, which the answer repeats.
     pub number: u32,
-    /// What is asked.
+    /// Content of the request.
     pub ask: Ask,
 }
 
-/// What a host asks for.
+/// Content of a request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Ask {
-    /// Which version is spoken. This request and its answer are the same in every version.
+    /// Asks for the version of the protocol. This request and its answer are the same in every version.
     Hello,
-    /// What the device is and can do.
+    /// Asks for the identity of the device.
     Describe,
-    /// To be driven: the clock starts, the output stays where it is.
+    /// Starts a run: the clock starts, the output does not change.
     Start(Start),
-    /// To take drives and to give samples.
+    /// Sends drives and asks for samples.
     Exchange(Exchange),
-    /// To come to rest, within the slew limit.
+    /// Ramps to rest within the slew limit.
     Stop,
-    /// To come to rest, and not to start again before the fault is cleared.
+    /// Ramps to rest; the device does not start again before the fault is cleared.
     Emergency,
-    /// To forget this fault, once at rest: who has seen another one does not know why it stands.
+    /// Clears this fault at rest. Another fault, which the host has not read, is not cleared.
     Clear(Fault),
-    /// To take a part of a model.
+    /// Sends a part of a model.
     Model(Chunk),
-    /// How it stands.
+    /// Asks for the status.
     Status,
 }
 
-/// How a run is to be done.
+/// Mode and limits of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Start {
-    /// Chosen by the host, another one for each run: requests of an older run are refused.
+    /// Number of the run, chosen by the host and different for each run.
+    ///
+    /// Requests of an older run are refused.
     pub session: u32,
-    /// Whether drives are voltages, or references that the device follows.
+    /// Meaning of the drives.
     pub mode: Mode,
-    /// Samples a second \[Hz\].
+    /// Sample rate \[Hz\].
     pub rate_hz: f32,
     /// Lowest voltage \[V\].
     pub low_v: f32,
     /// Highest voltage \[V\].
     pub high_v: f32,
-    /// Steepest slope \[V/s\].
+    /// Slew limit \[V/s\].
     pub slew_v_per_s: f32,
-    /// Highest temperature \[°C\].
+    /// Highest permitted temperature \[°C\].
     pub hottest_degc: f32,
-    /// Greatest tracking error \[output unit\]; of no account where voltages are driven.
+    /// Largest permitted tracking error \[output unit\]; used only with references.
     pub error: f32,
-    /// Silence of the host after which the device comes to rest \[s\].
+    /// Watchdog time: silence of the host after which the device ramps to rest \[s\].
     pub silence_s: f32,
-    /// Whether the external force is estimated, by the observer of the model that was handed over.
+    /// Whether the device estimates the external force, with the uploaded observer.
     pub force: bool,
 }
 
-/// What a drive is.
+/// Meaning of the drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
-    /// A voltage \[V\].
+    /// Voltages \[V\].
     Voltage,
-    /// A reference \[output unit\], which the device follows with its model and its loop.
+    /// References \[output unit\]; the device follows them with its controller.
     Reference,
-    /// Nothing: each asks for a sample, and the output stays where it is.
+    /// None: each drive only requests a sample, and the output does not change.
     Nothing,
 }
 
-/// A piece of drive, and how much has been heard of the samples.
+/// A block of drives, and the number of samples that the host has.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exchange {
     /// The run.
     pub session: u32,
-    /// Samples that the host has: the answer goes on from there.
+    /// Number of samples that the host has; the answer continues from there.
     pub heard: u32,
     /// Number of the first drive.
     pub first: u32,
@@ -105,18 +107,20 @@ pub struct Exchange {
 /// A part of a model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chunk {
-    /// Where it begins.
+    /// Position of the part in the model (bytes).
     pub offset: u32,
-    /// Bytes of the whole model.
+    /// Length of the whole model (bytes).
     pub total: u32,
-    /// Their [check sum](model_sum): parts of two models are not put together.
+    /// [Checksum](model_sum) of the whole model. It prevents a mixture of two models.
     pub sum: u32,
-    /// Its bytes.
+    /// The bytes of the part.
     pub bytes: Vec<u8, MOST_CHUNK>,
 }
 
-/// CRC-32C (Castagnoli) of a model. Another polynomial than that of the sums at its parts' ends: over bytes that end with their own sum a CRC is the same
-/// whatever the bytes are.
+/// Returns the CRC-32C (Castagnoli) of a model.
+///
+/// The head and the block of a controller end with their own CRC-32. A second CRC with the same polynomial would not depend on
+/// their content, so this one has another polynomial.
 pub fn model_sum(bytes: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(bytes)
 }
@@ -124,41 +128,41 @@ pub fn model_sum(bytes: &[u8]) -> u32 {
 /// An answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reply {
-    /// Of the request.
+    /// Number of the request.
     pub number: u32,
-    /// What is answered.
+    /// Content of the answer.
     pub tell: Tell,
 }
 
-/// What a device answers.
+/// Content of an answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[allow(clippy::large_enum_variant, reason = "no heap: there is nothing to box it in")]
+#[allow(clippy::large_enum_variant, reason = "no heap, so the variant cannot be boxed")]
 pub enum Tell {
-    /// The version that is spoken.
+    /// Version of the protocol.
     Version(u16),
-    /// What it is and can do.
+    /// Identity of the device.
     Identity(Identity),
-    /// How it stands.
+    /// Status of the device.
     Status(Status),
-    /// How it stands, and what it has measured.
+    /// Status of the device, and measured samples.
     Samples {
-        /// How it stands.
+        /// Status of the device.
         status: Status,
         /// Number of the first sample.
         first: u32,
         /// The samples.
         samples: Vec<Measured, MOST_SAMPLES>,
     },
-    /// How much of the model it has.
+    /// Number of bytes of the model that the device has.
     ModelBytes(u32),
-    /// That it does not do what was asked, and why; how it stands.
+    /// Reason why the request is refused, and status of the device.
     Refused(Refusal, Status),
 }
 
-/// What a device is and can do.
+/// Name, ranges and abilities of a device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
-    /// What it calls itself, in UTF-8.
+    /// Name of the device, in UTF-8.
     pub name: Vec<u8, MOST_NAME>,
     /// Lowest voltage \[V\].
     pub min_v: f32,
@@ -166,23 +170,23 @@ pub struct Identity {
     pub max_v: f32,
     /// Voltage at rest \[V\].
     pub rest_v: f32,
-    /// Steepest slope \[V/s\].
+    /// Largest slew rate \[V/s\].
     pub max_slew_v_per_s: f32,
-    /// Slowest clock \[Hz\].
+    /// Slowest sample clock \[Hz\].
     pub min_rate_hz: f32,
-    /// Fastest clock \[Hz\].
+    /// Fastest sample clock \[Hz\].
     pub max_rate_hz: f32,
     /// Unit of the output.
     pub output: Unit,
-    /// Whether it measures a temperature.
+    /// Whether the device measures a temperature.
     pub temperature: bool,
-    /// Whether it measures a load.
+    /// Whether the device measures a load.
     pub load: bool,
-    /// Whether it follows references.
+    /// Whether the device can follow references.
     pub follows: bool,
-    /// Drives that it can hold.
+    /// Length of the drive queue.
     pub queue: u32,
-    /// Most bytes of a model.
+    /// Maximum size of a model (bytes).
     pub model: u32,
 }
 
@@ -199,59 +203,59 @@ pub enum Unit {
     Newton,
 }
 
-/// How a device stands.
+/// Status of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// What it does.
+    /// State of the device.
     pub state: State,
-    /// The run, if there is or was one.
+    /// Number of the present or last run.
     pub session: u32,
     /// Periods of the clock since the run began.
     pub tick: u32,
-    /// What it puts out \[V\].
+    /// Present output voltage \[V\].
     pub present_v: f32,
-    /// What the sensor shows, in the device's unit.
+    /// Present sensor reading, in the device's unit.
     pub output: f32,
-    /// Drives that it has had, without a gap, from the beginning of the run.
+    /// Number of drives received without a gap since the run began.
     pub received: u32,
-    /// Number of the first drive for which it has no room.
+    /// Number of the first drive for which the device has no room.
     pub room: u32,
-    /// Samples that it has measured.
+    /// Number of measured samples.
     pub measured: u32,
 }
 
-/// What a device does.
+/// State of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
-    /// Nothing: the output stands at rest.
+    /// At rest.
     Idle,
-    /// A run: it plays what it is given, and holds the last of it.
+    /// In a run: the device plays the received drives and holds the last one.
     Running,
-    /// It comes to rest.
+    /// Ramping to rest.
     Stopping,
-    /// It comes to rest or stands there; a fault has to be cleared before the next run.
+    /// Ramping to rest or at rest after a fault, which must be cleared before the next run.
     Fault(Fault),
 }
 
-/// Why a device ended a run by itself.
+/// Reason why a run ended with a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Fault {
-    /// Nothing was heard of the host for as long as the run allows.
+    /// Watchdog: no valid request from the host within the time that the run allows.
     Silence,
-    /// The host asked for it.
+    /// Emergency stop.
     Emergency,
     /// The temperature is too high.
     Temperature,
-    /// A sensor shows what is no number.
+    /// A sensor reading is not a number.
     Sensor,
-    /// The output is further from the reference than the run allows.
+    /// The tracking error is larger than the run allows.
     TrackingError,
-    /// The drive that the reference asks for lies beyond the limits, and has for too long.
+    /// The drive has been at a limit for too long, and the output does not reach the reference.
     Saturation,
 }
 
 impl Fault {
-    /// Number for logs.
+    /// Returns the number of the fault, for logs and messages.
     pub const fn code(self) -> u8 {
         match self {
             Self::Silence => 1,
@@ -268,94 +272,100 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Silence => {
-                "the host was silent for longer than the run allows; look at the line and at what kept the host busy"
+                "the host was silent for longer than the run allows (--silence); check the line, and what kept the host busy"
             }
-            Self::Emergency => "an emergency stop was asked for",
-            Self::Temperature => "the temperature is above the limit of the run; let it cool or raise the limit",
-            Self::Sensor => "a sensor shows no number: it is past the end of its range, as where a loop oscillates, or its cable is out",
+            Self::Emergency => "an emergency stop was requested",
+            Self::Temperature => {
+                "the temperature is above the limit of the run (--hottest); let the actuator cool, or raise the limit"
+            }
+            Self::Sensor => "a sensor reading is not a number; check its cable, its range, and whether the loop oscillates",
             Self::TrackingError => {
-                "the output is further from the reference than the run allows; look for what holds the actuator"
+                "the output is further from the reference than the run allows (--max-error); check what blocks the actuator"
             }
             Self::Saturation => {
-                "the drive stands at a limit and the output stays away from its reference; shrink or shift the reference, or look for what holds the actuator"
+                "the drive is at a limit and the output does not reach the reference; \
+                 reduce or shift the reference, or check what blocks the actuator"
             }
         })
     }
 }
 
-/// What a device does not do.
+/// Reason why a device refuses a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// It is in another state than the request needs.
+    /// The device is not in the state that the request needs.
     State,
-    /// The request is of another run.
+    /// The request belongs to another run.
     Session,
-    /// A value of the start is out of the device's range.
+    /// A value of the start request is outside the device's range.
     Start(Field),
-    /// A drive is out of range or no number: none of the request was taken.
+    /// A drive is out of range or not a number; no drive of the request was accepted.
     Drive(u32),
-    /// It has no model, and follows no reference without one.
+    /// The device has no model, which it needs to follow references.
     NoModel,
-    /// The model has more bytes than there is room for.
+    /// The model is too large.
     ModelSize,
-    /// A part of the model begins beyond what has come so far.
+    /// An earlier part of the model is missing.
     ModelGap,
-    /// The bytes are no model that it can run.
+    /// The device cannot run the model.
     Model,
 }
 
-/// A value of a start.
+/// A value of a start request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Field {
-    /// The rate.
+    /// Sample rate.
     Rate,
-    /// The voltage limits.
+    /// Voltage limits.
     Voltage,
-    /// The slew limit.
+    /// Slew limit.
     Slew,
-    /// The silence.
+    /// Watchdog time.
     Silence,
-    /// The temperature limit.
+    /// Temperature limit.
     Temperature,
-    /// The greatest tracking error.
+    /// Largest permitted tracking error.
     Error,
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::State => "the device is busy with another run, or on its way to rest: stop that one, or wait and look (hystctl status)",
-            Self::Session => "the device is in another run, or was started anew: begin again",
-            Self::Start(Field::Rate) => "the device cannot run at this rate",
-            Self::Start(Field::Voltage) => "the voltage limits are not within the device's own",
-            Self::Start(Field::Slew) => "the slew limit is not positive, or above the device's own",
-            Self::Start(Field::Silence) => "the silence that is allowed has to be positive, and a minute at most",
-            Self::Start(Field::Temperature) => "the temperature limit is no number",
-            Self::Start(Field::Error) => "the greatest tracking error has to be positive",
+            Self::State => "the device is busy with another run, or still ramps to rest: stop that run, or wait; hystctl status prints its state",
+            Self::Session => "the device is in another run, or was reset: start the run again",
+            Self::Start(Field::Rate) => "the device cannot run at this rate: give another one",
+            Self::Start(Field::Voltage) => "the voltage limits are outside the device's range: give other ones (--limit)",
+            Self::Start(Field::Slew) => "the slew limit must be above 0 and at most that of the device (--slew)",
+            Self::Start(Field::Silence) => "the permitted silence of the host must be above 0 and at most 60 s (--silence)",
+            Self::Start(Field::Temperature) => "the temperature limit must be a number (--hottest)",
+            Self::Start(Field::Error) => "the largest permitted tracking error must be above 0 (--max-error)",
             Self::Drive(k) => {
-                return write!(f, "drive {k} of the run is out of range; nothing of its block was applied");
+                return write!(f, "drive sample {k} of the run is out of range; nothing of its block was applied");
             }
-            Self::NoModel => "the device has no model to follow a reference with: upload one first",
-            Self::ModelSize => "the model is larger than the device has room for",
+            Self::NoModel => "the device has no model, which it needs to follow references: upload one first",
+            Self::ModelSize => "the model is larger than the device has room for: give a smaller one",
             Self::ModelGap => "a part of the model was lost: send it again",
-            Self::Model => "the device cannot run this model: its kind, its size or its version is another one",
+            Self::Model => {
+                "the device cannot run this model: its kind, size or version is not supported; \
+                 give a model of plays, or update the firmware"
+            }
         })
     }
 }
 
-/// One instant of a run.
+/// One sample of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Period of the clock, from the beginning of the run.
+    /// Period of the clock, counted from the beginning of the run.
     pub tick: u32,
-    /// What was put out \[V\].
+    /// Applied voltage \[V\].
     pub drive_v: f32,
-    /// The output.
+    /// Measured output, in the device's unit.
     pub output: f32,
-    /// Temperature \[°C\]; of no account where the device has none.
+    /// Temperature \[°C\]; meaningless if the device does not measure it.
     pub temperature_degc: f32,
-    /// Load \[N\]; of no account where the device has none.
+    /// Load \[N\]; meaningless if the device does not measure it.
     pub load_n: f32,
-    /// Force that was estimated on the device \[N\], where it has a force observer.
+    /// Force estimated on the device \[N\], if it has a force observer.
     pub force_n: Option<f32>,
 }

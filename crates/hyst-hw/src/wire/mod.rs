@@ -1,12 +1,14 @@
-//! What goes over a serial line, a CAN bus or a socket, the same source on host and board: no heap, no clock, no device.
+//! The protocol over serial lines, CAN buses and sockets.
 //!
-//! - `frame.rs`: bytes to frames and back.
+//! Host and board use the same source. It has no heap, no clock and no drivers.
+//!
+//! - `frame.rs`: frames on a byte stream.
 //! - `iso_tp.rs`: messages over a CAN bus.
-//! - `message.rs`: what host and device say to each other.
-//! - `device.rs`: what a device does with it.
-//! - `lasting.rs`: for how long something has gone on, as an error that is too large.
+//! - `message.rs`: requests and answers.
+//! - `device.rs`: the device's side of the protocol.
+//! - `lasting.rs`: the duration of a condition, for example of a tracking error that is too large.
 //! - `recipe.rs`: a model, a PID and a force observer as bytes.
-//! - `follower.rs`: how a device follows references with them.
+//! - `follower.rs`: a controller that follows references with them.
 //! - `server.rs`: requests and answers over the drivers of a board.
 
 mod device;

@@ -1,20 +1,20 @@
-//! What a device follows references with, as bytes.
+//! A controller as bytes: a model, and optionally a PID and a force observer.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 4 | `HYCT` |
 //! | 1 | version of this format |
-//! | 1 | bit 0: with a PID; bit 1: with a force observer |
+//! | 1 | bit 0: contains a PID; bit 1: contains a force observer |
 //! | 0 or 72 | the nine numbers of [`PidParams`] in their order, `f64`, little endian |
 //! | 0 or 24 | the three numbers of [`ForceParams`] in their order, `f64`, little endian |
-//! | 4 | CRC-32 (ISO-HDLC) of everything before, little endian |
-//! | n | the model: a [block](hyst_core::read_block), which has a check sum of its own |
+//! | 4 | CRC-32 (ISO-HDLC) of all bytes before, little endian |
+//! | n | the model: a [block](hyst_core::read_block), which has its own checksum |
 
 use core::fmt;
 
 use hyst_core::{BlockError, ChainParams, ForceParams, List, PidParams, read_block};
 
-/// Version of these bytes.
+/// Version of this format.
 pub const RECIPE: u8 = 1;
 
 const MAGIC: [u8; 4] = *b"HYCT";
@@ -23,38 +23,38 @@ const FORCE_NUMBERS: usize = 3;
 const WITH_PID: u8 = 1;
 const WITH_FORCE: u8 = 2;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-/// Bytes in front of the model at most.
+/// Maximum number of bytes before the model.
 pub const MOST_HEAD: usize = MAGIC.len() + 2 + 8 * (PID_NUMBERS + FORCE_NUMBERS) + 4;
 
-/// Plays and elements of a model that a device has room for.
+/// Maximum number of plays of a model on a device.
 pub const MOST_PLAYS: usize = 64;
-/// Creep elements, or dead zones of a curve, that a device has room for.
+/// Maximum number of creep elements, or of dead zones of an asymmetry, of a model on a device.
 pub const MOST_ELEMENTS: usize = 16;
 
-/// A model with room for what a device can run.
+/// A model with the capacity of a device.
 pub type Model = ChainParams<List<MOST_PLAYS>, List<MOST_ELEMENTS>>;
 
-/// A model whose inverse leads, a PID that corrects it and a force observer beside it, if there are such.
+/// A controller: the model for the feedforward, and optionally a PID and a force observer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
-    /// The correction.
+    /// Feedback, if any.
     pub pid: Option<PidParams>,
-    /// What the model of the free actuator does not explain, as a force.
+    /// Force observer, if any. It converts the residual of the unloaded actuator's model to a force.
     pub force: Option<ForceParams>,
     /// The model.
     pub model: Model,
 }
 
-/// Why bytes are no recipe.
+/// Errors on reading a recipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecipeError {
-    /// They do not begin with `HYCT`.
+    /// The bytes do not begin with `HYCT`.
     NotARecipe,
-    /// They are of another version.
+    /// The bytes have another version.
     Version(u8),
-    /// There are fewer than there should be.
+    /// Bytes are missing at the end.
     Truncated,
-    /// The gains were changed on the way.
+    /// The checksum of the gains does not match.
     Corrupt,
     /// The model cannot be read.
     Model(BlockError),
@@ -67,8 +67,8 @@ impl fmt::Display for RecipeError {
             Self::Version(version) => {
                 write!(f, "controller version {version}, this build reads {RECIPE}: update the older of the two")
             }
-            Self::Truncated => f.write_str("controller cut short: send it again"),
-            Self::Corrupt => f.write_str("controller damaged: send it again"),
+            Self::Truncated => f.write_str("the controller is incomplete: send it again"),
+            Self::Corrupt => f.write_str("the controller is damaged: send it again"),
             Self::Model(error) => error.fmt(f),
         }
     }
@@ -90,11 +90,11 @@ fn of_pid(pid: &PidParams) -> [f64; PID_NUMBERS] {
     ]
 }
 
-/// What stands in front of the model's block.
+/// Returns the bytes before the model's block.
 pub fn head(pid: Option<&PidParams>, force: Option<&ForceParams>) -> heapless::Vec<u8, MOST_HEAD> {
     let mut bytes = heapless::Vec::new();
     let with = if pid.is_some() { WITH_PID } else { 0 } | if force.is_some() { WITH_FORCE } else { 0 };
-    // All of it fits: that is what `MOST_HEAD` counts.
+    // All bytes fit, by the definition of `MOST_HEAD`.
     let _ = bytes.extend_from_slice(&MAGIC);
     let _ = bytes.extend_from_slice(&[RECIPE, with]);
     let of_force = force.map(|f| [f.stiffness, f.kappa, f.chi]);
@@ -153,9 +153,11 @@ mod tests {
     use super::*;
     use crate::wire::model_sum;
 
-    /// Head and block end with their own sums; the sum that tells a controller from another has to see what is before these.
+    /// Head and block end with their own checksums.
+    ///
+    /// The checksum of the whole controller must still depend on the gains.
     #[test]
-    fn controllers_that_differ_in_gains_alone_have_different_sums() {
+    fn controllers_that_differ_only_in_gains_have_different_checksums() {
         let forces = [1.0, 2.0].map(|stiffness| {
             let mut bytes: Vec<u8> =
                 head(None, Some(&ForceParams { stiffness, kappa: 1.0, chi: 0.0 })).iter().copied().collect();
@@ -165,6 +167,6 @@ mod tests {
             bytes
         });
         assert_ne!(model_sum(&forces[0]), model_sum(&forces[1]));
-        assert_eq!(CRC.checksum(&forces[0]), CRC.checksum(&forces[1]), "what has to be told apart");
+        assert_eq!(CRC.checksum(&forces[0]), CRC.checksum(&forces[1]), "a second CRC-32 would not distinguish them");
     }
 }

@@ -1,5 +1,7 @@
-//! The line on the device's side, by the traits that drivers of boards implement: [`embedded_io`] for a serial port,
-//! [`embedded_can`] for a bus. Nothing here waits: a main loop calls `poll` as often as it comes round.
+//! The line on the device's side.
+//!
+//! It uses the common driver traits: [`embedded_io`] for a serial port, [`embedded_can`] for a CAN bus. Nothing here blocks: the main
+//! loop calls `poll` in each pass.
 
 use embedded_can::nb::Can;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
@@ -10,12 +12,12 @@ use super::frame::{Deframer, MAX_FRAME, encode};
 use super::iso_tp::{CanData, IsoTp};
 use super::message::Request;
 
-/// Bytes, or frames, that are looked at in one `poll`: a flood of them does not keep the clock waiting.
-const MOST_AT_ONCE: usize = 64;
-/// Largest identifier of 11 bits.
-const MOST_STANDARD: u32 = 0x7ff;
+/// Maximum number of bytes or frames in one `poll`, so that many of them do not delay the clock.
+const MAX_PER_POLL: usize = 64;
+/// Largest standard identifier (11 bits).
+const MAX_STANDARD_ID: u32 = 0x7ff;
 
-/// Answers over a serial line.
+/// Answers requests over a serial line.
 #[derive(Debug)]
 pub struct SerialServer {
     deframer: Deframer,
@@ -31,16 +33,17 @@ impl Default for SerialServer {
 }
 
 impl SerialServer {
-    /// Nothing was said yet.
+    /// Returns a server without received bytes.
     pub const fn new() -> Self {
         Self { deframer: Deframer::new(), answer: [0; MAX_FRAME], length: 0, sent: 0 }
     }
 
-    /// Sends what is to be sent and takes what has come, as far as `line` goes along at once. One answer at a time: while it goes out, requests
-    /// wait in the line.
+    /// Sends the pending answer and reads requests, as far as `line` is ready.
+    ///
+    /// While an answer is being sent, requests wait in the line.
     ///
     /// # Errors
-    /// Those of the line.
+    /// The errors of the line.
     pub fn poll<C, L, const Q: usize, const M: usize>(
         &mut self,
         device: &mut Device<C, Q, M>,
@@ -50,7 +53,7 @@ impl SerialServer {
         C: Control,
         L: Read + ReadReady + Write + WriteReady,
     {
-        for _ in 0..MOST_AT_ONCE {
+        for _ in 0..MAX_PER_POLL {
             let rest = self.answer.get(self.sent..self.length).unwrap_or_default();
             if !rest.is_empty() {
                 if !line.write_ready()? {
@@ -63,7 +66,7 @@ impl SerialServer {
             if !line.read_ready()? || line.read(&mut byte)? == 0 {
                 return Ok(());
             }
-            // What was changed on the way is asked again.
+            // The host repeats a damaged request.
             if let Some(Ok(request)) = self.deframer.next::<Request>(&mut &byte[..]) {
                 self.length = encode(&device.answer(&request), &mut self.answer).map_or(0, <[u8]>::len);
                 self.sent = 0;
@@ -73,30 +76,37 @@ impl SerialServer {
     }
 }
 
-/// Answers over a CAN bus of classic frames, by ISO-TP.
+/// Answers requests over a CAN bus with classic frames, by ISO-TP.
 #[derive(Debug)]
 pub struct CanServer {
     tp: IsoTp<MAX_FRAME>,
     deframer: Deframer,
-    /// Identifier of the frames that this device hears, and of those that it sends.
-    hears: u32,
-    speaks: Option<Id>,
-    /// Number of the request that is being answered.
-    answers: u32,
-    /// A frame for which the bus had no room.
+    /// Identifiers of the frames that this device receives and sends.
+    receive_id: u32,
+    send_id: Option<Id>,
+    /// Number of the request whose answer is being sent.
+    answered_number: u32,
+    /// A frame that the controller did not accept.
     held: Option<CanData>,
 }
 
 impl CanServer {
-    /// A device that hears frames with one identifier and sends them with another one.
-    pub fn new(hears: u32, speaks: u32) -> Self {
-        Self { tp: IsoTp::new(false), deframer: Deframer::new(), hears, speaks: id(speaks), answers: 0, held: None }
+    /// Returns a server that receives frames with one identifier and sends frames with another one.
+    pub fn new(receive_id: u32, send_id: u32) -> Self {
+        Self {
+            tp: IsoTp::new(false),
+            deframer: Deframer::new(),
+            receive_id,
+            send_id: id(send_id),
+            answered_number: 0,
+            held: None,
+        }
     }
 
-    /// As [`SerialServer::poll`].
+    /// Sends the pending answer and reads requests, like [`SerialServer::poll`].
     ///
     /// # Errors
-    /// Those of the bus.
+    /// The errors of the bus.
     pub fn poll<C, B, const Q: usize, const M: usize>(
         &mut self,
         device: &mut Device<C, Q, M>,
@@ -106,28 +116,28 @@ impl CanServer {
         C: Control,
         B: Can,
     {
-        for _ in 0..MOST_AT_ONCE {
-            let spoke = self.speak(bus)?;
+        for _ in 0..MAX_PER_POLL {
+            let frame_sent = self.send_frame(bus)?;
             let frame = match bus.receive() {
                 Ok(frame) => frame,
-                Err(nb::Error::WouldBlock) if spoke => continue,
+                Err(nb::Error::WouldBlock) if frame_sent => continue,
                 Err(nb::Error::WouldBlock) => return Ok(()),
                 Err(nb::Error::Other(error)) => return Err(error),
             };
-            if number(frame.id()) != self.hears || frame.is_remote_frame() {
+            if number(frame.id()) != self.receive_id || frame.is_remote_frame() {
                 continue;
             }
             let Some(mut message) = self.tp.take(frame.data()) else { continue };
             if let Some(Ok(request)) = self.deframer.next::<Request>(&mut message) {
-                // Asked again while its answer is on the way: on a slow bus that is no reason to begin anew.
-                if self.tp.busy() && !self.tp.waits() && request.number == self.answers {
+                // The request is repeated while its answer is being sent: on a slow bus, continue with that answer.
+                if self.tp.busy() && !self.tp.waits() && request.number == self.answered_number {
                     continue;
                 }
-                self.answers = request.number;
+                self.answered_number = request.number;
                 let reply = device.answer(&request);
                 let mut bytes = [0; MAX_FRAME];
                 if let Ok(answer) = encode(&reply, &mut bytes) {
-                    // A host that asks again has not got the last answer.
+                    // The host did not receive the last answer, or does not need it.
                     self.tp.give_up();
                     let _ = self.tp.send(answer);
                 }
@@ -136,13 +146,13 @@ impl CanServer {
         Ok(())
     }
 
-    /// Sends the next frame, if there is one and the bus takes it. Gives whether it did.
-    fn speak<B: Can>(&mut self, bus: &mut B) -> Result<bool, B::Error> {
+    /// Sends the next frame, if any; returns whether the controller accepted it.
+    fn send_frame<B: Can>(&mut self, bus: &mut B) -> Result<bool, B::Error> {
         let Some(data) = self.held.take().or_else(|| self.tp.frame()) else { return Ok(false) };
-        let Some(frame) = self.speaks.and_then(|id| B::Frame::new(id, &data)) else { return Ok(false) };
+        let Some(frame) = self.send_id.and_then(|id| B::Frame::new(id, &data)) else { return Ok(false) };
         match bus.transmit(&frame) {
             Ok(None) => Ok(true),
-            // Another one had to give way, and is sent again.
+            // The controller dropped another frame for this one; send that one again.
             Ok(Some(displaced)) => {
                 self.held = CanData::from_slice(displaced.data()).ok();
                 Ok(true)
@@ -157,7 +167,7 @@ impl CanServer {
 }
 
 fn id(number: u32) -> Option<Id> {
-    if number <= MOST_STANDARD {
+    if number <= MAX_STANDARD_ID {
         StandardId::new(number as u16).map(Id::Standard)
     } else {
         ExtendedId::new(number).map(Id::Extended)

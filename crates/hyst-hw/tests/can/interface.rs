@@ -1,38 +1,38 @@
-//! Interfaces that a test makes for itself, and programs beside it.
+//! Virtual interfaces and helper programs for a test.
 
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Bytes of a frame with its head, which is how an interface is told what it carries.
+/// MTU of an interface: bytes of a frame with its header, without and with CAN FD.
 const CLASSIC: &str = "16";
 const FD: &str = "72";
 
-/// A virtual interface, which ends with it.
+/// A virtual interface, deleted on drop.
 pub(crate) struct Virtual {
     pub(crate) name: &'static str,
 }
 
-/// Whether interfaces may be made here; says so if not.
-pub(crate) fn here() -> bool {
-    let here = std::env::var_os("HYST_CAN").is_some();
-    if !here {
-        println!("skipped: HYST_CAN is not set; cargo xtask can runs this in a machine with CAN");
+/// Returns whether the tests may create interfaces; otherwise prints that the test is skipped.
+pub(crate) fn may_create_interfaces() -> bool {
+    let may_create_interfaces = std::env::var_os("HYST_CAN").is_some();
+    if !may_create_interfaces {
+        println!("skipped: HYST_CAN is not set; cargo xtask can runs this test in a machine with CAN");
     }
-    here
+    may_create_interfaces
 }
 
 impl Virtual {
-    /// A bus of this name that is up, where interfaces may be made.
+    /// Creates a bus of this name and sets it up; `None` if the tests may not create interfaces.
     pub(crate) fn up(name: &'static str, fd: bool) -> Option<Self> {
         let made = Self::down(name, fd)?;
         ip(&["link", "set", name, "up"]);
         Some(made)
     }
 
-    /// The same, but down.
+    /// Creates a bus of this name that is down; `None` if the tests may not create interfaces.
     pub(crate) fn down(name: &'static str, fd: bool) -> Option<Self> {
-        if !here() {
+        if !may_create_interfaces() {
             return None;
         }
         ip(&["link", "add", name, "type", "vcan"]);
@@ -48,17 +48,17 @@ impl Drop for Virtual {
     }
 }
 
-/// Sets an interface up or down.
+/// Runs `ip` with these arguments.
 pub(crate) fn ip(arguments: &[&str]) {
     assert!(tried(arguments), "ip {}", arguments.join(" "));
 }
 
-/// The same; whether it could be done.
+/// Runs `ip` with these arguments and returns whether it succeeded.
 pub(crate) fn tried(arguments: &[&str]) -> bool {
-    Command::new("ip").args(arguments).status().expect("there is ip").success()
+    Command::new("ip").args(arguments).status().expect("ip is installed").success()
 }
 
-/// A program that ends with it.
+/// A program, killed on drop.
 pub(crate) struct Program(pub(crate) Child);
 
 impl Program {
@@ -75,10 +75,10 @@ impl Drop for Program {
     }
 }
 
-/// Waits until it is so; a machine that is emulated takes its time.
-pub(crate) fn until(what: &str, mut so: impl FnMut() -> bool) {
+/// Waits until the condition holds; an emulated machine is slow.
+pub(crate) fn until(what: &str, mut condition: impl FnMut() -> bool) {
     let began = Instant::now();
-    while !so() {
+    while !condition() {
         assert!(began.elapsed() < Duration::from_secs(60), "{what}");
         sleep(Duration::from_millis(5));
     }

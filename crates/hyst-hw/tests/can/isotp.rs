@@ -1,4 +1,4 @@
-//! The kernel's own ISO-TP at the other end of a [`CanLine`].
+//! ISO-TP of the kernel at the other end of a [`CanLine`].
 
 use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
@@ -10,36 +10,36 @@ use socketcan::{CanAddr, CanSocket, Socket, SocketOptions, StandardId};
 
 use super::interface::Virtual;
 
-/// Numbers of linux/can.h and linux/can/isotp.h.
+/// Constants of linux/can.h and linux/can/isotp.h.
 const ISOTP: i32 = 6;
 const LEVEL: i32 = 100 + ISOTP;
 const OPTIONS: i32 = 1;
 const FLOW: i32 = 2;
 const FRAMES: i32 = 5;
-/// Frames are filled up, and those that come have to be, to the right length and with the byte that is told.
+/// Frames are padded, and received frames must have the right length and padding byte.
 const FILL: u32 = 0x4 | 0x8 | 0x10 | 0x20;
 
-/// Most bytes of a message that both ends take.
+/// Longest message that both ends accept (bytes).
 const LONGEST: usize = hyst_hw::wire::MAX_FRAME;
 
-/// What the kernel's end is told to do.
+/// Settings of the kernel's end.
 #[derive(Clone, Copy, Debug)]
 struct Settings {
     fd: bool,
     fill: bool,
-    /// Frames until it allows the next ones, and the pause between them, as the standard writes it.
+    /// Block size and minimum separation time (STmin), as encoded in the standard.
     block: u8,
     pause: u8,
 }
 
-/// The kernel as the device.
+/// Opens the kernel's end, in the role of the device.
 fn kernel(interface: &str, settings: Settings) -> CanSocket {
     let kind = (Domain::from(libc::AF_CAN), Type::DGRAM, Protocol::from(ISOTP));
     let socket = socket2::Socket::new(kind.0, kind.1, Some(kind.2)).expect("the kernel has can-isotp");
     let socket = CanSocket::from(OwnedFd::from(socket));
     if settings.fill {
         let [a, b, c, d] = FILL.to_ne_bytes();
-        // Flags, a time, address, byte to fill with, byte that others fill with, address.
+        // Flags, time, address, padding byte to send, padding byte to expect, address.
         let options: [u8; 12] = [a, b, c, d, 0, 0, 0, 0, 0, 0xaa, 0xcc, 0];
         socket.set_socket_option(LEVEL, OPTIONS, &options).unwrap();
     }
@@ -55,12 +55,12 @@ fn kernel(interface: &str, settings: Settings) -> CanSocket {
     socket
 }
 
-/// Bytes that are others for every message.
+/// Returns bytes that are different for every message.
 fn message(length: usize, salt: usize) -> Vec<u8> {
     (0..length).map(|i| (i * 7 + length * 13 + salt * 101) as u8).collect()
 }
 
-/// Messages of these lengths there and back; how many.
+/// Exchanges messages of these lengths in both directions and returns their number.
 fn exchange(interface: &str, settings: Settings, lengths: impl Iterator<Item = usize>) -> usize {
     let mut peer = kernel(interface, settings);
     let bus = SocketCan::open(interface, settings.fd).unwrap();
@@ -71,23 +71,24 @@ fn exchange(interface: &str, settings: Settings, lengths: impl Iterator<Item = u
         let there = message(length, 1);
         line.send(&there).unwrap();
         let mut bytes = [0; 4095];
-        let came = peer.read(&mut bytes).unwrap_or_else(|error| panic!("{settings:?}, {length} bytes there: {error}"));
-        assert_eq!(bytes[..came], there, "{settings:?}, {length} bytes there");
+        let received =
+            peer.read(&mut bytes).unwrap_or_else(|error| panic!("{settings:?}, {length} bytes there: {error}"));
+        assert_eq!(bytes[..received], there, "{settings:?}, {length} bytes there");
 
         let back = message(length, 2);
         peer.write_all(&back).unwrap();
-        let (mut came, began) = (0, Instant::now());
-        while came < length && began.elapsed() < Duration::from_secs(20) {
-            came += line.receive(&mut bytes[came..], Duration::from_millis(100)).unwrap();
+        let (mut received, began) = (0, Instant::now());
+        while received < length && began.elapsed() < Duration::from_secs(20) {
+            received += line.receive(&mut bytes[received..], Duration::from_millis(100)).unwrap();
         }
-        assert_eq!(bytes[..came], back, "{settings:?}, {length} bytes back");
+        assert_eq!(bytes[..received], back, "{settings:?}, {length} bytes back");
         count += 2;
     }
     count
 }
 
 #[test]
-fn messages_of_every_length_over_classic_frames() {
+fn messages_of_every_length_pass_in_classic_frames() {
     let Some(bus) = Virtual::up("isotp", false) else { return };
     let settings = Settings { fd: false, fill: true, block: 0, pause: 0 };
     let count = exchange(bus.name, settings, 1..=LONGEST);
@@ -95,7 +96,7 @@ fn messages_of_every_length_over_classic_frames() {
 }
 
 #[test]
-fn messages_of_every_length_over_fd_frames() {
+fn messages_of_every_length_pass_in_fd_frames() {
     let Some(bus) = Virtual::up("isotp-fd", true) else { return };
     let settings = Settings { fd: true, fill: true, block: 0, pause: 0 };
     let count = exchange(bus.name, settings, 1..=LONGEST);
@@ -103,7 +104,7 @@ fn messages_of_every_length_over_fd_frames() {
 }
 
 #[test]
-fn blocks_and_pauses_are_kept() {
+fn block_size_and_separation_time_are_respected() {
     let Some(bus) = Virtual::up("isotp-slow", true) else { return };
     let lengths = [1, 7, 8, 20, 62, 63, 100, 300, LONGEST];
     let mut count = 0;

@@ -1,7 +1,7 @@
-//! CAN on Linux, against what others have written: the kernel's own ISO-TP and slcan, and can-utils.
+//! CAN on Linux, against other implementations: ISO-TP and slcan of the kernel, and can-utils.
 //!
-//! The tests make interfaces of their own, so they run where `HYST_CAN` is set, as root, with can-utils and the kernel's modules:
-//! `cargo xtask can` starts a machine in which all of that is there. Elsewhere each of them says that it skips.
+//! The tests create CAN interfaces. They need root, can-utils and the kernel's CAN modules, and run only if `HYST_CAN` is set.
+//! `cargo xtask can` starts a machine with all of that. Otherwise each test prints that it is skipped.
 #![cfg(all(feature = "std", target_os = "linux"))]
 
 mod adapter;

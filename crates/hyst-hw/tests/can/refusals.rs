@@ -1,13 +1,13 @@
-//! Interfaces that cannot be used, and what is said of them.
+//! Errors for CAN interfaces that cannot be used.
 
 use std::time::Duration;
 
 use hyst_hw::{Bus, Interface, SocketCan, SocketCanError, interfaces};
 
-use super::interface::{Virtual, here, ip};
+use super::interface::{Virtual, ip, may_create_interfaces};
 
 #[test]
-fn interfaces_are_found() {
+fn interfaces_are_listed() {
     let (Some(fd), Some(classic)) = (Virtual::up("found-fd", true), Virtual::down("found-classic", false)) else {
         return;
     };
@@ -19,7 +19,7 @@ fn interfaces_are_found() {
 }
 
 #[test]
-fn what_is_no_can_interface_is_told() {
+fn a_name_without_can_interface_is_reported() {
     let Some(bus) = Virtual::up("refuse-absent", true) else { return };
     for name in ["can-of-nobody", "lo", ""] {
         for fd in [false, true] {
@@ -32,7 +32,7 @@ fn what_is_no_can_interface_is_told() {
 }
 
 #[test]
-fn an_interface_that_is_down_is_told_with_the_command() {
+fn an_interface_that_is_down_is_reported_with_the_command() {
     let Some(bus) = Virtual::down("refuse-down", true) else { return };
     for fd in [false, true] {
         let error = SocketCan::open(bus.name, fd).unwrap_err();
@@ -42,7 +42,7 @@ fn an_interface_that_is_down_is_told_with_the_command() {
 }
 
 #[test]
-fn an_interface_without_fd_is_told() {
+fn an_interface_without_fd_is_reported() {
     let Some(bus) = Virtual::up("refuse-fd", false) else { return };
     let error = SocketCan::open(bus.name, true).unwrap_err();
     assert!(matches!(error, SocketCanError::ClassicOnly { .. }), "{error}");
@@ -50,7 +50,7 @@ fn an_interface_without_fd_is_told() {
 }
 
 #[test]
-fn an_interface_that_goes_down_is_no_silence() {
+fn an_interface_that_goes_down_is_an_error() {
     let Some(bus) = Virtual::up("refuse-later", true) else { return };
     let mut can = SocketCan::open(bus.name, false).unwrap();
     assert_eq!(can.receive(Duration::ZERO).unwrap(), None);
@@ -61,8 +61,8 @@ fn an_interface_that_goes_down_is_no_silence() {
 }
 
 #[test]
-fn frames_that_there_are_not_are_refused() {
-    if !here() {
+fn invalid_frames_are_refused() {
+    if !may_create_interfaces() {
         return;
     }
     let Some(bus) = Virtual::up("refuse-frames", true) else { return };

@@ -1,4 +1,4 @@
-//! A device on a bus, driven over it, with can-utils beside them.
+//! Runs of a device over a CAN bus, observed and disturbed by can-utils.
 
 use std::io::{BufRead, BufReader};
 use std::ops::ControlFlow;
@@ -14,11 +14,11 @@ use hyst_hw::{CanLine, FROM_DEVICE, Line, RecordOptions, Remote, RemoteOptions, 
 
 use super::interface::{Program, Virtual, until};
 
-/// Samples of a run.
+/// Number of samples of a run.
 const ROWS: usize = 1500;
 const RATE_HZ: f64 = 1000.0;
 
-/// An amplifier whose sensor shows half of what the period before put out.
+/// An amplifier whose sensor shows half the voltage of the previous period.
 struct Half(f32);
 
 impl Board for Half {
@@ -48,7 +48,7 @@ fn identity() -> Identity {
     }
 }
 
-/// Drives a device at the other end of these lines: nothing is lost, all of it as asked for.
+/// Runs a device over these lines and checks that every sample arrives with the requested drive.
 pub(crate) fn run(host: impl Line, mut line: impl Line + Send + 'static) {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
@@ -58,7 +58,7 @@ pub(crate) fn run(host: impl Line, mut line: impl Line + Send + 'static) {
         (device.state(), board.0)
     });
     let options = RemoteOptions {
-        // Frames of others make most answers useless in one of the tests; what waits then is asked again and again.
+        // In one of the tests, foreign frames destroy most answers, so requests are repeated many times.
         repeat: Duration::from_millis(40),
         lost: Duration::from_secs(120),
         silence_s: 60.0,
@@ -69,7 +69,7 @@ pub(crate) fn run(host: impl Line, mut line: impl Line + Send + 'static) {
     let drive: Vec<f64> = (0..ROWS).map(|k| 50.0 - 50.0 * (k as f64 * 0.02).cos()).collect();
     let recording =
         record(&mut remote, std::slice::from_ref(&drive), &RecordOptions::at(RATE_HZ), |_| ControlFlow::Continue(()))
-            .expect("the run comes to its end");
+            .expect("the run is complete");
     let samples = &recording.segments[0].samples;
     assert_eq!(samples.len(), ROWS);
     for (k, (sample, volts)) in samples.iter().zip(&drive).enumerate() {
@@ -80,7 +80,7 @@ pub(crate) fn run(host: impl Line, mut line: impl Line + Send + 'static) {
     assert_eq!(device.join().expect("the device ends"), (State::Idle, 0.0));
 }
 
-/// Both ends of a connection on this interface.
+/// Returns both ends of a connection on this interface.
 fn lines(interface: &str, fd: bool) -> (CanLine<SocketCan>, CanLine<SocketCan>) {
     let open = |to, from| {
         let bus = SocketCan::open(interface, fd).unwrap();
@@ -90,7 +90,7 @@ fn lines(interface: &str, fd: bool) -> (CanLine<SocketCan>, CanLine<SocketCan>) 
     (open(TO_DEVICE, FROM_DEVICE), open(FROM_DEVICE, TO_DEVICE))
 }
 
-/// What candump sees from now on, as identifier and data.
+/// Returns the frames that candump sees from now on, as identifier and data.
 fn dump(interface: &'static str) -> (Program, Receiver<String>) {
     let mut candump = Program::start("candump", &["-L", interface]);
     let stdout = candump.0.stdout.take().expect("it is piped");
@@ -112,15 +112,15 @@ fn dump(interface: &'static str) -> (Program, Receiver<String>) {
 }
 
 fn cansend(interface: &str, frame: &str) {
-    let status = Command::new("cansend").args([interface, frame]).status().expect("there is cansend");
+    let status = Command::new("cansend").args([interface, frame]).status().expect("cansend is installed");
     assert!(status.success(), "cansend {frame}");
 }
 
-/// How many frames there were in all, and how many of the longest.
+/// Returns the number of frames, and the number of frames with the maximum length.
 fn seen(frames: &Receiver<String>, fd: bool) -> (usize, usize) {
     let (mut all, mut longest) = (0, 0);
     for frame in frames.try_iter().filter(|frame| frame.starts_with("6A")) {
-        // "##" and a digit of flags, the lowest of which is that of the higher rate.
+        // "##" and a digit with flags; the lowest one is bit-rate switching.
         let (id, data) = match frame.split_once("##") {
             Some((id, data)) if fd && matches!(data.as_bytes().first(), Some(b'1' | b'5')) => (id, &data[1..]),
             None if !fd => frame.split_once('#').unwrap_or_else(|| panic!("{frame}")),
@@ -137,7 +137,7 @@ fn seen(frames: &Receiver<String>, fd: bool) -> (usize, usize) {
 }
 
 #[test]
-fn a_run_over_classic_frames() {
+fn a_run_over_classic_frames_is_complete() {
     let Some(bus) = Virtual::up("run", false) else { return };
     let (_candump, frames) = dump(bus.name);
     let (host, device) = lines(bus.name, false);
@@ -148,7 +148,7 @@ fn a_run_over_classic_frames() {
 }
 
 #[test]
-fn a_run_over_fd_frames() {
+fn a_run_over_fd_frames_is_complete() {
     let Some(bus) = Virtual::up("run-fd", true) else { return };
     let (_candump, frames) = dump(bus.name);
     let (host, device) = lines(bus.name, true);
@@ -158,7 +158,7 @@ fn a_run_over_fd_frames() {
     assert!(all > ROWS / 10 && longest > ROWS / 20);
 }
 
-/// Frames of others, and broken ones under the identifiers of the connection.
+/// Foreign frames, and invalid frames with the identifiers of the connection.
 const FOREIGN: [&str; 12] = [
     "123#DEADBEEF",
     "6A1#300000",
@@ -175,7 +175,7 @@ const FOREIGN: [&str; 12] = [
 ];
 
 #[test]
-fn frames_of_others_do_no_harm() {
+fn foreign_frames_do_not_disturb_a_run() {
     for fd in [false, true] {
         let Some(bus) = Virtual::up(if fd { "foreign-fd" } else { "foreign" }, fd) else { return };
         let over = Arc::new(AtomicBool::new(false));
@@ -198,7 +198,7 @@ fn frames_of_others_do_no_harm() {
         run(host, device);
         over.store(true, Ordering::Relaxed);
         let sent = others.join().unwrap();
-        println!("a run with {sent} frames of others in between");
+        println!("a run with {sent} foreign frames in between");
         assert!(sent >= FOREIGN.len());
     }
 }

@@ -1,6 +1,7 @@
 //! CAN over a serial line, against python-can and can-isotp at the other end of a pseudo terminal.
 //!
-//! `HYST_PYTHON` names a Python that has both, as `cargo xtask can` prepares one; without it these tests say that they skip.
+//! `HYST_PYTHON` is the path of a Python with both packages; `cargo xtask can` prepares one. Otherwise each test prints that it is
+//! skipped.
 #![cfg(all(feature = "std", unix))]
 
 use std::io::{BufRead, BufReader, Lines};
@@ -10,14 +11,14 @@ use std::time::{Duration, Instant};
 use hyst_hw::{Bus, CanLine, FROM_DEVICE, Line, Serial, Slcan, TO_DEVICE};
 use serialport::{SerialPort, TTYPort};
 
-/// How long the peer may take for an answer before it counts as lost.
+/// Time limit for an answer of the peer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// The peer, which ends with it.
+/// The peer, killed on drop.
 struct Peer {
     process: Child,
     said: Lines<BufReader<ChildStdout>>,
-    // Without it the terminal would hang up before the peer has opened it.
+    // Keeps the terminal open until the peer has opened it.
     _terminal: TTYPort,
 }
 
@@ -29,16 +30,16 @@ impl Drop for Peer {
 }
 
 impl Peer {
-    /// The next line that it prints.
+    /// Returns the next line that the peer prints.
     fn says(&mut self) -> String {
-        self.said.next().expect("the peer goes on").expect("it prints text")
+        self.said.next().expect("the peer still runs").expect("it prints text")
     }
 }
 
-/// A peer that does this, and the adapter at our end; `None` without Python.
+/// Starts a peer for this task and opens the adapter; `None` without Python.
 fn peer(what: &str, rest: &[&str]) -> Option<(Peer, Slcan<Serial>)> {
     let Some(python) = std::env::var_os("HYST_PYTHON") else {
-        println!("skipped: HYST_PYTHON names no Python with python-can; cargo xtask can makes one");
+        println!("skipped: HYST_PYTHON is not set (a Python with python-can); cargo xtask can prepares one");
         return None;
     };
     let (near, mut terminal) = TTYPort::pair().expect("a pseudo terminal");
@@ -54,7 +55,7 @@ fn peer(what: &str, rest: &[&str]) -> Option<(Peer, Slcan<Serial>)> {
     Some((peer, Slcan::open(Serial::over(Box::new(near)), 500_000).expect("the line is there")))
 }
 
-/// Identifiers of both kinds in turn, those at the ends among them.
+/// Returns alternating identifiers of both kinds, including the smallest and largest ones.
 fn id(k: u32) -> u32 {
     match k {
         0 => 0,
@@ -67,7 +68,7 @@ fn id(k: u32) -> u32 {
 }
 
 #[test]
-fn python_can_reads_and_writes_the_same_frames() {
+fn frames_pass_python_can_in_both_directions() {
     let Some((mut peer, mut bus)) = peer("frames", &[]) else { return };
     let lengths = (0..=8).cycle().take(400).chain([12, 16, 20, 24, 32, 48, 64].into_iter().cycle().take(56));
     let mut count = 0;
@@ -85,7 +86,9 @@ fn python_can_reads_and_writes_the_same_frames() {
     println!("{count} frames each way");
 }
 
-/// Messages there and back, of lengths around those at which the frames change; how many.
+/// Exchanges messages in both directions and returns their number.
+///
+/// The lengths include those around changes of the frame format.
 fn messages(fd: bool, block: &str) -> Option<usize> {
     let (mut peer, bus) = peer("isotp", &[if fd { "fd" } else { "classic" }, block])?;
     let mut line = CanLine::new(bus, TO_DEVICE, FROM_DEVICE, fd).patient(PATIENCE);
@@ -95,8 +98,8 @@ fn messages(fd: bool, block: &str) -> Option<usize> {
         line.send(&message).unwrap();
         let (mut back, mut bytes, began) = (Vec::new(), [0; 4095], Instant::now());
         while back.len() < length && began.elapsed() < PATIENCE {
-            let came = line.receive(&mut bytes, Duration::from_millis(100)).unwrap();
-            back.extend_from_slice(&bytes[..came]);
+            let received = line.receive(&mut bytes, Duration::from_millis(100)).unwrap();
+            back.extend_from_slice(&bytes[..received]);
         }
         assert_eq!(peer.says(), length.to_string(), "block {block}, fd {fd}");
         back.reverse();
@@ -107,7 +110,7 @@ fn messages(fd: bool, block: &str) -> Option<usize> {
 }
 
 #[test]
-fn can_isotp_understands_messages_and_is_understood() {
+fn messages_pass_can_isotp_in_both_directions() {
     for fd in [false, true] {
         for block in ["0", "4"] {
             let Some(count) = messages(fd, block) else { return };

@@ -1,7 +1,7 @@
-"""The other end of an slcan line: python-can and can-isotp, which others have written.
+"""The other end of an slcan line, with python-can and can-isotp.
 
-peer.py frames PORT           says what came, and sends it back reversed, under its identifier with the last bit turned
-peer.py isotp PORT FD BLOCK   says how long the message was that came, and sends it back reversed
+peer.py frames PORT           prints each received frame and returns it with reversed data and the last bit of the identifier inverted
+peer.py isotp PORT FD BLOCK   prints the length of each received message and returns the message reversed
 """
 
 import sys
@@ -10,7 +10,7 @@ import time
 import can
 import isotp
 
-# Nobody waits for it that long; who started it ends it before.
+# Upper limit; the test that started this program ends it earlier.
 SECONDS = 300.0
 
 
@@ -22,7 +22,7 @@ def frames(bus):
             arbitration_id=message.arbitration_id ^ 1,
             is_extended_id=message.is_extended_id,
             is_fd=message.is_fd,
-            # The adapter has letters for both.
+            # Frames with and without bit-rate switching have different letters.
             bitrate_switch=message.is_fd and message.arbitration_id % 4 < 2,
             data=message.data[::-1],
             check=True,

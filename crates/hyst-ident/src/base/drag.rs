@@ -1,18 +1,19 @@
-//! Drag on sliding plays, as [`hyst_core::ViscousPi`] has it: an overdrive `o = λ v + √(J v)` moves a play at the speed v.
+//! Drag on sliding play operators, as in [`hyst_core::ViscousPi`]: an overdrive `o = λ v + √(J v)` moves a play
+//! operator at the speed v.
 
 use crate::Samples;
 
-/// λ and J.
+/// The drag parameters λ and J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct DragParams {
-    /// λ \[s\]: loops widen with the rate.
+    /// λ \[s\]: the loop widens with the rate.
     pub(crate) seconds: f64,
-    /// J \[V s\]: loops widen with the root of the rate.
+    /// J \[V s\]: the loop widens with the square root of the rate.
     pub(crate) volt_seconds: f64,
 }
 
 impl DragParams {
-    /// In each segment of a record.
+    /// Returns the drag in each segment of a record.
     pub(crate) fn over(self, samples: &Samples) -> Drag {
         if self == Self::default() {
             return Drag::NONE;
@@ -25,11 +26,12 @@ impl DragParams {
     }
 }
 
-/// A drag at the sample period of each segment: that of any, or one for each; plays follow at once without.
+/// Drag at the sample period of each segment: one for all segments, or one for each. Without drag, play operators
+/// follow at once.
 #[derive(Clone, Debug)]
 pub(crate) struct Drag(Option<Overdrive>, Vec<Overdrive>);
 
-/// A drag at a sample period.
+/// Drag at one sample period.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Overdrive {
     period: f64,
@@ -40,17 +42,17 @@ pub(crate) struct Overdrive {
 }
 
 impl Drag {
-    /// Plays that follow at once.
+    /// No drag: play operators follow at once.
     pub(crate) const NONE: Self = Self(None, Vec::new());
 
-    /// In a segment, by its number; none where plays follow at once.
+    /// Returns the drag in a segment; `None` if play operators follow at once.
     pub(crate) fn of(&self, segment: usize) -> Option<Overdrive> {
         self.1.get(segment).copied().or(self.0)
     }
 }
 
 impl Overdrive {
-    /// Where a play at `p` comes in a sample in which it would be at `to` without drag.
+    /// Returns the next state of a play operator at `p` that would be at `to` without drag.
     pub(crate) fn towards(&self, p: f64, to: f64) -> f64 {
         let over = to - p;
         if over == 0.0 {

@@ -1,7 +1,8 @@
-//! An operator that is not linear in its parameters, by its output and how that changes with each of them.
+//! An operator that is not linear in its parameters, as its output and the derivatives with respect to the parameters.
 //!
-//! Near parameters p a model f(u; p) is the plane `f(u; p) + Σᵢ wᵢ cᵢ ∂f/∂pᵢ`, cᵢ the size of the parameter: the weights are relative changes. A model
-//! that was fitted while an effect stood in the record has taken a part of it, and gives that back by small changes of its parameters.
+//! Near the parameters p, the model f(u; p) is approximated by `f(u; p) + Σᵢ wᵢ cᵢ ∂f/∂pᵢ`, with cᵢ the value of the
+//! parameter: the weights are relative changes. A model that was fitted without a missing effect has taken up a part of
+//! it; small changes of its parameters correct that.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use hyst_core::{Error, Params, Stage};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::{Basis, Drag, turned};
+use super::{Basis, Drag, with_sign};
 use crate::drive::{Drive, Passes};
 use crate::lsq::Bounds;
 use crate::model::{Base, Operator};
@@ -19,43 +20,44 @@ use crate::{BetweenSamples, Samples};
 
 /// Step of the difference quotients, as a share of a parameter.
 const STEP: f64 = 1e-4;
-/// Largest change of a parameter, as a share of it, and of the output where that is more: the plane says little of what is farther.
-const FARTHEST: f64 = 0.3;
-const FARTHEST_MOTION: f64 = 0.05;
-/// Parameters that are changed at most: those that move the output most.
-const MOST: usize = 16;
-/// Motion for a change by all of a parameter, as a share of the output, below which it is rounding.
-const LEAST_MOTION: f64 = 1e-6;
-/// What holds the changes where the record does not tell two parameters apart.
+/// Maximum change of a parameter as a share of it, and maximum change of the output as a share of it; the larger one
+/// applies. The linearisation is inaccurate beyond it.
+const MAX_RELATIVE_CHANGE: f64 = 0.3;
+const MAX_MOTION_CHANGE: f64 = 0.05;
+/// Maximum number of parameters that are changed: those that move the output most.
+const MAX_PARAMETERS: usize = 16;
+/// Minimum motion for a relative change of 1, as a share of the output; below it the motion is rounding.
+const MIN_MOTION_SHARE: f64 = 1e-6;
+/// Regularisation of the changes, for parameters that the record cannot separate.
 const PENALTY: f64 = 1e-7;
 
-/// Any operator near the parameters that it has.
+/// A linearised operator of any kind.
 #[derive(Clone, Debug)]
 pub(crate) struct LinearisedBasis {
     pub(crate) base: Base,
     falls: bool,
     between: BetweenSamples,
-    /// Lowest and highest input of the record that it is for.
+    /// Minimum and maximum input of its record.
     range: [f64; 2],
     operator: Arc<PerSegment<Operator>>,
     slopes: Vec<Slope>,
-    /// Segments and surroundings of that record.
+    /// Segments and environment of that record.
     samples: Arc<Samples>,
 }
 
-/// An operator with one parameter changed either way.
+/// An operator with one parameter changed in both directions.
 #[derive(Clone, Debug)]
 struct Slope {
-    /// Its place in the order of a visit.
+    /// Index of the parameter in the order of a visit.
     parameter: usize,
-    /// Of the relative change.
+    /// Bounds of the relative change.
     bounds: Bounds,
-    /// Root of the squares of the motion for a change by all of the parameter \[y\].
+    /// Root of Σ motion² for a relative change of 1 \[y\].
     motion: f64,
     sides: Sides,
 }
 
-/// An operator with a parameter made larger and smaller, and how far these are apart as a share of it.
+/// An operator with one parameter increased and decreased, and the difference as a share of it.
 #[derive(Clone, Debug)]
 struct Sides {
     above: Arc<PerSegment<Operator>>,
@@ -64,7 +66,7 @@ struct Sides {
 }
 
 impl LinearisedBasis {
-    /// For a record whose drive goes on `between` the samples in one way.
+    /// Linearises an operator for a record, whose drive continues `between` the samples as given.
     ///
     /// # Errors
     /// If the operator cannot be built at the record's sample period.
@@ -78,11 +80,11 @@ impl LinearisedBasis {
         plane.base.clone().visit(&mut |_, _| count += 1);
         let mut slopes = plane.slopes(0..count);
         slopes.sort_by(|a, b| b.motion.total_cmp(&a.motion));
-        slopes.truncate(MOST);
+        slopes.truncate(MAX_PARAMETERS);
         Ok(Self { slopes, ..plane })
     }
 
-    /// The operator where these weights bring it.
+    /// Returns the operator with its parameters changed by these weights.
     pub(crate) fn operator(&self, weights: &[f64]) -> Base {
         let mut base = self.base.clone();
         let mut at = 0;
@@ -96,22 +98,22 @@ impl LinearisedBasis {
         base
     }
 
-    /// The operator with other parameters alone; none where there is no such operator.
+    /// Returns the operator with other parameters, without derivatives; `None` if there is no such operator.
     pub(crate) fn at(&self, base: Base) -> Option<Self> {
         let operator = built(&base, self.range, &self.samples, self.between).ok()?;
         Some(Self { base, operator: Arc::new(operator), ..self.alone() })
     }
 
-    /// The same with its changes with those parameters that `other` changes.
+    /// Adds the derivatives with respect to the parameters that `other` has.
     pub(crate) fn with_slopes_of(self, other: &Self) -> Self {
         let slopes = self.slopes(other.slopes.iter().map(|slope| slope.parameter));
         Self { slopes, ..self }
     }
 
-    /// The same over another record within the range of its own.
+    /// Returns the same for another record within the input range of its own.
     pub(crate) fn on(&self, samples: &Samples) -> Option<Self> {
         let there = Self { samples: Arc::new(samples.clone()), ..self.clone() };
-        // Which of several sample periods that has is not known here.
+        // With several sample periods the operator has to be rebuilt.
         if self.samples.periods.is_empty() {
             Some(there)
         } else {
@@ -119,7 +121,7 @@ impl LinearisedBasis {
         }
     }
 
-    /// The operator alone.
+    /// Returns the operator without derivatives.
     pub(crate) fn alone(&self) -> Self {
         Self {
             base: self.base.clone(),
@@ -130,14 +132,15 @@ impl LinearisedBasis {
         }
     }
 
-    /// How the output changes with these parameters; not with one that is zero or moves nothing, nor where there is no operator on either side.
+    /// Returns the derivatives with respect to these parameters. Parameters that are zero, do not move the output, or
+    /// cannot be changed are skipped.
     fn slopes(&self, parameters: impl Iterator<Item = usize>) -> Vec<Slope> {
         let Samples { input, segments, .. } = self.samples.as_ref();
         let output = size(&self.driven(&self.operator, input, segments));
         let slope = |parameter: usize| {
             let limits = self.limits(parameter)?;
             let here = || Arc::clone(&self.operator);
-            // At the end of what is possible there is one side only.
+            // At a bound of a parameter there is one side only.
             let sides = match (self.changed(parameter, STEP), self.changed(parameter, -STEP)) {
                 (Some(above), Some(below)) => Sides { above, below, apart: 2.0 * STEP },
                 (Some(above), None) => Sides { above, below: here(), apart: STEP },
@@ -145,15 +148,15 @@ impl LinearisedBasis {
                 (None, None) => return None,
             };
             let motion = size(&self.moved_by(&sides, input, segments));
-            let farthest = FARTHEST.max(FARTHEST_MOTION * output / motion);
+            let farthest = MAX_RELATIVE_CHANGE.max(MAX_MOTION_CHANGE * output / motion);
             let bounds = Bounds { lower: limits.lower.max(-farthest), upper: limits.upper.min(farthest) };
-            let moves = motion.is_finite() && motion > LEAST_MOTION * output;
+            let moves = motion.is_finite() && motion > MIN_MOTION_SHARE * output;
             moves.then_some(Slope { parameter, bounds, motion, sides })
         };
         parameters.collect::<Vec<_>>().into_par_iter().filter_map(slope).collect()
     }
 
-    /// How far a parameter can be changed, as shares of it; none of one that is zero.
+    /// Returns the bounds of a parameter's relative change; `None` if it is zero.
     fn limits(&self, parameter: usize) -> Option<Bounds> {
         let (mut at, mut limits) = (0, None);
         self.base.clone().visit(&mut |meta, x| {
@@ -166,7 +169,7 @@ impl LinearisedBasis {
         limits
     }
 
-    /// The operator with a parameter changed by a share of it.
+    /// Returns the operator with a parameter changed by a relative amount.
     fn changed(&self, parameter: usize, by: f64) -> Option<Arc<PerSegment<Operator>>> {
         let (mut base, mut at) = (self.base.clone(), 0);
         base.visit(&mut |_, x| {
@@ -178,7 +181,8 @@ impl LinearisedBasis {
         built(&base, self.range, &self.samples, self.between).ok().map(Arc::new)
     }
 
-    /// Output over a drive that may have rows before each segment of the record: the past that it begins after, in the surroundings of its first row.
+    /// Returns the output over a drive. The drive may have history rows before each segment of the record; they use the
+    /// environment of its first row.
     fn driven(&self, operator: &PerSegment<Operator>, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
         let own = |i: usize| segments[i].end - self.samples.segments[i].len()..segments[i].end;
         let past = |i: usize| &drive[segments[i].start..own(i).start];
@@ -228,7 +232,7 @@ impl Basis for LinearisedBasis {
             None => self.driven(&self.operator, drive, segments),
             Some(slope) => self.moved_by(&self.slopes[slope].sides, drive, segments),
         };
-        turned(self.falls, of.map(column).collect())
+        with_sign(self.falls, of.map(column).collect())
     }
 
     fn together(&self) -> usize {
@@ -275,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn small_changes_of_the_parameters_move_the_output_as_the_plane_says() {
+    fn the_linearisation_predicts_small_changes_of_the_parameters() {
         let samples = samples();
         let plane = plane(1.2, &samples);
         assert_eq!(plane.len(), 6, "the output and five parameters");
@@ -285,14 +289,14 @@ mod tests {
         let columns = plane.columns(0..6, &samples.input, &samples.segments, &Drag::NONE);
         for (k, there) in there.iter().enumerate() {
             let said: f64 = columns.iter().zip(weights).map(|(column, w)| w * column[k]).sum();
-            // Of second order in changes of 2e-3.
+            // Second order in changes of 2e-3.
             assert!((there - said).abs() < 1e-5 * 30.0, "row {k}: {there} {said}");
             assert!(k == 0 || (there - columns[0][k]).abs() > 1e-4, "row {k} has not moved");
         }
     }
 
     #[test]
-    fn a_past_does_what_the_same_rows_of_a_record_do() {
+    fn a_drive_history_acts_like_the_same_rows_of_a_record() {
         let whole = samples();
         let past = 300;
         let rest = Samples::of_columns(1e-2, whole.input[past..].to_vec(), whole.output[past..].to_vec());
@@ -301,12 +305,12 @@ mod tests {
         assert_eq!(output(&of_rest, &whole.input, &whole.segments)[past..], in_one[past..]);
         let forgotten = output(&of_rest, &rest.input, &rest.segments);
         assert!((forgotten[0] - in_one[past]).abs() > 0.1, "{} {}", forgotten[0], in_one[past]);
-        // Over another record as well.
+        // Also for another record.
         assert_eq!(output(&of_rest.on(&whole).unwrap(), &whole.input, &whole.segments), in_one);
     }
 
     #[test]
-    fn a_parameter_at_its_end_is_changed_to_one_side() {
+    fn a_parameter_at_its_bound_is_changed_to_one_side() {
         let plane = plane(1.0, &samples());
         let bounds = plane.bounds();
         assert_eq!(bounds.len(), 6);

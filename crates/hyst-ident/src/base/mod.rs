@@ -1,4 +1,4 @@
-//! Hysteresis bases as columns: each is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
+//! Hysteresis bases as columns: each operator is linear in its weights, `v = Σᵢ wᵢ φᵢ(u)`.
 
 mod drag;
 mod linearised;
@@ -10,7 +10,7 @@ mod travel;
 
 pub(crate) use drag::{Drag, DragParams};
 pub(crate) use linearised::LinearisedBasis;
-pub(crate) use pi::{PiBasis, SlidingPlays, play_column};
+pub(crate) use pi::{PiBasis, PlaysWithSlopes, play_column};
 pub(crate) use preisach::PreisachBasis;
 pub(crate) use rated::RatedBasis;
 pub(crate) use screening::{ROWS_PER_UNKNOWN, ScreeningBasis};
@@ -22,56 +22,57 @@ use nalgebra::DMatrix;
 use crate::Samples;
 use crate::lsq::Bounds;
 
-/// Columns that run through an operator or a filter side by side: each waits for its own last sample only.
-pub(crate) const BESIDE: usize = 4;
+/// Number of columns that pass through an operator or a filter together, so that the processor can overlap their steps.
+pub(crate) const SIDE_BY_SIDE: usize = 4;
 
-/// The columns of an operator whose output falls where the drive rises: with the other sign.
-fn turned(falls: bool, mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+/// Returns the columns with the other sign if the output falls while the drive rises.
+fn with_sign(falls: bool, mut columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     if falls {
         columns.iter_mut().flatten().for_each(|x| *x = -*x);
     }
     columns
 }
 
-/// A family of operators, linear in their weights.
+/// A family of operators that are linear in their weights.
 ///
-/// Every column is zero for the device at rest at 0 V with virgin memory, so that stages behind it
-/// scale the motion and not an arbitrary zero.
+/// Every column is zero for a device at rest at 0 V with virgin memory. So the stages behind the operator scale the
+/// motion and not an arbitrary zero.
 pub(crate) trait Basis: Sync {
-    /// The columns φᵢ `of` these numbers over the rows of `drive`, memory reset at the start of each segment. A base that
-    /// [cannot drag](Self::drags) does not look at `drag`.
+    /// Returns the columns φᵢ with the indices `of` over the rows of `drive`; the memory is reset at the start of each
+    /// segment. A basis without [drag](Self::drags) ignores `drag`.
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>>;
-    /// How many columns are best made in one pass over the drive.
+    /// Returns the best number of columns for one pass over the drive.
     fn together(&self) -> usize {
         8
     }
-    /// `Σᵢ wᵢ φᵢ` over the rows of `drive`, where that is less work than its columns are.
+    /// Returns `Σᵢ wᵢ φᵢ` over the rows of `drive`, if that takes less work than the columns; `None` otherwise.
     fn combined(&self, _weights: &[f64], _drive: &[f64], _segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         None
     }
-    /// Whether a search on it may add plays whose thresholds grow with the rate: beside an operator of another kind they take its misfit.
+    /// Returns whether a search on this basis may add play operators whose thresholds grow with the rate. Next to an
+    /// operator of another kind they take up its misfit.
     fn may_widen(&self) -> bool {
         true
     }
-    /// The same base over another record, where its columns depend on more than drive and segments.
+    /// Returns the same basis for another record, if its columns depend on more than drive and segments.
     fn over(&self, _samples: &Samples) -> Option<Box<dyn Basis>> {
         None
     }
-    /// Whether there is a drag: a rate-dependent form of the operator.
+    /// Returns whether the operator has a rate-dependent form (drag).
     fn drags(&self) -> bool {
         true
     }
-    /// Whether a half turn of the drive about its middle turns the output about its middle, whatever the weights: such a base cannot bend
-    /// one end of a loop, and an asymmetry is an effect that it lacks. Any other base bends by its own weights.
+    /// Returns whether the operator is odd: a drive mirrored about its middle mirrors the output, for all weights. Such
+    /// a basis cannot bend one end of a loop, so asymmetry is a separate effect. Other bases bend with their weights.
     fn is_odd(&self) -> bool {
         false
     }
-    /// Bounds of the weights.
+    /// Returns the bounds of the weights.
     fn bounds(&self) -> Vec<Bounds>;
-    /// What regularises the weights, as a matrix to be added to normal equations whose mean
-    /// diagonal (over the columns) is `level`; `None` if nothing has to.
+    /// Returns a regularisation matrix for the weights, to be added to normal equations with the mean diagonal `level`;
+    /// `None` if none is needed.
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>>;
-    /// Number of columns.
+    /// Returns the number of columns.
     fn len(&self) -> usize {
         self.bounds().len()
     }
@@ -81,7 +82,7 @@ pub(crate) trait Basis: Sync {
 mod tests {
     use super::*;
 
-    /// Two segments with minor loops; virgin memory at the start of each.
+    /// Two segments with minor loops, each with virgin memory at its start.
     fn samples() -> Samples {
         let input: Vec<f64> =
             (0..900).map(|k| f64::from(k) * 0.02).map(|t| 20.0 * t.sqrt() * (1.0 - t.cos())).collect();
@@ -94,7 +95,7 @@ mod tests {
         let weights: Vec<f64> = (0..basis.len()).map(|i| 0.3 + (1.7 * i as f64).sin().powi(2)).collect();
         let all = basis.columns(0..basis.len(), &samples.input, &samples.segments, drag);
         assert_eq!(all.len(), basis.len());
-        // However many are made at a time.
+        // Independent of how many columns are computed at a time.
         for together in [1, 3, 8] {
             for first in (0..basis.len()).step_by(together) {
                 let of = first..(first + together).min(basis.len());
@@ -109,14 +110,14 @@ mod tests {
     }
 
     #[test]
-    fn what_an_operator_gives_is_the_sum_of_its_columns() {
+    fn the_output_of_an_operator_is_the_sum_of_its_columns() {
         let samples = samples();
         let viscous = DragParams { seconds: 2e-3, volt_seconds: 1e-4 }.over(&samples);
         let screening = ScreeningBasis::for_samples(&samples, true, None);
         agrees(&screening, &samples, &Drag::NONE);
         agrees(&screening, &samples, &viscous);
         agrees(&PreisachBasis::for_samples(&samples, 8), &samples, &Drag::NONE);
-        // Driven to both sides there is no virgin strip.
+        // A drive to both sides has no virgin strip.
         let input: Vec<f64> = samples.input.iter().map(|u| u - 60.0).collect();
         let both = Samples { input, ..samples };
         agrees(&PreisachBasis::for_samples(&both, 9), &both, &Drag::NONE);

@@ -1,58 +1,58 @@
-//! The Prandtl-Ishlinskii operator as columns: the identity and its plays.
+//! The Prandtl-Ishlinskii operator as columns: the identity and play operators.
 
 use std::ops::Range;
 
 use hyst_core::play;
 use nalgebra::DMatrix;
 
-use super::{BESIDE, Basis, Drag, turned};
+use super::{Basis, Drag, SIDE_BY_SIDE, with_sign};
 use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
 use crate::lsq::Bounds;
 use crate::memory::WithPast;
 
-/// Plays whose loops lie inside the record's swing.
+/// Number of play operators with thresholds inside the record's swing.
 const LOOPS: usize = 15;
-/// Plays that only the first rise from virgin memory reaches.
+/// Number of play operators that only the first rise from virgin memory reaches.
 const VIRGIN: usize = 5;
-/// p₀ is at least this share of the mean gain: the inverse then amplifies by 20 at most.
-const FLOOR: f64 = 0.05;
-/// Largest weight of a play that only a first rise from rest moves, in mean gains. Nothing else than those rows tells its weight from the sensor's zero,
-/// and they may be a start-up.
-const STEEPEST: f64 = 2.0;
+/// Minimum of p₀, as a share of the mean gain: the inverse then amplifies by at most 20.
+const MIN_GAIN_SHARE: f64 = 0.05;
+/// Maximum weight of a play operator that only the first rise from rest moves, in mean gains. Only those rows separate
+/// its weight from the sensor's zero, and they may be start-up rows.
+const MAX_VIRGIN_WEIGHT: f64 = 2.0;
 /// Step of the difference quotients along a threshold, as a share of the input.
 const STEP: f64 = 1e-6;
 
-/// Thresholds and the floor of p₀.
+/// Play operators with fixed thresholds, and the minimum of p₀.
 #[derive(Clone, Debug)]
 pub(crate) struct PiBasis {
     pub(crate) thresholds: Vec<f64>,
     pub(crate) floor: f64,
-    /// Threshold from which on only a first rise from rest moves a play.
+    /// Threshold above which only the first rise from rest moves a play operator.
     pub(crate) virgin: f64,
-    /// Whether the output falls where the operator rises: weights stay positive, columns change their sign.
+    /// Whether the output falls while the operator rises: weights stay positive, columns change their sign.
     pub(crate) falls: bool,
 }
 
 impl PiBasis {
-    /// Thresholds spaced evenly over what the record's input can move: loops reach half its swing,
-    /// the first rise from rest its largest magnitude.
+    /// Returns even thresholds over the range of the record's input: up to half its swing, and up to its largest
+    /// magnitude for the first rise from rest.
     pub(crate) fn for_samples(samples: &Samples) -> Self {
         let (low, high) = samples.input_range();
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
         let thresholds = even(samples, LOOPS, VIRGIN);
-        Self { thresholds, floor: FLOOR * gain, virgin: 0.5 * (high - low), falls: samples.falls }
+        Self { thresholds, floor: MIN_GAIN_SHARE * gain, virgin: 0.5 * (high - low), falls: samples.falls }
     }
 
-    /// The same with a share of the plays.
+    /// Returns a basis with a fraction `1/by` of the play operators.
     pub(crate) fn coarser(samples: &Samples, by: usize) -> Self {
         Self { thresholds: even(samples, LOOPS.div_ceil(by), VIRGIN.div_ceil(by)), ..Self::for_samples(samples) }
     }
 
-    /// At most `most` thresholds where the record calls for them; without a number those, if they predict parts of the record that
-    /// are left out clearly better than these do and are no more. `None` if there are none. The output shows a play as what `through`
-    /// makes of it.
+    /// Returns at most `most` thresholds, chosen by the record. Without a number: thresholds that predict left-out
+    /// parts of the record clearly better than these and are no more. Returns `None` if there are none. `through` maps
+    /// the output of a play operator to the measured output.
     pub(crate) fn chosen(
         &self,
         samples: &Samples,
@@ -63,12 +63,12 @@ impl PiBasis {
         let all = WithPast::new(&samples.input, &samples.segments, &samples.pasts);
         let elements = |r: &[f64]| {
             let plays = plays(&all.drive, &all.segments, r, drag);
-            let mut plays = turned(self.falls, plays.iter().map(|play| all.own(play)).collect());
+            let mut plays = with_sign(self.falls, plays.iter().map(|play| all.own(play)).collect());
             through(&mut plays);
             plays
         };
         let bank = |rows| {
-            let mut identity = turned(self.falls, vec![samples.input.clone()]);
+            let mut identity = with_sign(self.falls, vec![samples.input.clone()]);
             through(&mut identity);
             let identity = identity.swap_remove(0);
             let candidates = even(samples, CANDIDATES, CANDIDATES / 4);
@@ -81,12 +81,13 @@ impl PiBasis {
     }
 }
 
-/// Even thresholds: `loops` inside the swing of a record and, where it shows a first rise from rest beyond that, `virgin` there.
+/// Returns even thresholds: `loops` inside the swing of a record and, if it shows a first rise from rest beyond that,
+/// `virgin` more.
 fn even(samples: &Samples, loops: usize, virgin: usize) -> Vec<f64> {
     let (low, high) = samples.input_range();
     let (half, reach) = ((high - low) / 2.0, low.abs().max(high.abs()));
     let mut thresholds: Vec<f64> = (1..=loops).map(|i| half * i as f64 / (loops + 1) as f64).collect();
-    // Only segments that start below the record's full swing show the virgin curve.
+    // Only segments that start near rest show the virgin curve.
     let starts_at_rest = samples.segments.iter().any(|s| samples.input[s.start].abs() < 0.1 * reach);
     if starts_at_rest && reach > 1.05 * half {
         thresholds.extend((0..virgin).map(|i| half + (reach - half) * i as f64 / virgin as f64));
@@ -98,7 +99,7 @@ impl Basis for PiBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let identity = of.contains(&0).then(|| drive.to_vec());
         let thresholds = &self.thresholds[of.start.max(1) - 1..of.end.max(1) - 1];
-        turned(self.falls, identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect())
+        with_sign(self.falls, identity.into_iter().chain(plays(drive, segments, thresholds, drag)).collect())
     }
 
     fn is_odd(&self) -> bool {
@@ -108,7 +109,7 @@ impl Basis for PiBasis {
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.thresholds.len() + 1];
         bounds[0] = Bounds::above(self.floor);
-        let steepest = STEEPEST * self.floor / FLOOR;
+        let steepest = MAX_VIRGIN_WEIGHT * self.floor / MIN_GAIN_SHARE;
         for (bound, _) in bounds[1..].iter_mut().zip(&self.thresholds).filter(|(_, r)| **r >= self.virgin) {
             bound.upper = steepest;
         }
@@ -116,20 +117,21 @@ impl Basis for PiBasis {
     }
 
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
-        // Thresholds that the record hardly tells apart share their weight instead of alternating.
+        // Thresholds that the record hardly separates share their weight instead of alternating.
         let n = self.len();
         Some(DMatrix::from_diagonal_element(n, n, 1e-9 * level))
     }
 }
 
-/// Plays with weights, and how their output changes where their thresholds do: the columns of a fit of both around an optimum.
-pub(crate) struct SlidingPlays<'a> {
+/// Play operators with weights, and the derivatives of their output with respect to the thresholds: the columns of a
+/// fit of both near an optimum.
+pub(crate) struct PlaysWithSlopes<'a> {
     pub(crate) plays: &'a PiBasis,
     /// p₀, then the weights.
     pub(crate) weights: &'a [f64],
 }
 
-impl Basis for SlidingPlays<'_> {
+impl Basis for PlaysWithSlopes<'_> {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Vec<Vec<f64>> {
         let step = STEP * drive.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
         let plain = self.plays.len();
@@ -156,35 +158,35 @@ impl Basis for SlidingPlays<'_> {
     }
 }
 
-/// The play operator over a drive, virgin at each segment's start.
+/// Returns the output of a play operator over a drive, with virgin memory at the start of each segment.
 pub(crate) fn play_column(drive: &[f64], segments: &[Range<usize>], r: f64) -> Vec<f64> {
     one_play(drive, segments, r, &Drag::NONE)
 }
 
-/// The play operator with drag over a drive, virgin at each segment's start.
+/// Returns the output of a play operator with drag over a drive, with virgin memory at the start of each segment.
 fn one_play(drive: &[f64], segments: &[Range<usize>], r: f64, drag: &Drag) -> Vec<f64> {
     let mut column = vec![0.0; drive.len()];
-    beside([&mut column], drive, segments, [r], drag);
+    run_plays([&mut column], drive, segments, [r], drag);
     column
 }
 
-/// Play operators with drag over a drive, virgin at each segment's start.
+/// Returns the outputs of play operators with drag over a drive, with virgin memory at the start of each segment.
 pub(super) fn plays(drive: &[f64], segments: &[Range<usize>], thresholds: &[f64], drag: &Drag) -> Vec<Vec<f64>> {
     let mut columns = vec![vec![0.0; drive.len()]; thresholds.len()];
-    for (columns, thresholds) in columns.chunks_mut(BESIDE).zip(thresholds.chunks(BESIDE)) {
+    for (columns, thresholds) in columns.chunks_mut(SIDE_BY_SIDE).zip(thresholds.chunks(SIDE_BY_SIDE)) {
         match (columns, thresholds) {
-            ([a, b, c, d], [p, q, r, s]) => beside([a, b, c, d], drive, segments, [*p, *q, *r, *s], drag),
-            ([a, b, c], [p, q, r]) => beside([a, b, c], drive, segments, [*p, *q, *r], drag),
-            ([a, b], [p, q]) => beside([a, b], drive, segments, [*p, *q], drag),
+            ([a, b, c, d], [p, q, r, s]) => run_plays([a, b, c, d], drive, segments, [*p, *q, *r, *s], drag),
+            ([a, b, c], [p, q, r]) => run_plays([a, b, c], drive, segments, [*p, *q, *r], drag),
+            ([a, b], [p, q]) => run_plays([a, b], drive, segments, [*p, *q], drag),
             (columns, thresholds) => {
-                columns.iter_mut().zip(thresholds).for_each(|(c, r)| beside([c], drive, segments, [*r], drag));
+                columns.iter_mut().zip(thresholds).for_each(|(c, r)| run_plays([c], drive, segments, [*r], drag));
             }
         }
     }
     columns
 }
 
-fn beside<const N: usize>(
+fn run_plays<const N: usize>(
     mut columns: [&mut Vec<f64>; N],
     drive: &[f64],
     segments: &[Range<usize>],
@@ -200,7 +202,7 @@ fn beside<const N: usize>(
     }
 }
 
-/// `follows(p, to)` is where a play at p comes in a sample in which it would be at `to` without drag.
+/// Runs play operators; `follows(p, to)` returns the next state of one at p that would be at `to` without drag.
 fn follow<const N: usize>(mut out: [&mut [f64]; N], drive: &[f64], r: [f64; N], follows: impl Fn(f64, f64) -> f64) {
     let mut p = [0.0; N];
     for (k, u) in drive.iter().enumerate() {
@@ -219,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plays_side_by_side_are_each_as_alone() {
+    fn play_operators_run_together_equal_single_ones() {
         let drive: Vec<f64> =
             (0..700).map(|k| 5.0 * (0.01 * f64::from(k)).sin() + (0.3 * f64::from(k)).sin()).collect();
         let segments = [0..1, 1..300, 300..700];

@@ -1,23 +1,22 @@
-//! The Preisach operator as columns: one per cell of the triangle, one per interval of the virgin
-//! strip.
+//! The Preisach operator as columns: one per cell of the triangle, and one per interval of the virgin strip.
 
 use std::ops::Range;
 
 use hyst_core::{Build, Env, Everett, Grid, PreisachParams, Stage, preisach_cell};
 use nalgebra::DMatrix;
 
-use super::{Basis, Drag, turned};
+use super::{Basis, Drag, with_sign};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::capacity::NODES;
 
-/// Reversible slope of each diagonal cell is at least this share of the mean gain.
-const FLOOR: f64 = 0.05;
-/// A cell of the strip rises by at most so many mean cells of the whole stroke: a first rise is steeper, but none jumps.
-const STEEPEST: f64 = 2.0;
+/// Minimum reversible slope of a diagonal cell, as a share of the mean gain.
+const MIN_SLOPE_SHARE: f64 = 0.05;
+/// Maximum of a cell of the strip, in mean cells of the whole stroke: a first rise is steeper, but does not jump.
+const MAX_STRIP_CELL: f64 = 2.0;
 /// Margin of the grid around the record's input, as a share of its swing.
 const MARGIN: f64 = 0.02;
-/// Weight of the differences between neighbouring cells against the record.
+/// Weight of the differences between neighbouring cells, relative to the record.
 const SMOOTHNESS: f64 = 3e-6;
 
 /// A grid over the record's input.
@@ -26,18 +25,18 @@ pub(crate) struct PreisachBasis {
     pub(crate) grid: Grid,
     pub(crate) rest: f64,
     pub(crate) floor: f64,
-    /// Whether the output falls where the operator rises: weights stay positive, columns change their sign.
+    /// Whether the output falls while the operator rises: weights stay positive, columns change their sign.
     pub(crate) falls: bool,
 }
 
 impl PreisachBasis {
-    /// A grid of `cells` cells over the record's input with a small margin; rest is 0 V, or the end
-    /// of the range next to it.
+    /// Returns a grid of `cells` cells over the record's input with a small margin. Rest is 0 V, or the end of the
+    /// range closest to it.
     pub(crate) fn for_samples(samples: &Samples, cells: usize) -> Self {
         let (low, high) = samples.input_range();
         let margin = MARGIN * (high - low);
-        // A device that is only driven to one side has its rest on the edge of the triangle, also where the
-        // measured drive passes 0 V by its own offset.
+        // A device that is driven to one side only rests on the edge of the triangle, even if an offset moves the
+        // measured drive past 0 V.
         let near_zero = |edge: f64| edge.abs() <= 0.2 * (high - low);
         let one_sided_up = near_zero(low) && low >= -margin;
         let one_sided_down = !one_sided_up && near_zero(high) && high <= margin;
@@ -55,19 +54,19 @@ impl PreisachBasis {
         };
         let gain = samples.output_span() / (high - low).max(f64::MIN_POSITIVE);
         let width = (high - low) / cells as f64;
-        Self { grid: Grid { low, high, cells }, rest, floor: FLOOR * gain * width, falls: samples.falls }
+        Self { grid: Grid { low, high, cells }, rest, floor: MIN_SLOPE_SHARE * gain * width, falls: samples.falls }
     }
 
     fn triangle(&self) -> usize {
         self.grid.cells * (self.grid.cells + 1) / 2
     }
 
-    /// Whether relays exist that the first rise from rest flips for good.
+    /// Returns whether there are relays that only the first rise from rest switches.
     fn has_strip(&self) -> bool {
         self.rest <= self.grid.low
     }
 
-    /// The operator with these weights.
+    /// Returns the operator with these weights.
     pub(crate) fn spec(&self, weights: &[f64]) -> PreisachParams<Vec<f64>> {
         let (density, once) = weights.split_at(self.triangle());
         let once = if self.has_strip() { once.to_vec() } else { vec![0.0; self.grid.cells] };
@@ -81,7 +80,7 @@ impl PreisachBasis {
         }
     }
 
-    /// Adds to the columns `of` a row `sign` times the share of every cell that lies between β and α.
+    /// Adds `sign` times the fraction of every cell between β and α to the columns `of` of a row.
     fn add_between(&self, row: &mut [f64], of: &Range<usize>, alpha: f64, beta: f64, sign: f64) {
         let width = (self.grid.high - self.grid.low) / self.grid.cells as f64;
         let place = |u: f64| ((u - self.grid.low) / width).clamp(0.0, self.grid.cells as f64);
@@ -92,7 +91,7 @@ impl PreisachBasis {
         let above = |cell: usize| (cell as f64 + 1.0 - b).clamp(0.0, 1.0);
         for i in bottom..=top {
             let rows = sign * below(i);
-            // The cells (i, 0) to (i, i) stand side by side.
+            // The cells (i, 0) to (i, i) are consecutive.
             let first = preisach_cell(i, 0);
             let inside = of.start.max(first + bottom)..of.end.min(first + i);
             for c in inside {
@@ -105,7 +104,7 @@ impl PreisachBasis {
         }
     }
 
-    /// Adds the virgin curve at `u` to the columns `of` a row.
+    /// Adds the virgin curve at `u` to the columns `of` of a row.
     fn add_virgin(&self, row: &mut [f64], of: &Range<usize>, u: f64) {
         self.add_between(row, of, u, self.grid.low, 1.0);
         if self.has_strip() {
@@ -117,11 +116,12 @@ impl PreisachBasis {
         }
     }
 
-    /// The columns `of` the whole.
+    /// Returns the columns with the indices `of`.
     fn some(&self, of: &Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
         let n = of.len();
         let mut columns = vec![vec![0.0; drive.len()]; n];
-        // The operator itself keeps the memory, with an empty map: one rule of wiping out for all.
+        // The operator itself, with an empty map, tracks the memory, so that the same wiping-out rule applies
+        // everywhere.
         let Ok(map) = Everett::<f64, NODES>::new(self.grid, self.rest, |_, _| 0.0, |_| 0.0) else {
             return columns;
         };
@@ -129,7 +129,7 @@ impl PreisachBasis {
         let env = Env::default();
         let mut state = map.state();
         for segment in segments {
-            // Rows at the reversals in force, each from the one before.
+            // Rows at the reversals in memory, each computed from the previous one.
             let mut levels: Vec<(f64, Vec<f64>)> = Vec::new();
             let mut at_rest: Option<Vec<f64>> = None;
             let mut row_now = |memory: &[f64], now: f64| -> Vec<f64> {
@@ -175,14 +175,14 @@ impl PreisachBasis {
 
 impl Basis for PreisachBasis {
     fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Vec<Vec<f64>> {
-        turned(self.falls, self.some(&of, drive, segments))
+        with_sign(self.falls, self.some(&of, drive, segments))
     }
 
     fn together(&self) -> usize {
         64
     }
 
-    /// By the operator itself: its map holds all columns at once.
+    /// Evaluates the operator itself: its map holds all columns at once.
     fn combined(&self, weights: &[f64], drive: &[f64], segments: &[Range<usize>], _drag: &Drag) -> Option<Vec<f64>> {
         let map: Box<Everett<f64, NODES>> = Box::new(self.spec(weights).build(&()).ok()?);
         let env = Env::default();
@@ -192,7 +192,7 @@ impl Basis for PreisachBasis {
             let zero = map.reset(&mut state, &env, self.rest);
             out.extend(drive[segment.clone()].iter().map(|u| map.step(&mut state, &env, *u) - zero));
         }
-        Some(turned(self.falls, vec![out]).swap_remove(0))
+        Some(with_sign(self.falls, vec![out]).swap_remove(0))
     }
 
     fn drags(&self) -> bool {
@@ -202,8 +202,8 @@ impl Basis for PreisachBasis {
     fn bounds(&self) -> Vec<Bounds> {
         let mut bounds = vec![Bounds::above(0.0); self.triangle()];
         if self.has_strip() {
-            // The floor is a share of the same mean cell.
-            let steepest = STEEPEST * self.floor / FLOOR;
+            // The minimum is a share of the same mean cell.
+            let steepest = MAX_STRIP_CELL * self.floor / MIN_SLOPE_SHARE;
             bounds.extend(std::iter::repeat_n(Bounds { lower: 0.0, upper: steepest }, self.grid.cells));
         }
         for i in 0..self.grid.cells {
@@ -212,9 +212,8 @@ impl Basis for PreisachBasis {
         bounds
     }
 
-    /// Smoothness: neighbouring cells of the triangle's inside, of its diagonal and of the strip
-    /// differ little. What the record shows overrules it; cells it never visits follow their
-    /// neighbours.
+    /// Returns a smoothness penalty: neighbouring cells inside the triangle, on its diagonal and in the strip differ
+    /// little. The record overrules it; cells that it never visits follow their neighbours.
     fn penalty(&self, level: f64) -> Option<DMatrix<f64>> {
         let n = self.len();
         let weight = SMOOTHNESS * level;

@@ -1,8 +1,10 @@
-//! A base whose loops change with the rate in any way: the rival of what is named beside a law of the rate.
+//! A base whose loops depend on the rate in any smooth way, used as a rival of late and slow effects next to a
+//! rate-dependence.
 //!
-//! No formula of a rate is an actuator's to the last digit: coercive voltages grow with a power of the rate, with its logarithm, or otherwise. Beside a
-//! base stand its plays times hat functions of the logarithm of the rate: weights and thresholds that depend on it in any smooth way, to first order. And
-//! plays whose thresholds grow with several powers of the rate, which remember at what rate they were moved.
+//! No formula for rate-dependence is exact: coercive voltages grow with a power of the rate, with its logarithm, or
+//! otherwise. To another base this one adds play operators multiplied by hat functions of the logarithm of the rate:
+//! weights and thresholds that depend on the rate smoothly, to first order. It also adds play operators whose
+//! thresholds grow with several powers of the rate and that remember the rate at which they moved.
 
 use std::ops::Range;
 
@@ -14,32 +16,33 @@ use super::{Basis, Drag};
 use crate::Samples;
 use crate::lsq::Bounds;
 
-/// Shares of the moving rows whose rates are the knots; at the first the base has all of its own.
+/// Quantiles of the moving rows whose rates are the knots. The first knot has no hat function.
 const KNOTS: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
 /// Thresholds, as shares of half the range; the first is that of the drive itself.
 const THRESHOLDS: [f64; 6] = [0.0, 0.08, 0.2, 0.35, 0.55, 0.75];
 
-/// Exponents of thresholds that grow, and their growth at the median rate.
+/// Exponents of growing thresholds, and their growth at the median rate.
 const EXPONENTS: [f64; 3] = [0.15, 0.4, 1.0];
 const GROWTH: f64 = 0.3;
 
-/// Another base, and plays that change with the rate.
+/// Another base with rate-dependent play operators.
 pub(crate) struct RatedBasis<'a> {
     base: &'a dyn Basis,
-    /// Logarithms of rates, rising.
+    /// Logarithms of the knot rates, increasing.
     knots: Vec<f64>,
     thresholds: Vec<f64>,
     /// Sample period of each segment \[s\].
     periods: Vec<f64>,
-    /// Median rate \[V/s\], and the time over which thresholds that grow feel it \[s\].
+    /// Median rate \[V/s\], and the averaging time of the rate for growing thresholds \[s\].
     median: f64,
     felt_over: f64,
-    /// Whether columns fall where the plays rise.
+    /// Whether the output falls while the play operators rise.
     falls: bool,
 }
 
 impl<'a> RatedBasis<'a> {
-    /// Around a base; none where the drive has one rate only. Thresholds that grow feel the rate over a time \[s\].
+    /// Builds the basis around another one; `None` if the drive has only one rate. `felt_over` is the averaging time of
+    /// the rate for growing thresholds \[s\].
     pub(crate) fn around(base: &'a dyn Basis, samples: &Samples, felt_over: f64) -> Option<Self> {
         let (low, high) = samples.input_range();
         let periods: Vec<f64> = (0..samples.segments.len()).map(|i| samples.period_of(i)).collect();
@@ -56,12 +59,12 @@ impl<'a> RatedBasis<'a> {
         (knots.len() > 1).then_some(Self { base, knots, thresholds, periods, median, felt_over, falls })
     }
 
-    /// Columns of the hats, and of thresholds that grow: the first threshold is zero, which does not.
+    /// Returns the numbers of columns with hat functions and with growing thresholds. The zero threshold does not grow.
     fn counts(&self) -> (usize, usize) {
         ((self.knots.len() - 1) * self.thresholds.len(), EXPONENTS.len() * (self.thresholds.len() - 1))
     }
 
-    /// What a play adds whose threshold grows; nothing where a stage cannot be built.
+    /// Returns the contribution of a play operator with a growing threshold; zero if the stage cannot be built.
     fn grown(&self, at: usize, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
         let plays = self.thresholds.len() - 1;
         let weight = if self.falls { -1.0 } else { 1.0 };
@@ -86,7 +89,7 @@ impl<'a> RatedBasis<'a> {
         column
     }
 
-    /// The hat of a knot over the rows.
+    /// Returns the hat function of a knot over the rows.
     fn hat(&self, knot: usize, rates: &[f64]) -> Vec<f64> {
         let (before, own, after) = (self.knots[knot - 1], self.knots[knot], self.knots.get(knot + 1));
         let of = |rate: &f64| {
@@ -101,7 +104,7 @@ impl<'a> RatedBasis<'a> {
     }
 }
 
-/// Rate at which each row is reached, 0 where a segment begins.
+/// Returns the rate of each row, 0 at the start of a segment.
 fn rates(drive: &[f64], segments: &[Range<usize>], periods: &[f64]) -> Vec<f64> {
     let mut rates = vec![0.0; drive.len()];
     for (rows, period) in segments.iter().zip(periods) {
@@ -170,9 +173,9 @@ mod tests {
     use crate::lsq::Blocks;
     use crate::nested::{Hypothesis, Problem};
 
-    /// Thresholds that grow with the logarithm of the rate as it is felt over 5 ms, which is no power of it.
+    /// Thresholds that grow with the logarithm of the rate, averaged over 5 ms: no power of the rate.
     #[test]
-    fn it_takes_a_law_of_the_rate_that_has_no_name() {
+    fn an_unlisted_rate_law_is_explained() {
         let drive = |t: f64| 50.0 + 45.0 * (5.0 * t * (1.0 + 0.8 * t)).sin() * (0.7 + 0.3 * (1.7 * t).cos());
         let input: Vec<f64> = (0..8000).map(|k| drive(1e-3 * f64::from(k))).collect();
         let (mut rate, mut last, mut plays) = (0.0, input[0], [0.0; 12]);
@@ -193,7 +196,7 @@ mod tests {
         };
         let (without, with) = (left(&base), left(&rated));
         assert!(1.0 - (with / without).powi(2) > DOMINANT_SHARE, "{with} {without}");
-        // However many columns are made at a time.
+        // Independent of how many columns are computed at a time.
         let all = rated.columns(0..rated.len(), &samples.input, &samples.segments, &Drag::NONE);
         for (at, column) in all.iter().enumerate() {
             assert_eq!(rated.columns(at..at + 1, &samples.input, &samples.segments, &Drag::NONE)[0], *column);

@@ -1,11 +1,11 @@
-//! A rich base for the search for effects.
+//! A rich base for the search for effects (screening basis).
 //!
-//! Every Preisach operator is `∫ ψ_r(play_r(u)) dr` with one curve ψ_r per threshold; a
-//! Prandtl-Ishlinskii operator is the case of straight lines. Here ψ_r is a polynomial of degree 3:
-//! enough that the residual of a fit is not the base's own shape, which would otherwise be taken for
-//! an effect. A bank that relaxes with the travel of the drive ([`travel`](super::travel)) is added for hysteresis that is no superposition of
-//! relays: an effect is named only for what no rate-independent memory takes as well. An operator that is not
-//! linear in its parameters is a further column: it may ring, lag or follow the temperature by itself.
+//! Every Preisach operator is `∫ ψ_r(play_r(u)) dr` with one curve ψ_r per threshold. A Prandtl-Ishlinskii operator is
+//! the case of straight lines. Here ψ_r is a polynomial of degree 3, so that the residual of a fit is not misfit of the
+//! base, which would otherwise be mistaken for an effect. A bank that relaxes with the travel of the drive
+//! ([`travel`](super::travel)) represents hysteresis that is no superposition of relays: an effect is named only if no
+//! rate-independent memory explains it as well. An operator that is not linear in its parameters is an additional
+//! column; it may ring, lag or depend on the temperature.
 
 use std::ops::Range;
 
@@ -14,17 +14,17 @@ use rayon::prelude::*;
 
 use super::pi::plays;
 use super::travel::TravelBank;
-use super::{BESIDE, Basis, Drag, LinearisedBasis, PiBasis};
+use super::{Basis, Drag, LinearisedBasis, PiBasis, SIDE_BY_SIDE};
 use crate::Samples;
 use crate::lsq::Bounds;
 use crate::repetition::only_loop;
 
-/// Rows for each unknown of the base: with fewer, noise looks like an effect.
+/// Minimum number of rows for each unknown of the base: with fewer, noise looks like an effect.
 pub(crate) const ROWS_PER_UNKNOWN: usize = 10;
-/// Divisor of the number of plays for the shortest records.
-const COARSEST: usize = 5;
+/// Maximum divisor of the number of play operators, for the shortest records.
+const MAX_DIVISOR: usize = 5;
 
-/// Plays with quadratic and cubic curves, and a bank that relaxes with travel.
+/// Play operators with quadratic and cubic curves, and a bank that relaxes with travel.
 #[derive(Clone, Debug)]
 pub(crate) struct ScreeningBasis {
     linear: PiBasis,
@@ -37,15 +37,14 @@ pub(crate) struct ScreeningBasis {
 }
 
 impl ScreeningBasis {
-    /// For the input range of a record; with drag only where the base that is extended in the end has one too, and with that base
-    /// if it is kept as it is.
+    /// Builds the basis for the input range of a record. `drags` allows a drag, if the base that is finally extended
+    /// has one too. `kept` is that base if its parameters are held.
     pub(crate) fn for_samples(samples: &Samples, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
-        // A short record determines fewer curves.
-        // Its weights have either sign.
+        // A short record determines fewer curves. The weights have either sign.
         let plays = |by| PiBasis { falls: false, ..PiBasis::coarser(samples, by) };
         let of = |by: usize| Self::of(samples, plays(by), drags, kept.clone());
         let fits = |basis: &Self| ROWS_PER_UNKNOWN * basis.len() <= samples.len();
-        (1..COARSEST).map(of).find(fits).unwrap_or_else(|| of(COARSEST))
+        (1..MAX_DIVISOR).map(of).find(fits).unwrap_or_else(|| of(MAX_DIVISOR))
     }
 
     fn of(samples: &Samples, linear: PiBasis, drags: bool, kept: Option<Box<LinearisedBasis>>) -> Self {
@@ -56,13 +55,13 @@ impl ScreeningBasis {
         Self { linear, curved, middle: 0.5 * (low + high), half: 0.5 * (high - low), travel, drags, kept }
     }
 
-    /// Columns of the plays, and where those of the bank end.
+    /// Returns the end of the columns of the play operators, and the end of those of the bank.
     fn ends(&self) -> (usize, usize) {
         let plays = self.linear.len() + 2 * self.curved.len();
         (plays, plays + self.travel.len())
     }
 
-    /// Square and cubic of a play's output, zero at its zero.
+    /// Returns the square and the cubic of a play operator's output, zero at output zero.
     #[inline]
     fn curves(&self, p: f64) -> [f64; 2] {
         let scale = 1.0 / self.half;
@@ -77,7 +76,7 @@ impl Basis for ScreeningBasis {
         let (curved, (played, kept)) = (self.linear.len(), self.ends());
         let mut columns = self.linear.columns(of.start.min(curved)..of.end.min(curved), drive, segments, drag);
         let of_curved = of.start.max(curved).min(played)..of.end.max(curved).min(played);
-        // A square and a cubic of each play.
+        // A square and a cubic for each play operator.
         let first = (of_curved.start - curved) / 2;
         let thresholds = &self.curved[first..(of_curved.end - curved).div_ceil(2).max(first)];
         let mut plays = plays(drive, segments, thresholds, drag);
@@ -90,7 +89,7 @@ impl Basis for ScreeningBasis {
         let of_travel = of.start.max(played).min(kept) - played..of.end.max(played).min(kept) - played;
         columns.extend(self.travel.columns(of_travel, drive, segments));
         if let Some(own) = self.kept.as_ref().filter(|_| of.end > kept) {
-            // In volts like the others, whatever its unit: one penalty is for all.
+            // Scaled to volts like the other columns, because one penalty applies to all.
             let size = |column: &[f64]| column.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
             let mut own = own.columns(of.start.max(kept) - kept..of.end - kept, drive, segments, drag);
             for column in &mut own {
@@ -102,7 +101,7 @@ impl Basis for ScreeningBasis {
         columns
     }
 
-    /// One pass for the line and the curves of a play.
+    /// Computes the line and the curves of each play operator in one pass.
     fn combined(&self, weights: &[f64], drive: &[f64], segments: &[Range<usize>], drag: &Drag) -> Option<Vec<f64>> {
         if self.kept.is_some() {
             return None;
@@ -111,7 +110,7 @@ impl Basis for ScreeningBasis {
         let (straight, bent) = of_plays.split_at(self.linear.len());
         let curves: Vec<(f64, [f64; 2])> =
             self.curved.iter().copied().zip(bent.chunks(2).map(|w| [w[0], w[1]])).collect();
-        // Of each threshold its line; the identity has the threshold 0 and no drag.
+        // The line of each threshold; the identity has threshold 0 and no drag.
         let add = |v: &mut [f64], p: &[f64], w: f64, bend: Option<[f64; 2]>| match bend {
             Some([square, cube]) => v.iter_mut().zip(p).for_each(|(v, p)| {
                 let [s, c] = self.curves(*p);
@@ -128,7 +127,8 @@ impl Basis for ScreeningBasis {
             v
         };
         let thresholds = &self.linear.thresholds;
-        let pieces: Vec<(&[f64], &[f64])> = thresholds.chunks(BESIDE).zip(straight[1..].chunks(BESIDE)).collect();
+        let pieces: Vec<(&[f64], &[f64])> =
+            thresholds.chunks(SIDE_BY_SIDE).zip(straight[1..].chunks(SIDE_BY_SIDE)).collect();
         let parts: Vec<Vec<f64>> = pieces.into_par_iter().map(part).collect();
         let mut v = vec![0.0; drive.len()];
         add(&mut v, drive, straight[0], bend(0.0));

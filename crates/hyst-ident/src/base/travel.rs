@@ -1,50 +1,51 @@
-//! Relaxation in travel: rate-independent memory that no superposition of relays has.
+//! Relaxation with travel: rate-independent memory that no superposition of relays has.
 //!
-//! A Duhem law `ż = |u̇| f(z, u) + u̇ g(u)` forgets with the distance that its input travels, not with time (Coleman and Hodgdon 1986; a
-//! Bouc-Wen law does so too). Its linear case is exactly a combination of the input and of
-//! `de = du − a |du| e`, one for each rate `a` of forgetting. A bank of such elements stands for all of them, as a bank of plays stands for a
-//! smooth density of thresholds. Read-outs `e²` and `e·x`, x the scaled input, stand for laws whose rate of forgetting depends on the branch.
+//! A Duhem law `ż = |u̇| f(z, u) + u̇ g(u)` forgets with the distance that its input travels, not with time (Coleman
+//! and Hodgdon 1986; also Bouc-Wen). Its linear case is exactly a combination of the input and of `de = du − a |du| e`,
+//! with one forgetting rate `a` for each element. A bank of such elements represents all rates, as a bank of play
+//! operators represents a smooth density of thresholds. The outputs `e²` and `e·x`, with x the scaled input, represent
+//! laws whose forgetting rate depends on the branch.
 
 use std::ops::Range;
 
-/// Travel after which an element has forgotten all but 1/e, in input ranges: from a tenth of a minor loop to two full sweeps.
-const SHORTEST: f64 = 1.0 / 16.0;
-const LONGEST: f64 = 2.0;
-/// Elements of the bank: a factor of two from one to the next.
+/// Travel over which an element forgets to 1/e, in input ranges: from a tenth of a minor loop to two full sweeps.
+const MIN_TRAVEL: f64 = 1.0 / 16.0;
+const MAX_TRAVEL: f64 = 2.0;
+/// Number of elements of the bank, with equal ratios of their rates.
 const ELEMENTS: usize = 6;
-/// Columns of an element: e, e² and e·x.
+/// Columns per element: e, e² and e·x.
 const READ_OUTS: usize = 3;
 
 /// A bank of elements that relax with the travel of the input.
 #[derive(Clone, Debug)]
 pub(super) struct TravelBank {
-    /// Rates of forgetting \[1/V\].
+    /// Forgetting rates \[1/V\].
     rates: Vec<f64>,
     middle: f64,
     half: f64,
 }
 
 impl TravelBank {
-    /// For a drive between these voltages.
+    /// Builds a bank for a drive between these voltages.
     pub(super) fn new(low: f64, high: f64) -> Self {
         let range = (high - low).max(f64::MIN_POSITIVE);
-        let ratio = (LONGEST / SHORTEST).powf(1.0 / (ELEMENTS - 1) as f64);
-        let rates = (0..ELEMENTS).map(|i| 1.0 / (range * LONGEST / ratio.powi(i as i32))).collect();
+        let ratio = (MAX_TRAVEL / MIN_TRAVEL).powf(1.0 / (ELEMENTS - 1) as f64);
+        let rates = (0..ELEMENTS).map(|i| 1.0 / (range * MAX_TRAVEL / ratio.powi(i as i32))).collect();
         Self { rates, middle: 0.5 * (low + high), half: 0.5 * range }
     }
 
-    /// No element: for a record that repeats one loop, in which travel grows with time and neither can be told from the other.
+    /// Returns a bank without elements, for a record that repeats one loop: travel is then proportional to time.
     pub(super) fn none() -> Self {
         Self { rates: Vec::new(), middle: 0.0, half: 1.0 }
     }
 
-    /// How many columns there are.
+    /// Returns the number of columns.
     pub(super) fn len(&self) -> usize {
         READ_OUTS * self.rates.len()
     }
 
-    /// The columns `of` these numbers \[V\]: e, e² and e·x of each element in turn. Each begins at 0 V with virgin memory and goes to the first
-    /// voltage of its segment.
+    /// Returns the columns with the indices `of` \[V\]: e, e² and e·x of each element in turn. Each element starts at 0
+    /// V with virgin memory and moves to the first voltage of its segment.
     pub(super) fn columns(&self, of: Range<usize>, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
         let mut columns = Vec::with_capacity(of.len());
         let elements = if of.is_empty() { 0..0 } else { of.start / READ_OUTS..of.end.div_ceil(READ_OUTS) };
@@ -53,7 +54,7 @@ impl TravelBank {
             let relaxed = relaxed(drive, segments, rate);
             let x = |u: f64| (u - self.middle) / self.half;
             for read_out in (0..READ_OUTS).filter(|read_out| of.contains(&(READ_OUTS * element + read_out))) {
-                // An element is at most 1/rate away from zero.
+                // The magnitude of an element is at most 1/rate.
                 columns.push(match read_out {
                     0 => relaxed.clone(),
                     1 => relaxed.iter().map(|e| rate * e * e).collect(),
@@ -65,7 +66,7 @@ impl TravelBank {
     }
 }
 
-/// `de = du − a |du| e`, exact for a drive that is linear between samples.
+/// Solves `de = du − a |du| e` exactly for a drive that is linear between samples.
 fn relaxed(drive: &[f64], segments: &[Range<usize>], rate: f64) -> Vec<f64> {
     let mut column = vec![0.0; drive.len()];
     for rows in segments {
@@ -84,7 +85,7 @@ fn relaxed(drive: &[f64], segments: &[Range<usize>], rate: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Slow or fast, finely or coarsely sampled: where the drive has been is all that counts.
+    /// The result depends only on the path, not on its speed or sampling.
     #[test]
     fn memory_depends_on_the_path_and_not_on_its_speed() {
         let path = |u: &mut dyn FnMut(f64)| {
@@ -107,9 +108,10 @@ mod tests {
         }
     }
 
-    /// A Coleman-Hodgdon law with straight curves, integrated in small steps, lies in the span of the input and one element.
+    /// A Coleman-Hodgdon law with straight curves, integrated in small steps, is a combination of the input and one
+    /// element.
     #[test]
-    fn a_straight_duhem_law_is_one_element() {
+    fn a_linear_duhem_law_is_one_element() {
         let (a, b, c) = (0.04, 0.05, 0.03);
         let drive: Vec<f64> =
             (0..400).map(|k| 45.0 * (1.0 - (0.05 * f64::from(k)).cos()) * f64::from(k) / 400.0).collect();

@@ -1,13 +1,13 @@
-//! Activation-function candidates side by side.
+//! Activation-function candidates, processed together.
 
 use hyst_core::ActivationKind;
 
 use super::{Kernel, Lanes, Row};
 
-/// `z = k₀ u + α u̇ + β f(γ u)`; parameters k₀, α, β, γ, as [`hyst_core::Activation`].
+/// Kernel of `z = k₀ u + α u̇ + β f(γ u)`; parameters k₀, α, β, γ, as [`hyst_core::Activation`].
 #[derive(Clone, Copy, Debug)]
 pub struct ActivationKernel {
-    /// f.
+    /// The activation function f.
     pub kind: ActivationKind,
 }
 

@@ -1,11 +1,11 @@
-//! Bouc-Wen candidates with n = 1 side by side.
+//! Bouc-Wen candidates with n = 1, processed together.
 
 use super::{Kernel, Lanes, Row};
 
-/// `y = k₀ u + g`, `ġ = α u̇ − β |u̇| g − γ u̇ |g|` (n = 1); parameters k₀, α, β, γ, as [`hyst_core::BoucWen`]: each sample
-/// is exact for an input that is linear between samples.
+/// Kernel of `y = k₀ u + g`, `ġ = α u̇ − β |u̇| g − γ u̇ |g|` (n = 1), as [`hyst_core::BoucWen`].
 ///
-/// Candidates with |γ| > β are no model: their output is not a number.
+/// Parameters: k₀, α, β, γ. Each sample is exact for an input that is linear between samples. Candidates with |γ| > β
+/// are not valid: their output is NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BoucWenKernel;
 
@@ -62,7 +62,7 @@ impl Kernel for BoucWenKernel {
             let sigma = way.abs();
             let q = s.g * sign;
             let mut to = c.approach(q, sigma);
-            // Where q passes zero the rate changes on the way: once after each reversal.
+            // The rate changes where q passes zero: once after each reversal.
             let (before, after) = (q * c.alpha, to * c.alpha);
             if before.0.iter().zip(after.0).any(|(before, after)| *before < 0.0 && after >= 0.0) {
                 for l in 0..super::LANES {
@@ -78,7 +78,8 @@ impl Kernel for BoucWenKernel {
 }
 
 impl BoucWenCoefficients {
-    /// q after a way σ with `dq/dσ = α − rate q`, the rate that of the side of zero on which q is, or to which α pulls it.
+    /// Returns q after a path σ with `dq/dσ = α − rate q`. The rate depends on the sign of q; at zero, on the sign of
+    /// α.
     #[inline(always)]
     fn approach(&self, q: Lanes, sigma: f64) -> Lanes {
         let side = q.choose(q, |q, _| q == 0.0, self.alpha, q);
@@ -91,7 +92,7 @@ impl BoucWenCoefficients {
         (self.alpha - rate * q).times_plus(length, q)
     }
 
-    /// q of one candidate after a way on which it passes zero.
+    /// Returns q of one candidate after a path on which it passes zero.
     #[inline(never)]
     fn through_zero(&self, lane: usize, q: f64, sigma: f64) -> f64 {
         let (alpha, above, below) = (self.alpha.0[lane], self.above.0[lane], self.below.0[lane]);

@@ -1,30 +1,28 @@
-//! Root mean square errors of many candidates as the cost of a search.
+//! RMS errors of many candidates as the cost of a search.
 
 use pulp::{Arch, Simd, WithSimd};
 
 use super::{Kernel, LANES, Lanes, Rows};
 use crate::optimize::Cost;
 
-/// Rows between two looks at whether the candidates are still worth it.
+/// Number of rows between two checks of the limits.
 const STRIDE: usize = 256;
 
-/// Most parameters of a kernel.
-const MOST: usize = 64;
+/// Maximum number of parameters of a kernel.
+const MAX_PARAMETERS: usize = 64;
 
-/// Why a kernel cannot run over rows.
+/// Reason why a kernel cannot run over rows.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ErrorsError {
-    /// A kernel without parameters or with too many.
-    #[error("a kernel of {parameters} parameters; it may have 1 to {MOST}")]
+    /// A kernel without parameters, or with too many.
+    #[error("the kernel has {parameters} parameters; expected 1 to {MAX_PARAMETERS}")]
     Parameters {
-        /// How many it has.
+        /// Number of parameters.
         parameters: usize,
     },
-    /// Columns that are not equally long.
-    #[error(
-        "{rows} rows, {output} outputs and {counts} flags of what counts: there has to be one of each for each row"
-    )]
+    /// Columns of different length.
+    #[error("{rows} rows, {output} outputs and {counts} flags of rows that count; expected equal numbers")]
     Lengths {
         /// Rows of the drive.
         rows: usize,
@@ -33,19 +31,19 @@ pub enum ErrorsError {
         /// Flags of rows that count.
         counts: usize,
     },
-    /// A segment that is no part of the rows.
-    #[error("segment {start} … {end} is no part of {rows} rows")]
+    /// A segment outside of the rows.
+    #[error("segment {start}..{end} is outside of the {rows} rows")]
     Segment {
         /// Its first row.
         start: usize,
-        /// The row behind its last one.
+        /// The row after its last one.
         end: usize,
-        /// Rows.
+        /// Number of rows.
         rows: usize,
     },
 }
 
-/// Root mean square error of a kernel's candidates over the rows that count \[y\].
+/// RMS error of a kernel's candidates over the rows that count \[y\].
 #[derive(Debug)]
 pub struct Errors<'a, K> {
     kernel: K,
@@ -55,13 +53,13 @@ pub struct Errors<'a, K> {
 }
 
 impl<'a, K: Kernel> Errors<'a, K> {
-    /// Of a kernel over some rows.
+    /// Prepares a kernel for these rows.
     ///
     /// # Errors
-    /// If the kernel has no parameters or more than 64, columns differ in length, or a segment is no part of them.
+    /// If the kernel has no parameters or more than 64, columns differ in length, or a segment is outside of the rows.
     pub fn new(kernel: K, data: Rows<'a>) -> Result<Self, ErrorsError> {
         let parameters = kernel.parameters();
-        if !(1..=MOST).contains(&parameters) {
+        if !(1..=MAX_PARAMETERS).contains(&parameters) {
             return Err(ErrorsError::Parameters { parameters });
         }
         let [rows, output, counts] = [data.rows.len(), data.output.len(), data.counts.len()];
@@ -75,7 +73,7 @@ impl<'a, K: Kernel> Errors<'a, K> {
         Ok(Self { kernel, data, count, arch: Arch::new() })
     }
 
-    /// Sums of squared errors; those of candidates beyond their `limits` may be infinite.
+    /// Returns the sums of squared errors; infinite if all candidates exceed their `limits`.
     #[inline(always)]
     fn pass(&self, parameters: &[Lanes], limits: Lanes) -> Lanes {
         let c = self.kernel.coefficients(parameters);
@@ -98,7 +96,7 @@ impl<'a, K: Kernel> Errors<'a, K> {
         sum
     }
 
-    /// Outputs of the first candidates, eight at most, over all rows, one list each.
+    /// Returns the outputs of the first candidates (at most eight) over all rows, one list each.
     pub fn outputs(&self, points: &[f64]) -> Vec<Vec<f64>> {
         let parameters = self.kernel.parameters();
         let used = (points.len() / parameters).min(LANES);
@@ -117,7 +115,7 @@ impl<'a, K: Kernel> Errors<'a, K> {
     }
 }
 
-/// One pass over the rows, compiled once for each set of vector instructions.
+/// One pass over the rows, compiled for each set of vector instructions.
 struct Pass<'a, 'b, K> {
     errors: &'b Errors<'a, K>,
     parameters: &'b [Lanes],
@@ -133,9 +131,9 @@ impl<K: Kernel> WithSimd for Pass<'_, '_, K> {
     }
 }
 
-/// Candidates one after the other, as parameters side by side; lanes without a candidate repeat the first.
-fn transposed(points: &[f64], parameters: usize) -> [Lanes; MOST] {
-    let mut out = [Lanes::ZERO; MOST];
+/// Rearranges consecutive candidates into lanes; lanes without a candidate repeat the first one.
+fn transposed(points: &[f64], parameters: usize) -> [Lanes; MAX_PARAMETERS] {
+    let mut out = [Lanes::ZERO; MAX_PARAMETERS];
     for (p, lanes) in out.iter_mut().enumerate().take(parameters) {
         for (l, x) in lanes.0.iter_mut().enumerate() {
             *x = points.get(l * parameters + p).or_else(|| points.get(p)).copied().unwrap_or(0.0);
@@ -157,7 +155,7 @@ impl<K: Kernel> Cost for Errors<'_, K> {
             let lanes = transposed(points, parameters);
             let mut limits = Lanes::all(f64::NEG_INFINITY);
             for (limit, h) in limits.0.iter_mut().zip(hopeless) {
-                // A hair more than the limit: a sum that rounds to it must not be given up.
+                // A margin above the limit, for sums that round to it.
                 *limit = h * h * self.count * (1.0 + 1e-9);
             }
             let sums = self.arch.dispatch(Pass { errors: self, parameters: &lanes[..parameters], limits });

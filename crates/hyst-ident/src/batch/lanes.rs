@@ -1,12 +1,14 @@
-//! Eight numbers side by side, one for each candidate of a pass.
+//! Vectors of eight numbers, one for each candidate of a pass.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// Candidates of one pass.
+/// Number of candidates of a pass.
 pub const LANES: usize = 8;
 
-/// One number for each of eight candidates. Every operation acts on each alone, in the same order as on one number: a candidate's
-/// result does not depend on its neighbours or on the instructions that the processor has.
+/// One number for each of eight candidates.
+///
+/// Every operation acts on each lane alone, in the same order as on one number. So a candidate's result depends neither
+/// on the other candidates nor on the instruction set of the processor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes(pub [f64; LANES]);
@@ -28,16 +30,16 @@ const FACTORIALS: [f64; 12] = [
 ];
 
 impl Lanes {
-    /// Zero for all.
+    /// Zero in all lanes.
     pub const ZERO: Self = Self([0.0; LANES]);
 
-    /// The same for all.
+    /// Returns the same number in all lanes.
     #[inline(always)]
     pub fn all(x: f64) -> Self {
         Self([x; LANES])
     }
 
-    /// A function of each number.
+    /// Applies a function to each lane.
     #[inline(always)]
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
         let mut out = self;
@@ -56,7 +58,7 @@ impl Lanes {
         out
     }
 
-    /// `self · factor + other`, rounded once.
+    /// Returns `self · factor + other`, rounded once.
     #[inline(always)]
     pub fn times_plus(self, factor: Self, other: Self) -> Self {
         let mut out = other;
@@ -66,21 +68,21 @@ impl Lanes {
         out
     }
 
-    /// `1 − e^(−x)` for x ≥ 0, to about one unit in the last place.
+    /// Returns `1 − e^(−x)` for x ≥ 0, to about one unit in the last place.
     #[inline(always)]
     pub fn fallen(self) -> Self {
-        // −x = k ln 2 + r with |r| ≤ ln 2 / 2; the sum with 1.5 · 2⁵² rounds, and leaves k in its last bits.
+        // −x = k ln 2 + r with |r| ≤ ln 2 / 2. Adding 1.5 · 2⁵² rounds and puts k into the last bits.
         const ROUND: f64 = 6_755_399_441_055_744.0;
         const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-        // Beyond this nothing of e^(−x) shows beside one.
+        // Above this e^(−x) is below the rounding of one.
         const FAR: f64 = 40.0;
-        // One operation on all lanes after the other: of a longer function of each the compiler makes no vectors.
+        // One operation on all lanes at a time: the compiler does not vectorise a longer function of each lane.
         let y = -self.at_most(Self::all(FAR));
         let rounded = y.times_plus(Self::all(std::f64::consts::LOG2_E), Self::all(ROUND));
         let k = rounded - Self::all(ROUND);
         let r = k.times_plus(Self::all(-LN_2[1]), k.times_plus(Self::all(-LN_2[0]), y));
         // e^r − 1 = r + r² (1/2! + r/3! + …).
-        // Pairs of terms, then pairs of pairs (Estrin): a long chain of sums would wait for each of them.
+        // Pairs of terms, then pairs of pairs (Estrin's scheme), to avoid a long chain of dependent sums.
         let (r2, one) = (r * r, |i: usize| Self::all(FACTORIALS[i]));
         let pair = |i: usize| r.times_plus(one(i + 1), one(i));
         let four = |i: usize| r2.times_plus(pair(i + 2), pair(i));
@@ -91,7 +93,7 @@ impl Lanes {
         -power.times_plus(rise, power - Self::all(1.0))
     }
 
-    /// `a` where `f` says so of this and another, `b` elsewhere.
+    /// Returns `a` in the lanes in which `f` holds for `self` and `other`, otherwise `b`.
     #[inline(always)]
     pub fn choose(self, other: Self, f: impl Fn(f64, f64) -> bool, a: Self, b: Self) -> Self {
         let mut out = b;
@@ -103,14 +105,14 @@ impl Lanes {
         out
     }
 
-    /// The smaller one; `self` where a number is none.
+    /// Returns the smaller number; `self` if one is NaN.
     #[inline(always)]
     pub fn at_most(self, other: Self) -> Self {
-        // One instruction, where `f64::min` takes four for the sake of what is no number.
+        // One instruction; `f64::min` takes four because of NaN.
         self.with(other, |x, y| if y < x { y } else { x })
     }
 
-    /// The larger one; `self` where a number is none.
+    /// Returns the larger number; `self` if one is NaN.
     #[inline(always)]
     pub fn at_least(self, other: Self) -> Self {
         self.with(other, |x, y| if y > x { y } else { x })
@@ -177,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_fallen_is_the_exponentials() {
+    fn fallen_matches_expm1() {
         for k in 0..20_000 {
             let x = 1e-9 * 1.0015f64.powi(k);
             let found = Lanes::all(x).fallen().0[3];

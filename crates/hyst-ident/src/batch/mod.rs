@@ -1,13 +1,13 @@
-//! Many candidates a pass: eight parameter sets of one model run side by side over the record, one in each lane of the processor's
-//! vector registers.
+//! Many candidates per pass: eight parameter sets of one model run together over the record, one in each lane of the
+//! processor's vector registers.
 //!
-//! A [`Kernel`] is a model written for that: no branch depends on a candidate's numbers. The compiler vectorises its loops; `pulp`
-//! chooses the instructions at run time. Results are the same bits on every processor: the compiler neither fuses nor reorders operations, and
-//! those that are written as fused ([`Lanes::times_plus`]) are rounded once everywhere, by an instruction or without one.
-//! The models themselves are those of `hyst-core`; the tests hold the two together.
+//! A [`Kernel`] is a model written for that: no branch depends on a candidate's values. The compiler vectorises its
+//! loops; `pulp` chooses the instructions at run time. Results are identical on every processor: the compiler neither
+//! fuses nor reorders operations, and fused operations ([`Lanes::times_plus`]) are rounded once everywhere, with or
+//! without an instruction for them. The tests compare the kernels with the models of `hyst-core`.
 //!
-//! [`Errors`] is the cost of a search over a kernel's parameters: the root mean square error over the rows of a record. It
-//! allocates nothing, and gives up on eight candidates as soon as all are worse than they may be.
+//! [`Errors`] is the cost of a search over a kernel's parameters: the RMS error over the rows of a record. It allocates
+//! nothing, and stops early if all eight candidates exceed their limits.
 
 mod activation;
 mod bouc_wen;
@@ -27,7 +27,7 @@ pub use td_pi::TdPiKernel;
 
 use std::ops::Range;
 
-/// One row as a kernel sees it.
+/// One row of a kernel's input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Input \[u\].
@@ -38,40 +38,40 @@ pub struct Row {
     pub temperature: f64,
 }
 
-/// A model that runs eight candidates side by side.
+/// A model that runs eight candidates together.
 pub trait Kernel: Sync {
-    /// What a pass needs of eight parameter sets.
+    /// Coefficients of a pass, computed from eight parameter sets.
     type Coefficients;
-    /// The histories of eight candidates.
+    /// States of eight candidates.
     type State;
 
-    /// Parameters of one candidate.
+    /// Returns the number of parameters of one candidate.
     fn parameters(&self) -> usize;
 
-    /// From the parameters, one [`Lanes`] each.
+    /// Computes the coefficients from the parameters, one [`Lanes`] each.
     fn coefficients(&self, parameters: &[Lanes]) -> Self::Coefficients;
 
-    /// Virgin memory.
+    /// Returns the state with virgin memory.
     fn state(&self) -> Self::State;
 
-    /// The outputs at a row; the first one after [`state`](Self::state) is that at rest.
+    /// Returns the outputs at a row; the first call after [`state`](Self::state) gives the output at rest.
     fn step(&self, c: &Self::Coefficients, s: &mut Self::State, row: &Row) -> Lanes;
 }
 
-/// The columns of a record that a pass runs over.
+/// The columns of a record for a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
-    /// What drives the model.
+    /// Input of the model.
     pub rows: &'a [Row],
-    /// What was measured \[y\].
+    /// Measured output \[y\].
     pub output: &'a [f64],
     /// Rows that count.
     pub counts: &'a [bool],
-    /// Stretches between which the device rests.
+    /// Segments; the device rests before each.
     pub segments: &'a [Range<usize>],
 }
 
-/// The rows of samples: rates from the sample period.
+/// Returns the rows of samples, with rates from the sample period.
 pub fn rows_of(samples: &crate::Samples) -> Vec<Row> {
     let mut rows = Vec::with_capacity(samples.len());
     for (i, segment) in samples.segments.iter().enumerate() {

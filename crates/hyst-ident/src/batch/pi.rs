@@ -1,14 +1,15 @@
-//! Prandtl-Ishlinskii candidates side by side.
+//! Prandtl-Ishlinskii candidates, processed together.
 
 use super::{Kernel, Lanes, Row};
 
-/// `y = p₀ u + Σ wᵢ playᵢ(u)` with N plays; parameters: p₀, r₁ … r_N, w₁ … w_N. As [`hyst_core::Pi`].
+/// Kernel of `y = p₀ u + Σ wᵢ playᵢ(u)` with N play operators, as [`hyst_core::Pi`].
 ///
-/// It runs the stops, `y = (p₀ + Σ wᵢ) u − Σ wᵢ stopᵢ(u)`: one operation less for each of them.
+/// Parameters: p₀, r₁ … r_N, w₁ … w_N. It computes stop operators, `y = (p₀ + Σ wᵢ) u − Σ wᵢ stopᵢ(u)`, which saves one
+/// operation for each.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PiKernel<const N: usize>;
 
-/// Eight parameter sets: slope of the virgin curve at infinity, thresholds, weights.
+/// Slope of the virgin curve at infinity, thresholds and weights of eight parameter sets.
 #[derive(Clone, Copy, Debug)]
 pub struct PiCoefficients<const N: usize> {
     slope: Lanes,
@@ -17,7 +18,7 @@ pub struct PiCoefficients<const N: usize> {
     w: [Lanes; N],
 }
 
-/// The stops and the last input.
+/// States of the stop operators, and the last input.
 #[derive(Clone, Copy, Debug)]
 pub struct PiLanes<const N: usize> {
     stops: [Lanes; N],
@@ -51,7 +52,7 @@ impl<const N: usize> Kernel for PiKernel<N> {
     fn step(&self, c: &PiCoefficients<N>, s: &mut PiLanes<N>, row: &Row) -> Lanes {
         let way = Lanes::all(row.input - s.input);
         s.input = row.input;
-        // Two sums: one would wait for each of its additions.
+        // Two sums, to shorten the chain of dependent additions.
         let (mut even, mut odd) = (c.slope * row.input, Lanes::ZERO);
         let mut stops = s.stops.chunks_exact_mut(2);
         for (i, pair) in stops.by_ref().enumerate() {
@@ -65,7 +66,7 @@ impl<const N: usize> Kernel for PiKernel<N> {
     }
 }
 
-/// Moves stop `i` and adds its share to a sum.
+/// Updates stop operator `i` and adds its contribution to a sum.
 #[inline(always)]
 fn slide<const N: usize>(stop: &mut Lanes, way: Lanes, c: &PiCoefficients<N>, i: usize, sum: Lanes) -> Lanes {
     *stop = (*stop + way).at_most(c.high[i]).at_least(c.low[i]);

@@ -1,15 +1,16 @@
-//! TD-PI candidates side by side.
+//! TD-PI candidates, processed together.
 
 use super::{Kernel, Lanes, Row};
 
-/// The TD-PI model with N thresholds besides r = 0; parameters α, ε, τ, η, a₀, a₁, b₀, b₁, as [`hyst_core::TdPi`].
+/// Kernel of the TD-PI model with N thresholds in addition to r = 0; parameters α, ε, τ, η, a₀, a₁, b₀, b₁, as
+/// [`hyst_core::TdPi`].
 #[derive(Clone, Copy, Debug)]
 pub struct TdPiKernel<const N: usize> {
     /// T₀ \[°C\].
     pub reference_degc: f64,
 }
 
-/// Eight parameter sets: thresholds, and weights at T₀, of the plays; envelopes; η.
+/// Thresholds and weights at T₀ of the play operators, envelopes and η of eight parameter sets.
 #[derive(Clone, Copy, Debug)]
 pub struct TdPiCoefficients<const N: usize> {
     r: [Lanes; N],
@@ -20,7 +21,7 @@ pub struct TdPiCoefficients<const N: usize> {
     right: [Lanes; 2],
 }
 
-/// The plays, the one of radius 0, and the factor of the last temperature.
+/// States of the play operators, of the one with r = 0, and the factor of the last temperature.
 #[derive(Clone, Copy, Debug)]
 pub struct TdPiLanes<const N: usize> {
     plays: [Lanes; N],
@@ -57,7 +58,7 @@ impl<const N: usize> Kernel for TdPiKernel<N> {
         let u = Lanes::all(row.input);
         let (left, right) = (c.left[0] * u + c.left[1], c.right[0] * u + c.right[1]);
         s.middle = s.middle.at_most(right).at_least(left);
-        // Two sums: one would wait for each of its additions.
+        // Two sums, to shorten the chain of dependent additions.
         let mut y = [c.epsilon * s.middle, Lanes::ZERO];
         for i in 0..N {
             s.plays[i] = s.plays[i].at_most(right + c.r[i]).at_least(left - c.r[i]);

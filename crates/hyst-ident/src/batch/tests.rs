@@ -1,4 +1,4 @@
-//! The kernels against the models of `hyst-core`, one candidate at a time.
+//! Compares the kernels with the models of `hyst-core`, one candidate at a time.
 
 use hyst_core::{
     Activation, ActivationKind, ActivationParams, BoucWen, BoucWenParams, Build, Env, Pi, Sampling, Stage, TdPi,
@@ -19,7 +19,7 @@ struct Data {
 }
 
 impl Data {
-    /// Two segments of a drive with minor loops, the temperature moving in the second.
+    /// Two segments of a drive with minor loops; the temperature changes in the second.
     fn new() -> Self {
         let segments = vec![0..900, 900..2000];
         let mut rows = Vec::new();
@@ -43,7 +43,7 @@ impl Data {
         Rows { rows: &self.rows, output: &self.output, counts: &self.counts, segments: &self.segments }
     }
 
-    /// Outputs of a stage of the core.
+    /// Returns the outputs of a stage of `hyst-core`.
     fn run(&self, stage: &impl Stage<f64>) -> Vec<f64> {
         let mut out = Vec::new();
         for segment in &self.segments {
@@ -65,7 +65,7 @@ impl Data {
     }
 }
 
-/// Outputs and costs of a kernel are those of a stage for each of eleven candidates.
+/// Asserts that outputs and costs of a kernel equal those of a stage for each of eleven candidates.
 fn agree<K: Kernel, S: Stage<f64>>(kernel: K, points: &[f64], stage: impl Fn(&[f64]) -> S) {
     let data = Data::new();
     let n = kernel.parameters();
@@ -82,7 +82,8 @@ fn agree<K: Kernel, S: Stage<f64>>(kernel: K, points: &[f64], stage: impl Fn(&[f
         let error = data.error(&expected);
         assert!((costs[i] - error).abs() <= 1e-10 * error, "candidate {i}: {} {error}", costs[i]);
     }
-    // Alone or beside others, a candidate has the same cost; given up, it has one that is no better than allowed.
+    // A candidate has the same cost alone and with others. If it is stopped early, its cost is no better than the
+    // limit.
     for (i, point) in points.chunks_exact(n).enumerate() {
         let mut alone = [0.0];
         errors.costs(point, &[f64::INFINITY], &mut alone);
@@ -140,7 +141,7 @@ proptest! {
 }
 
 #[test]
-fn a_candidate_that_is_no_model_has_no_finite_cost() {
+fn an_invalid_candidate_has_no_finite_cost() {
     let data = Data::new();
     let errors = Errors::new(BoucWenKernel, data.rows()).unwrap();
     let mut costs = [0.0];
@@ -149,7 +150,7 @@ fn a_candidate_that_is_no_model_has_no_finite_cost() {
 }
 
 #[test]
-fn what_a_pass_cannot_run_over_is_refused() {
+fn invalid_kernels_columns_and_segments_are_refused() {
     let data = Data::new();
     assert_eq!(Errors::new(PiKernel::<32>, data.rows()).unwrap_err(), ErrorsError::Parameters { parameters: 65 });
     assert_eq!(Errors::new(PiKernel::<31>, data.rows()).unwrap().outputs(&[0.1; 63]).len(), 1);
@@ -160,7 +161,7 @@ fn what_a_pass_cannot_run_over_is_refused() {
     let beyond = Rows { segments: &beyond, ..data.rows() };
     let segment = ErrorsError::Segment { start: 900, end: 2001, rows: 2000 };
     assert_eq!(Errors::new(BoucWenKernel, beyond).unwrap_err(), segment);
-    // More candidates than lanes: the first ones.
+    // With more candidates than lanes, the first ones are used.
     let many = [0.1, 0.05, 0.2, 0.1].repeat(9);
     assert_eq!(Errors::new(BoucWenKernel, data.rows()).unwrap().outputs(&many).len(), LANES);
 }

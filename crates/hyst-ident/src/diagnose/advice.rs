@@ -1,4 +1,4 @@
-//! Whether another kind of model explains the record better.
+//! Advice on the base model: whether another kind explains the record better.
 
 use hyst_core::Error;
 
@@ -12,11 +12,11 @@ use crate::model::Kind;
 use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
 
-/// Rows that the comparison uses.
+/// Maximum number of rows of the comparison.
 const ROWS: usize = 8_000;
 
-/// The kind of model with convex weights that predicts left-out parts of the record best with what was found, where it is clearly better than
-/// the own base.
+/// Returns the kind of model with convex weights that predicts left-out parts of the record best, with all effects
+/// found; `None` unless it is clearly better than the model's own base.
 pub(super) fn base_advice(
     samples: &Samples,
     own: (Kind, &dyn Basis),
@@ -26,8 +26,8 @@ pub(super) fn base_advice(
 ) -> Result<Option<BaseAdvice>, FitError> {
     let blocks = Blocks::new(samples, BLOCKS, ROWS);
     let cv_rmse = |basis: &dyn Basis| {
-        let problem = Problem::new(samples, basis, &blocks, per_record).holding();
-        // A drag belongs to plays.
+        let problem = Problem::new(samples, basis, &blocks, per_record).with_linear_effects_fixed();
+        // Only play operators have a drag.
         let known = Hypothesis { drag: found.drag.filter(|_| basis.drags()), ..found.clone() };
         Ok::<_, Error>(problem.fit_linear(&known)?.and_then(|f| Trial::of(&problem, f)).map(|t| t.cv_rmse()))
     };

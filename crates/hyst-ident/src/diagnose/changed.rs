@@ -1,6 +1,6 @@
-//! Whether a model that was fitted to other data lacks nothing but another zero or another fit.
+//! Tells a changed device or a changed sensor zero from a base model that is too coarse.
 
-use super::extension::Own;
+use super::extension::OwnModel;
 use super::findings::{Change, Remainder, RemainderKind};
 use crate::criteria::{HALF, MIN_RMSE_RATIO, NEGLIGIBLE_SHARE};
 use crate::digits::{short, signed};
@@ -9,11 +9,13 @@ use crate::nested::Hypothesis;
 use crate::record::OutputUnit;
 use crate::simulate::{Zero, simulate};
 
-/// A device that is no longer the one of the fit misses in the same way as a base that is too coarse does: a richer one would take it. But so
-/// would the same base with other weights, and it misses by more than it did in the record of its fit; a coarse base may follow a small part
-/// of that record better with other weights too, but misses there as it always did. `start` is what the model holds, `noise` the floor \[output unit\].
-pub(super) fn told_apart(
-    own: &Own<'_>,
+/// Checks whether a remainder that looks like a coarse base model is a change since the fit.
+///
+/// A changed device leaves the same kind of residual as a coarse base model: a finer one would explain it. In contrast
+/// to a coarse base, the error is larger than on the record of the fit, and the same base with other weights explains
+/// it too. `start` is the hypothesis of the model, `noise` the noise floor \[output unit\].
+pub(super) fn detect_change(
+    own: &OwnModel<'_>,
     start: &Hypothesis,
     noise: f64,
     zero: Zero,
@@ -27,14 +29,14 @@ pub(super) fn told_apart(
     if beyond > NEGLIGIBLE_SHARE * (input.high - input.low) {
         let (low, high, unit) = (input.low, input.high, input.symbol());
         let seen = format!(
-            "; its drive goes up to {} {unit} beyond {} to {} {unit}, which the model was fitted to",
+            "; the drive goes up to {} {unit} beyond the fitted range of {} to {} {unit}",
             short(beyond),
             short(low),
             short(high)
         );
         return Ok(Remainder { description: left.description + &seen, ..left });
     }
-    let again = simulate(&own.fitted_anew(start)?, own.train, zero)?;
+    let again = simulate(&own.refitted_base(start)?, own.train, zero)?;
     let (Some(before), Some(after)) = (&own.before.errors, &again.errors) else { return Ok(left) };
     let above = |mean_square: f64| (mean_square - noise * noise).max(0.0);
     let stood = above(before.rmse * before.rmse);
@@ -44,18 +46,18 @@ pub(super) fn told_apart(
     let line = Line::through(own);
     let unit = OutputUnit::of_suffix(&own.model.output.unit).map_or(own.model.output.unit.as_str(), |u| u.symbol());
     let behind_zero = above(before.rmse * before.rmse - line.mean * line.mean);
-    // Another gain moves the mean too, but not alone.
+    // Another gain moves the mean too, but it also changes the slope.
     let zero_alone = behind_zero <= (1.0 - HALF) * stood && above(line.mean_square) >= (1.0 - HALF) * behind_zero;
     Ok(if zero_alone {
         let description = format!(
-            "most of it is one constant: the sensor's zero stands {} {unit} from that of the record that the model was fitted to",
+            "most of it is a constant: the sensor's zero differs by {} {unit} from the record that the model was fitted to",
             signed(line.mean)
         );
         Remainder { change: Some(Change::Zero), description, ..left }
     } else {
         let description = format!(
-            "{:.2} % of span; the same model, fitted to this record, would leave {:.2} %: the device is no longer the one that it was fitted to \
-             (its output is {:.3} × what the model says, {} {unit} beside it)",
+            "{:.2} % of span; the same model refitted to this record leaves {:.2} %: the device has changed since the fit \
+             (its output is {:.3} × the predicted one, with an offset of {} {unit})",
             before.nrmse_percent,
             after.nrmse_percent,
             line.slope,
@@ -65,18 +67,18 @@ pub(super) fn told_apart(
     })
 }
 
-/// The straight line from what the model says to what was measured, over the rows that count.
+/// The straight line from predicted to measured output, over the rows that count.
 struct Line {
     slope: f64,
     offset: f64,
-    /// Mean of what was measured less what the model says.
+    /// Mean of measured minus predicted output.
     mean: f64,
-    /// Mean square of what was measured less the line.
+    /// Mean square of the measured output minus the line.
     mean_square: f64,
 }
 
 impl Line {
-    fn through(own: &Own<'_>) -> Self {
+    fn through(own: &OwnModel<'_>) -> Self {
         let (said, is) = (&own.before.predicted, &own.samples.output);
         let rows = || (0..is.len()).filter(|k| !own.before.settling[*k]);
         let n = rows().count().max(1) as f64;

@@ -1,27 +1,30 @@
-//! Whether a remainder is a sensor's noise, although it is not white.
+//! Tests whether a remainder that is not white is sensor noise.
 //!
-//! The electronics of sensors have flicker noise: its power falls as 1/f. What a device does by itself (a force, the room's temperature, a mount
-//! that slips, the gain of a worn element) wanders or jumps, and its power falls as 1/f² or faster. So the exponent tells the two apart:
-//! white 0, flicker 1, wandering 2. It is read off the octaves in which the power exceeds the white noise floor.
+//! Sensor electronics have flicker noise, whose power falls as 1/f. A disturbance of the device (a force, the room
+//! temperature, a slipping mount, the gain of a worn element) drifts or jumps; its power falls as 1/f² or faster. So
+//! the exponent separates them: white 0, flicker 1, random walk 2. It is fitted over the octaves in which the power
+//! exceeds the white noise floor.
 
 use std::ops::Range;
 
 use crate::criteria::HALF;
 use crate::linear::{Hann, windows};
 
-/// Exponents between those of white noise and of a random walk that are nearer to flicker noise.
-const FLICKER: Range<f64> = 0.5..1.5;
-/// Octaves that have to count.
-const LEAST_OCTAVES: usize = 4;
-/// Root mean square by which the octaves may scatter around the power law, as a logarithm to base 10: a tone or a mode stands out further.
-const SCATTER: f64 = 0.25;
-/// Excess kurtosis up to which a sample is as good as normal: jumps, bursts and what acts at the turns alone have more or less.
-const NORMAL: f64 = 1.0;
-/// Windows of the spectrum that the longest stretch of rows holds, without overlap.
+/// Exponents that are closer to flicker noise than to white noise or to a random walk.
+const FLICKER_EXPONENTS: Range<f64> = 0.5..1.5;
+/// Minimum number of octaves.
+const MIN_OCTAVES: usize = 4;
+/// Maximum RMS scatter of the octaves around the power law, in decades: a tone or a mode exceeds it.
+const MAX_SCATTER: f64 = 0.25;
+/// Maximum magnitude of the excess kurtosis of a nearly normal sample. Jumps, bursts and errors at turning points have
+/// more.
+const MAX_EXCESS_KURTOSIS: f64 = 1.0;
+/// Number of windows of the spectrum in the longest run of rows, without overlap.
 const WINDOWS: usize = 4;
 
-/// The exponent p of noise whose power falls as `1/fᵖ` and that a sensor may have; `None` if `residual` is something else, or white.
-/// `counts` are the rows to look at, `white` the standard deviation of the white noise \[unit of the residual\].
+/// Returns the exponent p if the residual is sensor noise with a power of `1/fᵖ`; `None` if it is something else or
+/// white.
+/// `counts` marks the rows to use, `white` is the standard deviation of the white noise \[unit of the residual\].
 pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[bool], white: f64) -> Option<f64> {
     let runs: Vec<Range<usize>> = segments.iter().flat_map(|s| runs(s, counts)).collect();
     let rows = || runs.iter().cloned().flatten().map(|k| residual[k]);
@@ -30,7 +33,7 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
     let moment = |power: i32| rows().map(|r| (r - mean).powi(power)).sum::<f64>() / n.max(1.0);
     let kurtosis = moment(4) / moment(2).powi(2) - 3.0;
     let length = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0) / WINDOWS;
-    if length < 1 << (LEAST_OCTAVES + 2) || kurtosis.is_nan() || kurtosis.abs() > NORMAL {
+    if length < 1 << (MIN_OCTAVES + 2) || kurtosis.is_nan() || kurtosis.abs() > MAX_EXCESS_KURTOSIS {
         return None;
     }
     let hann = Hann::new(length);
@@ -40,7 +43,7 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
         power.iter_mut().zip(hann.spectrum(&residual[window])).for_each(|(p, x)| *p += x.norm_sqr());
         energy += hann.energy();
     }
-    // Octaves from the third line on: the window smears the removed mean over the first two.
+    // Octaves from the third line on: the window spreads the removed mean over the first two.
     let octaves = (1..).map(|i| 1usize << i).take_while(|first| 2 * first <= length / 2);
     let points: Vec<[f64; 2]> = octaves
         .map(|first| {
@@ -50,7 +53,7 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
         .filter(|[_, above]| *above > HALF * white * white)
         .map(|[f, above]| [f, above.log10()])
         .collect();
-    if points.len() < LEAST_OCTAVES {
+    if points.len() < MIN_OCTAVES {
         return None;
     }
     let n = points.len() as f64;
@@ -59,10 +62,10 @@ pub(super) fn flicker(residual: &[f64], segments: &[Range<usize>], counts: &[boo
     let slope = points.iter().map(|p| (p[0] - f) * (p[1] - y)).sum::<f64>()
         / points.iter().map(|p| (p[0] - f).powi(2)).sum::<f64>();
     let scatter = (points.iter().map(|p| (p[1] - y - slope * (p[0] - f)).powi(2)).sum::<f64>() / n).sqrt();
-    (FLICKER.contains(&-slope) && scatter <= SCATTER).then_some(-slope)
+    (FLICKER_EXPONENTS.contains(&-slope) && scatter <= MAX_SCATTER).then_some(-slope)
 }
 
-/// Stretches of rows of a segment that count.
+/// Returns the contiguous runs of rows of a segment that count.
 fn runs(segment: &Range<usize>, counts: &[bool]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in segment.clone().filter(|k| counts[*k]) {
@@ -88,7 +91,7 @@ mod tests {
         flicker(&residual, std::slice::from_ref(&(0..ROWS)), &[true; ROWS], 0.3)
     }
 
-    /// Relaxers an octave apart, whose powers add up to 1/f.
+    /// Sum of first-order processes one octave apart: its power falls as 1/f.
     fn pink(normal: &mut dyn FnMut() -> f64, x: &mut [f64; 14]) -> f64 {
         for (i, x) in x.iter_mut().enumerate() {
             let keep = (-1.0 / f64::from(1 << i)).exp();
@@ -98,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn flicker_noise_is_told_from_what_wanders_and_from_white_noise() {
+    fn flicker_noise_is_separated_from_random_walk_and_white_noise() {
         let state = std::cell::RefCell::new([0.0; 14]);
         let pink = exponent(|_, normal| pink(normal, &mut state.borrow_mut()) + 0.3 * normal()).unwrap();
         assert!((0.7..1.3).contains(&pink), "{pink}");
@@ -113,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_record_tells_nothing() {
+    fn a_short_record_gives_no_exponent() {
         assert_eq!(flicker(&[0.1; 90], std::slice::from_ref(&(0..90)), &[true; 90], 0.1), None);
     }
 }

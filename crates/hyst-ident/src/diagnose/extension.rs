@@ -1,12 +1,12 @@
-//! The user's own model with what was found, and whether that helps it.
+//! Extends the user's model with the effects found and checks whether that improves it.
 
 use std::collections::BTreeMap;
 
 use hyst_core::{CurveSide, Error};
 
 use super::follow::followed;
-use super::search::{Named, Search, further, with_own_laws};
-use super::shape::Bent;
+use super::search::{Named, Search, search_with_noise, with_best_laws};
+use super::shape::CurveFits;
 use super::trial::Trial;
 use super::{FINAL_ROWS, SHAPE_ROWS, score, shape, uncertainty};
 use crate::base::{Drag, LinearisedBasis, PiBasis};
@@ -20,52 +20,52 @@ use crate::samples::Samples;
 use crate::settle::{Settled, start_up_rows, unless_followed};
 use crate::simulate::{Simulation, Zero, simulate};
 
-/// What the own base was found to lack beside what was found before.
+/// Result of the search for a curve on the model's base.
 #[derive(Default)]
-pub(super) struct Shaped {
-    /// A curve or a stop, and the fit with it and with all that is known then.
+pub(super) struct CurveSearch {
+    /// The missing curve or saturation, and the fit with it and all known effects.
     pub(super) curve: Option<(Named, Fitted)>,
-    /// The base, if its plays were chosen anew.
+    /// The base, if its thresholds were chosen again.
     pub(super) basis: Option<BasisOf>,
-    /// What was found once more beside the curve, in the place of all that was found before.
+    /// The search that was repeated with the curve; it replaces the previous one.
     pub(super) searched: Option<Search>,
 }
 
-/// A model with what was found.
+/// A model extended by the effects found.
 pub(super) struct Extension {
     pub(super) hypothesis: Hypothesis,
     pub(super) errors: BTreeMap<String, f64>,
-    /// The record with other starts of its segments, if it was fitted to that.
-    pub(super) begun: Option<Samples>,
+    /// The record with re-estimated starts of its segments, if the model was fitted to that.
+    pub(super) restarted: Option<Samples>,
     pub(super) model: Model,
-    /// What it says of the record.
+    /// Simulation of the training record.
     pub(super) after: Simulation,
 }
 
-/// A model and the record that it is extended on.
+/// The user's model and the record on which it is extended.
 #[derive(Clone, Copy)]
-pub(super) struct Own<'a> {
+pub(super) struct OwnModel<'a> {
     pub(super) model: &'a Model,
     pub(super) train: &'a Record,
-    /// The record with the rows that count for the search.
+    /// The record, with the rows that count for the search.
     pub(super) samples: &'a Samples,
-    /// The model's own base.
+    /// Basis of the model's own base.
     pub(super) basis: &'a BasisOf,
-    /// The model as it was, on the record.
+    /// Simulation of the training record with the unextended model.
     pub(super) before: &'a Simulation,
-    /// One zero for each file.
+    /// Whether each file has its own sensor zero.
     pub(super) per_record: bool,
 }
 
-impl<'a> Own<'a> {
+impl<'a> OwnModel<'a> {
     pub(super) fn stage(&self, source: Error) -> FitError {
         FitError::Stage { record: self.train.name(), source }
     }
 
-    /// Places a stop that was found where the own base meets it.
+    /// Refits a saturation limit on the model's own base.
     pub(super) fn stop(&self, hypothesis: &mut Hypothesis, errors: &mut BTreeMap<String, f64>) -> Result<(), FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks).holding();
+        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
         if let Some(fit) = shape::own_stop(&problem, hypothesis).map_err(|e| self.stage(e))? {
             self.take(Effect::Saturation, &fit, errors);
             *hypothesis = fit.hypothesis;
@@ -73,7 +73,7 @@ impl<'a> Own<'a> {
         Ok(())
     }
 
-    /// A problem on a base, over the rows that count for the search.
+    /// Returns the problem on a basis, over the rows that count for the search.
     pub(super) fn on<'b>(&self, basis: &'b BasisOf, blocks: &'b Blocks) -> Problem<'b>
     where
         'a: 'b,
@@ -81,14 +81,14 @@ impl<'a> Own<'a> {
         Problem::new(self.samples, basis.as_ref(), blocks, self.per_record)
     }
 
-    /// Standard errors of an effect's parameters.
+    /// Copies the standard errors of one effect's parameters from a fit.
     pub(super) fn take(&self, effect: Effect, fit: &Fitted, errors: &mut BTreeMap<String, f64>) {
         let of_fit = uncertainty::standard_errors(fit, self.samples.time[0]);
         errors.extend(of_fit.into_iter().filter(|(key, _)| key.split('.').next() == Some(effect.name())));
     }
 
-    /// Looks on the own base for what only it can show: whether it lacks a curve. `known` is what the model held already, `hypothesis` what was found
-    /// beyond it.
+    /// Searches the model's own base for a missing curve, which the screening basis cannot show. `known` is what the
+    /// model already contains, `hypothesis` adds the effects found.
     pub(super) fn shape(
         &self,
         known: &Hypothesis,
@@ -97,35 +97,37 @@ impl<'a> Own<'a> {
         noise: f64,
         seed: u64,
         progress: &(dyn Fn(&str) + Sync),
-    ) -> Result<Shaped, FitError> {
+    ) -> Result<CurveSearch, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks).holding();
+        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
         let stage = |e| self.stage(e);
         let plain = shape::plain(&problem, hypothesis).map_err(stage)?;
         let Some(plain) = plain.filter(|plain| !shape::is_complete(plain, richest)) else {
-            return Ok(Shaped::default());
+            return Ok(CurveSearch::default());
         };
-        let (mut bent, mut bases): (Vec<Bent>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
-        let complete = |curved: &shape::Curved| shape::is_complete(&curved.trial, richest);
+        let (mut bent, mut bases): (Vec<CurveFits>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
+        let complete = |curved: &shape::CurveFit| shape::is_complete(&curved.trial, richest);
         for side in [CurveSide::Output, CurveSide::Input] {
-            // A curve behind the operator is solved for; one before it has to be searched, and only where that is not enough.
-            if bent.iter().flat_map(Bent::curves).any(complete) {
+            // A curve behind the operator is linear in its weights. One before the operator has to be searched, so it
+            // is tried only if needed.
+            if bent.iter().flat_map(CurveFits::curves).any(complete) {
                 break;
             }
             let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
-            let anew = own.as_ref().map(|bent| self.rechosen(&problem, &bent.trial.fit)).transpose()?.flatten();
-            // The own plays were chosen without the curve, and follow what it makes of the drive.
+            let anew = own.as_ref().map(|bent| self.reselected(&problem, &bent.trial.fit)).transpose()?.flatten();
+            // The model's thresholds were chosen without the curve. Even thresholds over the curved drive may fit
+            // better.
             let anew = match (anew, &own) {
                 (None, Some(bent)) if !complete(bent) => self.even(&problem, &bent.trial.fit)?,
                 (anew, _) => anew,
             };
-            let mut here = Bent { own, anew: None };
+            let mut here = CurveFits { own, anew: None };
             if let Some(basis) = &anew {
-                let behind = self.on(basis, &blocks).beside(&problem).holding();
+                let behind = self.on(basis, &blocks).beside(&problem).with_linear_effects_fixed();
                 match shape::plain(&behind, hypothesis).map_err(stage)? {
-                    // Other plays alone were missing, no curve.
+                    // Only the thresholds were wrong; no curve is missing.
                     Some(plain) if shape::is_complete(&plain, richest) => {
-                        return Ok(Shaped { basis: anew, ..Shaped::default() });
+                        return Ok(CurveSearch { basis: anew, ..CurveSearch::default() });
                     }
                     Some(plain) => {
                         let with = shape::bent(&behind, hypothesis, &plain.fit, side).map_err(stage)?;
@@ -137,7 +139,8 @@ impl<'a> Own<'a> {
             bent.push(here);
             bases.push(anew);
         }
-        // What was found on another base, without the curve, has taken a part of it: all is searched once more with the curve.
+        // The effects found without the curve may have taken up a part of it. All effects are searched again with the
+        // curve.
         let all = bent.iter().enumerate().flat_map(|(at, bent)| bent.curves().map(move |curved| (at, curved)));
         let best = all.min_by(|(_, a), (_, b)| a.trial.total().total_cmp(&b.trial.total()));
         let mut searched = None;
@@ -147,26 +150,27 @@ impl<'a> Own<'a> {
             let free = self.on(basis, &blocks).beside(&problem);
             let already: Vec<Cause> = known.causes().into_iter().chain([Cause::Effect(Effect::Asymmetry)]).collect();
             if let Some(from) = free.fit(&curved.trial.fit.hypothesis).map_err(stage)? {
-                progress("searching with the curve that the model's own base lacks");
-                let search = further(&free, from, &already, noise, seed, progress).map_err(stage)?;
-                let with = shape::Curved { trial: search.best.clone(), is_lopsided: curved.is_lopsided };
+                progress("searching again with the curve added to the base model");
+                let search = search_with_noise(&free, from, &already, noise, seed, progress).map_err(stage)?;
+                let with = shape::CurveFit { trial: search.best.clone(), is_asymmetric: curved.is_asymmetric };
                 let plain = bent[at].anew.as_ref().filter(|_| is_anew).map(|(plain, _)| plain.clone());
                 bent.push(match plain {
-                    Some(plain) => Bent { own: None, anew: Some((plain, with)) },
-                    None => Bent { own: Some(with), anew: None },
+                    Some(plain) => CurveFits { own: None, anew: Some((plain, with)) },
+                    None => CurveFits { own: Some(with), anew: None },
                 });
                 bases.push(if is_anew { bases[at].clone() } else { None });
                 searched = Some(search);
             }
         }
         let found = shape::shape(&problem, hypothesis, &plain, bent, richest, noise, seed).map_err(stage)?;
-        let Some(shape) = found else { return Ok(Shaped::default()) };
+        let Some(shape) = found else { return Ok(CurveSearch::default()) };
         let basis = shape.anew.and_then(|at| bases.swap_remove(at));
         let searched = searched.filter(|search| search.best.fit.hypothesis == shape.hypothesis);
-        Ok(Shaped { curve: Some((shape.named, shape.fit)), basis, searched })
+        Ok(CurveSearch { curve: Some((shape.named, shape.fit)), basis, searched })
     }
 
-    /// What a search on the own base finds where the rich one needs nothing; none unless it explains the record as well as that.
+    /// Searches the model's own base for effects after the screening basis needed none. Returns `None` unless the
+    /// result explains the record as well as the screening basis.
     pub(super) fn closing(
         &self,
         found: &Hypothesis,
@@ -180,44 +184,45 @@ impl<'a> Own<'a> {
         let problem = self.on(self.basis, &blocks);
         let stage = |e| self.stage(e);
         let Some(plain) = shape::plain(&problem, found).map_err(stage)? else { return Ok(None) };
-        // What a wandering or a slow amplifier leaves is no base's.
-        let nameless = found.causes().iter().any(|cause| cause.is_nameless());
-        if nameless || shape::is_complete(&plain, richest) {
+        // A wander or a slow amplifier is no misfit of a base.
+        let unlisted = found.causes().iter().any(|cause| cause.is_unlisted());
+        if unlisted || shape::is_complete(&plain, richest) {
             return Ok(None);
         }
         let (before, floor) = (plain.total(), plain.fit.rows as f64 * noise * noise);
-        let search = further(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
-        let closes = search.best.cv_rmse() <= shape::CLOSED_ANEW * richest
+        let search = search_with_noise(&problem, plain.fit, &start.causes(), noise, seed, progress).map_err(stage)?;
+        let closes = search.best.cv_rmse() <= shape::MAX_RATIO_RESELECTED * richest
             && before - search.best.total() >= DOMINANT_SHARE * (before - floor);
         Ok(Some(search).filter(|s| closes && !s.named.is_empty()))
     }
 
-    /// The own base with plays where the record calls for them once these effects are known, if they predict clearly better than those
-    /// it has and are no more: those were placed while the effects stood in the record.
-    pub(super) fn on_better_plays(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
+    /// Returns the model's base with thresholds chosen with these effects known, if they predict clearly better and are
+    /// no more than before. The original thresholds were chosen before the effects were known.
+    pub(super) fn with_better_thresholds(&self, hypothesis: &Hypothesis) -> Result<Option<BasisOf>, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, FINAL_ROWS);
-        let problem = self.on(self.basis, &blocks).holding();
+        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
         let fit = problem.fit_linear(hypothesis).map_err(|e| self.stage(e))?;
-        fit.map(|fit| self.rechosen(&problem, &fit)).transpose().map(Option::flatten)
+        fit.map(|fit| self.reselected(&problem, &fit)).transpose().map(Option::flatten)
     }
 
-    fn rechosen(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
+    fn reselected(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
         let BasisOf::Pi(plays) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         let drag = fit.hypothesis.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         Ok(plays.chosen(&seen.samples, &drag, &|plays| seen.through(plays), None).map(BasisOf::Pi))
     }
 
-    /// Plays spread evenly over what drives them, as a fit begins with.
+    /// Returns even thresholds over the drive of the operator, as at the start of a fit.
     fn even(&self, problem: &Problem<'_>, fit: &Fitted) -> Result<Option<BasisOf>, FitError> {
         let BasisOf::Pi(_) = self.basis else { return Ok(None) };
         let seen = problem.tangent(fit).map_err(|e| self.stage(e))?;
         Ok(Some(BasisOf::Pi(PiBasis::for_samples(&seen.samples))))
     }
 
-    /// What was found beyond what is `known`, all refitted on the own base; none unless that misses next to nothing of what the rich one shows. A rich
-    /// base takes a part of what it is searched for, and its own parameters say less.
-    pub(super) fn refound(
+    /// Refits the effects beyond `known` on the model's own base. Returns `None` unless that base then follows the
+    /// record about as well as the screening basis. A screening basis takes up a part of each effect, so its parameters
+    /// are biased.
+    pub(super) fn refitted_effects(
         &self,
         known: &Hypothesis,
         hypothesis: &Hypothesis,
@@ -240,26 +245,28 @@ impl<'a> Own<'a> {
             other => other.clone(),
         };
         let problem = self.on(&basis, &blocks);
-        let held = shape::plain(&self.on(&basis, &blocks).holding(), hypothesis).map_err(stage)?;
+        let held = shape::plain(&self.on(&basis, &blocks).with_linear_effects_fixed(), hypothesis).map_err(stage)?;
         let follows = |trial: &Trial| {
             let cv_rmse = trial.cv_rmse();
             let is_worth = || held.as_ref().is_none_or(|held| score::is_worth(held, trial));
-            let is_near = cv_rmse <= shape::CLOSED_ANEW * richest || cv_rmse <= shape::CLOSED * richest && is_worth();
-            // Or what it takes is not what the rich one gives it at all.
+            let is_near = cv_rmse <= shape::MAX_RATIO_RESELECTED * richest
+                || cv_rmse <= shape::MAX_RATIO_TO_SCREENING * richest && is_worth();
+            // Or the effects explain something else on this base than on the screening basis.
             let is_another = || held.as_ref().is_some_and(|held| score::is_far_better(held, trial));
             (is_near || is_another()) && score::sensible(&problem, trial)
         };
         let fit = problem.fit(hypothesis).map_err(stage)?;
         let Some(mut trial) = fit.and_then(|fit| Trial::of(&problem, fit)) else { return Ok(None) };
-        if trial.cv_rmse() > shape::CLOSED_ANEW * richest {
-            trial = with_own_laws(&problem, trial, &known.causes(), noise, seed).map_err(stage)?;
+        if trial.cv_rmse() > shape::MAX_RATIO_RESELECTED * richest {
+            trial = with_best_laws(&problem, trial, &known.causes(), noise, seed).map_err(stage)?;
         }
         Ok(Some(trial).filter(follows).map(|trial| trial.fit))
     }
 
-    /// The model with what was found beyond what is `known`: of several extensions the one that leaves least of the record, if it helps the model and
-    /// transfers. With the parameters of the rich base or those of the own one, and with the starts as they were known or as they show now; a start that
-    /// the model cannot be brought to says nothing.
+    /// Returns the extension with the smallest error over all rows, among those that improve the model and transfer to
+    /// other experiments.
+    /// The candidates combine the parameters from the screening basis or from the model's own base with the known or
+    /// the re-estimated starts. A start to which the model cannot be brought is skipped.
     pub(super) fn best(
         &self,
         known: &Hypothesis,
@@ -267,23 +274,23 @@ impl<'a> Own<'a> {
         (richest, noise, seed): (f64, f64, u64),
         zero: Zero,
     ) -> Result<Extension, FitError> {
-        let begun = self.start(found.0, richest)?;
+        let restarted = self.start(found.0, richest)?;
         let mut extensions = Vec::new();
-        for begun in std::iter::once(None).chain(begun.map(Some)) {
-            let own = Own { samples: begun.as_ref().unwrap_or(self.samples), ..*self };
+        for restarted in std::iter::once(None).chain(restarted.map(Some)) {
+            let own = OwnModel { samples: restarted.as_ref().unwrap_or(self.samples), ..*self };
             let of = |hypothesis: &Hypothesis, errors: BTreeMap<String, f64>| {
-                let model = own.extended(hypothesis, &errors, begun.is_some())?;
+                let model = own.extended(hypothesis, &errors, restarted.is_some())?;
                 let after = simulate(&model, self.train, zero)?;
                 Ok::<_, FitError>(Extension {
                     hypothesis: hypothesis.clone(),
                     errors,
-                    begun: begun.clone(),
+                    restarted: restarted.clone(),
                     model,
                     after,
                 })
             };
             extensions.push(of(found.0, found.1.clone())?);
-            if let Some(fit) = own.refound(known, found.0, richest, noise, seed)? {
+            if let Some(fit) = own.refitted_effects(known, found.0, richest, noise, seed)? {
                 extensions.push(of(&fit.hypothesis, uncertainty::standard_errors(&fit, self.samples.time[0]))?);
             }
         }
@@ -291,8 +298,8 @@ impl<'a> Own<'a> {
         extensions.sort_by(|a, b| left(a).total_cmp(&left(b)));
         let mut best = 0;
         for (at, e) in extensions.iter().enumerate() {
-            let own = Own { samples: e.begun.as_ref().unwrap_or(self.samples), ..*self };
-            if own.is_helped(self.before, &e.after) && own.transfers(known, &e.hypothesis)? {
+            let own = OwnModel { samples: e.restarted.as_ref().unwrap_or(self.samples), ..*self };
+            if own.is_improved(self.before, &e.after) && own.transfers(known, &e.hypothesis)? {
                 best = at;
                 break;
             }
@@ -300,20 +307,20 @@ impl<'a> Own<'a> {
         Ok(extensions.swap_remove(best))
     }
 
-    /// The model with these effects and their standard errors: they keep the parameters that the rich base gave them, since refitted on a
-    /// coarser base they would take up its misfit. Only the base's weights and the zero are solved again. `begun` says that the start of the record was
-    /// found beside these effects.
+    /// Returns the model with these effects and their standard errors. The effects keep the parameters from the
+    /// screening basis: refitted on a coarser base they would take up its misfit. Only the weights and the zero are
+    /// solved again. `restarted` says that the starts of the segments were re-estimated with these effects.
     fn extended(
         &self,
         hypothesis: &Hypothesis,
         errors: &BTreeMap<String, f64>,
-        begun: bool,
+        restarted: bool,
     ) -> Result<Model, FitError> {
-        self.refitted(hypothesis, errors, true, begun)
+        self.refitted(hypothesis, errors, true, restarted)
     }
 
-    /// The model as it is with all solved again that it is linear in.
-    pub(super) fn fitted_anew(&self, hypothesis: &Hypothesis) -> Result<Model, FitError> {
+    /// Returns the same model with all its linear unknowns solved again.
+    pub(super) fn refitted_base(&self, hypothesis: &Hypothesis) -> Result<Model, FitError> {
         self.refitted(hypothesis, &BTreeMap::new(), false, false)
     }
 
@@ -322,7 +329,7 @@ impl<'a> Own<'a> {
         hypothesis: &Hypothesis,
         errors: &BTreeMap<String, f64>,
         holds: bool,
-        begun: bool,
+        restarted: bool,
     ) -> Result<Model, FitError> {
         let mut motion = without_sensor_effects(self.samples, &hypothesis.effects);
         let mut moving = Hypothesis { zero_wanders: false, gain_wanders: false, ..hypothesis.clone() };
@@ -331,15 +338,15 @@ impl<'a> Own<'a> {
         let mut fitted = |settling: &[bool]| {
             motion.settling.copy_from_slice(settling);
             let problem = Problem::new(&motion, self.basis.as_ref(), &blocks, self.per_record);
-            let problem = if holds { problem.holding() } else { problem };
+            let problem = if holds { problem.with_linear_effects_fixed() } else { problem };
             let Some(fit) = problem.fit_linear(&moving).map_err(|e| self.stage(e))? else { return Ok(None) };
             let residual = problem.residual(&fit).map_err(|e| self.stage(e))?;
             let starting = start_up_rows(&motion, &residual);
             Ok::<_, FitError>(Some((fit, starting)))
         };
-        // What was a start-up for the model as it was need be none for the extended one, which may have to see those rows to follow them.
-        // One that was found beside what was found lasts as long as it did there.
-        let starting = if begun { &self.samples.settling } else { &self.before.settling };
+        // A start-up row of the unextended model may be an ordinary row for the extended one, which may need it. With
+        // re-estimated starts, the start-up rows are those of that estimate.
+        let starting = if restarted { &self.samples.settling } else { &self.before.settling };
         let known = Settled::from(starting.clone(), &mut fitted)?;
         let known = known.ok_or_else(|| FitError::Unsolvable { record: self.train.name() })?;
         let Settled { fit, settling } = unless_followed(self.samples, known, &mut fitted)?;
@@ -348,7 +355,7 @@ impl<'a> Own<'a> {
             BasisOf::Linearised(plane) => {
                 let solve = |basis: &LinearisedBasis, hypothesis: &Hypothesis| {
                     let problem = Problem::new(&motion, basis, &blocks, self.per_record);
-                    let problem = if holds { problem.holding() } else { problem };
+                    let problem = if holds { problem.with_linear_effects_fixed() } else { problem };
                     problem.fit_linear(hypothesis).map_err(|e| self.stage(e))
                 };
                 let followed = followed(plane, &moving, solve, solve)?;
@@ -357,13 +364,13 @@ impl<'a> Own<'a> {
             }
             other => (other.clone(), fit),
         };
-        // Its reach is that of the motion, not of the sensor.
+        // The output range is that of the motion, without the sensor's effects.
         let mut extended = to_model(self.train, &motion, &basis, &fit, self.model.seed);
         extended.effects.drift = hypothesis.effects.drift;
         extended.effects.interference = hypothesis.effects.interference;
         extended.between_samples = self.model.between_samples;
         if extended.base == self.model.base {
-            // What is known of an operator that stays as it is stays known.
+            // The parameters of an operator that is not refitted keep their standard errors.
             let of_operator = format!("{}.", self.model.base.kind().name());
             let own = |name: &&String| name.starts_with(&of_operator);
             let errors = self.model.std_errors.iter().filter(|(name, _)| own(name));
@@ -374,11 +381,12 @@ impl<'a> Own<'a> {
         Ok(extended)
     }
 
-    /// Whether it errs less `after` than `before`, over the rows that count for the search: a model that misses a stop, say, takes
-    /// the rows on it for a start-up. Or over those that it was fitted to itself: what an unknown start hides from it says nothing of the rest.
-    /// In any case it may not err more, by [`RMSE_TOLERANCE`], over the rows that are a start-up for neither, nor by [`LARGE_RATIO`] over all that the
-    /// sensor shows.
-    pub(super) fn is_helped(&self, before: &Simulation, after: &Simulation) -> bool {
+    /// Returns whether the error `after` the extension is smaller than `before`, over the rows that count for the
+    /// search or over the rows that the extended model was fitted to. A model without a saturation, for example, marks
+    /// the saturated rows as start-up.
+    /// In addition the error must not grow by more than [`RMSE_TOLERANCE`] over the rows that are start-up for neither
+    /// model, and not by more than [`LARGE_RATIO`] over all rows that the sensor shows.
+    pub(super) fn is_improved(&self, before: &Simulation, after: &Simulation) -> bool {
         let samples = self.samples;
         let errs_less = |counts: &dyn Fn(usize) -> bool| {
             let rows = || (0..samples.len()).filter(|k| !samples.settling[*k] && counts(*k));
@@ -398,12 +406,12 @@ impl<'a> Own<'a> {
             && stays_within(LARGE_RATIO, &|k| !samples.blind[k])
     }
 
-    /// Whether the own base predicts experiments that it was not fitted to at least as well with these effects as without: a model that does
-    /// worse there is not handed out.
+    /// Returns whether the model's own base predicts experiments outside its fit at least as well with these effects as
+    /// without. A model that predicts worse is rejected.
     pub(super) fn transfers(&self, start: &Hypothesis, found: &Hypothesis) -> Result<bool, FitError> {
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
-        let problem = self.on(self.basis, &blocks).holding();
-        // A wandering is no part of the model; the amplifier is the same for both.
+        let problem = self.on(self.basis, &blocks).with_linear_effects_fixed();
+        // The wander is no part of the model; the slew limit applies to both.
         let model_of = |h: &Hypothesis| Hypothesis {
             zero_wanders: false,
             gain_wanders: false,
@@ -415,7 +423,7 @@ impl<'a> Own<'a> {
         Ok(problem.transferred([&before, &after]).is_none_or(|[before, after]| after <= before))
     }
 
-    /// The record with what an amplifier makes of its drive that follows no steeper slope than this \[V/s\].
+    /// Returns the record with its drive limited to this slope \[V/s\], as by a slow amplifier.
     pub(super) fn amplified(&self, v_per_s: f64) -> Record {
         let mut drive = self.train.input().to_vec();
         limit_slope(&mut drive, self.samples, v_per_s);

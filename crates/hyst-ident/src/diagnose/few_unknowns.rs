@@ -1,19 +1,20 @@
-//! What a base with fewer unknowns shows where the rich one leaves much.
+//! Searches the model's own base if the screening basis predicts badly.
 //!
-//! Where the drive has turned seldom, a rich base takes up a part of each of several effects. It predicts badly, and no effect shows by itself. If the
-//! model's own base, with all that was found, predicts as well as the rich one, the additional unknowns are worth nothing. Then the own base is searched
-//! too. Its result replaces the first one if it predicts far better.
+//! If the drive has few turning points, a screening basis takes up a part of each of several effects. It predicts badly
+//! and no effect shows alone. If the model's own base, with all effects found, predicts as well as the screening basis,
+//! the additional unknowns are useless. The own base is then searched too. Its result replaces the first one if it
+//! predicts far better.
 
 use hyst_core::Error;
 
 use super::score;
-use super::search::{Search, further};
-use super::shape::{CLOSED_ANEW, is_near};
+use super::search::{Search, search_with_noise};
+use super::shape::{MAX_RATIO_RESELECTED, is_near};
 use super::trial::Trial;
 use crate::nested::{Cause, Hypothesis, Problem};
 
-/// What a search from a start, beyond what was there `already`, finds on a base with `few` unknowns, if it predicts far better than what was `found` on
-/// a rich one.
+/// Searches the basis with `few` unknowns from a start, for causes beyond `already`. Returns the result if it predicts
+/// far better than `found`, the result on the screening basis.
 pub(super) fn search(
     few: &Problem<'_>,
     found: &Search,
@@ -26,12 +27,12 @@ pub(super) fn search(
         return Ok(None);
     }
     let as_found = few.fit(hypothesis)?.and_then(|f| Trial::of(few, f));
-    let Some(as_found) = as_found.filter(|own| own.cv_rmse() <= CLOSED_ANEW * rich) else { return Ok(None) };
+    let Some(as_found) = as_found.filter(|own| own.cv_rmse() <= MAX_RATIO_RESELECTED * rich) else { return Ok(None) };
     progress("searching on the model's own base, which has fewer unknowns");
     let Some(from) = few.fit(start)? else { return Ok(None) };
-    let seen = further(few, from, &already, found.noise, seed, progress)?;
+    let seen = search_with_noise(few, from, &already, found.noise, seed, progress)?;
     let differs = seen.best.fit.hypothesis.causes() != hypothesis.causes();
-    // By what was found there, not by the base alone.
+    // The gain must come from the effects, not from the basis alone.
     let predicts = [&found.best, &as_found].into_iter().all(|other| score::is_far_better(other, &seen.best));
     Ok(Some(seen).filter(|seen| differs && predicts && !seen.named.is_empty()))
 }

@@ -1,4 +1,4 @@
-//! `findings.json`.
+//! Findings: the contents of `findings.json`.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::simulate::{Simulation, Zero};
 /// Schema of the findings that this version writes.
 const SCHEMA: &str = "hyst.findings/2";
 
-/// The diagnosis in a word.
+/// The verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -23,66 +23,67 @@ pub enum Verdict {
     Explained,
     /// The model is at the noise floor.
     NothingMissing,
-    /// A richer base would take what is left.
+    /// A finer base model would explain the remainder.
     BaseTooCoarse,
-    /// Something is left that nothing on the list explains.
+    /// No listed effect explains the remainder.
     Unexplained,
 }
 
-/// What kind of residual is left.
+/// What the remainder consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RemainderKind {
     /// Noise.
     None,
-    /// The base's own misfit.
+    /// Misfit of the base model.
     BaseCapacity,
     /// Unknown.
     Unexplained,
 }
 
-/// What is no longer as it was in the record that a model was fitted to.
+/// What has changed since the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Change {
-    /// The sensor's zero alone.
+    /// Only the sensor's zero.
     Zero,
-    /// The device: it is another one, or the same with another gain or shape.
+    /// The device: another one, or the same with another gain or shape.
     Device,
 }
 
-/// What is left after everything that was found.
+/// The residual of the extended model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Remainder {
     /// What it is.
     pub kind: RemainderKind,
-    /// Share of the output's variance.
+    /// Share of the variance of the output.
     pub variance_share: f64,
-    /// Of what a richer base would take: what the same base would take too, fitted anew, since something has changed since the fit.
+    /// What has changed since the fit, if the same base model, refitted to this record, explains what a finer one
+    /// would.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
-    /// Slope from which on the drive is not followed, as by an amplifier whose current is limited \[input unit/s\].
+    /// Slope above which the output does not follow the drive, as behind a current-limited amplifier \[input unit/s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slew_limit: Option<f64>,
-    /// In words.
+    /// Description in a sentence.
     pub description: String,
-    /// Where it lives, in sentences; none if it is noise.
+    /// Where in the record it is largest, in sentences; empty if it is noise.
     #[serde(rename = "where", default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<String>,
 }
 
-/// A parameter that was found.
+/// A fitted parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// Value.
     pub value: f64,
-    /// Standard error; none if the parameter sits at a bound or is a convention.
+    /// Standard error; `None` for a parameter at a bound and for a convention.
     pub std_error: Option<f64>,
     /// Unit.
     pub unit: String,
 }
 
-/// Another effect in the place of a named one.
+/// Another effect tried instead of a named one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// Its name.
@@ -94,30 +95,30 @@ pub struct Alternative {
     pub indistinguishable: bool,
 }
 
-/// What kind of thing an effect is.
+/// Class of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EffectKind {
-    /// Loops that change with the rate of the drive.
+    /// Rate-dependent hysteresis: the loop changes with the rate of the drive.
     Rate,
-    /// The output goes on after the drive has stopped.
+    /// The output continues to move after the drive has stopped.
     SlowMemory,
-    /// The output is filtered: late, smooth or ringing.
+    /// Linear dynamics: the output is late, smoothed or ringing.
     LinearDynamics,
-    /// A curve without memory behind the hysteresis.
+    /// A memoryless curve at the output or the input of the hysteresis.
     OutputShape,
-    /// It follows the measured temperature.
+    /// The output follows the measured temperature.
     Temperature,
-    /// It follows the measured load.
+    /// The output follows the measured load.
     Load,
-    /// The zero moves with time, whatever the drive does.
+    /// The zero moves with time, independently of the drive.
     Time,
     /// A periodic signal in the sensor.
     Tone,
 }
 
 impl EffectKind {
-    /// The kind of an effect.
+    /// Returns the class of an effect.
     pub fn of(effect: Effect) -> Self {
         match effect {
             Effect::RateDependence => Self::Rate,
@@ -132,21 +133,21 @@ impl EffectKind {
     }
 }
 
-/// An effect that helps but is not sure enough to be named.
+/// A suspect: an effect that helps but is not certain enough to be named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Suspect {
     /// Name.
     pub name: Effect,
-    /// What kind of thing it is.
+    /// Class.
     pub kind: EffectKind,
-    /// Probability that it acts.
+    /// Probability that the effect is present.
     pub probability: f64,
     /// Cross-validated RMSE with it \[output unit\].
     pub cv_rmse: f64,
-    /// What explains nearly as much in its place.
+    /// Effect that explains nearly as much instead.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rival: Option<Effect>,
-    /// The command that makes the record that would decide.
+    /// Command that designs the deciding record.
     pub command: String,
 }
 
@@ -155,41 +156,41 @@ pub struct Suspect {
 pub struct BaseAdvice {
     /// The kind.
     pub model: Kind,
-    /// Its cross-validated RMSE with all that was found \[output unit\].
+    /// Its cross-validated RMSE with all effects found \[output unit\].
     pub cv_rmse: f64,
-    /// That of the model's own kind.
+    /// Cross-validated RMSE of the model's own kind \[output unit\].
     pub own_cv_rmse: f64,
 }
 
-/// Rows that a diagnosis used, and why it did not use the others.
+/// Rows that a diagnosis used, and rows that it left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rows {
     /// Rows that were used.
     pub used: usize,
-    /// Rows that were not, by what is the matter with them.
+    /// Rows left out, by reason.
     pub left_out: LeftOut,
-    /// Numbers of the rows that spike, from 1 for the first row of data; the first [`MOST_LISTED`] of them.
+    /// Row numbers of spikes, counted from 1 at the first row of data; the first [`MOST_LISTED`] of them.
     pub spikes: Vec<usize>,
 }
 
-/// Rows that were left out.
+/// Rows left out, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct LeftOut {
-    /// Holes in time, where a log has lost samples.
+    /// Gaps in time where a log lost samples.
     pub gaps: usize,
-    /// The sensor shows for a moment what no device does.
+    /// Spikes: single sensor values that no device produces.
     pub spikes: usize,
-    /// A transient from before the record.
+    /// Start-up rows: a transient from before the record.
     pub start_up: usize,
-    /// The sensor stands at the end of its range.
+    /// The sensor is at the end of its range.
     pub saturated: usize,
-    /// The sensor repeats one value and jumps.
+    /// The sensor repeats one value and then jumps.
     #[serde(default)]
     pub frozen: usize,
 }
 
-/// Spikes that are listed at most.
+/// Maximum number of spikes in the list.
 pub const MOST_LISTED: usize = 100;
 
 /// A named effect.
@@ -197,17 +198,17 @@ pub const MOST_LISTED: usize = 100;
 pub struct Finding {
     /// Name.
     pub name: Effect,
-    /// What kind of thing it is.
+    /// Class.
     pub kind: EffectKind,
-    /// Which law it follows; none where a flexible form extends the model, which is more than its parameters say.
+    /// Law that the effect follows; `None` if the model is extended by a flexible form.
     pub law: Option<String>,
-    /// Probability that the name is right; not calibrated yet.
+    /// Probability that the name is right.
     pub probability: f64,
     /// Parameters.
     pub parameters: BTreeMap<String, Found>,
-    /// Why it was named, in sentences.
+    /// Evidence, in sentences.
     pub evidence: Vec<String>,
-    /// What else was tried in its place, best first.
+    /// Other effects tried instead, best first.
     pub alternatives: Vec<Alternative>,
     /// Cross-validated RMSE without it \[output unit\].
     pub cv_rmse_before: f64,
@@ -215,48 +216,48 @@ pub struct Finding {
     pub cv_rmse_after: f64,
 }
 
-/// Errors on the training and the test record.
+/// Errors on the training record and the test record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OnRecords {
     /// Training record.
     pub train: Option<Errors>,
-    /// Test record, where one was given.
+    /// Test record, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<Errors>,
 }
 
-/// What a diagnosis found.
+/// The result of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     /// `hyst.findings/2`
     pub schema: String,
     /// Base model.
     pub base: Kind,
-    /// Unit of all errors: the ending of the output's column.
+    /// Unit of all errors: the suffix of the output's column.
     pub unit: String,
     /// Standard deviation of the white noise in the record \[unit\].
     pub noise_floor: f64,
-    /// What was done with the sensor's zero.
+    /// How the sensor's zero was treated.
     pub zero: Zero,
-    /// The diagnosis in a word.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Errors of the model as it was given.
+    /// Errors of the model before the extension.
     pub before: OnRecords,
-    /// Effects, in the chain's order.
+    /// Named effects, in the order of the signal chain.
     pub effects: Vec<Finding>,
-    /// Plays that the base of the extended model has at other places than the model's; `None` if they stayed where they were. Those of the
-    /// model were placed while the effects stood in the record.
+    /// Number of play operators of the extended model if their thresholds were chosen again; `None` if they are
+    /// unchanged. The original thresholds were chosen before the effects were known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plays_placed_anew: Option<usize>,
-    /// Effects that help but are not sure enough to be named, the most probable first.
+    /// Suspects, most probable first.
     pub suspects: Vec<Suspect>,
-    /// What this record would have shown of each effect that is not named.
+    /// Limits of detection of the effects that are not named.
     pub limits: BTreeMap<Effect, Limit>,
     /// Another kind of model that explains the record better, if one does.
     pub base_advice: Option<BaseAdvice>,
-    /// Which rows were used.
+    /// Rows used and left out.
     pub rows: Rows,
-    /// What is left.
+    /// The remainder.
     pub remainder: Remainder,
     /// Errors of the extended model.
     pub after: OnRecords,
@@ -274,7 +275,7 @@ pub(super) struct Material<'a> {
     pub(super) remainder: Remainder,
     pub(super) zero: Zero,
     pub(super) samples: &'a Samples,
-    /// Cross-validated error that the base of the search leaves with all that was found, in noise floors.
+    /// Cross-validated RMSE on the basis of the search with all effects found, in noise floors.
     pub(super) left: f64,
     pub(super) suspects: Vec<Suspect>,
     pub(super) limits: BTreeMap<Effect, Limit>,
@@ -282,7 +283,7 @@ pub(super) struct Material<'a> {
     pub(super) rows: Rows,
 }
 
-/// Thresholds of a base of plays.
+/// Returns the thresholds of a base with play operators.
 fn thresholds(base: &Base) -> Option<&[f64]> {
     match base {
         Base::Pi(p) => Some(&p.thresholds),

@@ -1,8 +1,8 @@
-//! What was found, on the finest base at hand: parameters refitted, names that this base does not need taken back, and what drowned in the
-//! misfit of the base of the search looked for anew.
+//! Checks the effects found on a finer basis: refits their parameters, drops the names that it does not need and
+//! searches for effects that the misfit of the screening basis has hidden.
 //!
-//! That base is rich but smooth. Where a Preisach triangle predicts the record better, what the search took for an effect may have been the
-//! base's own misfit, what it found may be bent by it, and what it missed may be hidden by it.
+//! The screening basis is rich but smooth. If a Preisach triangle predicts the record better, a named effect may have
+//! been misfit of the screening basis, its parameters may be biased, and other effects may be hidden.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use hyst_core::Error;
 
 use super::scan::Scan;
 use super::score;
-use super::search::{Search, beyond, further};
+use super::search::{Search, new_causes, search_with_noise};
 use super::shape::own_stop;
 use super::starts::starts;
 use super::trial::Trial;
@@ -25,23 +25,23 @@ use crate::settle::start_up_rows;
 
 /// Cells along an edge of the triangle.
 const CELLS: usize = 24;
-/// Cells along an edge of the one that is searched, which a trial passes four times as fast.
+/// Cells along an edge of the triangle that is searched: a trial on it is four times as fast.
 const SEARCHED_CELLS: usize = 16;
-/// Rows that the comparison uses.
+/// Maximum number of rows.
 const ROWS: usize = 8_000;
 
-/// What a hysteresis that takes its time may be taken for.
-const SLOW: [Effect; 4] = [Effect::Delay, Effect::Lag, Effect::Resonance, Effect::Creep];
+/// Effects that a rate-dependent hysteresis may be mistaken for.
+const LATE_OR_SLOW: [Effect; 4] = [Effect::Delay, Effect::Lag, Effect::Resonance, Effect::Creep];
 
-/// What is known in the end.
+/// Final result of the check.
 pub(super) struct Finer {
     pub(super) hypothesis: Hypothesis,
     pub(super) errors: BTreeMap<String, f64>,
-    /// Cross-validated error that the finest base leaves \[y\].
+    /// Cross-validated RMSE on the finest basis \[y\].
     pub(super) cv_rmse: f64,
 }
 
-/// Looks on the finest base for what the search could not see, takes names back that it does not need, and refits the others there.
+/// Refits the effects on the finest basis, drops those that it does not need and searches for hidden ones.
 pub(super) fn refine(
     problem: &Problem<'_>,
     found: &mut Search,
@@ -50,8 +50,8 @@ pub(super) fn refine(
     seed: u64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Finer, Error> {
-    beside_nameless(problem, found, already)?;
-    beside_a_law_of_the_rate(problem, found, already, seed)?;
+    drop_small_next_to_unlisted(problem, found, already)?;
+    drop_misfit_of_rate_law(problem, found, already, seed)?;
     let of = |trial: &Trial| Finer {
         hypothesis: trial.fit.hypothesis.clone(),
         errors: standard_errors(&trial.fit, samples.time[0]),
@@ -65,8 +65,8 @@ pub(super) fn refine(
     let basis = PreisachBasis::for_samples(samples, CELLS);
     let mut settled = samples.clone();
     let first = Problem::new(samples, &basis, &blocks, problem.zero_per_file).widening_as(problem);
-    let Some(rough) = placed(&first, &found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
-    // A triangle that keeps every turn in its memory also shows how long an unknown start lasts.
+    let Some(rough) = first_fit(&first, &found.best.fit.hypothesis)? else { return Ok(of(&found.best)) };
+    // A triangle keeps every reversal in its memory, so it also shows how long an unknown start lasts.
     let starting = start_up_rows(samples, &first.residual(&rough)?);
     settled.settling.iter_mut().zip(starting).for_each(|(known, starts)| *known |= starts);
     drop(first);
@@ -82,8 +82,8 @@ pub(super) fn refine(
     }
     if score::is_far_better(&found.best, &best)
         && best.cv_rmse() > LARGE_RATIO * found.noise
-        && let Some(anew) = searched_anew(problem, &triangle, found, already, seed, progress)?
-        && let Some(rough) = placed(&triangle, &anew.best.fit.hypothesis)?
+        && let Some(anew) = search_coarser_triangle(problem, &triangle, found, already, seed, progress)?
+        && let Some(rough) = first_fit(&triangle, &anew.best.fit.hypothesis)?
         && let Some(with) = fitted(&rough.hypothesis)?
     {
         (*found, best) = (anew, with);
@@ -92,9 +92,9 @@ pub(super) fn refine(
     loop {
         let mut least: Option<Trial> = None;
         let loose = Undetermined::of(&best.fit);
-        for cause in beyond(&best.fit.hypothesis, already) {
+        for cause in new_causes(&best.fit.hypothesis, already) {
             let Some(without) = without(&triangle, &best, cause, found.noise, seed)? else { continue };
-            let is_loose = loose.speaks_against(cause, || score::is_far_better(&without, &best));
+            let is_loose = loose.contradicts(cause, || score::is_far_better(&without, &best));
             if (is_loose || !score::judge(&triangle, &without, &best, found.noise, seed).accepted())
                 && least.as_ref().is_none_or(|l| without.total() < l.total())
             {
@@ -103,21 +103,22 @@ pub(super) fn refine(
         }
         let Some(without) = least else { break };
         best = fitted(&without.fit.hypothesis)?.unwrap_or(without);
-        // Of two modes one may stay, and the name with it.
-        let stays = beyond(&best.fit.hypothesis, already);
+        // If one of two modes stays, the name stays.
+        let stays = new_causes(&best.fit.hypothesis, already);
         found.named.retain(|n| stays.contains(&Cause::Effect(n.effect)));
     }
     Ok(of(&best))
 }
 
-/// A first fit of what was found on another base: a stop stands where this base meets it, if that is better.
-fn placed(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
+/// Returns a first fit with the effects found on another basis. The saturation limit is refitted if that is better.
+fn first_fit(problem: &Problem<'_>, found: &Hypothesis) -> Result<Option<Fitted>, Error> {
     let as_found = problem.fit_linear(found)?;
     let stop = if found.effects.saturation.is_some() { own_stop(problem, found)? } else { None };
     Ok(as_found.into_iter().chain(stop).min_by(|a, b| a.squares.total_cmp(&b.squares)))
 }
 
-/// The finer base without one cause, all else refitted; its parameters as they are where that already shows that it is not needed.
+/// Returns the finer basis without one cause, everything else refitted. Parameters are not refitted if the cause is
+/// clearly not needed without that.
 fn without(triangle: &Problem<'_>, best: &Trial, cause: Cause, noise: f64, seed: u64) -> Result<Option<Trial>, Error> {
     let less = best.fit.hypothesis.without(cause);
     let Some(kept) = triangle.fit_linear(&less)?.and_then(|f| Trial::of(triangle, f)) else { return Ok(None) };
@@ -128,32 +129,33 @@ fn without(triangle: &Problem<'_>, best: &Trial, cause: Cause, noise: f64, seed:
     Ok(Some(refitted.filter(|t| t.total() < kept.total()).unwrap_or(kept)))
 }
 
-/// Asks the finer base about what came near to each effect that was named: the one that it clearly prefers is named.
+/// Lets the finer basis decide between each named effect and its close rivals: a clearly better rival takes over the
+/// name.
 fn decide_rivals(triangle: &Problem<'_>, found: &mut Search, best: &mut Trial, seed: u64) -> Result<(), Error> {
     for n in 0..found.named.len() {
-        for i in 0..found.named[n].instead.len() {
-            let other = found.named[n].instead[i].clone();
-            // The others of its set are those of the best, or another rival has been named since.
+        for i in 0..found.named[n].rivals.len() {
+            let other = found.named[n].rivals[i].clone();
+            // Only if the other effects of both sets are the same: another rival may have been named since.
             let stands = best.fit.hypothesis.without(Cause::Effect(found.named[n].effect)).causes()
                 == other.hypothesis.without(Cause::Effect(other.effect)).causes();
             let near = other.tie
                 || (other.judgement.explains_enough() && other.cv_rmse <= LARGE_RATIO * found.named[n].cv_with);
-            // In one loop no base can tell what is late from what is late otherwise.
+            // In a single loop no basis can tell one late effect from another.
             if !near || !stands || triangle.only_loop.is_some() {
                 continue;
             }
             let Some(trial) = triangle.fit(&other.hypothesis)?.and_then(|f| Trial::of(triangle, f)) else { continue };
             let named = &mut found.named[n];
-            named.instead[i].tie = score::undecided(best, &trial, seed);
+            named.rivals[i].tie = score::undecided(best, &trial, seed);
             if other.judgement.explains_enough() && score::clearly_better(best, &trial, seed) {
-                let was = &mut named.instead[i];
+                let was = &mut named.rivals[i];
                 (was.effect, was.cv_rmse, was.judgement) = (named.effect, named.cv_with, named.judgement);
                 was.hypothesis = best.fit.hypothesis.clone();
                 (named.effect, named.cv_with, named.judgement) = (other.effect, other.cv_rmse, other.judgement);
                 *best = trial;
             }
         }
-        found.named[n].instead.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
+        found.named[n].rivals.sort_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
     }
     found.named.sort_by_key(|n| n.effect);
     Ok(())
@@ -163,8 +165,9 @@ fn is_named(found: &Search, effect: Effect) -> bool {
     found.named.iter().any(|n| n.effect == effect)
 }
 
-/// What a triangle of fewer cells finds beyond what was found, where it sees far better too; nothing where its word does not stand.
-fn searched_anew(
+/// Searches a coarser triangle for further effects. Returns the result if that triangle also predicts far better and
+/// finds a new name; `None` otherwise.
+fn search_coarser_triangle(
     problem: &Problem<'_>,
     triangle: &Problem<'_>,
     found: &Search,
@@ -174,22 +177,22 @@ fn searched_anew(
 ) -> Result<Option<Search>, Error> {
     let basis = PreisachBasis::for_samples(problem.samples, SEARCHED_CELLS);
     let coarser = Problem::new(triangle.samples, &basis, triangle.blocks, triangle.zero_per_file).widening_as(problem);
-    let rough = placed(&coarser, &found.best.fit.hypothesis)?;
+    let rough = first_fit(&coarser, &found.best.fit.hypothesis)?;
     let from = rough.map(|rough| coarser.fit(&rough.hypothesis)).transpose()?.flatten();
     let from = from.and_then(|f| Trial::of(&coarser, f));
     let Some(from) = from.filter(|t| score::is_far_better(&found.best, t)) else { return Ok(None) };
-    let mut anew = further(&coarser, from.fit, already, found.noise, seed, progress)?;
-    beside_nameless(&coarser, &mut anew, already)?;
-    // A wandering alone is no news: of what a triangle leaves some is its own, and wanders like anything.
+    let mut anew = search_with_noise(&coarser, from.fit, already, found.noise, seed, progress)?;
+    drop_small_next_to_unlisted(&coarser, &mut anew, already)?;
+    // A new wander alone does not count: the triangle's own misfit looks like one.
     let news = anew.named.iter().any(|n| !is_named(found, n.effect));
-    Ok((news && !may_be_drag(problem, found, &anew)?).then_some(anew))
+    Ok((news && !may_be_rate_dependence(problem, found, &anew)?).then_some(anew))
 }
 
-/// Whether what the triangle alone calls late, or creep, is better explained by a hysteresis that takes its time, which the triangle cannot do:
-/// the base of the search, which can, is asked.
-fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<bool, Error> {
+/// Returns whether a late effect or a creep that only the triangle finds is better explained by rate-dependent
+/// hysteresis. The triangle cannot model that, so the screening basis decides.
+fn may_be_rate_dependence(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<bool, Error> {
     let late: Vec<Effect> =
-        anew.named.iter().map(|n| n.effect).filter(|e| SLOW.contains(e) && !is_named(found, *e)).collect();
+        anew.named.iter().map(|n| n.effect).filter(|e| LATE_OR_SLOW.contains(e) && !is_named(found, *e)).collect();
     if late.is_empty() {
         return Ok(false);
     }
@@ -208,27 +211,28 @@ fn may_be_drag(problem: &Problem<'_>, found: &Search, anew: &Search) -> Result<b
     Ok(false)
 }
 
-/// Takes back what is small beside a wandering, or an amplifier that does not follow, that was found.
-fn beside_nameless(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
+/// Drops effects that are small compared with a zero or gain wander or a slew limit that was found.
+fn drop_small_next_to_unlisted(problem: &Problem<'_>, found: &mut Search, already: &[Cause]) -> Result<(), Error> {
     let h = found.best.fit.hypothesis.clone();
     let follows = Hypothesis { slew_limit: None, ..h.clone() };
     let by_less_than_a_sample = |seconds: f64| seconds < problem.samples.period;
     let share = |effect: Effect| match effect {
         Effect::Delay if h.effects.delay.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
         Effect::Lag if h.effects.lag.is_some_and(|p| by_less_than_a_sample(p.seconds)) => f64::INFINITY,
-        // An amplifier turns between two samples, where no row shows it: what remains of it looks like an effect of the motion, none of the sensor.
+        // A slew limit ends between two samples. Its remaining error looks like an effect of the motion, not of the
+        // sensor.
         _ if effect.acts_on_the_motion() => MIN_SHARE_BESIDE_SLEW_LIMIT,
         _ => 0.0,
     };
-    beside(problem, found, already, &follows, &share)?;
-    // A zero or a gain that wanders is interpolated between few heights; the remainder looks like many effects.
+    drop_below_share(problem, found, already, &follows, &share)?;
+    // A wandering zero or gain is interpolated between few points; its remaining error looks like many effects.
     let still = Hypothesis { zero_wanders: false, gain_wanders: false, ..found.best.fit.hypothesis.clone() };
-    beside(problem, found, already, &still, &|_| MINOR_SHARE)
+    drop_below_share(problem, found, already, &still, &|_| MINOR_SHARE)
 }
 
-/// Takes back what is late or slow beside a law of the rate where any other law of the rate takes it as well: what a formula misses of an actuator's own
-/// law would be called a lag or a creep.
-fn beside_a_law_of_the_rate(
+/// Drops late and slow effects next to a rate-dependence if a free law of the rate explains the record without them.
+/// The misfit of the formula for rate-dependence would otherwise be named a lag or a creep.
+fn drop_misfit_of_rate_law(
     problem: &Problem<'_>,
     found: &mut Search,
     already: &[Cause],
@@ -236,12 +240,13 @@ fn beside_a_law_of_the_rate(
 ) -> Result<(), Error> {
     loop {
         let h = found.best.fit.hypothesis.clone();
-        let new = beyond(&h, already);
-        let late: Vec<Cause> = SLOW.map(Cause::Effect).into_iter().filter(|cause| new.contains(cause)).collect();
+        let new = new_causes(&h, already);
+        let late: Vec<Cause> =
+            LATE_OR_SLOW.map(Cause::Effect).into_iter().filter(|cause| new.contains(cause)).collect();
         if late.is_empty() || !new.contains(&Cause::Effect(Effect::RateDependence)) {
             return Ok(());
         }
-        // A law whose thresholds grow says over what time the rate is felt.
+        // A widening has its own time over which it averages the rate.
         let felt_over = h.effects.widening.as_ref().map_or(0.0, |p| p.seconds);
         let rated = RatedBasis::around(problem.basis, problem.samples, felt_over);
         let Some(rated) = rated.filter(|rated| ROWS_PER_UNKNOWN * rated.len() <= problem.samples.len()) else {
@@ -262,13 +267,13 @@ fn beside_a_law_of_the_rate(
         let Some((cause, _)) = needless else { return Ok(()) };
         let Some(trial) = problem.fit(&h.without(cause))?.and_then(|f| Trial::of(problem, f)) else { return Ok(()) };
         found.best = trial;
-        let stays = beyond(&found.best.fit.hypothesis, already);
+        let stays = new_causes(&found.best.fit.hypothesis, already);
         found.named.retain(|n| stays.contains(&Cause::Effect(n.effect)));
     }
 }
 
-/// Takes back what explains less than a share of what was found does beyond `less`, which lacks something without a name.
-fn beside(
+/// Drops effects that explain less than a share of what the causes missing in `less` explain.
+fn drop_below_share(
     problem: &Problem<'_>,
     found: &mut Search,
     already: &[Cause],
@@ -284,13 +289,13 @@ fn beside(
     let mut kept = h.clone();
     found.named.retain(|n| {
         let enough = n.cv_without.powi(2) - n.cv_with.powi(2) >= share(n.effect) * explained.max(0.0);
-        if enough || n.judgement.alone {
+        if enough || n.judgement.sensor_tone {
             return true;
         }
-        // What was judged is the last of two modes; the other stays, and the name with it.
+        // The judgement was about the last of two modes. If the other one stays, the name stays.
         let cause = Cause::Effect(n.effect);
         kept = kept.without(cause);
-        beyond(&kept, already).contains(&cause)
+        new_causes(&kept, already).contains(&cause)
     });
     if kept != *h
         && let Some(trial) = problem.fit(&kept)?.and_then(|f| Trial::of(problem, f))

@@ -1,8 +1,9 @@
-//! Limits of detection: how large an effect that is not named would have to be for this record to show it.
+//! Limits of detection: the smallest size of an effect that is not named at which this record would have shown it.
 //!
-//! An effect of a given size changes the output by a column of numbers. What the base and all that was found cannot imitate of that column is
-//! what the search would have gained, and the search accepts from a known gain on (`least_gain` in `score.rs`). So the size follows from linear
-//! algebra, without a search; where an effect does not grow in proportion to its parameter, the column is made anew at the size found.
+//! An effect of a given size changes the output by a column of numbers. The part of that column that the base and the
+//! effects found cannot imitate is the gain of a search for it. The search accepts from a known gain on (`least_gain`
+//! in `score.rs`). So the size follows from linear algebra, without a search. If an effect is not proportional to its
+//! parameter, the column is recomputed at the size found.
 
 use std::collections::BTreeMap;
 
@@ -18,37 +19,39 @@ use crate::model::{Effect, Effects};
 use crate::nested::{Cause, Problem, SignalPath};
 use crate::samples::range;
 
-/// Above the gain from which on the search accepts: noise may take some of it.
-const MARGIN: f64 = 1.25;
-/// Rounds in which a column is made anew at the size found.
+/// Safety factor on the gain at which the search accepts: noise may hide a part of it.
+const GAIN_MARGIN: f64 = 1.25;
+/// Maximum number of rounds in which the column is recomputed.
 const ROUNDS: usize = 4;
-/// Damping of the mode whose limit is told, the frequencies at which it is tried, and the least share of the motion that a mode may carry.
+/// Mode of the limit for a resonance: damping ratio, number of frequencies that are tried, and smallest share of the
+/// motion.
 const DAMPING: f64 = 0.02;
 const FREQUENCIES: usize = 10;
-const LEAST_MODE: f64 = 0.06;
-/// Frequency of the tone whose limit is told \[Hz\]; a tenth of the sample rate where that is no frequency of the record.
-const MAINS: f64 = 50.0;
-/// How much deeper each stop is than the one before that is tried.
-const DEEPER: f64 = 1.3;
-/// Least depth of a stop, as a share of the stroke.
-const SHALLOWEST: f64 = 1e-3;
+const MIN_MODE_SHARE: f64 = 0.06;
+/// Frequency of the tone of the limit for interference \[Hz\]; a tenth of the sample rate if the record does not cover
+/// it.
+const MAINS_HZ: f64 = 50.0;
+/// Ratio of successive depths of the saturation limit that are tried.
+const DEPTH_RATIO: f64 = 1.3;
+/// Smallest depth of the saturation limit, as a share of the stroke.
+const MIN_DEPTH_SHARE: f64 = 1e-3;
 
-/// What a record would have shown of an effect.
+/// Limit of detection of an effect in one record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Limit {
-    /// From this size on it would have been named.
+    /// The smallest size at which the effect would have been named.
     Size {
         /// Size.
         size: f64,
         /// Its unit.
         unit: String,
-        /// What the size is of.
+        /// What the size measures.
         meaning: String,
     },
-    /// It cannot be seen, however large it is.
+    /// The record cannot show the effect, whatever its size.
     NotVisible {
-        /// Why.
+        /// Reason.
         not_visible: String,
     },
 }
@@ -61,12 +64,12 @@ impl Limit {
     fn of(size: Option<f64>, unit: &str, meaning: String) -> Self {
         match size.filter(|s| s.is_finite() && *s > 0.0) {
             Some(size) => Self::Size { size, unit: unit.into(), meaning },
-            None => Self::hidden("what it does is imitated by the base or by what was found"),
+            None => Self::hidden("the base model or the effects found imitate it"),
         }
     }
 }
 
-/// What all limits need.
+/// Shared context of all limits.
 struct Limits<'a> {
     scan: Scan<'a>,
     /// Gain from which on an effect is accepted, and from which on a tone is.
@@ -74,7 +77,8 @@ struct Limits<'a> {
     least_tone: f64,
 }
 
-/// The limit of each effect that was not found, on the base of the search. An asymmetry, which that base has in itself, has none.
+/// Returns the limit of each effect that was not found, on the basis of the search. Asymmetry has none: that basis
+/// bends by itself.
 pub(super) fn limits(
     problem: &Problem<'_>,
     found: &Trial,
@@ -83,11 +87,11 @@ pub(super) fn limits(
 ) -> Result<BTreeMap<Effect, Limit>, Error> {
     let h = &found.fit.hypothesis;
     let (rows, left) = (found.fit.rows as f64, found.total());
-    let least = |left: f64| MARGIN * least_gain(rows, left, noise).max(f64::MIN_POSITIVE);
+    let least = |left: f64| GAIN_MARGIN * least_gain(rows, left, noise).max(f64::MIN_POSITIVE);
     let all = Limits {
         scan: Scan::new(problem, &found.fit, 0.0)?,
         least: least(left),
-        // A tone may stand alone, whatever else is left.
+        // A tone is judged against the noise floor alone.
         least_tone: least(rows * noise * noise),
     };
     let mut limits = BTreeMap::new();
@@ -105,7 +109,8 @@ pub(super) fn limits(
 }
 
 impl Limits<'_> {
-    /// The size at which what nothing else imitates of an effect is `least`; `change` is what the effect of a size adds to the output.
+    /// Returns the size at which the part of an effect that nothing else imitates reaches `least` (Σ residual²).
+    /// `change` returns the change of the output for a size.
     fn size(
         &self,
         first: f64,
@@ -125,19 +130,19 @@ impl Limits<'_> {
             }
             size = next.min(most);
         }
-        // At the bound of what an effect can be it is not seen.
+        // At the largest possible size the effect is not detected.
         let left = self.scan.left(&change(size)?);
         Ok((size < most || left >= least).then_some(size))
     }
 
-    /// What the motion changes by with another stage before the operator.
+    /// Returns the change of the motion with another stage before the operator.
     fn moved(&self, change: &dyn Fn(&mut Effects)) -> Result<Vec<f64>, Error> {
         let mut h = self.scan.from.hypothesis.clone();
         change(&mut h.effects);
         self.scan.moved(&h)
     }
 
-    /// The limit of an effect that this record can show; none of one that is looked for elsewhere.
+    /// Returns the limit of an effect that this record can show; `None` for an effect that is searched elsewhere.
     fn of(&self, effect: Effect, (u, y): (&str, &str)) -> Result<Option<Limit>, Error> {
         let s = self.scan.problem.samples;
         let (low, high) = s.input_range();
@@ -147,7 +152,7 @@ impl Limits<'_> {
                 let size = self.size(s.period, 0.1 * longest, self.least, &|seconds| {
                     self.moved(&|e| e.delay = Some(DelayParams { seconds }))
                 })?;
-                Limit::of(size, "s", "time by which the output comes late at every frequency".into())
+                Limit::of(size, "s", "delay of the output, the same at every frequency".into())
             }
             Effect::Lag => {
                 let size = self.size(s.period, 0.1 * longest, self.least, &|seconds| {
@@ -165,7 +170,9 @@ impl Limits<'_> {
                 Limit::of(
                     size,
                     u,
-                    format!("by how much a drive of {at} {u}/s is trailed, growing with the root of the rate"),
+                    format!(
+                        "lag of the hysteresis behind a drive of {at} {u}/s, growing with the square root of the rate"
+                    ),
                 )
             }
             Effect::Temperature => {
@@ -174,14 +181,14 @@ impl Limits<'_> {
                     let p = TemperatureParams { per_kelvin, reference_degc, ..TemperatureParams::default() };
                     self.scan.behind(Effects { temperature: Some(p), ..Effects::default() })
                 })?;
-                Limit::of(size, "1/K", "relative change of the gain for each kelvin".into())
+                Limit::of(size, "1/K", "relative change of the gain per kelvin".into())
             }
             Effect::Creep => {
                 let size = self.size(1e-3, 1.0, self.least, &|decade| {
                     let bank = starts::bank(s, self.scan.problem.only_loop, decade / starts::PER_DECADE);
                     self.scan.behind(Effects { creep: Some(bank), ..Effects::default() })
                 })?;
-                Limit::of(size, "1", "share of a step by which the output goes on in each decade of time".into())
+                Limit::of(size, "1", "continued motion per decade of time, as a share of the step".into())
             }
             Effect::Load => {
                 let Some(load) = &s.load else { return Ok(None) };
@@ -191,7 +198,7 @@ impl Limits<'_> {
                     path.structure(&mut column);
                     Ok(column)
                 })?;
-                Limit::of(size, &format!("{y}/N"), "by how much the output yields for each newton".into())
+                Limit::of(size, &format!("{y}/N"), "deflection of the output per newton of load".into())
             }
             Effect::Resonance => self.mode()?,
             Effect::Saturation => self.stop(y),
@@ -200,11 +207,11 @@ impl Limits<'_> {
                 let size = self.size(1.0, f64::INFINITY, self.least, &|way| {
                     Ok(s.time.iter().map(|t| way * (t - s.time[0]) / whole).collect())
                 })?;
-                Limit::of(size, y, "by how much the zero moves steadily over the record".into())
+                Limit::of(size, y, "linear drift of the zero over the record".into())
             }
             Effect::Interference => {
                 let rate = 1.0 / s.period;
-                let hz = if MAINS < 0.4 * rate && MAINS > 3.0 / longest { MAINS } else { 0.1 * rate };
+                let hz = if MAINS_HZ < 0.4 * rate && MAINS_HZ > 3.0 / longest { MAINS_HZ } else { 0.1 * rate };
                 let turn = |t: &f64| std::f64::consts::TAU * (hz * t).fract();
                 let size = self.size(1.0, f64::INFINITY, self.least_tone, &|amplitude| {
                     Ok(s.time.iter().map(|t| amplitude * turn(t).sin()).collect())
@@ -215,7 +222,7 @@ impl Limits<'_> {
         }))
     }
 
-    /// The mode that is seen best: how much of the motion it has to carry.
+    /// Returns the limit for the mode that is detected best: its share of the motion.
     fn mode(&self) -> Result<Limit, Error> {
         let s = self.scan.problem.samples;
         let (first, last) = (f64::max(4.0 / s.longest_segment(), 1.0), 0.3 / s.period);
@@ -231,28 +238,28 @@ impl Limits<'_> {
             }
         }
         let Some((size, hz)) = best else {
-            return Ok(Limit::hidden("the drive excites no mode enough to be seen"));
+            return Ok(Limit::hidden("the drive does not excite any mode enough"));
         };
         let meaning =
             format!("share of the motion that goes through a mode at {} Hz with damping ratio {DAMPING}", short(hz));
-        Ok(Limit::of(Some(size.max(LEAST_MODE)), "1", meaning))
+        Ok(Limit::of(Some(size.max(MIN_MODE_SHARE)), "1", meaning))
     }
 
-    /// How far below the highest output a stop has to lie.
+    /// Returns the limit for an upper saturation limit: its distance below the highest output.
     fn stop(&self, y: &str) -> Limit {
         let (low, high) = range(self.scan.motion.iter().copied());
-        let mut depth = SHALLOWEST * (high - low);
+        let mut depth = MIN_DEPTH_SHARE * (high - low);
         while depth < high - low {
             let ends: Vec<f64> = self.scan.motion.iter().map(|m| (high - depth - m).min(0.0)).collect();
             if self.scan.left(&ends) >= self.least {
                 return Limit::of(
                     Some(depth),
                     y,
-                    "how far below the highest output a stop at the upper end lies".into(),
+                    "distance of the upper saturation limit below the highest output".into(),
                 );
             }
-            depth *= DEEPER;
+            depth *= DEPTH_RATIO;
         }
-        Limit::hidden("what it does is imitated by the base or by what was found")
+        Limit::hidden("the base model or the effects found imitate it")
     }
 }

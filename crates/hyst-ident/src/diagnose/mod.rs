@@ -1,15 +1,16 @@
-//! Closing the loop with measured data: find what a fitted model leaves over, name the effect that
-//! explains it, add it, and show the error before and after.
+//! Diagnosis: finds the effects that a fitted model misses, names them, adds them and reports the errors before and
+//! after.
 //!
-//! 1. **Search** on a rich base (`base/screening.rs`: rate-independent, and the model's own where that stays as it is), so that a coarse one's
-//!    own misfit is not taken for an effect: forward with a small beam, then elimination, then swaps.
-//!    Every trial refits the whole nested model.
-//! 2. **Judge** by cross-validation inside the training record: a block bootstrap must find the gain,
-//!    and it must matter against the noise floor and against what is left (a tone of the sensor's own only against the noise floor).
-//! 3. **Ask** a Preisach triangle, where it predicts better, whether it needs what was found, and what else, and the own base whether it
-//!    lacks a curve.
-//! 4. **Extend** the user's own model with the effects found, all weights refitted; and their parameters, where that model follows as well as the
-//!    rich base, after it was asked again how each segment begins.
+//! 1. **Search** on a screening basis (`base/screening.rs`): rate-independent, with many unknowns, so that the misfit
+//!    of a coarse base model is not mistaken for an effect. A forward beam search is followed by elimination and swaps.
+//!    Every trial refits the whole nested model. An operator that is not refitted is one column of the screening basis.
+//! 2. **Judge** each effect by cross-validation inside the training record. A block bootstrap must confirm the gain.
+//!    The gain must also be large against the noise floor and against the residual. A tone of the sensor only has to be
+//!    large against the noise floor.
+//! 3. **Check** the result on a Preisach basis if that predicts better: drop the effects that it does not need and
+//!    search for further ones. Check the model's base for a missing curve (asymmetry or saturation).
+//! 4. **Extend** the user's model with the effects and refit all weights. Estimate the start of each segment again.
+//!    Refit the parameters of the effects too if the model then follows the record as well as the screening basis does.
 
 mod advice;
 mod changed;
@@ -48,7 +49,7 @@ pub use limits::Limit;
 pub use probability::Weighed;
 pub use suspects::{FOLLOWED, drive_options, usual_rival};
 
-use extension::{Own, Shaped};
+use extension::{CurveSearch, OwnModel};
 
 use crate::base::{Basis, DragParams, ROWS_PER_UNKNOWN, ScreeningBasis};
 use crate::fit::{BLOCKS, BasisOf, FitError, FitOptions, basis_of, check, fit_settled, sign_matters};
@@ -62,10 +63,10 @@ use crate::simulate::{Zero, simulate};
 use crate::stop::{Stop, until_stopped};
 use trial::Trial;
 
-/// What a diagnosis may be told.
+/// Options of a diagnosis.
 #[derive(Clone, Copy, Debug)]
 pub struct DiagnoseOptions {
-    /// What is done with the sensor's zero.
+    /// How the sensor's zero is treated.
     pub zero: Zero,
     /// Seed of the bootstrap.
     pub seed: u64,
@@ -77,32 +78,33 @@ impl Default for DiagnoseOptions {
     }
 }
 
-/// A diagnosis: the extended model and how it was found.
+/// A diagnosis: the extended model and the findings.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
-    /// The user's model with every effect that was found; the same model if none was.
+    /// The user's model with every named effect; the unchanged model if there is none.
     pub extended: Model,
-    /// What was found, with evidence.
+    /// The findings with their evidence.
     pub findings: Findings,
-    /// What a person can check: each named effect's trace in the record, and the whole model before and after.
+    /// Pictures to check by eye: the trace of each named effect in the record, and the whole model before and after.
     pub pictures: Vec<Picture>,
-    /// Where what is left lives.
+    /// Breakdowns of the remainder by time, drive, branch and frequency.
     pub breakdowns: Vec<Breakdown>,
-    /// Each name that was given, or that might have been, with what its probability was computed from.
+    /// Named effects and candidates, with the features from which their probability is computed.
     pub weighed: Vec<Weighed>,
 }
 
-/// Rows that the search uses at most.
+/// Maximum number of rows of the search.
 const SEARCH_ROWS: usize = 16_000;
-/// Rows that the search for a curve behind the own base uses at most.
+/// Maximum number of rows of the search for a curve on the model's base.
 const SHAPE_ROWS: usize = 8_000;
-/// Rounds in which a stop and the plays of the base behind it are placed.
+/// Maximum number of rounds in which a new saturation limit and the thresholds of the base are fitted in turn.
 const STOP_ROUNDS: usize = 3;
-/// Rows that the final fit uses at most.
+/// Maximum number of rows of the final fit.
 const FINAL_ROWS: usize = 40_000;
 
-/// Diagnoses a model on the record that it was fitted to; `test` is only simulated, never fitted.
-/// `progress` is told what is being done.
+/// Diagnoses a model on the record that it was fitted to.
+///
+/// `test` is simulated and never fitted. `progress` receives a line of text at each step.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -116,10 +118,10 @@ pub fn diagnose(
     diagnose_until(train, test, model, options, progress, &Stop::default())
 }
 
-/// As [`diagnose`]; `stop` ends it from another thread, within moments.
+/// Diagnoses as [`diagnose`] does; `stop` ends the computation from another thread.
 ///
 /// # Errors
-/// See [`FitError`]; [`FitError::Stopped`] where it was ended.
+/// See [`FitError`]; [`FitError::Stopped`] if `stop` ended it.
 pub fn diagnose_until(
     train: &Record,
     test: Option<&Record>,
@@ -153,11 +155,13 @@ fn found_in(
         _ => None,
     };
     let screening = ScreeningBasis::for_samples(&samples, own.as_ref().drags(), kept);
-    // Start-up rows are those that the rich base does not follow either: what only a coarse one misses is no transient.
+    // Start-up rows are rows that the screening basis does not follow either. A misfit of a coarse base alone is no
+    // transient.
     let fitting = FitOptions { zero_per_record: per_record, ..FitOptions::default() };
     fit_settled(&mut samples, &screening, &fitting, &|| train.name())?;
-    // Nor are those that the model itself follows: a rich base that has not seen them may be anywhere there. Unless it follows them after a past
-    // that the search does not know.
+    // Rows that the model itself follows are no start-up rows: the screening basis, fitted without them, is
+    // undetermined there. Exception: segments that the model follows only after a drive history that the search does
+    // not know.
     for ((segment, in_mid_cycle), past) in samples.segments.iter().zip(&before.in_mid_cycle).zip(&samples.pasts) {
         for k in segment.clone().filter(|_| !in_mid_cycle || !past.is_empty()) {
             samples.settling[k] &= before.settling[k] || samples.blind[k];
@@ -170,10 +174,11 @@ fn found_in(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    // The plane of an operator that was fitted while something stood in the record holds no search: what it misses far from there looks like effects.
+    // The linearised operator was fitted before the effects were known. It is not used for the search: far from its
+    // parameters its linearisation error looks like effects.
     let few = (!matches!(own, BasisOf::Linearised(_))).then(|| own.as_ref());
     let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
-    // A search over other rows continues from what the one before has found.
+    // A search over other rows starts from the result of the previous search.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
@@ -191,13 +196,13 @@ fn found_in(
         Ok::<_, FitError>((found, start_up_rows(samples, &residual), on_own))
     };
     let (mut found, starting, mut on_own) = searched(&samples, &start)?;
-    // A transient may stand out only once what else was missing is found.
+    // A transient may show only after the missing effects are found.
     if samples.settling.iter().zip(&starting).any(|(known, starts)| *starts && !*known) {
-        progress("searching again without the start-up rows that have come to light");
+        progress("searching again without the new start-up rows");
         samples.settling.iter_mut().zip(&starting).for_each(|(known, starts)| *known |= *starts);
         (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
     }
-    // And what stood out as one may be no more than what was missing: a stop that hides the rise from rest, say.
+    // An apparent start-up may be a missing effect: a saturation, for example, hides the rise from rest.
     if !found.named.is_empty() {
         let mut seen = samples.clone();
         let known = Settled { fit: found.best.fit.clone(), settling: samples.settling.clone() };
@@ -209,29 +214,30 @@ fn found_in(
             Ok::<_, FitError>(Some((fit, starting)))
         })?;
         if followed.settling != samples.settling {
-            progress("searching again with the rows that are no start-up once it is known what acts");
+            progress("searching again with the start-up rows that the effects explain");
             samples.settling = followed.settling;
             (found, _, on_own) = searched(&samples, &found.best.fit.hypothesis)?;
         }
     }
 
-    progress("asking a finer base whether it needs what was found");
+    progress("checking the effects on a finer base model");
     let problem = Problem::new(&samples, base_of(on_own), &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: mut richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
-    // A base of few unknowns was searched: a rich one may still follow better what was found there.
+    // The search used a basis with few unknowns. With the same effects, the screening basis may follow the record even
+    // better.
     if on_own {
         let rich = Problem::new(&samples, &screening, &blocks, per_record);
         let fit = rich.fit_linear(&hypothesis).map_err(stage)?;
         richest = fit.and_then(|f| Trial::of(&rich, f)).map_or(richest, |rich| richest.min(rich.cv_rmse()));
     }
-    // Its parameters are those of the drift alone; the zero wanders beyond it, and that is told.
-    if let Some(least) = found.beside_wandering.filter(|_| hypothesis.effects.drift.is_some()) {
+    // The drift's parameters come from the fit without zero wander. The wander beyond the drift is reported too.
+    if let Some(least) = found.cv_rmse_with_wander.filter(|_| hypothesis.effects.drift.is_some()) {
         hypothesis.zero_wanders = true;
         richest = richest.min(least);
     }
     let only_loop = problem.only_loop;
-    progress("computing what this record would have shown");
+    progress("computing the limits of detection");
     let units = (model.input.symbol(), model.output.unit.as_str());
     let with_found = problem.fit_linear(&hypothesis).map_err(stage)?.and_then(|f| Trial::of(&problem, f));
     let mut limits = with_found
@@ -241,38 +247,39 @@ fn found_in(
     drop(problem);
 
     let effects = |h: &Hypothesis| h.causes().iter().filter_map(|c| c.effect()).collect::<Vec<_>>();
-    // What was found takes other plays to follow; a stop stands where these meet it, and what it hides is another thing then.
+    // With the new effects, other thresholds fit better. The saturation limit depends on the thresholds, so both are
+    // fitted in turn.
     let mut basis: Option<BasisOf> = None;
-    let asked = Own { model, train, samples: &samples, basis: &own, before: &before, per_record };
+    let own_model = OwnModel { model, train, samples: &samples, basis: &own, before: &before, per_record };
     let stop_is_new = hypothesis.effects.saturation.is_some() && start.effects.saturation.is_none();
     if effects(&hypothesis) != effects(&start) {
-        basis = asked.on_better_plays(&hypothesis)?;
+        basis = own_model.with_better_thresholds(&hypothesis)?;
     }
     for round in (1..=STOP_ROUNDS).filter(|_| stop_is_new) {
-        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
-        asked.stop(&mut hypothesis, &mut errors)?;
-        // The last word is the stop's.
-        let better = if round < STOP_ROUNDS { asked.on_better_plays(&hypothesis)? } else { None };
+        let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
+        own_model.stop(&mut hypothesis, &mut errors)?;
+        // The last round ends with the saturation limit.
+        let better = if round < STOP_ROUNDS { own_model.with_better_thresholds(&hypothesis)? } else { None };
         let Some(better) = better else { break };
         basis = Some(better);
     }
-    // Where each segment has begun, if that shows only beside a curve.
+    // The starts of the segments, if they show only together with a curve.
     let mut started: Option<Samples> = None;
-    // A base that is not odd bends by its own weights: what a curve behind it took would be its misfit.
+    // A base that is not odd bends with its own weights. A curve behind it would take up its misfit.
     if only_loop.is_none() && own.as_ref().is_odd() {
-        progress("asking whether the model's own base lacks a curve");
-        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
-        let shaped_beside = |effects: &Hypothesis| {
-            let with_start = asked.start_beside_a_curve(effects, richest)?;
-            let asked = Own { samples: with_start.as_ref().unwrap_or(&samples), ..asked };
-            let shaped = asked.shape(&start, effects, richest, found.noise, options.seed, progress)?;
+        progress("checking the base model for asymmetry and saturation");
+        let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
+        let find_curve = |effects: &Hypothesis| {
+            let with_start = own_model.start_beside_a_curve(effects, richest)?;
+            let own_model = OwnModel { samples: with_start.as_ref().unwrap_or(&samples), ..own_model };
+            let shaped = own_model.shape(&start, effects, richest, found.noise, options.seed, progress)?;
             Ok::<_, FitError>((with_start, shaped))
         };
-        let (mut with_start, mut shaped) = shaped_beside(&hypothesis)?;
-        // What was found may be no more than the trace that a missing curve leaves on a base that does not have it.
-        let left = |shaped: &Shaped| shaped.curve.as_ref().map_or(f64::INFINITY, |(curve, _)| curve.cv_with);
-        if left(&shaped) > shape::CLOSED_ANEW * richest && shaped.basis.is_none() && !found.named.is_empty() {
-            let alone = shaped_beside(&start)?;
+        let (mut with_start, mut shaped) = find_curve(&hypothesis)?;
+        // The named effects may be no more than the trace of a missing curve.
+        let left = |shaped: &CurveSearch| shaped.curve.as_ref().map_or(f64::INFINITY, |(curve, _)| curve.cv_with);
+        if left(&shaped) > shape::MAX_RATIO_RESELECTED * richest && shaped.basis.is_none() && !found.named.is_empty() {
+            let alone = find_curve(&start)?;
             if left(&alone.1) < left(&shaped) {
                 found.named.clear();
                 (with_start, shaped) = alone;
@@ -281,7 +288,7 @@ fn found_in(
         if let Some((curve, fit)) = shaped.curve {
             match &shaped.searched {
                 Some(_) => errors = uncertainty::standard_errors(&fit, samples.time[0]),
-                None => asked.take(curve.effect, &fit, &mut errors),
+                None => own_model.take(curve.effect, &fit, &mut errors),
             }
             if let Some(searched) = shaped.searched {
                 found.named = searched.named;
@@ -293,43 +300,44 @@ fn found_in(
         }
         basis = shaped.basis.or(basis);
     }
-    let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
-    // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
+    let own_model = OwnModel { samples: started.as_ref().unwrap_or(&samples), ..own_model };
+    // With much memory a basis can imitate an effect in a single record. If the model's base with few effects fits as
+    // well, that explanation is simpler.
     if found.named.is_empty() && only_loop.is_none() && few.is_some() {
-        progress("asking whether the model's own base with an effect explains as much");
-        let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
-        if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
+        progress("searching for effects on the model's own base");
+        let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
+        if let Some(closing) = own_model.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
             hypothesis = closing.best.fit.hypothesis.clone();
             errors = uncertainty::standard_errors(&closing.best.fit, samples.time[0]);
             found = closing;
-            basis = asked.on_better_plays(&hypothesis)?.or(basis);
+            basis = own_model.with_better_thresholds(&hypothesis)?.or(basis);
         }
     }
-    let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
+    let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
 
-    progress("refitting the model with what was found");
+    progress("refitting the model with the effects found");
     let mut extended = model.clone();
     let mut after = before.clone();
-    let mut begun: Option<Samples> = None;
+    let mut restarted: Option<Samples> = None;
     if effects(&hypothesis) != effects(&start) {
         let found_here = (&hypothesis, &errors);
-        let best = asked.best(&start, found_here, (richest, found.noise, options.seed), options.zero)?;
-        extension::Extension { hypothesis, errors, begun, model: extended, after } = best;
+        let best = own_model.best(&start, found_here, (richest, found.noise, options.seed), options.zero)?;
+        extension::Extension { hypothesis, errors, restarted, model: extended, after } = best;
     }
-    let asked = Own { samples: begun.as_ref().unwrap_or(asked.samples), ..asked };
+    let own_model = OwnModel { samples: restarted.as_ref().unwrap_or(own_model.samples), ..own_model };
 
-    progress("judging what is left");
+    progress("classifying the remainder");
     let mut useless = Vec::new();
-    // What an amplifier does not follow would hide the rest.
+    // A drive that the amplifier does not follow would hide the difference.
     let mut amplified = None;
     if let Some(v_per_s) = hypothesis.slew_limit.filter(|_| !found.named.is_empty()) {
-        let record = asked.amplified(v_per_s);
+        let record = own_model.amplified(v_per_s);
         amplified = Some((simulate(model, &record, options.zero)?, simulate(&extended, &record, options.zero)?));
     }
     let (without, with) = amplified.as_ref().map_or((&before, &after), |(without, with)| (without, with));
-    let helps = || Ok::<_, FitError>(asked.is_helped(without, with) && asked.transfers(&start, &hypothesis)?);
+    let helps = || Ok::<_, FitError>(own_model.is_improved(without, with) && own_model.transfers(&start, &hypothesis)?);
     if !found.named.is_empty() && !helps()? {
-        // What the rich base shows is hidden by what this one misses.
+        // The misfit of the model's base hides what the screening basis shows.
         useless = found.named.drain(..).map(|n| n.effect).collect();
         (extended, after, amplified) = (model.clone(), before.clone(), None);
         let Hypothesis { slew_limit, zero_wanders, gain_wanders, .. } = hypothesis;
@@ -341,8 +349,8 @@ fn found_in(
     let mut remainder =
         remainder::judge(&found, &hypothesis, &after, amplified.as_ref(), &samples, richest, model.input.symbol());
     if extended == *model {
-        let asked = Own { basis: &own, ..asked };
-        remainder = changed::told_apart(&asked, &start, found.noise, options.zero, remainder)?;
+        let own_model = OwnModel { basis: &own, ..own_model };
+        remainder = changed::detect_change(&own_model, &start, found.noise, options.zero, remainder)?;
     }
     let remainder = remainder.beside(only_loop, &useless);
     let tests = test
@@ -362,7 +370,7 @@ fn found_in(
         noise: found.noise,
     })?;
     limits.retain(|effect, _| !named.contains(effect));
-    // Of the base of the search: what the own base misses beside an effect does not speak against it.
+    // On the basis of the search: the misfit of the model's own base is no evidence against an effect.
     let left = found.best.cv_rmse() / found.noise.max(f64::MIN_POSITIVE);
     let candidates = suspects::candidates(&found, &named, left);
     let suspects = suspects::suspects(&candidates, model, &samples, remainder.slew_limit);
@@ -371,7 +379,7 @@ fn found_in(
     let base_advice = match remainder.kind {
         RemainderKind::None => None,
         _ => {
-            let own = (model.base.kind(), asked.basis.as_ref());
+            let own = (model.base.kind(), own_model.basis.as_ref());
             advice::base_advice(&samples, own, &hypothesis, per_record, &stage)?
         }
     };
@@ -396,7 +404,7 @@ fn found_in(
     Ok(Diagnosis { extended, findings, pictures, breakdowns, weighed })
 }
 
-/// What a model already holds.
+/// Returns what a model already contains.
 fn hypothesis_of(model: &Model) -> Hypothesis {
     let drag = match &model.base {
         Base::ViscousPi(p) => Some(DragParams { seconds: p.seconds, volt_seconds: p.volt_seconds }),
@@ -405,7 +413,7 @@ fn hypothesis_of(model: &Model) -> Hypothesis {
     Hypothesis { drag, ..Hypothesis::of(model.effects.clone()) }
 }
 
-/// Why a record cannot show a cause at all; `None` if it can.
+/// Returns why a record cannot show a cause; `None` if it can.
 fn hidden(cause: Cause, problem: &Problem<'_>) -> Option<&'static str> {
     let varies = |column: &[f64], least: f64| {
         let (low, high) = crate::samples::range(column.iter().copied());
@@ -414,18 +422,18 @@ fn hidden(cause: Cause, problem: &Problem<'_>) -> Option<&'static str> {
     match cause {
         Cause::Effect(Effect::Temperature) => match &problem.samples.temperature {
             None => Some("the temperature was not recorded"),
-            Some(degc) => (!varies(degc, 0.5)).then_some("the temperature did not change by half a kelvin"),
+            Some(degc) => (!varies(degc, 0.5)).then_some("the temperature changed by less than 0.5 K"),
         },
         Cause::Effect(Effect::Load) => match &problem.samples.load {
             None => Some("the load was not recorded"),
             Some(newtons) => (!varies(newtons, 0.0)).then_some("the load did not change"),
         },
-        // What changes one loop's shape may as well be a hysteresis of that shape. That the output turns after the drive does is none:
-        // of what is late, the simplest stands for all.
+        // In a single loop, an effect that changes its shape cannot be separated from the hysteresis. A late output
+        // can, but not one late effect from another: the simplest represents all of them.
         Cause::Effect(Effect::RateDependence | Effect::Resonance | Effect::Saturation | Effect::Asymmetry)
-        | Cause::SlewLimit => {
-            problem.only_loop.map(|_| "the record repeats one loop, whose shape may as well be the hysteresis")
-        }
+        | Cause::SlewLimit => problem.only_loop.map(
+            |_| "the record repeats one loop, which does not separate the effect from the shape of the hysteresis",
+        ),
         _ => None,
     }
 }

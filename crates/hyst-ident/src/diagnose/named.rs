@@ -1,4 +1,4 @@
-//! One named effect in figures and words: its law, its parameters, and why it was named.
+//! One named effect in numbers and words: its law, its parameters and its evidence.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,12 @@ use crate::model::{Base, Effect, Model, creep_share};
 use crate::record::OutputUnit;
 use crate::samples::Samples;
 
-/// What is told of an effect that was named.
+/// Builds the finding of a named effect.
 pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
     let unit = symbol(m);
     let after = named.cv_with;
     let j = &named.judgement;
-    // First what a person can check against the device, then what the statistics say.
+    // First the evidence that a person can check on the device, then the statistics.
     let mut evidence: Vec<String> = signature(m, named.effect).into_iter().collect();
     evidence.push(format!(
         "cross-validated error {} {unit} without it, {} {unit} with it; better in {:.1} % of {} bootstrap draws",
@@ -26,14 +26,14 @@ pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
         super::score::DRAWS
     ));
     evidence.push(format!(
-        "explains {:.0} % of what stood above the noise floor; its part is {:.1} noise floors",
+        "explains {:.0} % of the residual variance above the noise floor; its RMS is {:.1} noise floors",
         100.0 * j.share,
         j.over_noise
     ));
-    if j.alone {
+    if j.sensor_tone {
         evidence.push(
-            "it is there all the time and far above what is left beside it, however little of that it explains: neither the drive nor the \
-             base's misfit makes such a tone"
+            "the tone is present throughout the record and far above the residual at neighbouring frequencies; neither the drive nor a \
+             misfit of the base model causes such a tone"
                 .into(),
         );
     }
@@ -45,7 +45,7 @@ pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
         parameters: parameters(m, named.effect),
         evidence,
         alternatives: named
-            .instead
+            .rivals
             .iter()
             .map(|i| Alternative { name: i.effect, cv_rmse: i.cv_rmse, indistinguishable: i.tie })
             .collect(),
@@ -54,7 +54,7 @@ pub(super) fn finding(m: &Material<'_>, named: &Named) -> Finding {
     }
 }
 
-/// The law that an effect follows in a model; none of a flexible form.
+/// Returns the law of an effect in a model; `None` for a flexible form.
 fn law(model: &Model, effect: Effect) -> Option<&'static str> {
     let e = &model.effects;
     Some(match effect {
@@ -84,26 +84,26 @@ fn law(model: &Model, effect: Effect) -> Option<&'static str> {
             Some(_) => "sine-with-harmonics",
             None => "sine",
         },
-        // A bank of relaxations, a curve of straight pieces.
+        // A bank of relaxations and a piecewise linear curve have no law.
         Effect::Creep | Effect::Asymmetry => return None,
     })
 }
 
-/// The output's unit as a person writes it.
+/// Returns the symbol of the output's unit.
 fn symbol<'a>(m: &'a Material<'_>) -> &'a str {
     let unit = &m.model.output.unit;
     OutputUnit::of_suffix(unit).map_or(unit.as_str(), |u| u.symbol())
 }
 
-/// The effect in words that a person can check against the device.
+/// Describes the effect so that a person can check it on the device.
 fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
     let (e, input) = (&m.extended.effects, m.extended.input.symbol());
     Some(match effect {
-        Effect::Delay => format!("the output follows {:.3} ms late at every frequency", 1e3 * e.delay?.seconds),
+        Effect::Delay => format!("the output is delayed by {:.3} ms at every frequency", 1e3 * e.delay?.seconds),
         Effect::Lag => {
             let tau = e.lag?.seconds;
             format!(
-                "the phase falls like a first-order lag with its corner at {:.1} Hz",
+                "the phase follows a first-order lag with a corner frequency of {:.1} Hz",
                 1.0 / (2.0 * std::f64::consts::PI * tau)
             )
         }
@@ -121,8 +121,8 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         Effect::RateDependence if e.widening.is_some() => {
             let p = e.widening.as_ref()?;
             format!(
-                "loops widen with the rate to the power of {:.2}, wide ones more than narrow ones: at {} {input}/s the branches of a wide loop are {} {} farther \
-                 apart than on a slow drive",
+                "the loop widens with rate^{:.2}, wide loops more than narrow ones: at {} {input}/s the branches of a wide loop are {} {} farther \
+                 apart than at low rate",
                 p.exponent,
                 short(p.reference_rate),
                 short(2.0 * p.extra_half_width()),
@@ -132,7 +132,7 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         Effect::RateDependence if e.rate.is_some() => {
             let p = e.rate?;
             format!(
-                "loops widen with the rate to the power of {:.2}: at {} {input}/s the hysteresis sees the drive {} {input} late",
+                "the loop widens with rate^{:.2}: at {} {input}/s the hysteresis lags the drive by {} {input}",
                 p.exponent,
                 short(p.reference_rate),
                 short(p.volts)
@@ -140,19 +140,19 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
         }
         Effect::RateDependence => match rate_dependence(m.extended) {
             Some(p) if p.volt_seconds > 0.0 => format!(
-                "loops widen with the rate: at 100 {input}/s a sliding play is {:.3} {input} behind",
+                "the loop widens with rate: at 100 {input}/s a sliding play operator lags the drive by {:.3} {input}",
                 100.0 * p.seconds + (100.0 * p.volt_seconds).sqrt()
             ),
-            Some(p) => format!("loops widen with the rate: sliding plays lag by {:.3} ms", 1e3 * p.seconds),
+            Some(p) => format!("the loop widens with rate: sliding play operators lag by {:.3} ms", 1e3 * p.seconds),
             None => {
-                "loops widen with the rate; this base has no form that does: fit pi, or dpm to records at several rates"
+                "the loop widens with rate; this base model has no rate-dependent form: fit pi, or fit dpm to records at several rates"
                     .into()
             }
         },
-        Effect::Load => format!("the output yields by {} {} for each N", signed(e.load?.per_newton), symbol(m)),
+        Effect::Load => format!("the output moves by {} {} per N of load", signed(e.load?.per_newton), symbol(m)),
         Effect::Saturation => {
             let (name, limit) = limit(m)?;
-            format!("the output stops at {} {} at its {name} end while the drive goes on", short(limit), symbol(m))
+            format!("the output stops at {} {} at its {name} end while the drive continues", short(limit), symbol(m))
         }
         Effect::Temperature => {
             let p = e.temperature?;
@@ -175,10 +175,10 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
             let share = 100.0 * share;
             match holds {
                 true => format!(
-                    "in the {hold:.2} s of the longest hold after a step the output goes on by {share:.1} % of it"
+                    "in the longest hold ({hold:.2} s) the output continues to move by {share:.1} % of the step before it"
                 ),
                 false => format!(
-                    "in {hold:.2} s, as long as the longest segment, the output would go on by {share:.1} % of a step; the drive holds nowhere"
+                    "the drive has no hold; in {hold:.2} s (the longest segment) the output would continue to move by {share:.1} % of a step"
                 ),
             }
         }
@@ -210,7 +210,7 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
                 .collect();
             let also = if also.is_empty() { String::new() } else { format!(", with harmonics of {}", also.join(", ")) };
             format!(
-                "the sensor shows a tone of {} {} at {:.3} Hz{also}, whatever the drive",
+                "the sensor shows a tone of {} {} at {:.3} Hz{also}, independent of the drive",
                 short(p.amplitude),
                 symbol(m),
                 p.hz
@@ -219,7 +219,7 @@ fn signature(m: &Material<'_>, effect: Effect) -> Option<String> {
     })
 }
 
-/// Orders and amplitudes \[y\] of the harmonics that a tone has.
+/// Returns the orders and amplitudes \[y\] of a tone's harmonics.
 fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
     (2..)
         .zip(tone.harmonics.chunks_exact(2))
@@ -227,13 +227,13 @@ fn harmonics(tone: &InterferenceParams) -> impl Iterator<Item = (u8, f64)> {
         .filter(|(_, a)| *a > 0.0)
 }
 
-/// The longest time for which the drive stands still \[s\], or the longest segment where it never does, and whether it does.
+/// Returns the longest hold of the drive \[s\] and `true`; without a hold, the longest segment \[s\] and `false`.
 fn longest_hold(samples: &Samples) -> (f64, bool) {
     let (low, high) = samples.input_range();
     let still = |a: f64, b: f64| (a - b).abs() <= 1e-6 * (high - low);
     let holds = samples.segments.iter().enumerate().flat_map(|(i, s)| {
         let runs = samples.input[s.clone()].chunk_by(move |a, b| still(*a, *b)).map(<[f64]>::len);
-        runs.filter(|rows| *rows > LEAST_HOLD).map(move |rows| samples.period_of(i) * (rows - 1) as f64)
+        runs.filter(|rows| *rows > MIN_HOLD_ROWS).map(move |rows| samples.period_of(i) * (rows - 1) as f64)
     });
     match holds.reduce(f64::max) {
         Some(longest) => (longest, true),
@@ -241,10 +241,10 @@ fn longest_hold(samples: &Samples) -> (f64, bool) {
     }
 }
 
-/// Rows that the drive has to stand still for a hold.
-const LEAST_HOLD: usize = 50;
+/// Minimum number of rows of a hold.
+const MIN_HOLD_ROWS: usize = 50;
 
-/// Slopes of a curve at its two ends.
+/// Returns the slopes of a curve at its two ends.
 fn slopes(p: &AsymmetryParams<Vec<f64>>) -> (f64, f64) {
     let end = |rising: bool| {
         let zones = p.thresholds.iter().zip(&p.weights).filter(|(s, _)| (**s >= 0.0) == rising);
@@ -253,16 +253,16 @@ fn slopes(p: &AsymmetryParams<Vec<f64>>) -> (f64, f64) {
     (end(false), end(true))
 }
 
-/// The drag of a model's plays.
+/// Returns the viscous play operators of a model.
 fn rate_dependence(model: &Model) -> Option<&ViscousPiParams<Vec<f64>>> {
     if let Base::ViscousPi(p) = &model.base { Some(p) } else { None }
 }
 
-/// The end at which the motion is stopped, and where the sensor shows it.
+/// Returns the end at which the motion is limited, and the sensor value there.
 fn limit(m: &Material<'_>) -> Option<(&'static str, f64)> {
     let (p, zero) = (m.extended.effects.saturation?, m.extended.zero);
     let (low, high) = (m.extended.output.low - zero, m.extended.output.high - zero);
-    // The one that the output comes nearer to.
+    // The limit that the output comes closer to.
     Some(if p.high - high < low - p.low { ("upper", p.high + zero) } else { ("lower", p.low + zero) })
 }
 

@@ -1,4 +1,4 @@
-//! Causes that compete: all are ranked by probes, and only what may win is fitted in full.
+//! Competition of causes: probes rank all of them, and only those that may win are fitted in full.
 
 use hyst_core::Error;
 use rayon::prelude::*;
@@ -11,56 +11,57 @@ use super::trial::Trial;
 use super::uncertainty::Undetermined;
 use crate::nested::{Cause, Hypothesis, Probe};
 
-/// Σ residual² of a probe, over that of the leader, up to which it is fitted in full: more than `BEAM_WITHIN` of the search, so that what is given up would not
-/// have been carried on.
+/// Largest Σ residual² of a probe, relative to that of the leader, at which it is fitted in full. Larger than
+/// `LARGE_RATIO` of the search, so that no probe is dropped that the search would have followed.
 const MAX_RATIO_TO_LEADER: f64 = 4.0;
-/// The same over that of the best law of its cause.
+/// The same, relative to the best law of its own cause.
 const MAX_RATIO_TO_OWN: f64 = 2.0;
-/// Gain of a probe, over that which an effect has to have, from which on it is fitted in full, and from which on it is reported.
+/// Gain of a probe, relative to the gain that an effect needs, above which it is fitted in full and above which it is
+/// reported.
 const MIN_GAIN_TO_FIT: f64 = 0.5;
 const MIN_GAIN_TO_REPORT: f64 = 0.2;
 
-/// What is known of a cause added to a fit.
+/// State of a cause that is added to a fit.
 enum Attempt {
-    /// It was fitted before: what came of it.
+    /// Fitted before, with the result.
     Known(Option<Box<Hypothesis>>),
-    /// Where a probe from each start has led.
-    Begun(Vec<Probe>),
+    /// Results of the probes from each start.
+    Probed(Vec<Probe>),
 }
 
 impl Judge<'_> {
-    /// A cause added to a scanned fit.
+    /// Adds a cause to a scanned fit.
     pub(super) fn trials(&self, scan: &Scan<'_>, cause: Cause) -> Result<Option<Trial>, Error> {
         Ok(self.race(&[(scan, cause)])?.into_iter().next().flatten())
     }
 
-    /// Each cause added to its scanned fit, in order. All are ranked by probes; only those that may still win, and may gain as
-    /// much as an effect has to, are fitted in full.
+    /// Adds each cause to its scanned fit; results are in the order of `jobs`. Probes rank all of them. Only those that
+    /// may still win, and whose gain may suffice for an effect, are fitted in full.
     pub(super) fn race(&self, jobs: &[(&Scan<'_>, Cause)]) -> Result<Vec<Option<Trial>>, Error> {
-        // Each trial is computed alone and collected in order: threads change nothing.
+        // Each trial is computed independently and collected in order, so threads change nothing.
         let attempts: Vec<Result<Attempt, Error>> =
             jobs.par_iter().map(|(scan, cause)| self.attempt(scan, *cause)).collect();
         let attempts: Vec<Attempt> = attempts.into_iter().collect::<Result<_, _>>()?;
         let probes = attempts.iter().flat_map(|attempt| match attempt {
             Attempt::Known(_) => &[],
-            Attempt::Begun(probes) => probes.as_slice(),
+            Attempt::Probed(probes) => probes.as_slice(),
         });
         let leader = probes.map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
-        let ended: Vec<Result<Option<Trial>, Error>> = jobs
+        let finished: Vec<Result<Option<Trial>, Error>> = jobs
             .par_iter()
             .zip(&attempts)
             .map(|((scan, cause), attempt)| match attempt {
                 Attempt::Known(found) => found.as_ref().map_or(Ok(None), |found| self.refit(found)),
-                Attempt::Begun(probes) => self.ended(scan, *cause, probes, leader),
+                Attempt::Probed(probes) => self.finished(scan, *cause, probes, leader),
             })
             .collect();
-        ended.into_iter().collect()
+        finished.into_iter().collect()
     }
 
-    /// What is known of a cause, or how it begins.
+    /// Returns the known result of a cause, or its probes.
     fn attempt(&self, scan: &Scan<'_>, cause: Cause) -> Result<Attempt, Error> {
         let from = &scan.from.hypothesis;
-        // The same fit may be asked for again when effects are swapped.
+        // Swaps may request the same fit again.
         let known = self.known.lock().ok().and_then(|known| {
             let same = known.iter().find(|(parent, of, _)| *of == cause && parent == from);
             same.map(|(.., found)| found.clone())
@@ -68,27 +69,27 @@ impl Judge<'_> {
         if let Some(found) = known {
             return Ok(Attempt::Known(found.map(Box::new)));
         }
-        Ok(Attempt::Begun(self.probes(scan, cause)?))
+        Ok(Attempt::Probed(self.probes(scan, cause)?))
     }
 
-    /// Where a probe from each start of a cause leads.
+    /// Runs a probe from each start of a cause.
     fn probes(&self, scan: &Scan<'_>, cause: Cause) -> Result<Vec<Probe>, Error> {
         let starts = starts::starts(scan, cause)?;
         let probes: Vec<Result<Option<Probe>, Error>> =
-            starts.par_iter().map(|start| scan.vantage.probe(start)).collect();
+            starts.par_iter().map(|start| scan.prober.probe(start)).collect();
         probes.into_iter().filter_map(Result::transpose).collect()
     }
 
-    /// The best of what came of some starts, those fitted to the end that may win against what leads.
-    fn ended(&self, scan: &Scan<'_>, cause: Cause, probes: &[Probe], leader: f64) -> Result<Option<Trial>, Error> {
+    /// Returns the best result of a cause; probes that may win against the leader are fitted to convergence.
+    fn finished(&self, scan: &Scan<'_>, cause: Cause, probes: &[Probe], leader: f64) -> Result<Option<Trial>, Error> {
         let gain = |probe: &Probe| scan.from.squares - probe.squares;
         let own = probes.iter().map(|probe| probe.squares).fold(f64::INFINITY, f64::min);
-        // Of those that lead to one place the first stands for all.
+        // Of probes with nearly the same parameters only the first is fitted.
         let is_first =
             |at: &usize| !probes[..*at].iter().any(|other| other.hypothesis.is_near(&probes[*at].hypothesis));
         let apart: Vec<&Probe> = (0..probes.len()).filter(is_first).map(|at| &probes[at]).collect();
         let may_win = |probe: &&Probe| {
-            // In one loop all that is late is alike in the end, however far apart its laws begin.
+            // In a single loop all late effects end alike, however different the probes are.
             let is_near = self.problem.only_loop.is_some()
                 || (probe.squares <= MAX_RATIO_TO_LEADER * leader && probe.squares <= MAX_RATIO_TO_OWN * own);
             is_near && gain(probe) >= MIN_GAIN_TO_FIT * scan.least_gain
@@ -97,7 +98,7 @@ impl Judge<'_> {
             .par_iter()
             .map(|probe| match may_win(probe) {
                 true => self.refit(&probe.hypothesis),
-                // It is reported beside the others.
+                // Reported for comparison, not refitted.
                 false if gain(probe) >= MIN_GAIN_TO_REPORT * scan.least_gain => {
                     let as_it_is = self.problem.fit_linear(&probe.hypothesis)?;
                     Ok(as_it_is.and_then(|fit| Trial::of(self.problem, fit)))
@@ -106,8 +107,8 @@ impl Judge<'_> {
             })
             .collect();
         let mut fitted: Vec<Trial> = fits.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
-        // Fitted to the end, a bank of relaxations also takes the part of a lag, beyond what a creep can be. Where it is not sensible then, it counts
-        // as its probes left it.
+        // When fitted to convergence, a bank of relaxations may also take up a lag, beyond what a creep can be. If the
+        // result is implausible, the unrefined probes count instead.
         let creeps = apart.iter().any(|probe| probe.hypothesis.effects.creep != scan.from.hypothesis.effects.creep);
         let overreaches = creeps && !fitted.iter().any(|trial| score::sensible(self.problem, trial));
         if overreaches {
@@ -117,7 +118,7 @@ impl Judge<'_> {
             }
         }
         let found = self.best_law(fitted);
-        // What was given up, or stands as a probe left it, is not known to its end.
+        // Results from dropped or unrefined probes are not stored as known.
         if !overreaches
             && apart.iter().all(may_win)
             && let Ok(mut known) = self.known.lock()
@@ -128,20 +129,20 @@ impl Judge<'_> {
         Ok(found)
     }
 
-    /// Which of the laws of one cause stands for it.
+    /// Returns the law that represents a cause.
     fn best_law(&self, mut fitted: Vec<Trial>) -> Option<Trial> {
-        // A law whose parameters end at a bound stands for another that is simpler.
+        // A law with parameters at a bound imitates a simpler law.
         if fitted.iter().any(|trial| score::sensible(self.problem, trial)) {
             fitted.retain(|trial| score::sensible(self.problem, trial));
         }
-        // A drift that slows down without end has to show both that it settles and that it goes on.
+        // A drift with a linear and a settling part has to show both parts.
         let slows_down =
             |trial: &Trial| trial.fit.hypothesis.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second != 0.0);
-        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit).speaks_against(DRIFT, || false);
+        let is_loose = |trial: &Trial| Undetermined::of(&trial.fit).contradicts(DRIFT, || false);
         if fitted.iter().any(|trial| !slows_down(trial)) {
             fitted.retain(|trial| !slows_down(trial) || !is_loose(trial));
         }
-        // Of the laws of one cause the simplest that is not clearly beaten; of equally simple ones the better.
+        // The simplest law that is not clearly worse; of equally simple ones the better.
         fitted.sort_by_key(|trial| trial.fit.solution.len());
         let mut best: Option<usize> = None;
         for (at, trial) in fitted.iter().enumerate() {
@@ -155,9 +156,10 @@ impl Judge<'_> {
         best.map(|best| fitted.swap_remove(best))
     }
 
-    /// A set whose temperature expands, with a drift in the place of the expansion where that does as well: a zero that moves as steadily as the
-    /// temperature may as well drift. Asked once all else is known, since what is still missing hides which it is.
-    pub(super) fn drifts_instead(&self, set: &Trial) -> Result<Option<Trial>, Error> {
+    /// Replaces a thermal expansion by a drift, if the drift fits as well: a zero that moves as steadily as the
+    /// temperature may also drift. Decided after all other effects are known, since a missing effect hides the
+    /// difference.
+    pub(super) fn drift_instead_of_expansion(&self, set: &Trial) -> Result<Option<Trial>, Error> {
         let mut still = set.fit.hypothesis.clone();
         let Some(temperature) = still.effects.temperature.as_mut().filter(|p| p.expansion != 0.0) else {
             return Ok(None);

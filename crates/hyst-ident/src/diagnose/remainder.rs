@@ -1,4 +1,4 @@
-//! What is left when every effect that was found has been added.
+//! Classifies the residual of the extended model.
 
 use super::findings::{Remainder, RemainderKind};
 use super::search::Search;
@@ -11,11 +11,14 @@ use crate::nested::Hypothesis;
 use crate::samples::Samples;
 use crate::simulate::Simulation;
 
-/// Parts of a record in each of which a residual has to be small.
+/// Number of parts of a record; the residual has to be small in each of them.
 const PARTS: usize = 20;
 
-/// Whether the rest is noise, lack of capacity of the base, or unexplained. `amplified` is what the model says, without and with what was
-/// found, about the record as an amplifier drives it that does not follow every slope. The drive is in the unit `input`.
+/// Classifies the remainder as noise, misfit of the base model, or unexplained.
+///
+/// `amplified` holds the simulations without and with the effects found, on the record whose drive is slope-limited
+/// like the amplifier's output; `None` without such a limit. `richest` is the cross-validated RMSE of the finest base
+/// \[output unit\]. `input` is the unit of the drive.
 pub(super) fn judge(
     found: &Search,
     h: &Hypothesis,
@@ -43,15 +46,15 @@ pub(super) fn judge(
     };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     let wanders = match (h.zero_wanders, h.gain_wanders) {
-        (true, true) => Some("the zero and the gain wander"),
-        (true, false) if h.effects.drift.is_some() => Some("beyond the drift the zero wanders"),
-        (true, false) => Some("the zero wanders"),
+        (true, true) => Some("the sensor's zero and the gain wander"),
+        (true, false) if h.effects.drift.is_some() => Some("in addition to the drift, the sensor's zero wanders"),
+        (true, false) => Some("the sensor's zero wanders"),
         (false, true) => Some("the gain wanders"),
         (false, false) => None,
     };
     let wanders = wanders.map(|what| {
         format!(
-            "{what} in time as no effect of the list does; look for what was not recorded (a load, a temperature, a mount that slips)"
+            "{what} in time, and no listed effect explains it; look for an unrecorded cause (a load, a temperature, a slipping mount)"
         )
     });
     let limited = h.slew_limit.map(|v_per_s| {
@@ -59,51 +62,52 @@ pub(super) fn judge(
         let left = |s: &Simulation| percent(s.errors.as_ref().map_or(f64::NAN, |e| e.rmse));
         let helped = amplified.map_or(String::new(), |(without, with)| {
             format!(
-                " (of what such an amplifier makes of the drive the model misses {:.2} %, {:.2} % without what was found)",
+                " (with the drive limited in this way the residual is {:.2} % of span, {:.2} % without the effects found)",
                 left(with),
                 left(without)
             )
         });
         format!(
-            "the drive is not followed where it is steeper than {limit} {input}/s, as by an amplifier whose current is limited{helped}; no model \
-             makes up for that: measure with a drive below that slope (`excite --slew`), and keep to it"
+            "the output does not follow a drive steeper than {limit} {input}/s, as behind a current-limited amplifier{helped}; no model \
+             corrects that: record with a drive below this slope (`excite --slew`) and stay below it in use"
         )
     });
-    let nameless: Vec<String> = limited.into_iter().chain(wanders).collect();
-    if !nameless.is_empty() {
-        let what = format!("{:.2} % of span: {}", percent(rmse), nameless.join("; "));
+    let unlisted: Vec<String> = limited.into_iter().chain(wanders).collect();
+    if !unlisted.is_empty() {
+        let what = format!("{:.2} % of span: {}", percent(rmse), unlisted.join("; "));
         return left(RemainderKind::Unexplained, what);
     }
     if rmse <= MIN_RMSE_RATIO * found.noise {
         return left(
             RemainderKind::None,
             format!(
-                "what is left is noise: {:.3} % of span, against a floor of {:.3} %",
+                "the remainder is noise: {:.3} % of span, noise floor {:.3} %",
                 percent(rmse),
                 percent(found.noise)
             ),
         );
     }
-    // The search ran on a richer, rate-independent base: what that one takes is the base's.
+    // The search ran on a richer, rate-independent basis. What that basis explains is misfit of the base model.
     let above = (rmse * rmse - noise2).max(f64::MIN_POSITIVE);
-    let taken = 1.0 - (richest * richest - noise2).max(0.0) / above;
+    let screening_share = 1.0 - (richest * richest - noise2).max(0.0) / above;
     let residual: Vec<f64> = samples.output.iter().zip(&after.predicted).map(|(y, p)| y - p).collect();
     let counts: Vec<bool> = after.settling.iter().map(|s| !s).collect();
-    if taken < HALF {
-        let undecided = history::undecided(samples, &residual, &counts).unwrap_or(f64::INFINITY);
-        let decided = 1.0 - (undecided - noise2).max(0.0) / above;
-        if decided >= HALF {
+    if screening_share < HALF {
+        let undetermined_variance =
+            history::undetermined_variance(samples, &residual, &counts).unwrap_or(f64::INFINITY);
+        let determined_share = 1.0 - (undetermined_variance - noise2).max(0.0) / above;
+        if determined_share >= HALF {
             let what = format!(
-                "{:.2} % of span: {:.0} % of its variance comes back where the input and its history do, so that it is a map of them that this base, \
-                 and the richer ones that were tried, are too coarse for",
+                "{:.2} % of span: {:.0} % of its variance is a function of the input and its history; this base model and the finer ones tried \
+                 are too coarse for it",
                 percent(rmse),
-                100.0 * decided
+                100.0 * determined_share
             );
             return left(RemainderKind::BaseCapacity, what);
         }
         if let Some(exponent) = colour::flicker(&residual, &samples.segments, &counts, found.noise) {
             let what = format!(
-                "what is left is noise: {:.3} % of span; its power falls with the frequency to the power of {exponent:.1}, like the flicker noise of \
+                "the remainder is noise: {:.3} % of span; its power falls as 1/f^{exponent:.1}, like the flicker noise of \
                  a sensor, down to a white floor of {:.3} %",
                 percent(rmse),
                 percent(found.noise)
@@ -111,11 +115,11 @@ pub(super) fn judge(
             return left(RemainderKind::None, what);
         }
         let (rows, hysteresis) = samples.hysteresis();
-        if is_as_of_another_law(&residual, &rows, &hysteresis, found.noise) {
+        if is_within_law_accuracy(&residual, &rows, &hysteresis, found.noise) {
             let hysteresis = rms(&hysteresis);
             let what = format!(
-                "{:.2} % of span stands above the noise floor of {:.2} %; that is {:.1} % of the hysteresis, and no law of hysteresis describes an \
-                 actuator more closely",
+                "{:.2} % of span is above the noise floor of {:.2} %; the excess is {:.1} % of the hysteresis, which is within the accuracy \
+                 of a hysteresis model",
                 percent(rmse),
                 percent(found.noise),
                 100.0 * above.sqrt() / hysteresis
@@ -123,37 +127,40 @@ pub(super) fn judge(
             return left(RemainderKind::BaseCapacity, what);
         }
     }
-    let map = "a map of the input's history that this base is too coarse for";
-    let (kind, rest) = if taken >= DOMINANT_SHARE || (taken >= HALF && richest <= MIN_RMSE_RATIO * found.noise) {
+    let map = "a function of the input's history that this base model is too coarse for";
+    let (kind, rest) = if screening_share >= DOMINANT_SHARE
+        || (screening_share >= HALF && richest <= MIN_RMSE_RATIO * found.noise)
+    {
         (RemainderKind::BaseCapacity, format!("nearly all of it is {map}"))
-    } else if taken >= HALF {
+    } else if screening_share >= HALF {
         let rest = format!(
-            "{:.0} % of its variance is {map}; the rest stands above the noise floor of {:.2} % too, and no effect of the list explains it",
-            100.0 * taken,
+            "{:.0} % of its variance is {map}; the rest is also above the noise floor of {:.2} %, and no listed effect explains it",
+            100.0 * screening_share,
             percent(found.noise)
         );
         (RemainderKind::BaseCapacity, rest)
-    } else if taken >= MINOR_SHARE {
+    } else if screening_share >= MINOR_SHARE {
         let rest = format!(
-            "no effect of the list explains it, and only {:.0} % of its variance is {map}; look for what was not recorded (a load, a temperature)",
-            100.0 * taken
+            "no listed effect explains it, and only {:.0} % of its variance is {map}; look for an unrecorded cause (a load, a temperature)",
+            100.0 * screening_share
         );
         (RemainderKind::Unexplained, rest)
     } else {
         let what = format!(
-            "{:.2} % of span stands above the noise floor of {:.2} %, and no effect of the list explains it",
+            "{:.2} % of span is above the noise floor of {:.2} %, and no listed effect explains it",
             percent(rmse),
             percent(found.noise)
         );
         return left(RemainderKind::Unexplained, what);
     };
-    let richer = format!("a richer rate-independent base would leave {:.2} %", percent(richest));
+    let richer = format!("a finer rate-independent base model would leave {:.2} %", percent(richest));
     left(kind, format!("{:.2} % of span; {richer}: {rest}", percent(rmse)))
 }
 
-/// Whether a residual is nowhere larger than what a model of another law misses: in each part of the record, at most [`LAW_ACCURACY`] of the hysteresis
-/// of that part or of the whole record.
-fn is_as_of_another_law(residual: &[f64], rows: &[usize], hysteresis: &[f64], noise: f64) -> bool {
+/// Returns whether a residual is as small as the misfit of another hysteresis law: at most [`LAW_ACCURACY`] of the
+/// hysteresis, in each part of the record. The hysteresis is that of the part or of the whole record, whichever is
+/// larger.
+fn is_within_law_accuracy(residual: &[f64], rows: &[usize], hysteresis: &[f64], noise: f64) -> bool {
     let whole = rms(hysteresis);
     let rows_each = rows.len().div_ceil(PARTS).max(1);
     rows.chunks(rows_each).zip(hysteresis.chunks(rows_each)).all(|(rows, hysteresis)| {
@@ -163,18 +170,20 @@ fn is_as_of_another_law(residual: &[f64], rows: &[usize], hysteresis: &[f64], no
 }
 
 impl Remainder {
-    /// With what else has to be said: that the record repeats one loop \[Hz\], and which effects of a rich base do not help this one.
+    /// Adds two remarks: the record repeats one loop \[Hz\]; effects found on a richer basis do not improve this base
+    /// model.
     pub(super) fn beside(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
         let of_shapes = self.kind != RemainderKind::None && self.change.is_none();
         if let Some(hz) = only_loop.filter(|_| of_shapes) {
             self.description += &format!(
-                "; the record repeats one loop at {hz:.4} Hz, in which rate-dependence, resonance, asymmetry and saturation look like a hysteresis of another shape, and whatever is late looks alike: drive several frequencies and amplitudes"
+                "; the record repeats one loop at {hz:.4} Hz, which separates neither rate-dependence, resonance, asymmetry and saturation \
+                 from the shape of the hysteresis nor a delay from a lag: drive several frequencies and amplitudes"
             );
         }
         if !useless.is_empty() && self.change.is_none() {
             let names: Vec<&str> = useless.iter().map(|e| e.name()).collect();
             self.description += &format!(
-                "; on a richer base {} would explain a part, but this base does not follow better with it: fit a richer one first",
+                "; on a finer base model {} would explain a part, but this base model does not improve with it: fit a finer one first",
                 names.join(", ")
             );
         }

@@ -1,4 +1,4 @@
-//! Which rows a diagnosis used, and why not the others.
+//! Counts the rows that a diagnosis used and those that it left out, by reason.
 
 use super::findings::{LeftOut, MOST_LISTED, Rows};
 use crate::clipping::clipped_rows;
@@ -6,7 +6,7 @@ use crate::frozen::frozen_rows;
 use crate::record::Record;
 use crate::samples::Samples;
 
-/// The rows of a record of which `samples` says which count.
+/// Returns the row counts of a record; `samples` marks the rows that count.
 pub(super) fn rows(record: &Record, samples: &Samples) -> Rows {
     let clipped = clipped_rows(&samples.output, &samples.segments);
     let all = || 0..samples.len();

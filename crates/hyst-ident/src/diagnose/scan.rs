@@ -1,75 +1,76 @@
-//! Which causes are worth a fit: group score tests.
+//! Group score tests: which causes are worth a fit.
 //!
-//! To first order a cause adds some columns to the output. What a fit cannot imitate of them says how much of Σ residual² they would take, by
-//! linear algebra alone. A cause that would take next to nothing is not fitted: no refinement of its parameters makes that much.
+//! To first order a cause adds some columns to the output. The part of them that a fit cannot imitate determines by how
+//! much they would lower Σ residual²; this takes linear algebra only. A cause with a very small gain is not fitted,
+//! because refining its parameters cannot raise the gain enough.
 
 use hyst_core::{DelayParams, Error, LagParams, TemperatureParams};
 
 use super::starts::{PER_DECADE, bank, starting_temperature, stops};
 use crate::model::{Effect, Effects, Widening};
-use crate::nested::{Cause, Fitted, HATS, Hypothesis, Problem, SignalPath, Vantage, hat, owed};
+use crate::nested::{Cause, Fitted, HATS, Hypothesis, Prober, Problem, SignalPath, hat, initial};
 use crate::samples::range;
 
-/// Share of the gain that an effect needs from which on a first-order gain is followed up.
-const PROMISING: f64 = 0.05;
-/// Depths at which a stop is tried, in strokes.
-const DEPTHS: [f64; 3] = [0.01, 0.04, 0.15];
+/// Minimum first-order gain of a cause, as a share of the gain that an effect needs.
+const MIN_GAIN_SHARE: f64 = 0.05;
+/// Depths of the saturation limit that are tried, as shares of the stroke.
+const SATURATION_DEPTHS: [f64; 3] = [0.01, 0.04, 0.15];
 
-/// A fit, and what separates a new column from it.
+/// A fit, prepared for testing further columns.
 pub(super) struct Scan<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) from: &'a Fitted,
     pub(super) residual: Vec<f64>,
     pub(super) motion: Vec<f64>,
-    pub(super) vantage: Vantage<'a>,
-    /// Gain in Σ residual² that is asked for.
+    pub(super) prober: Prober<'a>,
+    /// Required gain in Σ residual².
     pub(super) least_gain: f64,
     pub(super) promising: f64,
 }
 
 impl<'a> Scan<'a> {
-    /// Of a fit to which something is to be added that gains at least `least` of Σ residual².
+    /// Prepares a fit to which a cause with a gain of at least `least` (Σ residual²) is to be added.
     pub(super) fn new(problem: &'a Problem<'a>, from: &'a Fitted, least: f64) -> Result<Self, Error> {
         Ok(Self {
             residual: problem.residual(from)?,
             motion: problem.motion(&from.hypothesis, &from.solution)?,
-            vantage: Vantage::new(problem, from)?,
+            prober: Prober::new(problem, from)?,
             least_gain: least,
-            promising: PROMISING * least,
+            promising: MIN_GAIN_SHARE * least,
             problem,
             from,
         })
     }
 
-    /// Gain of a column and the factor at which it does, where that is promising and the factor positive.
+    /// Returns the gain of a column and its best factor, if the gain is promising and the factor positive.
     pub(super) fn gain(&self, column: &[f64]) -> Option<(f64, f64)> {
-        let (gain, amplitude) = self.vantage.projector.gain(column, &self.residual);
+        let (gain, amplitude) = self.prober.projector.gain(column, &self.residual);
         (amplitude > 0.0 && gain >= self.promising).then_some((gain, amplitude))
     }
 
-    /// Σ squares of what the fit cannot imitate of a column.
+    /// Returns Σ squares of the part of a column that the fit cannot imitate.
     pub(super) fn left(&self, column: &[f64]) -> f64 {
-        self.vantage.projector.left(column)
+        self.prober.projector.left(column)
     }
 
-    /// What the motion changes by with another hypothesis.
+    /// Returns the change of the motion with another hypothesis.
     pub(super) fn moved(&self, h: &Hypothesis) -> Result<Vec<f64>, Error> {
         let mut moved = self.problem.motion(h, &self.from.solution)?;
         moved.iter_mut().zip(&self.motion).for_each(|(a, b)| *a -= b);
         Ok(moved)
     }
 
-    /// Gain of the plays of a widening together.
+    /// Returns the joint gain of the play operators of a widening.
     pub(super) fn gain_of_widening(&self, widening: &Widening) -> Result<f64, Error> {
         let mut h = self.from.hypothesis.clone();
         h.effects.widening = Some(widening.clone());
         let path = SignalPath::new(self.problem.samples, &h)?;
         let mut columns = path.widening().to_vec();
         path.output_side_of(&mut columns);
-        Ok(self.vantage.projector.joint_gain(&columns, &self.residual))
+        Ok(self.prober.projector.joint_gain(&columns, &self.residual))
     }
 
-    /// What stages behind the motion change it by.
+    /// Returns the change of the motion by stages behind it.
     pub(super) fn behind(&self, effects: Effects) -> Result<Vec<f64>, Error> {
         let mut moved = self.motion.clone();
         SignalPath::new(self.problem.samples, &Hypothesis::of(effects))?.output_side(&mut moved);
@@ -77,25 +78,25 @@ impl<'a> Scan<'a> {
         Ok(moved)
     }
 
-    /// Whether a cause would take enough to be worth a fit. Those whose place is looked for first (a mode, a slope, a law of the rate, a tone) are
-    /// tested there.
+    /// Returns whether a cause would gain enough to be worth a fit. Causes whose start is searched first (mode, slew
+    /// limit, rate-dependence, tone) are tested there.
     pub(super) fn is_promising(&self, cause: Cause) -> Result<bool, Error> {
         let columns = match cause {
             Cause::Effect(effect) => self.columns(effect)?,
             Cause::ZeroWanders => Some(self.hats(&|_| 1.0)),
             Cause::GainWanders => Some(self.hats(&|k| self.motion[k])),
-            Cause::GoesOn => {
-                let h = Hypothesis { goes_on: true, ..self.from.hypothesis.clone() };
-                Some(owed::columns(self.problem.samples, &h))
+            Cause::InitialState => {
+                let h = Hypothesis { initial_state: true, ..self.from.hypothesis.clone() };
+                Some(initial::columns(self.problem.samples, &h))
             }
             Cause::SlewLimit => None,
         };
-        // Of either sign: a fit may begin at the other.
-        let takes = |columns: &[Vec<f64>]| self.vantage.projector.joint_gain(columns, &self.residual);
+        // Of either sign: a fit may start with the other one.
+        let takes = |columns: &[Vec<f64>]| self.prober.projector.joint_gain(columns, &self.residual);
         Ok(columns.is_none_or(|columns| !columns.is_empty() && takes(&columns) >= self.promising))
     }
 
-    /// First-order columns of an effect; none where its place is looked for first.
+    /// Returns the first-order columns of an effect; `None` if its start is searched first.
     fn columns(&self, effect: Effect) -> Result<Option<Vec<Vec<f64>>>, Error> {
         let s = self.problem.samples;
         let with = |change: &dyn Fn(&mut Effects)| {
@@ -116,7 +117,7 @@ impl<'a> Scan<'a> {
                 vec![of(gain)?, of(late)?, kelvin]
             }
             Effect::Creep => {
-                // Each element by itself: the search may take any of them.
+                // Each element separately: the search may use any of them.
                 let all = bank(s, self.problem.only_loop, 0.01 / PER_DECADE);
                 let one = |i: usize| {
                     let shares = (0..all.shares.len()).map(|j| if i == j { all.shares[j] } else { 0.0 }).collect();
@@ -139,13 +140,17 @@ impl<'a> Scan<'a> {
                     let lower = self.motion.iter().map(|m| (low + depth - m).max(0.0)).collect();
                     [upper, lower]
                 };
-                if stops(s, self.from).is_none() { Vec::new() } else { DEPTHS.into_iter().flat_map(beyond).collect() }
+                if stops(s, self.from).is_none() {
+                    Vec::new()
+                } else {
+                    SATURATION_DEPTHS.into_iter().flat_map(beyond).collect()
+                }
             }
             Effect::RateDependence | Effect::Resonance | Effect::Interference | Effect::Asymmetry => return Ok(None),
         }))
     }
 
-    /// The hats of something that wanders over the record.
+    /// Returns the hat functions of a wander over the record.
     fn hats(&self, of: &dyn Fn(usize) -> f64) -> Vec<Vec<f64>> {
         let rows = self.problem.samples.len();
         let share = |k: usize| k as f64 / rows.max(2) as f64;

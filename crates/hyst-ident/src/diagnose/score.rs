@@ -1,11 +1,11 @@
-//! Whether an effect's gain is real and matters.
+//! Decides whether the gain of an effect is significant and large enough.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use hyst_core::{ResonanceParams, SaturationParams};
 
-use super::tone::stands_alone;
+use super::tone::is_sensor_tone;
 use super::trial::Trial;
 use crate::Samples;
 use crate::criteria::{
@@ -17,44 +17,45 @@ use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
 use crate::samples::range;
 use crate::settle::windows;
 
-/// Bootstrap draws.
+/// Number of bootstrap draws.
 pub(super) const DRAWS: usize = 1000;
-/// Periods that a mode has to ring until 1/e of it is left, where nothing shows that it turns the phase.
+/// Periods in which a mode must still ring to 1/e of its amplitude, if it does not turn the phase.
 const RINGING_PERIODS: f64 = 3.0;
-/// Blocks that are drawn together.
-const RUN: usize = 4;
+/// Number of consecutive blocks that are drawn together.
+const BLOCKS_PER_RUN: usize = 4;
 
-/// How exactly the frequency of a loop is known, as a share.
-const HARMONIC: f64 = 0.002;
+/// Relative accuracy of the frequency of a loop.
+const LOOP_FREQUENCY_TOLERANCE: f64 = 0.002;
 
-/// How an effect was judged.
+/// Judgement of an effect.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judgement {
     /// Share of bootstrap draws in which the cross-validated error falls.
     pub(crate) confidence: f64,
-    /// RMSE after over before, cross-validated.
+    /// Cross-validated RMSE after divided by before.
     pub(crate) ratio: f64,
     /// Share of the variance above the noise floor that the effect explains.
     pub(crate) share: f64,
-    /// Root mean square of what it adds, in noise floors.
+    /// RMS of the effect's contribution, in noise floors.
     pub(crate) over_noise: f64,
-    /// Whether its parameters are physically sensible and away from their bounds, but for what a mode that rings carries.
+    /// Whether its parameters are physically plausible and inside their bounds (except the gain of a ringing mode).
     pub(crate) sensible: bool,
-    /// Whether it explains too little, but is a tone that neither the drive nor a misfit makes.
-    pub(crate) alone: bool,
+    /// Whether the effect explains too little, but is a tone that neither the drive nor a misfit causes.
+    pub(crate) sensor_tone: bool,
 }
 
 impl Judgement {
     pub(crate) fn accepted(&self) -> bool {
-        self.is_sure() && (self.alone || self.explains())
+        self.is_sure() && (self.sensor_tone || self.explains())
     }
 
-    /// Accepted for what it explains, not for standing alone.
+    /// Returns whether the effect is accepted for what it explains, not only as a prominent tone.
     pub(crate) fn explains_enough(&self) -> bool {
         self.is_sure() && self.explains()
     }
 
-    /// Whether it helps in nearly every part of the record and stands above the noise, however little of what is left it explains.
+    /// Returns whether the effect helps in nearly every part of the record and exceeds the noise, however little it
+    /// explains.
     pub(crate) fn is_sure(&self) -> bool {
         self.sensible && self.confidence >= MIN_CONFIDENCE && self.over_noise >= MIN_NOISE_FLOORS
     }
@@ -64,8 +65,8 @@ impl Judgement {
     }
 }
 
-/// Gain in Σ residual² from which on an effect is accepted that leaves this much of it over `rows` rows: what the thresholds of
-/// [`Judgement`] come to.
+/// Returns the gain in Σ residual² at which an effect is accepted, if `left` remains with it over `rows` rows. Combines
+/// the thresholds of [`Judgement`].
 pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
     let of_fall = left * (1.0 / (1.0 - MIN_RMSE_DROP).powi(2) - 1.0);
@@ -73,7 +74,7 @@ pub(super) fn least_gain(rows: f64, left: f64, noise: f64) -> f64 {
     (MIN_NOISE_FLOORS * MIN_NOISE_FLOORS * floor).max(of_fall).max(of_share)
 }
 
-/// Gain from which on an effect may be accepted beside a fit that leaves this much of Σ residual² without it.
+/// Returns the gain at which an effect may be accepted, if Σ residual² is `before` without it.
 pub(super) fn least_gain_from(rows: f64, before: f64, noise: f64) -> f64 {
     let floor = rows * noise * noise;
     let of_fall = before * (1.0 - (1.0 - MIN_RMSE_DROP).powi(2));
@@ -81,8 +82,8 @@ pub(super) fn least_gain_from(rows: f64, before: f64, noise: f64) -> f64 {
     (MIN_NOISE_FLOORS * MIN_NOISE_FLOORS * floor).max(of_fall.min(of_share))
 }
 
-/// How `with` stands against `without`, by the weaker of what it predicts and what it fits: where a part of the record shows what no
-/// other part does, leaving that part out says more about the gap than about the effect.
+/// Judges `with` against `without`, by the weaker of the cross-validated and the fitted gain. Where a part of the
+/// record shows something that no other part does, leaving that part out says more about the gap than about the effect.
 pub(crate) fn judge(problem: &Problem<'_>, without: &Trial, with: &Trial, noise: f64, seed: u64) -> Judgement {
     let rows = with.fit.rows.max(1) as f64;
     let gain_of = |before: f64, after: f64| {
@@ -99,40 +100,41 @@ pub(crate) fn judge(problem: &Problem<'_>, without: &Trial, with: &Trial, noise:
         share: predicted.1.min(fitted.1),
         over_noise: predicted.2.min(fitted.2),
         sensible: sensible(problem, with),
-        alone: false,
+        sensor_tone: false,
     };
     let is_new_tone = without.fit.hypothesis.effects.interference.is_none();
-    let alone = is_new_tone && judged.is_sure() && !judged.explains() && stands_alone(problem, with);
-    Judgement { alone, ..judged }
+    let sensor_tone = is_new_tone && judged.is_sure() && !judged.explains() && is_sensor_tone(problem, with);
+    Judgement { sensor_tone, ..judged }
 }
 
-/// What `with` takes of the error of each block.
+/// Returns the fall of the error of each block.
 fn differences(without: &Trial, with: &Trial) -> Vec<f64> {
     without.blocks.iter().zip(&with.blocks).map(|(a, b)| a - b).collect()
 }
 
-/// Whether the second predicts clearly better than the first: in nearly every bootstrap draw.
+/// Returns whether the second predicts clearly better than the first: in nearly every bootstrap draw.
 pub(super) fn clearly_better(first: &Trial, second: &Trial, seed: u64) -> bool {
     share_above_zero(&differences(first, second), seed) >= MIN_BETTER_DRAWS
 }
 
-/// Whether the second predicts better by as much as an effect has to.
+/// Returns whether the second predicts better by the margin that an effect needs.
 pub(super) fn is_worth(first: &Trial, second: &Trial) -> bool {
     second.cv_rmse() <= (1.0 - MIN_RMSE_DROP) * first.cv_rmse()
 }
 
-/// Whether the second predicts so much better that it is needed, however little its parameters are known.
+/// Returns whether the second predicts so much better that it is needed even with uncertain parameters.
 pub(super) fn is_far_better(first: &Trial, second: &Trial) -> bool {
     first.cv_rmse() > MIN_RMSE_RATIO * second.cv_rmse()
 }
 
-/// Whether neither predicts clearly better than the other.
+/// Returns whether neither predicts clearly better than the other.
 pub(super) fn undecided(a: &Trial, b: &Trial, seed: u64) -> bool {
     let apart = (a.cv_rmse() / b.cv_rmse()).ln().abs() > MIN_RMSE_RATIO.ln();
     !apart && !clearly_better(a, b, seed) && !clearly_better(b, a, seed)
 }
 
-/// Share of block-bootstrap draws whose sum is above zero, or below it by next to nothing of the whole. Runs of blocks are drawn: neighbours share what is slow.
+/// Returns the share of block-bootstrap draws with a positive sum; a sum that is negative by a small part of the total
+/// counts too. Runs of neighbouring blocks are drawn together, because slow errors correlate between neighbours.
 fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
     let n = differences.len();
     if n == 0 {
@@ -140,8 +142,8 @@ fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut draw = || {
-        let runs = n.div_ceil(RUN);
-        let sum_of = |first: usize| (first..first + RUN).map(|b| differences[b % n]).sum::<f64>();
+        let runs = n.div_ceil(BLOCKS_PER_RUN);
+        let sum_of = |first: usize| (first..first + BLOCKS_PER_RUN).map(|b| differences[b % n]).sum::<f64>();
         (0..runs).map(|_| sum_of(rng.random_range(0..n))).sum::<f64>()
     };
     let least = -MINOR_SHARE * differences.iter().sum::<f64>().max(0.0);
@@ -149,12 +151,12 @@ fn share_above_zero(differences: &[f64], seed: u64) -> f64 {
     above as f64 / DRAWS as f64
 }
 
-/// Whether every effect's parameters are physically sensible and away from the bounds of the search.
+/// Returns whether the parameters of all effects are physically plausible and inside the bounds of the search.
 pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
     let samples = problem.samples;
     let e = &trial.fit.hypothesis.effects;
     let (longest, nyquist) = (samples.longest_segment(), 0.5 / samples.period);
-    // No law of a drag is the device's to the last digit: what is late by a part of a sample then is the law's own misfit.
+    // The law of a drag is not exact: a delay of a fraction of a sample is then the misfit of that law.
     let least = if trial.fit.hypothesis.drag.is_some() { 0.3 } else { 0.02 };
     let time = |seconds: f64| seconds > least * samples.period;
     !ends_at_a_bound(&trial.fit.hypothesis, samples)
@@ -166,7 +168,7 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
             p.seconds == 0.0
                 || p.seconds > MIN_DRIFT_TIME * samples.duration() && outlasts_the_start(samples, p.seconds)
         })
-        && e.saturation.is_none_or(|p| stops_something(samples, &trial.fit, &p))
+        && e.saturation.is_none_or(|p| has_sharp_limit(samples, &trial.fit, &p))
         && e.temperature.is_none_or(|p| p.per_kelvin.abs() < 0.049)
         && e.creep.as_ref().is_none_or(|p| p.total() > 0.0 && p.total() < HALF)
         && e.resonances.iter().all(|p| {
@@ -178,49 +180,50 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
         && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, MIN_TONE_HZ) && !is_harmonic(problem, p.hz))
 }
 
-/// Whether what settles with a time constant \[s\] is still seen once the drive has wiped out what the actuator remembered from before the record: within that
-/// time an unknown start settles too.
+/// Returns whether a settling process with this time constant \[s\] outlasts the unknown memory from before the record.
+/// The unknown start settles too, until the drive has erased it.
 fn outlasts_the_start(samples: &Samples, seconds: f64) -> bool {
     let begins_at_rest = samples.pasts.first().is_none_or(Vec::is_empty);
     let rows = windows(samples).first().copied().unwrap_or(0);
     begins_at_rest || seconds > rows as f64 * samples.period_of(0)
 }
 
-/// Whether a mode rings: by itself it goes on for some periods, or its own part at its frequency, g/(2ζ), exceeds the part of the motion that does
-/// not go through it, 1 − g, so that the phase turns. What only ripples the motion there is the misfit of another law as well. What does not
-/// decay within the record may as well be a harmonic of the drive.
+/// Returns whether a mode rings: its free oscillation lasts some periods, or its own part at its frequency, g/(2ζ),
+/// exceeds the part of the motion beside it, 1 − g, so that it turns the phase. A smaller ripple may be the misfit of
+/// another law. A mode that does not decay within the record may be a harmonic of the drive.
 fn rings(mode: &ResonanceParams, longest: f64) -> bool {
     let turns_the_phase = mode.gain >= (1.0 - mode.gain) * 2.0 * mode.damping;
     let decays = std::f64::consts::TAU * mode.hz * mode.damping * longest >= 1.0;
     mode.gain > 0.0 && decays && (turns_the_phase || mode.damping < 1.0 / (std::f64::consts::TAU * RINGING_PERIODS))
 }
 
-/// Whether a tone is a harmonic of the one loop that a record repeats: then it may as well be the loop's shape.
+/// Returns whether a tone is a harmonic of the single loop of the record. It is then indistinguishable from the loop's
+/// shape.
 fn is_harmonic(problem: &Problem<'_>, hz: f64) -> bool {
     problem.only_loop.is_some_and(|first| is_multiple(hz, first, problem.samples.duration()))
 }
 
-/// Whether a frequency \[Hz\] is a multiple of a first one, as far as a record of some seconds shows it.
+/// Returns whether a frequency \[Hz\] is a multiple of a first one, within the resolution of a record of `seconds`.
 fn is_multiple(hz: f64, first: f64, seconds: f64) -> bool {
-    // Over the record its phase then turns by less than once against the loop.
-    (hz - first * (hz / first).round()).abs() < 1.0 / seconds + HARMONIC * hz
+    // The phase then turns by less than one period against the loop over the record.
+    (hz - first * (hz / first).round()).abs() < 1.0 / seconds + LOOP_FREQUENCY_TOLERANCE * hz
 }
 
-/// Whether the output comes to one of the limits and stays there for some rows.
-fn stops_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
-    p.knee < MAX_SHARP_KNEE && comes_near(samples, fit, p, 0.0)
+/// Returns whether the output reaches one of the limits and stays there for some rows.
+fn has_sharp_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
+    p.knee < MAX_SHARP_KNEE && is_close_to_limit(samples, fit, p, 0.0)
 }
 
-/// Whether it comes so near to one of the limits that it follows the motion by less than half, for some rows: a soft stop does, where the base does
-/// not bend in itself.
-pub(super) fn halves_something(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
-    // In a knee of width w the slope is 1 − x² at the share x of it.
+/// Returns whether the output comes so close to a limit that it follows the motion by less than half, for some rows. A
+/// soft limit counts on a base that does not bend by itself.
+pub(super) fn has_soft_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams) -> bool {
+    // In a knee of width w the slope is 1 − x² at the fraction x of it.
     let halved = (1.0 - 0.5f64.sqrt()) * p.knee * (p.high - p.low);
-    p.knee < MAX_KNEE && comes_near(samples, fit, p, halved)
+    p.knee < MAX_KNEE && is_close_to_limit(samples, fit, p, halved)
 }
 
-/// Whether some rows are nearer to a limit than a share of the motion's span, or than this \[y\].
-fn comes_near(samples: &Samples, fit: &Fitted, p: &SaturationParams, least: f64) -> bool {
+/// Returns whether some rows are closer to a limit than a share of the motion's span, or than `least` \[y\].
+fn is_close_to_limit(samples: &Samples, fit: &Fitted, p: &SaturationParams, least: f64) -> bool {
     let shown = shown_motion(samples, fit);
     let (low, high) = range(shown.iter().copied());
     let near = least.max(MAX_STOP_DISTANCE * (high - low));
@@ -233,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tone_two_lines_beside_a_harmonic_is_none() {
+    fn a_tone_two_spectral_lines_from_a_harmonic_is_no_harmonic() {
         // A loop of 2 Hz over 4 s has lines of 0.25 Hz; its frequency is known to 0.2 %.
         assert!(is_multiple(10.0, 2.0, 4.0) && is_multiple(10.2, 2.0, 4.0));
         assert!(!is_multiple(10.5, 2.0, 4.0) && !is_multiple(9.5, 2.0, 4.0));
@@ -243,9 +246,10 @@ mod tests {
     fn a_ripple_of_the_motion_is_no_mode() {
         let rings = |damping: f64, gain: f64| rings(&ResonanceParams { hz: 48.0, damping, gain }, 10.0);
         assert!(!rings(0.062, 0.02) && !rings(0.1, 0.004) && !rings(0.01, 0.0));
-        // Lightly damped modes that carry little, a mode beside a stiff part, and one that carries all and hardly rings.
+        // Lightly damped modes with a small share, a mode in parallel with a stiff part, and a heavily damped one with
+        // the whole motion.
         assert!(rings(0.02, 0.01) && rings(0.01, 0.05) && rings(0.05, 0.4) && rings(0.3, 1.0));
-        // What does not decay in the record.
+        // A mode that does not decay within the record.
         assert!(!rings(1e-4, 0.6));
     }
 }

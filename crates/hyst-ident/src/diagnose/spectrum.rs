@@ -6,7 +6,8 @@ use realfft::RealFftPlanner;
 
 use crate::samples::Samples;
 
-/// Power spectrum summed over segments, each zero-padded to a common duration; and the step \[Hz\]. A segment has none beyond half its sample rate.
+/// Returns the power spectrum summed over the segments, each zero-padded to a common duration, and the frequency step
+/// \[Hz\]. A segment contributes up to half its sample rate.
 fn power(samples: &Samples, residual: &[f64]) -> (Vec<f64>, f64) {
     let seconds = samples.longest_segment().max(samples.period);
     let length = ((2.0 * seconds / samples.period).round() as usize).next_power_of_two();
@@ -20,11 +21,11 @@ fn power(samples: &Samples, residual: &[f64]) -> (Vec<f64>, f64) {
         let mean = rows.iter().sum::<f64>() / rows.len().max(1) as f64;
         let n = rows.len() as f64;
         for (k, (x, r)) in input.iter_mut().zip(rows).enumerate() {
-            // Hann window: without it the slow part of the residual would spill over the band.
+            // Hann window: without it, slow parts of the residual would leak over the whole band.
             let window = 0.5 - 0.5 * (2.0 * std::f64::consts::PI * (k as f64 + 0.5) / n).cos();
             *x = window * (r - mean);
         }
-        // Lengths are the planner's own.
+        // Cannot fail: the lengths come from the planner.
         if fft.process(&mut input, &mut output).is_ok() {
             power.iter_mut().zip(&output).for_each(|(p, c)| *p += c.norm_sqr());
         }
@@ -32,7 +33,7 @@ fn power(samples: &Samples, residual: &[f64]) -> (Vec<f64>, f64) {
     (power, step)
 }
 
-/// Height of each line over the median of its neighbourhood (a tenth of its frequency to each side).
+/// Returns the height of each line above the median of its neighbourhood (a tenth of its frequency to each side).
 fn prominence(power: &[f64]) -> Vec<f64> {
     let n = power.len();
     (0..n)
@@ -47,7 +48,7 @@ fn prominence(power: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Frequencies \[Hz\] of the `count` most prominent lines, highest first.
+/// Returns the frequencies \[Hz\] of the `count` most prominent lines, most prominent first.
 pub(super) fn peaks(samples: &Samples, residual: &[f64], count: usize) -> Vec<f64> {
     let (power, step) = power(samples, residual);
     let prominence = prominence(&power);
@@ -60,8 +61,8 @@ pub(super) fn peaks(samples: &Samples, residual: &[f64], count: usize) -> Vec<f6
     lines.into_iter().map(|i| i as f64 * step).collect()
 }
 
-/// Frequency \[Hz\] of the strongest tone on the lab's clock: the most prominent lines, each refined
-/// by a fit of sine and cosine to the whole record, phase unbroken over gaps.
+/// Returns the frequency \[Hz\] of the strongest tone with a continuous phase on the lab clock. The most prominent
+/// lines are refined by a fit of sine and cosine to the whole record, across gaps.
 pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
     let total = samples.time.last()? - samples.time.first()?;
     let longest = samples.longest_segment();
@@ -74,7 +75,7 @@ pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
     peaks(samples, residual, 3)
         .into_iter()
         .filter_map(|hz| {
-            // The coherent peak is 1/total wide; the segment's spectrum places it within 1/longest.
+            // The coherent peak has a width of 1/total; the segment's spectrum locates it within 1/longest.
             let steps = ((4.0 * total / longest) as usize).clamp(4, 400);
             let (_, hz) = around(hz, 1.0 / longest, steps)?;
             around(hz, 1.0 / longest / steps as f64, 4)
@@ -83,11 +84,11 @@ pub(super) fn tone(samples: &Samples, residual: &[f64]) -> Option<f64> {
         .map(|(_, hz)| hz)
 }
 
-/// Frequency \[Hz\] at which a signal has most power, its mean left out.
+/// Returns the frequency \[Hz\] with the most power in a signal, its mean excluded.
 pub(super) fn strongest(samples: &Samples, signal: &[f64]) -> Option<f64> {
     let (power, step) = power(samples, signal);
     let line = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
-    // Between the lines of the transform too.
+    // Also between the lines of the transform.
     let near = (-8..=8).map(|i| (line as f64 + f64::from(i) / 8.0) * step);
     let heights = near.map(|hz| {
         let of = |s| explained(samples, std::slice::from_ref(s), signal, hz);
@@ -96,11 +97,11 @@ pub(super) fn strongest(samples: &Samples, signal: &[f64]) -> Option<f64> {
     heights.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hz)| hz)
 }
 
-/// Σ residual² that a sine and cosine of this frequency take in these segments.
+/// Returns the Σ residual² that a sine and cosine of this frequency explain in these segments.
 pub(super) fn explained(samples: &Samples, segments: &[Range<usize>], residual: &[f64], hz: f64) -> f64 {
     let (mut ss, mut sc, mut cc, mut rs, mut rc) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for segment in segments.iter().filter(|segment| !segment.is_empty()) {
-        // One sine and cosine per segment, then rotation: the grid inside a segment is even.
+        // One sine and cosine per segment, then rotation: the samples of a segment are evenly spaced.
         let angle = |t: f64| 2.0 * std::f64::consts::PI * (hz * t).fract();
         let (mut s, mut c) = angle(samples.time[segment.start]).sin_cos();
         let (ds, dc) = angle(samples.period_at(segment.start)).sin_cos();

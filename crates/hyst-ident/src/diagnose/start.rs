@@ -1,11 +1,12 @@
-//! How each segment begins, as the model's own base shows it with what was found.
+//! Estimates the start of each segment again, on the model's own base with the effects found.
 //!
-//! The search takes a start as its rich base saw it while the effects stood in the record. Once these are known, or beside a curve that may be missing,
-//! the own base is asked again: for the histories that may have led there, for the last turns, and for what is a start-up then.
+//! The search uses the start that its basis found before the effects were known. With the effects, or with a curve that
+//! may be missing, the model's own base estimates again: the drive history before the segment, the last reversals, and
+//! the start-up rows.
 
 use hyst_core::{CurveSide, Error};
 
-use super::extension::Own;
+use super::extension::OwnModel;
 use super::trial::Trial;
 use super::{SHAPE_ROWS, shape};
 use crate::fit::{BLOCKS, FitError};
@@ -15,27 +16,27 @@ use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
 use crate::settle::{start_up_rows, without_beginnings};
 
-/// How often a start is looked for, each time with what is known of it.
+/// Maximum number of estimates of the last reversals, each from the previous one.
 const RECALLS: usize = 2;
 
-/// A record with the start of each segment, and what the own base with a curve leaves of it then, cross-validated \[y\].
+/// A record with the starts of its segments, and the cross-validated RMSE of the model's base with a curve \[y\].
 struct Start {
     samples: Samples,
     cv_rmse: f64,
 }
 
-impl Own<'_> {
-    /// The record with the start of each segment as the own base shows it once it has the curve that it may lack: beneath what a missing curve leaves
-    /// everywhere no start stands out. None if that is as it was known.
+impl OwnModel<'_> {
+    /// Returns the record with the starts that the model's base shows together with a missing curve; `None` if they are
+    /// unchanged. Without the curve, its residual hides the starts.
     pub(super) fn start_beside_a_curve(
         &self,
         hypothesis: &Hypothesis,
         richest: f64,
     ) -> Result<Option<Samples>, FitError> {
         let behind = self.started(hypothesis, richest, Some(CurveSide::Output))?;
-        // A curve before the hysteresis has to be searched: only where one behind it leaves much.
+        // A curve before the hysteresis has to be searched. This is done only if one behind it leaves a large error.
         let before = match &behind {
-            Some(behind) if behind.cv_rmse > shape::CLOSED * richest => {
+            Some(behind) if behind.cv_rmse > shape::MAX_RATIO_TO_SCREENING * richest => {
                 self.started(hypothesis, richest, Some(CurveSide::Input))?
             }
             _ => None,
@@ -44,7 +45,8 @@ impl Own<'_> {
         Ok(better.map(|start| start.samples).filter(|start| self.is_another(start)))
     }
 
-    /// The same as the own base shows it with what was found.
+    /// Returns the record with the starts that the model's base shows with the effects found; `None` if they are
+    /// unchanged.
     pub(super) fn start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
         let start = self.started(hypothesis, richest, None)?;
         Ok(start.map(|start| start.samples).filter(|start| self.is_another(start)))
@@ -54,7 +56,8 @@ impl Own<'_> {
         start.settling != self.samples.settling || start.pasts != self.samples.pasts
     }
 
-    /// The start of each segment, beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
+    /// Estimates the start of each segment, with a curve on one side if given. Returns `None` if nothing is missing or
+    /// no curve can be fitted.
     fn started(
         &self,
         hypothesis: &Hypothesis,
@@ -67,12 +70,13 @@ impl Own<'_> {
         if plain.is_none_or(|plain| shape::is_complete(&plain, richest)) {
             return Ok(None);
         }
-        // Near 0 V only where everything is known but the start.
+        // Near 0 V only if nothing but the start is unknown.
         let asked = match side {
             Some(_) => memory::away(self.samples),
             None => vec![true; self.samples.segments.len()],
         };
-        // What a fit with another start leaves, what it leaves in each row, and the turns of the drive before that these call for.
+        // Fits with another start: returns the trial, the residual of each row, and the reversals before the record
+        // that they suggest.
         let fitted = |samples: &Samples, recalls: bool| {
             let blocks = Blocks::new(samples, BLOCKS, SHAPE_ROWS);
             let problem = Problem::new(samples, self.basis.as_ref(), &blocks, self.per_record);
@@ -91,11 +95,11 @@ impl Own<'_> {
             let fitted = fitted(samples, false).map_err(stage)?;
             Ok::<_, FitError>(fitted.map_or(f64::INFINITY, |(trial, ..)| trial.fit.squares))
         };
-        // Of what came before, a part is seen all through the record: each history is judged by a fit of its own, to the rows in which no start-up can
-        // lie.
+        // A part of the history shows in the whole record. Each history is judged by its own fit to the rows after the
+        // start-up windows.
         let late = without_beginnings(self.samples);
         let mut known = memory::with_histories(&late, &asked, &mut |samples| squares(samples))?;
-        // Then the turns, as far as the first rows show them; what is left is a start-up.
+        // Then the last reversals, as far as the first rows show them. The remaining rows are start-up.
         let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
         for _ in 0..RECALLS {
             let Some((.., pasts)) = fitted(&known, true).map_err(stage)? else { break };

@@ -1,42 +1,44 @@
-//! Effects that help but are not sure enough to be named, and the record that would decide.
+//! Suspects: effects that help but are not certain enough to be named, with the experiment that would decide.
 
 use super::findings::{EffectKind, Suspect};
 use super::probability::{Evidence, NAMED, SUSPECTED};
-use super::search::{Near, Search};
+use super::search::{NearMiss, Search};
 use crate::digits::short;
 use crate::model::{Effect, Model};
 use crate::samples::Samples;
 
-/// Share of the slope at which an amplifier has been seen to fall behind that a drive may have.
+/// Maximum slope of the next drive, as a share of the slope that the amplifier did not follow.
 pub const FOLLOWED: f64 = 0.8;
 
-/// What an effect is told from where nothing else comes near: only a record that drives several rates and amplitudes tells it from a lag.
+/// Returns the effect that is hardest to separate from `effect`, if the search found no rival.
 pub fn usual_rival(effect: Effect) -> Effect {
     if effect == Effect::Lag { Effect::Creep } else { Effect::Lag }
 }
 
-/// Range and rate of a record's drive as options of `excite`, and the slope that the amplifier follows where it has not followed every one
-/// \[input unit/s\].
+/// Returns the options of `excite` for the range and rate of a record, and for the slope if the amplifier is slow.
+///
+/// `slew_limit` is the slope that the amplifier did not follow \[input unit/s\].
 pub fn drive_options(model: &Model, period: f64, slew_limit: Option<f64>) -> String {
-    // Six digits: a period as printed gives a rate that is a whole number but for rounding.
+    // Six digits: a period as printed gives a rate that is an integer up to rounding.
     let digits = |x: f64| format!("{x:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
     let slew = slew_limit.map(|limit| format!(" --slew {}", short(FOLLOWED * limit)));
     let (low, high) = (digits(model.input.low), digits(model.input.high));
     format!("--low {low} --high {high} --rate {}{}", digits(1.0 / period), slew.unwrap_or_default())
 }
 
-/// What is known of an effect that came near to be named.
+/// Evidence for an effect that was nearly named.
 pub(super) struct Candidate {
     pub(super) effect: Effect,
     cv_rmse: f64,
-    /// What does nearly as well.
+    /// The closest rival.
     rival: Option<Effect>,
     pub(super) evidence: Evidence,
 }
 
-/// What is known of each effect that helps beside those that were named, but by too little; `left` is what is left in noise floors.
+/// Returns the candidates: effects that help in addition to the named ones, but too little. `left` is the final error
+/// in noise floors.
 pub(super) fn candidates(found: &Search, named: &[Effect], left: f64) -> Vec<Candidate> {
-    let of = |near: &Near| {
+    let of = |near: &NearMiss| {
         let others = found.near.iter().filter(|other| other.effect != near.effect);
         let rival = others.min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
         let next_best = rival.map_or(1.0 / near.judgement.ratio, |other| other.cv_rmse / near.cv_rmse);
@@ -46,7 +48,7 @@ pub(super) fn candidates(found: &Search, named: &[Effect], left: f64) -> Vec<Can
     found.near.iter().filter(|near| !named.contains(&near.effect)).map(of).collect()
 }
 
-/// Those of them that are suspects, the most probable first.
+/// Returns the candidates that are suspects, most probable first.
 pub(super) fn suspects(
     candidates: &[Candidate],
     model: &Model,

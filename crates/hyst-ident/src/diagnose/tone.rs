@@ -1,7 +1,8 @@
-//! Whether a tone is the sensor's own, however little of what is left it explains.
+//! Tests whether a tone belongs to the sensor, even if it explains little of the residual.
 //!
-//! A coarse base's misfit may be far larger than a tone, but it comes and goes with the drive and has power where the motion has. A tone that is
-//! there all the time, stands out of what is left beside it and is no small part of what moves at its frequency is none of that.
+//! The misfit of a coarse base may be far larger than a tone, but it varies with the drive and has power where the
+//! motion has power. A sensor tone is present throughout the record, exceeds the residual at neighbouring frequencies,
+//! and is not small compared with the motion at its frequency.
 
 use std::ops::Range;
 
@@ -11,66 +12,66 @@ use crate::criteria::MINOR_SHARE;
 use crate::nested::Problem;
 use crate::samples::Samples;
 
-/// Frequencies to each side that a tone is held against, and how far they are apart, in lines of the longest segment.
+/// Number of neighbouring frequencies on each side, and their spacing in lines of the longest segment.
 const NEIGHBOURS: usize = 8;
-const APART: f64 = 2.0;
-/// How far it stands above them (power).
-const OVER_NEIGHBOURS: f64 = 20.0;
-/// Parts of the record, in how many of them it is there, in how many of them so little moves at its frequency, and between which shares of its
-/// height over the whole record it is there.
+const LINE_SPACING: f64 = 2.0;
+/// Minimum power of the tone relative to its neighbours.
+const MIN_POWER_RATIO: f64 = 20.0;
+/// Number of parts of the record; minimum number of parts that show the tone; minimum number with little motion at its
+/// frequency; and range of the tone's height in a part, relative to the whole record.
 const PARTS: usize = 8;
-const MOST_PARTS: usize = 7;
-const QUIET_PARTS: usize = 4;
-const THERE: Range<f64> = 0.5..1.5;
-/// Harmonics of the drive's strongest line that a misfit may ring at.
-const HARMONICS: f64 = 20.0;
+const MIN_PARTS_WITH_TONE: usize = 7;
+const MIN_QUIET_PARTS: usize = 4;
+const HEIGHT_RATIO: Range<f64> = 0.5..1.5;
+/// Highest order of a harmonic of the drive's strongest line at which a misfit may occur.
+const MAX_HARMONIC: f64 = 20.0;
 
-/// Whether the tone that a trial holds is one that neither the drive nor a misfit makes.
-pub(super) fn stands_alone(problem: &Problem<'_>, with: &Trial) -> bool {
+/// Returns whether the trial's tone is caused neither by the drive nor by a misfit.
+pub(super) fn is_sensor_tone(problem: &Problem<'_>, with: &Trial) -> bool {
     let fit = &with.fit;
     let Some(tone) = fit.hypothesis.effects.interference else { return false };
-    let (Ok(motion), Ok(left)) = (problem.motion(&fit.hypothesis, &fit.solution), problem.residual(fit)) else {
+    let (Ok(motion), Ok(residual)) = (problem.motion(&fit.hypothesis, &fit.solution), problem.residual(fit)) else {
         return false;
     };
     let samples = problem.samples;
     let wave: Vec<f64> = samples.time.iter().map(|t| tone.at(*t)).collect();
     let power: f64 = wave.iter().map(|w| w * w).sum();
-    is_there_throughout(&left, &wave)
-        && stands_out(samples, &left, tone.hz, power)
-        && is_there_at_rest(samples, &motion, &wave, tone.hz)
+    is_present_throughout(&residual, &wave)
+        && is_prominent(samples, &residual, tone.hz, power)
+        && is_present_at_rest(samples, &motion, &wave, tone.hz)
         && !is_harmonic(samples, &motion, tone.hz)
 }
 
-/// Whether nearly every part of the record shows the tone as the whole does.
-fn is_there_throughout(left: &[f64], wave: &[f64]) -> bool {
+/// Returns whether nearly every part of the record shows the tone with its overall height.
+fn is_present_throughout(residual: &[f64], wave: &[f64]) -> bool {
     let part = wave.len().div_ceil(PARTS).max(1);
-    let shown = left.chunks(part).zip(wave.chunks(part)).filter(|(left, wave)| {
+    let shown = residual.chunks(part).zip(wave.chunks(part)).filter(|(residual, wave)| {
         let own: f64 = wave.iter().map(|w| w * w).sum();
-        let shared: f64 = left.iter().zip(*wave).map(|(r, w)| r * w).sum();
-        THERE.contains(&(1.0 + shared / own.max(f64::MIN_POSITIVE)))
+        let shared: f64 = residual.iter().zip(*wave).map(|(r, w)| r * w).sum();
+        HEIGHT_RATIO.contains(&(1.0 + shared / own.max(f64::MIN_POSITIVE)))
     });
-    shown.count() >= MOST_PARTS
+    shown.count() >= MIN_PARTS_WITH_TONE
 }
 
-/// Whether a tone of this power stands far above what is left beside it.
-fn stands_out(samples: &Samples, left: &[f64], hz: f64, power: f64) -> bool {
-    let apart = APART / samples.longest_segment();
-    let mut beside: Vec<f64> = (1..=NEIGHBOURS)
-        .flat_map(|k| [-1.0, 1.0].map(|side| hz + side * apart * k as f64))
+/// Returns whether a tone of this power far exceeds the residual at neighbouring frequencies.
+fn is_prominent(samples: &Samples, residual: &[f64], hz: f64, power: f64) -> bool {
+    let spacing = LINE_SPACING / samples.longest_segment();
+    let mut neighbours: Vec<f64> = (1..=NEIGHBOURS)
+        .flat_map(|k| [-1.0, 1.0].map(|side| hz + side * spacing * k as f64))
         .filter(|hz| *hz > 0.0 && *hz < 0.5 / samples.period)
-        .map(|hz| explained(samples, &samples.segments, left, hz))
+        .map(|hz| explained(samples, &samples.segments, residual, hz))
         .collect();
-    beside.sort_by(f64::total_cmp);
-    beside.get(beside.len() / 2).is_some_and(|middle| power > OVER_NEIGHBOURS * middle)
+    neighbours.sort_by(f64::total_cmp);
+    neighbours.get(neighbours.len() / 2).is_some_and(|middle| power > MIN_POWER_RATIO * middle)
 }
 
-/// Whether in enough parts of the record next to nothing moves at the tone's frequency, or hardly beside it.
-fn is_there_at_rest(samples: &Samples, motion: &[f64], wave: &[f64], hz: f64) -> bool {
+/// Returns whether enough parts of the record have little motion at the tone's frequency and next to it.
+fn is_present_at_rest(samples: &Samples, motion: &[f64], wave: &[f64], hz: f64) -> bool {
     let line = 1.0 / samples.longest_segment();
     let part = wave.len().div_ceil(PARTS).max(1);
     let quiet = wave.chunks(part).enumerate().filter(|(i, wave)| {
         let rows = i * part..i * part + wave.len();
-        // Segment by segment, whose phases need not agree.
+        // Per segment, because the phases of the motion need not agree.
         let pieces: Vec<Range<usize>> = samples
             .segments
             .iter()
@@ -81,22 +82,22 @@ fn is_there_at_rest(samples: &Samples, motion: &[f64], wave: &[f64], hz: f64) ->
         let moved = [hz - line, hz, hz + line].map(of).into_iter().fold(0.0, f64::max);
         wave.iter().map(|w| w * w).sum::<f64>() > MINOR_SHARE * moved
     });
-    quiet.count() >= QUIET_PARTS
+    quiet.count() >= MIN_QUIET_PARTS
 }
 
-/// Whether it is a harmonic of the line that the motion has most of.
+/// Returns whether the frequency is a harmonic of the strongest line of the motion.
 fn is_harmonic(samples: &Samples, motion: &[f64], hz: f64) -> bool {
     let line = 1.0 / samples.longest_segment();
     let Some(first) = strongest(samples, motion).filter(|first| *first > line) else { return false };
     let order = (hz / first).round();
-    (1.0..=HARMONICS).contains(&order) && (hz - order * first).abs() < 1.5 * line && first > 4.0 * line
+    (1.0..=MAX_HARMONIC).contains(&order) && (hz - order * first).abs() < 1.5 * line && first > 4.0 * line
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Rows of a millisecond.
+    /// Rows with a period of 1 ms.
     fn samples(rows: usize) -> Samples {
         Samples::of_columns(1e-3, vec![0.0; rows], vec![0.0; rows])
     }
@@ -106,26 +107,26 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_and_goes_is_not_there_throughout() {
+    fn a_tone_in_a_third_of_the_record_is_not_present_throughout() {
         let s = samples(16_000);
         let wave = sine(&s, 50.0);
-        assert!(is_there_throughout(&vec![0.0; s.len()], &wave));
-        // A line that only a third of the record shows is taken for a third of its height all the time.
+        assert!(is_present_throughout(&vec![0.0; s.len()], &wave));
+        // A line in only a third of the record is fitted with a third of its height over the whole record.
         let whole: Vec<f64> = wave.iter().map(|w| w / 3.0).collect();
-        let left: Vec<f64> =
+        let residual: Vec<f64> =
             wave.iter().enumerate().map(|(k, w)| if k < 5_333 { 2.0 * w / 3.0 } else { -w / 3.0 }).collect();
-        assert!(!is_there_throughout(&left, &whole));
+        assert!(!is_present_throughout(&residual, &whole));
     }
 
     #[test]
-    fn a_line_of_a_crowd_does_not_stand_out() {
+    fn a_line_among_similar_ones_is_not_prominent() {
         let s = samples(16_000);
         let power = 8_000.0;
-        assert!(stands_out(&s, &vec![0.0; s.len()], 50.0, power));
-        // A sweep leaves as much beside it.
+        assert!(is_prominent(&s, &vec![0.0; s.len()], 50.0, power));
+        // A sweep has as much power at the neighbouring frequencies.
         let sweep: Vec<f64> = s.time.iter().map(|t| (std::f64::consts::TAU * (40.0 + 0.6 * t) * t).sin()).collect();
-        let beside = explained(&s, &s.segments, &sweep, 50.0);
-        assert!(!stands_out(&s, &sweep, 50.0, 3.0 * beside));
+        let neighbours = explained(&s, &s.segments, &sweep, 50.0);
+        assert!(!is_prominent(&s, &sweep, 50.0, 3.0 * neighbours));
     }
 
     #[test]
@@ -137,14 +138,14 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_moves_all_the_time_is_no_tone_however_its_phase_goes() {
+    fn a_line_of_the_motion_is_no_tone_of_the_sensor() {
         let mut s = samples(16_000);
         s.segments = vec![0..9_000, 9_000..16_000];
         let wave: Vec<f64> = sine(&s, 50.0).iter().map(|w| 0.1 * w).collect();
         let mut motion = sine(&s, 50.0);
         motion[9_000..].iter_mut().for_each(|y| *y = -*y);
-        assert!(!is_there_at_rest(&s, &motion, &wave, 50.0));
+        assert!(!is_present_at_rest(&s, &motion, &wave, 50.0));
         motion[..9_000].fill(0.0);
-        assert!(is_there_at_rest(&s, &motion, &wave, 50.0));
+        assert!(is_present_at_rest(&s, &motion, &wave, 50.0));
     }
 }

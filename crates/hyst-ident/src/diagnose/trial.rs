@@ -6,7 +6,7 @@ use crate::nested::{Fitted, Problem};
 #[derive(Clone)]
 pub(crate) struct Trial {
     pub(crate) fit: Fitted,
-    /// Σ residual² of each block, predicted from other blocks.
+    /// Σ residual² of each block, predicted from the other blocks.
     pub(crate) blocks: Vec<f64>,
 }
 
@@ -16,12 +16,12 @@ impl Trial {
         Some(Self { fit, blocks })
     }
 
-    /// Σ residual² over all blocks, each predicted from others.
+    /// Returns Σ residual² over all blocks, each predicted from the others.
     pub(crate) fn total(&self) -> f64 {
         self.blocks.iter().sum()
     }
 
-    /// Root mean square of the cross-validated residual \[output unit\].
+    /// Returns the RMS of the cross-validated residual \[output unit\].
     pub(crate) fn cv_rmse(&self) -> f64 {
         (self.total() / self.fit.rows.max(1) as f64).sqrt()
     }

@@ -9,30 +9,32 @@ use crate::lsq::Share;
 use crate::model::Effect;
 use crate::nested::{Cause, Fitted};
 
-/// Effects whose law this record does not determine: a parameter that cannot be told from the value at which its effect is absent (or, for
-/// the damping of a mode, from zero) says little.
+/// Effects whose law the record does not determine: a parameter is not significantly different from the value at which
+/// its effect vanishes (for the damping of a mode: from zero).
 pub(super) struct Undetermined {
-    little: Vec<Effect>,
-    nothing: Vec<Effect>,
+    uncertain: Vec<Effect>,
+    insignificant: Vec<Effect>,
 }
 
 impl Undetermined {
     pub(super) fn of(fit: &Fitted) -> Self {
-        Self { little: within(fit, MIN_STD_ERRORS), nothing: within(fit, MINOR_SHARE) }
+        Self { uncertain: within(fit, MIN_STD_ERRORS), insignificant: within(fit, MINOR_SHARE) }
     }
 
-    /// Whether a cause goes for that: a parameter that says nothing speaks against it however much lower the error is with it.
-    pub(super) fn speaks_against(&self, cause: Cause, far_better: impl FnOnce() -> bool) -> bool {
+    /// Returns whether this is evidence against a cause. A parameter without any significance is, even if the error is
+    /// far lower with the cause.
+    pub(super) fn contradicts(&self, cause: Cause, far_better: impl FnOnce() -> bool) -> bool {
         let Some(effect) = cause.effect() else { return false };
-        self.nothing.contains(&effect) || self.little.contains(&effect) && !far_better()
+        self.insignificant.contains(&effect) || self.uncertain.contains(&effect) && !far_better()
     }
 }
 
-/// Effects with a parameter that is less than so many standard errors from the value at which they vanish.
+/// Returns the effects with a parameter that is fewer than `std_errors` standard errors from the value at which it
+/// vanishes.
 fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
     let errors = standard_errors(fit, 0.0);
     let e = &fit.hypothesis.effects;
-    // A parameter at a bound has no error: the bounds are judged elsewhere.
+    // A parameter at a bound has no error; bounds are checked elsewhere.
     let unsure = |key: &str, value: f64| errors.get(key).is_some_and(|error| value.abs() < std_errors * error);
     let modes = e.resonances.iter().zip(["resonance", "resonance_2"]);
     let mut loose_mode = modes.map(|(mode, stage)| {
@@ -52,8 +54,8 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
         Effect::Resonance => loose_mode.any(|loose| loose),
         Effect::Drift => e.drift.is_some_and(|p| match p.seconds > 0.0 {
             true => {
-                let goes_on = p.per_second == 0.0 || !unsure("drift.per_second", p.per_second);
-                !goes_on || unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds)
+                let has_slope = p.per_second == 0.0 || !unsure("drift.per_second", p.per_second);
+                !has_slope || unsure("drift.settling", p.settling) || unsure("drift.seconds", p.seconds)
             }
             false => unsure("drift.per_second", p.per_second),
         }),
@@ -62,18 +64,19 @@ fn within(fit: &Fitted, std_errors: f64) -> Vec<Effect> {
             e.rate.is_some_and(|p| unsure("rate-dependence.volts", p.volts))
                 || e.widening.as_ref().is_some_and(|p| unsure("rate-dependence.extra_half_width", p.extra_half_width()))
         }
-        // A stop acts or does not; a curve has several parameters of which one may be idle.
+        // A saturation is present or not. A curve has several parameters, one of which may be unused.
         Effect::Saturation | Effect::Asymmetry => false,
     };
     Effect::ALL.into_iter().filter(|effect| of(*effect)).collect()
 }
 
-/// Standard error of every effect's parameters, by `stage.parameter`.
+/// Returns the standard errors of all effects' parameters, by `stage.parameter`.
 ///
-/// Jackknife over blocks: each block b is left out of the normal equations once, and the solution moves by
-/// `(H − H_b)⁻¹ s_b` with s_b the gradient that the block contributes; the covariance is (B − 1)/B times the sum of the moves' outer
-/// products. A misfit that is correlated inside a block widens the errors as it should, and so does a parameter that one block
-/// alone determines. Parameters at a bound are held there and get none. `start_s` is the clock at the record's first row \[s\].
+/// Jackknife over blocks: each block b is left out of the normal equations once, and the solution changes by `(H −
+/// H_b)⁻¹ s_b`, with s_b the gradient that the block contributes. The covariance is (B − 1)/B times the sum of the
+/// outer products of these changes. So a misfit that is correlated inside a block increases the errors, and so does a
+/// parameter that only one block determines. Parameters at a bound are held there and get no error. `start_s` is the
+/// time of the record's first row \[s\].
 pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f64> {
     let mut errors = BTreeMap::new();
     let Some(columns) = fit.shares.first().map(Share::columns) else { return errors };
@@ -100,7 +103,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         let others = DMatrix::from_fn(free.len(), free.len(), |r, c| {
             h[(r, c)] - gram.matrix[(free[r], free[c])] / (scale[r] * scale[c])
         });
-        // Where the others alone determine nothing, the move is that of the whole.
+        // If the other blocks determine nothing, the change is that of all blocks.
         let moved = others.cholesky().unwrap_or_else(|| whole.clone()).solve(&score);
         covariance.ger(1.0, &moved, &moved, 1.0);
     }
@@ -139,7 +142,7 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         errors.insert("creep.total".into(), total.sqrt());
     }
     if let Some(p) = &fit.hypothesis.effects.widening {
-        // Neighbouring weights are far less certain than what they make together.
+        // Neighbouring weights are far less certain than their sum.
         let plays = || layout.widening.clone().zip(&p.thresholds);
         let pairs = plays().flat_map(|a| plays().map(move |b| (a, b)));
         let parts = pairs.filter_map(|((a, r), (b, s))| Some(r * s * covariance_of(a, b)?));
@@ -161,8 +164,8 @@ pub(super) fn standard_errors(fit: &Fitted, start_s: f64) -> BTreeMap<String, f6
         put(format!("asymmetry.weights[{i}]"), Some(unknown));
     }
     if let (Some(tone), Some(sine), Some(hz)) = (fit.hypothesis.effects.interference, layout.tone.clone().next(), hz) {
-        // Amplitude and phase are those of sine and cosine parts. The phase is that at the clock's zero, from which a frequency that
-        // is off by δ has carried the first row 2π t₀ δ away.
+        // Amplitude and phase follow from the sine and cosine parts. The phase refers to time zero. A frequency error δ
+        // changes the phase at the first row by 2π t₀ δ.
         let (s, c) = tone.phase.sin_cos();
         let a = tone.amplitude.max(f64::MIN_POSITIVE);
         let away = -2.0 * std::f64::consts::PI * start_s;

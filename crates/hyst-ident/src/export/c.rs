@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{block, harmless, lost, origin, words};
 use crate::model::Model;
 
-/// What the symbols of a C header begin with; its macros have it in capitals.
+/// The prefix of the symbols of a C header. Macros have it in upper case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CName(String);
 
@@ -23,30 +23,33 @@ impl Default for CName {
 impl FromStr for CName {
     type Err = String;
 
-    /// What no C identifier may have becomes `_`.
+    /// Replaces characters that C identifiers cannot have by `_`.
     fn from_str(name: &str) -> Result<Self, String> {
-        // The language keeps identifiers that begin with `_` for itself.
+        // C reserves identifiers that begin with `_`.
         if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
-            return Err("symbols in C begin with it: begin with a letter from a to z, as in x_axis".into());
+            return Err(
+                "it is the prefix of C symbols and must begin with a letter from a to z, for example x_axis".into()
+            );
         }
         Ok(Self(identifier(name)))
     }
 }
 
-/// A C99 header: the block of bytes, and every parameter as a constant with its unit. A program can have the headers of many models,
-/// each with a name of its own; of two with the same name the compiler refuses the second.
+/// Returns a C99 header with the parameter block and every parameter as a constant with its unit.
+///
+/// A program can include the headers of several models with different names. The compiler refuses a second model with the same name.
 ///
 /// # Errors
-/// As [`block`].
+/// Those of [`block`].
 pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     let bytes = block(model)?;
     let macros = name.to_ascii_uppercase();
-    // The block's own check sum tells two models apart.
+    // The checksum of the block distinguishes two models.
     let sum: String = bytes.iter().rev().take(4).map(|byte| format!("{byte:02x}")).collect();
     let mut text = format!(
         "/* Written by hystctl {}. {}\n *\n\
          {} */\n#ifndef {macros}_MODEL_H\n#define {macros}_MODEL_H\n#define {macros}_MODEL_SUM 0x{sum}u\n\n\
-         #include <stdint.h>\n\n#define {macros}_KIND \"{}\"\n\n/* What hyst_core::read_block reads. */\n\
+         #include <stdint.h>\n\n#define {macros}_KIND \"{}\"\n\n/* Parameter block for hyst_core::read_block. */\n\
          static const uint8_t {name}_block[{}] = {{",
         env!("CARGO_PKG_VERSION"),
         origin(model),
@@ -59,12 +62,13 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     }
     text += "\n};\n";
     let (input, output) = (harmless(model.input.symbol()), harmless(model.output.symbol()));
-    let _ = writeln!(text, "\n/* What the sensor shows at rest: added to what leaves the last stage. */");
+    let _ = writeln!(text, "\n/* Sensor zero (reading at rest): added to the output of the last stage. */");
     let _ = writeln!(text, "static const double {name}_zero = {:?}; /* {output} */", model.zero);
     if model.falls {
-        let _ = writeln!(text, "/* The output falls where the input rises: y = -H(u) leaves the hysteresis H. */");
+        let _ =
+            writeln!(text, "/* The output falls when the input rises: the output of the hysteresis H is y = -H(u). */");
     }
-    let _ = writeln!(text, "/* Inputs that the model was identified on. */");
+    let _ = writeln!(text, "/* Input range that the model was identified on. */");
     let _ = writeln!(text, "static const double {name}_input_low = {:?}; /* {input} */", model.input.low);
     let _ = writeln!(text, "static const double {name}_input_high = {:?}; /* {input} */", model.input.high);
     let mut modes = 0;
@@ -80,7 +84,7 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
         }
         text += " */\n";
         modes += usize::from(title == "resonance");
-        // A second mode must not have the names of the first.
+        // The constants of a second mode need other names.
         let second = if title == "resonance" && modes > 1 { format!("_{modes}") } else { String::new() };
         let prefix = format!("{name}_{}{second}", identifier(&title));
         constants(&mut text, &prefix, "", &Value::Object(stage), &units);
@@ -92,15 +96,15 @@ pub fn c(model: &Model, CName(name): &CName) -> Result<String, BlockError> {
     Ok(text)
 }
 
-/// What a header holds, as lines of a comment: the block, and the chain that the constants make.
+/// Returns the comment about the contents of a header: the block, and the chain of the constants.
 fn about(model: &Model, name: &str) -> String {
     let stages = model.stages();
     let chain: Vec<&str> = stages.iter().filter_map(|stage| stage.get("stage")?.as_str()).collect();
     format!(
-        " * {name}_block is for Rust firmware: hyst_core::read_block (feature block) makes the model of it.\n\
-         \x20* The constants are for code of your own: {} -> {} -> + {name}_zero -> {},\n\
-         \x20* stage by stage below; in each, u is what enters it and y what leaves it. No constant depends on a sample period.\n\
-         \x20* After each constant stands its unit; NAME_length is the number of a list's elements.{}",
+        " * {name}_block is for Rust firmware: hyst_core::read_block (feature block) builds the model from it.\n\
+         \x20* The constants are for your own code: {} -> {} -> + {name}_zero -> {},\n\
+         \x20* stage by stage below. In each stage, u is the input and y the output. No constant depends on the sample period.\n\
+         \x20* The unit follows each constant. NAME_length is the number of elements of a list.{}",
         harmless(&model.input.column),
         chain.join(" -> "),
         harmless(&model.output.column),
@@ -112,7 +116,7 @@ fn identifier(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
 
-/// Writes every number and list below `value` as a constant; `path` is its place, for its unit.
+/// Writes every number and list below `value` as a constant. `path` is the place of `value`, by which its unit is found.
 fn constants(text: &mut String, prefix: &str, path: &str, value: &Value, units: &Value) {
     let unit = || match units.get(path).and_then(Value::as_str) {
         Some(unit) => format!(" /* {} */", harmless(unit)),

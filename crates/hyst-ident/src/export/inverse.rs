@@ -1,14 +1,14 @@
-//! How exported Rust source says that its model is inverted.
+//! The example of a compensator in exported Rust source.
 
 use hyst_core::{Activation, Build, CompensatorOptions, Error, Invert, Sampling};
 
 use crate::model::capacity::REFERENCES;
 use crate::model::{Base, Model, TEMPERATURE_OF_INVERSE, searched_range};
 
-/// How near a search in single precision comes to the drive, as a share of the range; what a preview may miss, of the largest |α u̇|.
+/// Tolerance of a search in single precision, as a share of the input range; error of a preview, relative to the largest |α u̇|.
 const TOLERANCE: f64 = 1e-6;
 
-/// The lines of the comment that make a compensator of the chain, with room for what it takes at this sample period.
+/// Returns the comment with the code that makes a compensator of the chain, with capacities for this sample period.
 pub(super) fn example(model: &Model, period: f64) -> String {
     let made = model
         .compensator(period, &CompensatorOptions::default())
@@ -27,15 +27,15 @@ pub(super) fn example(model: &Model, period: f64) -> String {
     format!(
         "// The drive that makes the actuator follow a reference:\n\
          {hysteresis}\
-         //   let inverse = {compensator}; // {taps}: taps of its longest filter at this period\n\
+         //   let inverse = {compensator}; // {taps}: taps of the longest filter at this period\n\
          //   let mut memory = inverse.state();\n\
-         //   let mut drive = inverse.reset(&mut memory, &env, reference); // its first value\n\
-         //   drive = inverse.step(&mut memory, &env, reference); // every period; for inverse.lead() periods earlier than this\n\
-         // With inverse.lead() > 0 give step the reference, and env, of so many periods ahead. Limits keeps a drive in bounds.\n"
+         //   let mut drive = inverse.reset(&mut memory, &env, reference); // first reference value\n\
+         //   drive = inverse.step(&mut memory, &env, reference); // once per period; the drive of inverse.lead() periods earlier\n\
+         // If inverse.lead() > 0, pass the reference and env of that many periods ahead to step. Limits limits the drive.\n"
     )
 }
 
-/// The lines that make the inverse of an operator that does not choose it itself; `None` if it does. `lead` is its preview.
+/// Returns the code that makes the inverse of an operator; `None` if the chain makes it. `lead` is the preview of the inverse.
 fn hysteresis(model: &Model, period: f64, lead: usize) -> Result<Option<Vec<String>>, Error> {
     let [low, high] = searched_range([model.input.low, model.input.high]);
     let range = format!("{low:?}, {high:?}, {:?}", TOLERANCE * (high - low));
@@ -45,7 +45,7 @@ fn hysteresis(model: &Model, period: f64, lead: usize) -> Result<Option<Vec<Stri
     Ok(match &model.base {
         Base::TdEm(_) => Some(vec![
             format!(
-                "let linear = model.hysteresis.band_limited::<{}>({TEMPERATURE_OF_INVERSE:?}, None)?; // degC that its filter is for",
+                "let linear = model.hysteresis.band_limited::<{}>({TEMPERATURE_OF_INVERSE:?}, None)?; // temperature of its filter, degC",
                 2 * lead + 1
             ),
             "let band = Some((linear.bandwidth_hz(), linear.error()));".into(),
@@ -62,7 +62,7 @@ fn hysteresis(model: &Model, period: f64, lead: usize) -> Result<Option<Vec<Stri
             let references = function.anti_causal::<REFERENCES>(TOLERANCE)?.lead() + 1;
             Some(vec![
                 format!(
-                    "let preview = model.hysteresis.anti_causal::<{references}>({TOLERANCE:?})?; // {references}: references that it looks over"
+                    "let preview = model.hysteresis.anti_causal::<{references}>({TOLERANCE:?})?; // {references}: references in the preview"
                 ),
                 "let hysteresis = InverseHysteresis { lead: preview.lead(), inverse: preview, band: None };".into(),
             ])

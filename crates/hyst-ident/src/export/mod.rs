@@ -1,4 +1,4 @@
-//! `export`: a model's parameters for a board, as a block of bytes, as Rust source, as a C header.
+//! `export`: the parameters of a model for firmware, as a block of bytes, Rust source or a C header.
 
 mod c;
 mod inverse;
@@ -13,10 +13,10 @@ use hyst_core::{BlockError, write_block};
 use crate::BetweenSamples;
 use crate::model::{FittedOn, Model};
 
-/// The parameter block that firmware reads with [`hyst_core::read_block`].
+/// Returns the parameter block that firmware reads with [`hyst_core::read_block`].
 ///
 /// # Errors
-/// If the block would be larger than 16 MB.
+/// If the block is larger than 16 MB.
 pub fn block(model: &Model) -> Result<Vec<u8>, BlockError> {
     let params = model.to_params();
     let mut size = 4096;
@@ -30,16 +30,17 @@ pub fn block(model: &Model) -> Result<Vec<u8>, BlockError> {
     }
 }
 
-/// What is lost on a board, if something is: it takes one sample after the other, and no band-limited drive can be told from what has
-/// come of it so far.
+/// Returns the limitation of the model on a board, if there is one.
+///
+/// A board processes one sample at a time, so it cannot interpolate a band-limited drive.
 pub fn lost(model: &Model) -> Option<&'static str> {
     (model.between_samples == BetweenSamples::BandLimited).then_some(
-        "identified with a drive that is band-limited between samples, but a board sees it linear between them: \
-         a sine at a fifth of the sample rate counts 12 % less, at a twentieth 1 %; sample faster",
+        "identified with a drive that is band-limited between samples, but a board interpolates it linearly: \
+         this reduces a sine at 1/5 of the sample rate by 12 %, at 1/20 by 1 %; use a higher sample rate",
     )
 }
 
-/// Text of the model file for a comment: what could end the comment or its line is left out.
+/// Removes from a text of the model file all characters that could end a comment or its line.
 fn harmless(text: &str) -> String {
     text.replace("*/", "").chars().filter(|c| !c.is_control()).collect()
 }

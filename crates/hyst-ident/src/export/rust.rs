@@ -8,18 +8,18 @@ use serde::{Deserialize, Serialize};
 use super::{harmless, inverse, lost, origin};
 use crate::model::{Base, Model};
 
-/// A list of numbers that prints itself as a slice in Rust source.
+/// A list of numbers that is printed as a slice in Rust source.
 #[derive(Serialize, Deserialize)]
 struct Slice(Vec<f64>);
 
 impl fmt::Debug for Slice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // In one line whatever the style: a list of hundreds would fill pages.
+        // Always on one line, because lists may have hundreds of numbers.
         write!(f, "&{:?}", self.0)
     }
 }
 
-/// The operator's type in Rust source, with room for exactly what the model has, and what it is built for.
+/// Returns the type of the operator in Rust source, with exactly the needed capacity, and the context of its `build`.
 fn operator_type(base: &Base) -> (String, &'static str) {
     let plays = |list: &[f64]| list.len().max(1);
     match base {
@@ -43,16 +43,16 @@ fn operator_type(base: &Base) -> (String, &'static str) {
     }
 }
 
-/// Room for the dead time of a model at a sample period, and for the two samples that every delay takes.
+/// Returns the capacity for the dead time of a model at a sample period \[samples\], including the two samples that every delay needs.
 fn dead_time(model: &Model, period: f64) -> usize {
     let of_the_drive = model.effects.delay.map_or(0.0, |p| p.seconds);
     let of_the_operator = if let Base::Ifm(p) = &model.base { p.tau } else { 0.0 };
     ((of_the_drive.max(of_the_operator) / period).ceil() as usize + 2).next_power_of_two().max(32)
 }
 
-/// Rust source: constants for `hyst-core`, and the function that builds the chain of them.
+/// Returns Rust source: constants for `hyst-core`, and the function that builds the chain from them.
 pub fn rust(model: &Model) -> String {
-    // Through JSON, because that maps the lists of every kind of parameters at once. It cannot fail: these are the same types.
+    // The conversion through JSON maps the lists of all kinds of parameters. It cannot fail, because the types are the same.
     let params: Option<ChainParams<Slice>> =
         serde_json::to_value(model.to_params()).ok().and_then(|v| serde_json::from_value(v).ok());
     let Some(params) = params else { return String::new() };
@@ -60,7 +60,7 @@ pub fn rust(model: &Model) -> String {
         Some((kind, p)) => format!("(ActivationKind, ActivationParams) = (ActivationKind::{kind:?}, {p:?})"),
         None => {
             let text = format!("{:?}", params.operator);
-            // `Pi(PiParams { … })`: the type of what is inside is its first word.
+            // `Pi(PiParams { … })`: the first word inside is the type of the parameters.
             let inner = text.find('(').map_or("", |at| &text[at + 1..text.len() - 1]);
             let name = inner.split([' ', '{']).next().unwrap_or_default();
             let list = if inner.contains("&[") { "<&[f64]>" } else { "" };
@@ -72,10 +72,10 @@ pub fn rust(model: &Model) -> String {
     let period = 1.0 / model.recorded_at_hz;
     let mut surroundings = String::new();
     if model.needs_temperature() {
-        surroundings += "// The model follows temperature: set env.temperature [degC] at every sample.\n";
+        surroundings += "// The model depends on temperature: set env.temperature [degC] at every sample.\n";
     }
     if model.needs_load() {
-        surroundings += "// The model yields under load: set env.load [N] at every sample.\n";
+        surroundings += "// The model depends on load: set env.load [N] at every sample.\n";
     }
     if let Some(lost) = lost(model) {
         surroundings += &format!("// The model was {lost}.\n");
@@ -83,33 +83,33 @@ pub fn rust(model: &Model) -> String {
     format!(
         "// Written by hystctl {version}. {origin}\n\
          //\n\
-         // What it says of a drive:\n\
-         //   let sampling = Sampling {{ period: {period:?} }}; // s, yours\n\
-         //   let model = chain::<f32, {dead_time}>(&sampling)?; // {dead_time}: samples of dead time that it has room for, and 2\n\
+         // The predicted output of a drive:\n\
+         //   let sampling = Sampling {{ period: {period:?} }}; // your sample period, s\n\
+         //   let model = chain::<f32, {dead_time}>(&sampling)?; // {dead_time}: capacity for the dead time in samples, plus 2\n\
          //   let mut state = model.state();\n\
          //   let mut y = model.reset(&mut state, &env, INPUT[0] as f32); // env: hyst_core::Env\n\
-         //   y = model.step(&mut state, &env, drive); // every period\n\
+         //   y = model.step(&mut state, &env, drive); // once per period\n\
          //\n\
          {inverse}\
          {surroundings}\
          #[allow(unused_imports)]\n\
          use hyst_core::{{*, Curve::*, CurveSide::*, GlOrder::*, RateLaw::*, SlipReading::*}};\n\
          \n\
-         /// The memory operator.\n\
+         /// The base model.\n\
          pub const OPERATOR: {operator};\n\
-         /// The stages around it.\n\
+         /// The effects.\n\
          pub const EFFECTS: EffectParams<&[f64]> = {effects:?};\n\
-         /// Whether the output falls where the operator rises.\n\
+         /// Whether the output falls when the base model rises.\n\
          pub const FALLS: bool = {falls};\n\
-         /// What the sensor shows at rest [{unit}].\n\
+         /// The sensor zero: reading at rest [{unit}].\n\
          pub const ZERO: f64 = {zero:?};\n\
-         /// Inputs that the model was identified on, lowest and highest [{input}].\n\
+         /// Minimum and maximum input that the model was identified on [{input}].\n\
          pub const INPUT: [f64; 2] = {range:?};\n\
          \n\
-         /// The model at a sample period, in `f32` or `f64`; `D - 2` samples of dead time fit.\n\
+         /// Builds the model for a sample period, in `f32` or `f64`, with a dead time of up to `D - 2` samples.\n\
          ///\n\
          /// # Errors\n\
-         /// If the sample period does not suit the parameters, or the dead time does not fit.\n\
+         /// If the parameters do not allow the sample period, or the dead time is longer than `D - 2` samples.\n\
          pub fn chain<T: Real, const D: usize>(\n    sampling: &Sampling,\n) -> Result<Chain<T, {operator_type}, D, {creep}>, Error> {{\n    \
          let hysteresis: {operator_type} = OPERATOR.build({context})?;\n    \
          Ok(EFFECTS.around(hysteresis, sampling)?.with_falling(FALLS).with_zero(ZERO))\n\

@@ -1,25 +1,25 @@
-//! What a C header says of each stage: its equation, in the names of its constants, and how its lists are laid out.
+//! The comments in a C header about each stage: its equation with the names of its constants, and the layout of its lists.
 
-/// The lines about a stage, by its name in the file. `u` is what enters it, `y` what leaves it, `h` the sample period.
+/// Returns the comment about a stage, by its name in the file. `u` is its input, `y` its output, `h` the sample period.
 pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
     match name {
         "delay" => &["y(t) = u(t - seconds)"],
         "rate" => &[
             "o(x) = volts (|x| / reference_rate)^exponent sgn(x); law follows: v = u - o(du/dt)",
-            "holds: v <- max(u - |o(du/dt)|, min(u + |o(du/dt)|, v)); relaxes: u - v = o(dv/dt), an implicit Euler step a sample",
+            "holds: v <- max(u - |o(du/dt)|, min(u + |o(du/dt)|, v)); relaxes: u - v = o(dv/dt), one implicit Euler step per sample",
         ],
         "lag" => &["seconds dy/dt + y = u"],
         "pi" => &[
             "y = gain u + sum over i of weights[i] play[i]",
-            "play[i] <- max(u - thresholds[i], min(u + thresholds[i], play[i])), 0 before the first input; thresholds rise",
+            "play[i] <- max(u - thresholds[i], min(u + thresholds[i], play[i])), 0 before the first input; thresholds increase",
         ],
         "rate-dependence" => &[
-            "the plays of pi slide with drag: one that u is o = |u - play[i]| - thresholds[i] > 0 ahead of follows at the speed v of",
-            "seconds v + sqrt(volt_seconds v) = o; in a sample it moves by h v, (seconds + h) v + sqrt(volt_seconds v) = o",
+            "drag of the play operators of pi: if o = |u - play[i]| - thresholds[i] > 0, play[i] moves towards u at the speed v with",
+            "seconds v + sqrt(volt_seconds v) = o; in one sample it moves by h v, (seconds + h) v + sqrt(volt_seconds v) = o",
         ],
         "gpi" => &[
             "y = gain F(0) + sum over i of weights[i] F(thresholds[i])",
-            "F(r) <- max(left(u) - r, min(right(u) + r, F(r))), 0 before the first input; thresholds rise",
+            "F(r) <- max(left(u) - r, min(right(u) + r, F(r))), 0 before the first input; thresholds increase",
             "left, right: linear is slope u + offset, tanh is height tanh(rate u + shift) + offset",
         ],
         "td-pi" => &[
@@ -27,26 +27,26 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
             "F(r) <- max(a0 u + a1 - r, min(b0 u + b1 + r, F(r))), 0 before the first input",
         ],
         "maxwell-slip" => &[
-            "y = sum over i of gains[i] element[i]; widths rise",
-            "backlash: element[i] is the play of half-width widths[i] / 2; elasto-slip: u minus the play of half-width widths[i]",
+            "y = sum over i of gains[i] element[i]; widths increase",
+            "backlash: element[i] is the play with half-width widths[i] / 2; elasto-slip: u minus the play with half-width widths[i]",
         ],
         "td-em" => &[
-            "i = sum over k of slip_gains[k] element[k] (backlash: the play of half-width slip_widths[k] / 2), a current",
-            "it charges capacitance || resistance to a voltage v, and mass x'' + damping x' + stiffness x = psi v; y = per_metre x",
+            "i = sum over k of slip_gains[k] element[k] (backlash: the play with half-width slip_widths[k] / 2), a current",
+            "i charges capacitance || resistance to a voltage v, and mass x'' + damping x' + stiffness x = psi v; y = per_metre x",
             "psi = coupling[0] + coupling[1] T + coupling[2] T^2, T in degC",
         ],
         "preisach" => &[
-            "relays switch up at alpha and down at beta <= alpha; the grid cuts low .. high into cells intervals for each",
-            "density[a (a + 1) / 2 + b]: output gained by the relays with alpha in interval a and beta in interval b <= a, counted from 0",
-            "once[a]: output gained by those with alpha in interval a that never switch back; rest: input of the virgin memory",
-            "y is 0 at rest; between the nodes of the grid it is interpolated",
+            "relays switch up at alpha and down at beta <= alpha; the grid divides low .. high into cells intervals for each",
+            "density[a (a + 1) / 2 + b]: output of the relays with alpha in interval a and beta in interval b <= a, counted from 0",
+            "once[a]: output of the relays with alpha in interval a that never switch back; rest: input of the initial state",
+            "y is 0 at rest and is interpolated between the nodes of the grid",
         ],
         "dpm" => &[
-            "each branch of preisach counts times xi(rate |du/dt|, change of the input since it began), bilinear between nodes",
+            "each branch of preisach is multiplied by xi(rate |du/dt|, change of the input since its start), bilinear between nodes",
             "preisach_density[a (a + 1) / 2 + b]: relays with alpha in interval a and beta in interval b <= a of the grid, from 0;",
-            "preisach_once[a]: those with alpha in interval a that never switch back; preisach_rest: input of the virgin memory",
+            "preisach_once[a]: relays with alpha in interval a that never switch back; preisach_rest: input of the initial state",
             "mirror_weights[d mirror_changes + p]: xi at node d of rate_low .. rate_high and node p of change_low .. change_high",
-            "fade: travel over which the step at a closing loop fades to 1/e; 0 leaves it a step",
+            "fade: travel over which the jump at a closing loop decays to 1/e; 0 keeps the jump",
         ],
         "bouc-wen" => {
             &["y = k0 u + g, dg = alpha du - beta |du| |g|^(n-1) g - gamma du |g|^n, g = 0 before the first input"]
@@ -66,8 +66,8 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "softsign" => &["y = k0 u + alpha du/dt + beta gamma u / (1 + |gamma u|)"],
         "tanh" => &["y = k0 u + alpha du/dt + beta tanh(gamma u)"],
         "asymmetry" => &[
-            "y = u + sum over j of weights[j] d[j]: of thresholds[j] >= 0, d = max(u - thresholds[j], 0); below, min(u - thresholds[j], 0)",
-            "side: output, it bends what the hysteresis gives; input, it bends the drive before the hysteresis",
+            "y = u + sum over j of weights[j] d[j]; d[j] = max(u - thresholds[j], 0) if thresholds[j] >= 0, else min(u - thresholds[j], 0)",
+            "side: output, the curve is after the hysteresis; input, it is before the hysteresis",
         ],
         "temperature" => &[
             "y = u (1 + per_kelvin x) + expansion x, seconds dx/dt = T - reference_degc - x, T the measured temperature",
@@ -76,13 +76,13 @@ pub(super) fn of_stage(name: &str) -> &'static [&'static str] {
         "load" => &["y = u + per_newton F, F the measured load"],
         "resonance" => &["y = (1 - gain) u + gain x, x'' = w^2 (u - x) - 2 damping w x', w = 2 pi hz"],
         "saturation" => &[
-            "y = u but within knee (high - low) of low and high, where it nears them as k + (L - k) tanh((u - k) / (L - k))",
+            "w = knee (high - low); y = u from low + w to high - w; beyond, y = k + (L - k) tanh((u - k) / (L - k)), L = low or high, k = L +- w",
         ],
         "drift" => &[
-            "y = u + per_second t + settling (1 - exp(-(t - since_s) / seconds)) from since_s on, t the lab's clock; seconds 0: none",
+            "y = u + per_second t + settling (1 - exp(-(t - since_s) / seconds)) from since_s on, t the time; seconds 0: no settling",
         ],
         "interference" => &[
-            "y = u + amplitude sin(2 pi hz t + phase) + sum of a_k sin(2 pi k hz t) + b_k cos(2 pi k hz t), k = 2 to 5, t the lab's clock",
+            "y = u + amplitude sin(2 pi hz t + phase) + sum of a_k sin(2 pi k hz t) + b_k cos(2 pi k hz t), k = 2 to 5, t the time",
             "harmonics: a_2, b_2, a_3, b_3, a_4, b_4, a_5, b_5",
         ],
         _ => &[],
@@ -95,11 +95,11 @@ mod tests {
     use crate::model::Kind;
 
     #[test]
-    fn every_kind_and_the_triangle_are_described() {
+    fn every_kind_is_described_and_the_layout_of_the_triangle_is_right() {
         for kind in Kind::ALL {
             assert!(!of_stage(kind.name()).is_empty(), "{kind}");
         }
-        // The place that the words give.
+        // The place that the comment states.
         assert_eq!(hyst_core::preisach_cell(5, 3), 5 * (5 + 1) / 2 + 3);
     }
 }

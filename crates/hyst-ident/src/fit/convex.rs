@@ -1,10 +1,10 @@
-//! Fits that are one convex problem: weights over plays or cells.
+//! Convex fits: weights of play operators or of Preisach cells.
 
 use super::{
-    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_EACH, basis_for, check, fit_settled, solved, to_model,
-    with_errors,
+    BLOCKS, BasisOf, Fit, FitError, FitOptions, ROWS, ROWS_PER_UNKNOWN, basis_for, check, fit_settled, solved,
+    to_model, with_errors,
 };
-use crate::base::{Drag, SlidingPlays};
+use crate::base::{Drag, PlaysWithSlopes};
 use crate::identify::{Estimate, Noise, TableEstimate, TableOf, convex, parameters_of};
 use crate::lsq::{Blocks, Gram, Share};
 use crate::model::{Base, Kind, Model, ZERO};
@@ -12,20 +12,20 @@ use crate::nested::Fitted;
 use crate::record::Record;
 use crate::samples::Samples;
 
-/// Rows below which no model of this version can be fitted, whatever they show.
-const FEWEST: usize = 45;
-/// How it is done, in words.
-const HOW: &str = "convex: weights that are not negative, one optimum";
+/// Minimum number of rows for any model.
+const MIN_ROWS: usize = 45;
+/// Description of the fit.
+const DESCRIPTION: &str = "convex: non-negative weights, one optimum";
 
-/// Non-negative weights over plays or cells.
+/// Fits non-negative weights of play operators or cells.
 pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<Fit, FitError> {
     let mut samples = Samples::from_record(record);
     let name = || record.name();
-    let enough = |rows: usize, unknowns: usize| match ROWS_EACH * unknowns {
+    let enough = |rows: usize, unknowns: usize| match ROWS_PER_UNKNOWN * unknowns {
         needed if rows < needed => Err(FitError::TooShort { record: name(), rows, unknowns, needed }),
         _ => Ok(()),
     };
-    enough(samples.len(), FEWEST / ROWS_EACH)?;
+    enough(samples.len(), MIN_ROWS / ROWS_PER_UNKNOWN)?;
     check(record, &samples, false)?;
     let basis = basis_for(kind, &samples)?;
     enough(samples.len(), basis.len())?;
@@ -34,7 +34,7 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
     enough(settled, basis.len())?;
     let BasisOf::Pi(even) = &basis else {
         let model = to_model(record, &samples, &basis, &fitted, options.seed);
-        return Ok(Fit { tables: vec![cells(&fitted, &samples, &left)], ..Fit::at_once(model, HOW) });
+        return Ok(Fit { tables: vec![cells(&fitted, &samples, &left)], ..Fit::at_once(model, DESCRIPTION) });
     };
     let Some(chosen) = even.chosen(&samples, &Drag::NONE, &|_| {}, options.thresholds) else {
         if options.thresholds.is_some() {
@@ -42,20 +42,20 @@ pub(super) fn fit(record: &Record, kind: Kind, options: &FitOptions) -> Result<F
         }
         let model = to_model(record, &samples, &basis, &fitted, options.seed);
         let estimate = plays(&model.base, &fitted, &fitted, &samples, &left);
-        return Ok(with_estimate(model, estimate, HOW));
+        return Ok(with_estimate(model, estimate, DESCRIPTION));
     };
     let count = chosen.thresholds.len();
     enough(settled, 2 * (1 + count))?;
     let (fitted, left) = solved(&samples, &chosen, options.zero_per_record, &name)?;
-    let sliding = SlidingPlays { plays: &chosen, weights: &fitted.weights };
+    let sliding = PlaysWithSlopes { plays: &chosen, weights: &fitted.weights };
     let slopes = solved(&samples, &sliding, options.zero_per_record, &name)?.0;
     let model = to_model(record, &samples, &BasisOf::Pi(chosen.clone()), &fitted, options.seed);
     let estimate = plays(&model.base, &fitted, &slopes, &samples, &left);
     let why = match options.thresholds {
         Some(most) => format!("{most} at most"),
-        None => "clearly better than even ones on parts left out".into(),
+        None => "clearly better than even ones on left-out parts".into(),
     };
-    Ok(with_estimate(model, estimate, &format!("{HOW}; {count} thresholds chosen by the record ({why})")))
+    Ok(with_estimate(model, estimate, &format!("{DESCRIPTION}; {count} thresholds chosen by the record ({why})")))
 }
 
 fn with_estimate(model: Model, estimate: Estimate, how: &str) -> Fit {
@@ -63,13 +63,13 @@ fn with_estimate(model: Model, estimate: Estimate, how: &str) -> Fit {
     Fit { estimate: Some(estimate), ..Fit::at_once(model, how) }
 }
 
-/// Standard errors of the weights of a Prandtl-Ishlinskii operator and of the sensor's zeros, and of its thresholds where
-/// `columns`, at the same optimum, has their slopes too.
+/// Returns the standard errors of the weights of a Prandtl-Ishlinskii operator and of the sensor's zeros. Includes the
+/// thresholds if `columns`, at the same optimum, has their derivatives.
 fn plays(base: &Base, fitted: &Fitted, columns: &Fitted, samples: &Samples, left: &[f64]) -> Estimate {
     let (thresholds, mut parameters): (Vec<_>, Vec<_>) =
         parameters_of(base).into_iter().partition(|(name, _)| name.starts_with("thresholds"));
     let (low, high) = samples.input_range();
-    // Weights are parts of one curve; thresholds have their places along it.
+    // Weights are parts of one curve, so their scale is the sum; the scale of thresholds is half of their spacing.
     let whole = parameters.iter().map(|(_, weight)| weight).sum();
     let mut scales = vec![whole; parameters.len()];
     if columns.weights.len() > parameters.len() {
@@ -84,14 +84,14 @@ fn plays(base: &Base, fitted: &Fitted, columns: &Fitted, samples: &Samples, left
     convex::estimate(parameters, &scales, &total, &free, &noise(samples, left))
 }
 
-/// What the record says of each cell of a Preisach triangle.
+/// Returns what the record says about each cell of a Preisach triangle.
 pub(crate) fn cells(fitted: &Fitted, samples: &Samples, left: &[f64]) -> TableEstimate {
     let weights = &fitted.weights;
     let mean = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
     TableEstimate::of(TableOf::Cells, weights, mean, &total(fitted), &fitted.bounds, &noise(samples, left))
 }
 
-/// What is left in the rows that a fit used.
+/// Returns the noise estimated from the residual in the rows that a fit used.
 fn noise(samples: &Samples, left: &[f64]) -> Noise {
     Noise::of(left, &Blocks::new(samples, BLOCKS, ROWS).used_of_segments(samples))
 }
@@ -110,13 +110,13 @@ mod tests {
     use crate::base::play_column;
     use crate::record::{Columns, OutputUnit};
 
-    /// A sine whose amplitude rises from 0 and falls again, ± 50 V.
+    /// A sine with an amplitude that rises from 0 and falls again, ± 50 V.
     fn drive() -> Vec<f64> {
         (0..3000).map(|k| f64::from(k) / 3000.0).map(|x| 50.0 * (3.0 * x).sin() * (88.0 * x).sin()).collect()
     }
 
-    /// A record of plays with the sensor's zero at 2.5 µm and noise of `sigma` that is an autoregression: each row has the share
-    /// `remembered` of the one before.
+    /// A record of play operators with the sensor's zero at 2.5 µm and autoregressive noise of standard deviation
+    /// `sigma`, with the coefficient `remembered`.
     fn record(plays: &PiParams<Vec<f64>>, u: Vec<f64>, sigma: f64, remembered: f64, seed: u64) -> Record {
         let rows = u.len();
         let mut y: Vec<f64> = u.iter().map(|u| 2.5 + plays.gain * u).collect();
@@ -140,7 +140,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Plays where the fit puts its own.
+    /// Play operators with the thresholds of the fit.
     fn plays() -> PiParams<Vec<f64>> {
         let thresholds = (1..=15).map(|i| 50.0 * f64::from(i) / 16.0).collect();
         PiParams { gain: 0.1, thresholds, weights: (0..15).map(|i| 0.02 - 0.001 * f64::from(i)).collect() }
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn standard_errors_are_the_scatter_of_repeated_records() {
+    fn standard_errors_equal_the_scatter_over_repeated_records() {
         let truth = plays();
         let expected: Vec<f64> = [&[truth.gain], &truth.weights[..], &[2.5]].concat();
         for remembered in [0.0, 0.5] {
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn chosen_thresholds_scatter_as_stated_too() {
+    fn standard_errors_of_chosen_thresholds_equal_their_scatter() {
         let truth = PiParams { gain: 0.1, thresholds: vec![3.3, 11.7, 37.2], weights: vec![0.03, 0.05, 0.02] };
         let expected: Vec<f64> = [&[truth.gain], &truth.weights[..], &truth.thresholds[..], &[2.5]].concat();
         let (mut squares, mut stated) = (vec![0.0; expected.len()], vec![0.0; expected.len()]);
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn thresholds_are_chosen_for_the_convex_fit_of_pi_alone() {
+    fn a_number_of_thresholds_is_refused_except_for_the_convex_fit_of_pi() {
         let record = record(&plays(), drive(), 0.02, 0.0, 1);
         let refused = |kind, thresholds, optimizer: &str| {
             let optimizer = optimizer.parse().unwrap();
@@ -207,8 +207,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_at_a_bound_is_held_there() {
-        // Every second play is missing: noise draws its weight to either side of zero, where it must not go.
+    fn weights_at_a_bound_are_held_and_have_no_error() {
+        // Every second play operator is missing: noise moves its weight to either side of zero, but negative weights
+        // are not allowed.
         let mut sparse = plays();
         sparse.weights.iter_mut().skip(1).step_by(2).for_each(|w| *w = 0.0);
         let found = fitted(&record(&sparse, drive(), 0.02, 0.0, 1));
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_loop_in_noise_does_not_tell_is_named() {
+    fn undetermined_parameters_of_a_noisy_loop_are_named() {
         let one_loop = (0..200).map(|k| 50.0 * (0.1 * f64::from(k)).sin()).collect();
         let found = fitted(&record(&plays(), one_loop, 4.0, 0.0, 1));
         let undetermined = found.estimate.unwrap().undetermined().len();
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_counted_by_what_the_record_says_of_them() {
+    fn cells_are_counted_by_how_well_they_are_determined() {
         let record = record(&plays(), drive(), 0.02, 0.0, 1);
         let found = fit(&record, Kind::Preisach, &FitOptions::default()).unwrap();
         assert!(found.estimate.is_none());
@@ -239,7 +240,7 @@ mod tests {
         let errors: Vec<f64> = table.std_errors.iter().flatten().copied().collect();
         assert_eq!(errors.len() + table.held + table.untouched, 300);
         assert_eq!(errors.iter().filter(|e| **e < 0.5 * table.mean).count(), table.determined);
-        // 3000 rows do not tell 300 cells, but they tell some.
+        // 3000 rows determine some of the 300 cells, but not all.
         assert!(table.determined > 10 && table.vague() > 10, "{table:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a fit may be told.
+//! Options of a fit.
 
 use std::str::FromStr;
 
@@ -8,21 +8,21 @@ use crate::model::Kind;
 use crate::model::capacity::PLAYS;
 use crate::optimize::{Method, MethodError};
 
-/// How a fit goes about it.
+/// Optimizer of a fit.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Optimizer {
-    /// What suits the model: convex where it is linear in its weights, else adaptive differential evolution over what it is not
-    /// linear in.
+    /// Chosen by the model: convex if it is linear in its weights, otherwise adaptive differential evolution over the
+    /// nonlinear parameters.
     #[default]
     Auto,
-    /// One convex problem.
+    /// A single convex problem.
     Convex,
-    /// A search, by its [`name`](Method::named).
+    /// A search, by [`name`](Method::named).
     Search(String),
 }
 
 impl Optimizer {
-    /// Names of all.
+    /// Returns the names of all optimizers.
     pub fn names() -> Vec<&'static str> {
         ["auto", "convex"].into_iter().chain(Method::NAMES).collect()
     }
@@ -43,10 +43,10 @@ impl FromStr for Optimizer {
     }
 }
 
-/// Kinds whose fit is one convex problem, unless a search is asked for.
+/// Kinds whose fit is a single convex problem unless a search is requested.
 const CONVEX: [Kind; 3] = [Kind::Pi, Kind::Preisach, Kind::Dpm];
 
-/// Bounds of one searched variable, instead of those that the record suggests.
+/// Bounds of one searched variable, instead of those suggested by the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VariableBounds {
     /// The variable.
@@ -57,41 +57,41 @@ pub struct VariableBounds {
     pub upper: f64,
 }
 
-/// What a fit may be told.
+/// Options of a fit.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    /// Seed of what is drawn at random; kept with the model.
+    /// Seed of the random numbers; stored with the model.
     pub seed: u64,
     /// One sensor zero for each file instead of one for all.
     pub zero_per_record: bool,
-    /// How to go about it.
+    /// Optimizer.
     pub optimizer: Optimizer,
-    /// How often a search is repeated, with other draws; the best is taken.
+    /// Number of repetitions of a search with other random numbers; the best result is used.
     pub trials: usize,
-    /// Most evaluations of a trial; `None` for 1500 a variable, 200 with a Bouc-Wen oscillator.
+    /// Maximum number of evaluations of a trial; `None` for 1500 per variable (200 for a Bouc-Wen oscillator).
     pub evaluations: Option<u64>,
-    /// Members, particles or wolves; `None` for the search's own.
+    /// Population size (members, particles or wolves); `None` for the default of the search.
     pub population: Option<usize>,
-    /// Bounds instead of those that the record suggests.
+    /// Bounds instead of those suggested by the record.
     pub bounds: Vec<VariableBounds>,
     /// Form of a model that has more than one.
     pub form: Form,
-    /// Most thresholds of the convex fit of `pi`, chosen by the record; `None` for even ones, unless some that are no more predict parts
-    /// of the record clearly better.
+    /// Maximum number of thresholds of the convex fit of `pi`, chosen by the record. `None` for even thresholds, unless
+    /// no more chosen ones predict parts of the record clearly better.
     pub thresholds: Option<usize>,
 }
 
 impl FitOptions {
-    /// Whether weights are to be solved for without a search, where that is possible.
+    /// Returns whether weights are solved for without a search, if the model allows that.
     pub fn convex(&self) -> bool {
         matches!(self.optimizer, Optimizer::Auto | Optimizer::Convex)
     }
 
-    /// Whether a model of this kind can be fitted with these options.
+    /// Checks whether a model of this kind can be fitted with these options.
     ///
     /// # Errors
-    /// [`FitError::Thresholds`] if there are no thresholds to choose, [`FitError::UnknownBounds`] if there are bounds where nothing is
-    /// searched, [`FitError::Elements`] if a model cannot have that many.
+    /// [`FitError::Thresholds`] if the model has no selectable thresholds, [`FitError::UnknownBounds`] if there are
+    /// bounds but nothing is searched, [`FitError::Elements`] if the number of elements is out of range.
     pub fn suits(&self, kind: Kind) -> Result<(), FitError> {
         if let Some(elements) = self.form.elements.filter(|n| !(1..=PLAYS).contains(n)) {
             return Err(FitError::Elements { elements, most: PLAYS });
@@ -104,7 +104,7 @@ impl FitOptions {
             None => return Ok(()),
             Some(1..=PLAYS) if kind == Kind::Pi && self.convex() => return Ok(()),
             Some(_) if kind == Kind::Pi && self.convex() => "give 1 to 64",
-            Some(_) => "other models, and a search, take a number of elements",
+            Some(_) => "for other models and for a search, give a number of elements",
         };
         Err(FitError::Thresholds { kind: kind.name(), advice })
     }

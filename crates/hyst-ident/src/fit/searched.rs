@@ -4,19 +4,22 @@ use std::ops::ControlFlow;
 
 use hyst_core::Kind;
 
-use super::{Fit, FitError, FitOptions, Optimizer, ROWS_EACH, check, model_of, with_errors};
+use super::{Fit, FitError, FitOptions, Optimizer, ROWS_PER_UNKNOWN, check, model_of, with_errors};
 use crate::BetweenSamples;
-use crate::identify::{Beside, Ended, Family, Form, Identification, Located, SearchOptions, family_of, largest_input};
+use crate::identify::{
+    Ended, Family, Form, Identification, Located, OtherParameter, SearchOptions, family_of, largest_input,
+};
 use crate::model::ZERO;
 use crate::optimize::{Method, Progress, SearchError};
 use crate::record::Record;
 use crate::samples::Samples;
 use crate::settle::start_up_rows;
 
-/// Most rows that a global search looks at.
-const SEARCHED: usize = 12_000;
-/// Share of what a linear drive leaves that a band-limited one has to stay below: what makes no difference is linear.
-const LESS: f64 = 0.99;
+/// Maximum number of rows of a global search.
+const MAX_SEARCH_ROWS: usize = 12_000;
+/// Maximum ratio of the residual with a band-limited drive to that with a linear one, at which the band-limited one is
+/// used.
+const MAX_RESIDUAL_RATIO: f64 = 0.99;
 
 pub(super) fn fit(
     record: &Record,
@@ -26,7 +29,7 @@ pub(super) fn fit(
 ) -> Result<Fit, FitError> {
     let mut samples = Samples::from_record(record);
     check(record, &samples, false)?;
-    // The operators rise: one that falls is fitted to the output with the other sign, which the model turns back.
+    // The operators increase. For a decreasing output they are fitted to its negative, and the model inverts the sign.
     samples.falls &= super::sign_matters(kind);
     if samples.falls {
         samples.output.iter_mut().for_each(|y| *y = -*y);
@@ -35,13 +38,13 @@ pub(super) fn fit(
         return Err(FitError::Missing {
             record: record.name(),
             column: "temperature_degc".into(),
-            advice: format!("{} is a model of it", kind.name()),
+            advice: format!("{} models the temperature dependence", kind.name()),
         });
     }
     let name = record.name();
     let setup = Setup { kind, options, name: &name, largest: largest_input(&samples) };
     let Searched { best, left, how } = setup.search(&samples, watch)?;
-    // What is still ringing or remembers what was before the record says nothing about the model.
+    // Rows that still ring, or that depend on the memory from before the record, do not count.
     samples.settling = best.settling;
     let (mut found, given) = {
         let family = setup.family(&samples, best.between)?;
@@ -63,7 +66,7 @@ pub(super) fn fit(
     Ok(Fit { estimate: Some(found.estimate), trials, evaluations, between_samples: left, ..fit })
 }
 
-/// Says where a searched variable has ended, and what to do about it if the model allows more.
+/// Describes a searched variable that ended at a bound, with the option that widens it if the model allows more.
 fn at_bound(Ended { name, bound, beyond }: &Ended) -> String {
     let more = if *beyond { format!("; widen it with --bounds {name}=LOW..HIGH") } else { String::new() };
     format!("{name} ended at its bound {bound}{more}")
@@ -73,7 +76,7 @@ fn kind_needs_temperature(kind: Kind) -> bool {
     matches!(kind, Kind::TdPi | Kind::TdEm)
 }
 
-/// A fit to all rows with one way of the drive between them.
+/// A fit to all rows with one interpolation of the drive between samples.
 struct Tried {
     between: BetweenSamples,
     located: Located,
@@ -87,7 +90,8 @@ impl Tried {
         Self { between, settling: start_up_rows(identification.samples, &residual), residual, located }
     }
 
-    /// The other one, if that leaves less; and what each leaves \[y\], over the rows that are a start-up for neither.
+    /// Chooses the other fit if its residual is smaller. Returns the residual of each too \[y\], over the rows that are
+    /// start-up for neither.
     fn or(self, other: Self) -> (Self, Vec<(BetweenSamples, f64)>) {
         let counts = |k: &usize| !self.settling[*k] && !other.settling[*k];
         let rmse = |t: &Self| {
@@ -96,31 +100,31 @@ impl Tried {
         };
         let (own, others) = (rmse(&self), rmse(&other));
         let left = vec![(self.between, own), (other.between, others)];
-        (if others < LESS * own { other } else { self }, left)
+        (if others < MAX_RESIDUAL_RATIO * own { other } else { self }, left)
     }
 }
 
 /// The best fit to all rows.
 struct Searched {
     best: Tried,
-    /// What each way leaves, if several were tried.
+    /// Residual of each interpolation, if several were tried.
     left: Vec<(BetweenSamples, f64)>,
-    /// In words, how it was found.
+    /// Description of the search.
     how: String,
 }
 
-/// What is to be fitted, and how.
+/// What to fit, and with which options.
 struct Setup<'a> {
     kind: Kind,
     options: &'a FitOptions,
-    /// What errors call the record.
+    /// Name of the record in errors.
     name: &'a str,
     /// Largest |input| of the record.
     largest: f64,
 }
 
 impl<'a> Setup<'a> {
-    /// How the drive may go on between samples.
+    /// Returns the interpolation of the drive between samples, and a second one to try.
     fn ways(&self) -> (BetweenSamples, Option<BetweenSamples>) {
         match (self.kind, self.options.form.between_samples) {
             (Kind::BoucWenOscillator, None) => (BetweenSamples::Linear, Some(BetweenSamples::BandLimited)),
@@ -128,7 +132,7 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// The family over these rows, with the caller's bounds.
+    /// Returns the family over these rows, with the caller's bounds.
     fn family<'s>(&self, samples: &'s Samples, between: BetweenSamples) -> Result<Bounded<'s>, FitError>
     where
         'a: 's,
@@ -140,7 +144,7 @@ impl<'a> Setup<'a> {
         let family = Bounded { family: family_of(kind, samples, largest, &form).ok_or_else(linear)?, options };
         let variables = family.variables();
         let unknowns = variables.len() + family.linear().len() + 1;
-        let (settled, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_EACH * unknowns);
+        let (settled, needed) = (samples.settling.iter().filter(|s| !**s).count(), ROWS_PER_UNKNOWN * unknowns);
         if settled < needed {
             return Err(FitError::TooShort { record: self.name.into(), rows: settled, unknowns, needed });
         }
@@ -154,14 +158,15 @@ impl<'a> Setup<'a> {
         Ok(family)
     }
 
-    /// The rows that a global search looks at, if they are not all: the valley shows in a part of the record.
+    /// Returns the rows of a global search, if not all are used: a part of the record suffices to find the optimum
+    /// roughly.
     fn beginnings(&self, samples: &Samples) -> Option<Samples> {
-        // An oscillator is an equation of motion in many substeps, and periods of it are short.
-        let most = if self.kind == Kind::BoucWenOscillator { SEARCHED / 6 } else { SEARCHED };
+        // An oscillator is integrated in many substeps, and its periods are short.
+        let most = if self.kind == Kind::BoucWenOscillator { MAX_SEARCH_ROWS / 6 } else { MAX_SEARCH_ROWS };
         (samples.len() > most).then(|| samples.beginnings(most))
     }
 
-    /// A search over all rows, and every way of the drive between them from where it has ended.
+    /// Searches over all rows, then tries every interpolation of the drive from the result.
     fn search(
         &self,
         samples: &Samples,
@@ -188,10 +193,10 @@ impl<'a> Setup<'a> {
         Ok(Searched { best, left, how })
     }
 
-    /// The search of a family's variables, and in words what it is and why it.
+    /// Returns the search over a family's variables, and its description.
     fn search_of(&self, family: &dyn Family) -> Result<(SearchOptions, String), FitError> {
         let Self { options, kind, .. } = *self;
-        // From anywhere near, Levenberg-Marquardt finds an oscillator: its output is smooth in all variables.
+        // Levenberg-Marquardt finds an oscillator from a nearby start, because its output is smooth in all variables.
         let each = if kind == Kind::BoucWenOscillator { 200 } else { 1500 };
         let variables = family.variables().len();
         let (method, how) = self.method(variables, family.linear().len())?;
@@ -283,8 +288,8 @@ impl Family for Bounded<'_> {
         self.family.identified(name)
     }
 
-    fn beside(&self, name: &str) -> Beside {
-        self.family.beside(name)
+    fn other_parameter(&self, name: &str) -> OtherParameter {
+        self.family.other_parameter(name)
     }
 
     fn in_order(&self, values: &mut [f64]) {

@@ -1,8 +1,9 @@
-//! Where a record calls for elements: thresholds of plays, widths of slipping elements.
+//! Elements chosen by the record: thresholds of play operators, widths of slipping elements.
 //!
-//! Weights that are not negative over many even candidates are sparse, so one convex problem shows about where elements are. Then
-//! those two neighbours are merged whose merging costs least, until there are few enough, and the rest slides to where it fits
-//! best: Gauss-Newton in places and weights together, as in the sliding Frank-Wolfe algorithm (Denoyelle et al. 2019).
+//! Non-negative weights over many even candidates are sparse, so one convex problem shows roughly where the elements
+//! are. Then the two neighbours whose merging costs least are merged until there are few enough. Finally the elements
+//! slide to the best fit: Gauss-Newton in places and weights together, as in the sliding Frank-Wolfe algorithm
+//! (Denoyelle et al. 2019).
 
 use std::ops::Range;
 
@@ -10,64 +11,65 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::Samples;
-use crate::base::BESIDE;
+use crate::base::SIDE_BY_SIDE;
 use crate::lsq::{Blocks, Bounds, Gram, solve};
 use crate::nested::folds_interleaved;
 
-/// Share of the largest element's motion below which an element is no candidate.
-const STANDS_STILL: f64 = 0.02;
-/// Candidates over the range in which elements can be told apart.
+/// Minimum motion of a candidate, as a share of the largest one.
+const MIN_MOTION_SHARE: f64 = 0.02;
+/// Number of candidates over the range in which elements can be separated.
 pub(crate) const CANDIDATES: usize = 64;
-/// Rows that a choice looks at; the last slide sees more.
+/// Maximum number of rows of a choice; the last slide uses more.
 pub(crate) const ROWS: usize = 12_000;
-/// Pieces that a record is cut into, and folds that these are dealt to, for the error on parts left out.
+/// Number of pieces of a record, and number of folds, for the error on left-out parts.
 const BLOCKS: usize = 64;
 const FOLDS: usize = 8;
-/// Weights below this share of their sum are none.
-const NOTHING: f64 = 1e-9;
-/// Share of the first candidate that a place is at least.
-const LEAST: f64 = 0.05;
+/// Weights below this share of their sum count as zero.
+const MIN_WEIGHT_SHARE: f64 = 1e-9;
+/// Minimum place, as a share of the first candidate.
+const MIN_PLACE_SHARE: f64 = 0.05;
 /// Step of the difference quotients along a place, as a share of the range.
 const STEP: f64 = 1e-6;
-/// Most steps of a slide, and the relative fall of the squares at which it ends.
-const SLIDES: usize = 12;
+/// Maximum number of steps of a slide, and the relative fall of the squares at which it ends.
+const MAX_SLIDES: usize = 12;
 const SETTLED: f64 = 1e-4;
-/// Places on a record's parts left out are clearly better than others if they leave this share of their RMS at most.
-const CLEARLY: f64 = 0.8;
-/// Fewer places are as good if they leave no more than this share of the RMS.
-const AS_GOOD: f64 = 1.01;
+/// Maximum ratio of the RMS on left-out parts to that of other places, at which places are clearly better.
+const MAX_RMS_RATIO: f64 = 0.8;
+/// Maximum ratio of the RMS at which fewer places are as good.
+const RMS_TOLERANCE: f64 = 1.01;
 
-/// Elements of one kind that differ in one number, their place: the threshold of a play, the width of a backlash or spring.
+/// Elements of one kind that differ in one number, their place: the threshold of a play operator, the width of a
+/// backlash or spring.
 pub(crate) struct Bank<'a> {
     samples: &'a Samples,
-    /// Outputs of elements at these places over all rows.
+    /// Outputs of elements at given places over all rows.
     elements: &'a Elements<'a>,
-    /// Columns that are there in any case, over the rows that count: those of the caller, then one zero for each file.
+    /// Columns of every model, over the rows that count: those of the caller, then one zero for each file.
     always: Vec<Vec<f64>>,
     bounds: Vec<Bounds>,
     candidates: Vec<f64>,
     rows: Vec<usize>,
-    /// Which of `rows` belong to each block.
+    /// Indices into `rows` of each block.
     blocks: Vec<Range<usize>>,
     folds: Vec<Vec<usize>>,
 }
 
-/// Outputs of elements at these places over all rows of a record.
+/// Outputs of elements at given places over all rows of a record.
 pub(crate) type Elements<'a> = dyn Fn(&[f64]) -> Vec<Vec<f64>> + Sync + 'a;
 
 /// Elements at their places.
 #[derive(Clone)]
 struct Placed {
     places: Vec<f64>,
-    /// Normal equations: what is always there, the elements, their slopes along the place, the output.
+    /// Normal equations: columns of every model, the elements, their derivatives with respect to the place, the output.
     gram: Gram,
     weights: Vec<f64>,
     squares: f64,
 }
 
 impl<'a> Bank<'a> {
-    /// A bank over at most about `rows` of the rows that count; `always` are columns over all rows that every such model has, with their bounds. Each file
-    /// has a zero of its own here: that takes nothing from a loop.
+    /// Builds a bank over about `rows` of the rows that count. `always` are columns over all rows that every such model
+    /// has, with their bounds. Each file has its own zero, which does not affect the loops.
     pub(crate) fn new(
         samples: &'a Samples,
         always: Vec<(Vec<f64>, Bounds)>,
@@ -93,28 +95,29 @@ impl<'a> Bank<'a> {
         bounds.resize(columns.len(), Bounds::FREE);
         let always = columns.iter().map(|c| rows.iter().map(|k| c[*k]).collect()).collect();
         let folds = folds_interleaved(&cut, FOLDS);
-        // One that hardly moves in the rows that count cannot be told from the sensor's zero.
+        // A candidate that hardly moves in the rows that count cannot be separated from the sensor's zero.
         let moves = |column: Vec<f64>| {
             let (low, high) = crate::samples::range(column.into_iter());
             high - low
         };
         let moves: Vec<f64> = over(&rows, elements, &candidates).into_par_iter().map(moves).collect();
-        let enough = STANDS_STILL * moves.iter().fold(0.0, |m: f64, x| m.max(*x));
+        let enough = MIN_MOTION_SHARE * moves.iter().fold(0.0, |m: f64, x| m.max(*x));
         let candidates =
             candidates.into_iter().zip(moves).filter(|(_, moves)| *moves > enough).map(|(c, _)| c).collect();
         Self { samples, elements, always, bounds, candidates, rows, blocks, folds }
     }
 
-    /// At most `most` places in rising order; fewer where the record calls for fewer. `None` if the equations cannot be solved.
+    /// Returns at most `most` places in increasing order, fewer if fewer suffice; `None` if the equations cannot be
+    /// solved.
     pub(crate) fn at_most(&self, most: usize) -> Option<Vec<f64>> {
         let (places, weights) = self.sparse()?;
         Some(self.fewer(places, weights, most)?.places)
     }
 
-    /// Places, no more than the `given` ones, that predict parts of the record which are left out clearly better than those do;
-    /// of such, the fewest that are as good. `None` if there are none.
+    /// Returns places that predict left-out parts of the record clearly better than the `given` ones and are no more;
+    /// among those, the fewest that are as good. Returns `None` if there are none.
     pub(crate) fn better_than(&self, given: &[f64]) -> Option<Vec<f64>> {
-        let enough = CLEARLY * CLEARLY * self.left_out(given)?;
+        let enough = MAX_RMS_RATIO * MAX_RMS_RATIO * self.left_out(given)?;
         let (places, weights) = self.sparse()?;
         let mut best = self.fewer(places, weights, given.len())?;
         let mut least = self.left_out(&best.places)?;
@@ -124,7 +127,7 @@ impl<'a> Bank<'a> {
         while best.places.len() > 1 {
             let fewer = self.fewer(best.places.clone(), best.weights.clone(), best.places.len() - 1)?;
             let squares = self.left_out(&fewer.places)?;
-            if squares > AS_GOOD * AS_GOOD * least {
+            if squares > RMS_TOLERANCE * RMS_TOLERANCE * least {
                 break;
             }
             (best, least) = (fewer, least.min(squares));
@@ -132,12 +135,12 @@ impl<'a> Bank<'a> {
         Some(best.places)
     }
 
-    /// Places that slid from given ones to where they fit best.
+    /// Returns the places after a slide from given ones to the best fit.
     pub(crate) fn from(&self, places: Vec<f64>) -> Option<Vec<f64>> {
         Some(self.slid(places)?.places)
     }
 
-    /// Squares that are left of parts of the record by weights that were fitted to the other parts.
+    /// Returns Σ residual² of left-out parts of the record, predicted with weights fitted to the other parts.
     fn left_out(&self, places: &[f64]) -> Option<f64> {
         let columns = self.columns(places);
         let of_fold =
@@ -151,12 +154,12 @@ impl<'a> Bank<'a> {
         grams.iter().map(error).sum()
     }
 
-    /// The candidates that have weight; two neighbours on the grid are one element between them.
+    /// Returns the candidates with a positive weight; two neighbours on the grid are merged into one element.
     fn sparse(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         let n = self.candidates.len();
         let z = self.solved(&self.gram_of(&self.columns(&self.candidates)), n)?;
         let weights = self.weights(&z, n);
-        let smallest = NOTHING * weights.iter().sum::<f64>();
+        let smallest = MIN_WEIGHT_SHARE * weights.iter().sum::<f64>();
         let (mut places, mut kept, mut i) = (Vec::new(), Vec::new(), 0);
         while i < n {
             let pair = if i + 1 < n && weights[i] > smallest && weights[i + 1] > smallest { 2 } else { 1 };
@@ -170,8 +173,8 @@ impl<'a> Bank<'a> {
         Some((places, kept))
     }
 
-    /// Takes elements away until at most `most` are left; then, as long as noise would pay for one with its place and weight
-    /// (Schwarz's criterion), further ones. What is left has slid.
+    /// Removes elements until at most `most` remain, and then further ones as long as the gain of an element with its
+    /// place and weight is within the noise (Schwarz's criterion). The remaining elements slide.
     fn fewer(&self, mut places: Vec<f64>, mut weights: Vec<f64>, most: usize) -> Option<Placed> {
         while places.len() > most {
             (places, weights) = self.one_less(&places, &weights)?;
@@ -188,7 +191,7 @@ impl<'a> Bank<'a> {
         Some(here)
     }
 
-    /// Places and weights without one element, merged with its neighbour or left out, whichever costs least.
+    /// Returns places and weights with one element merged with its neighbour or left out, whichever costs least.
     fn one_less(&self, places: &[f64], weights: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let n = places.len();
         let between: Vec<f64> = (1..n).map(|i| middle(&places[i - 1..=i], &weights[i - 1..=i]).0).collect();
@@ -208,10 +211,10 @@ impl<'a> Bank<'a> {
         Some((kept.iter().map(|i| all[*i]).collect(), weights))
     }
 
-    /// Slides elements to where they fit best; those that end without weight are left out.
+    /// Slides the elements to the best fit and drops those that end without weight.
     fn slid(&self, places: Vec<f64>) -> Option<Placed> {
         let mut here = self.at(places)?;
-        for _ in 0..SLIDES {
+        for _ in 0..MAX_SLIDES {
             let Some(step) = self.step(&here) else { break };
             let moved = |share: f64| {
                 let to: Vec<f64> = here.places.iter().zip(step.iter()).map(|(place, d)| place + share * d).collect();
@@ -225,7 +228,7 @@ impl<'a> Bank<'a> {
                 break;
             }
         }
-        let smallest = NOTHING * here.weights.iter().sum::<f64>();
+        let smallest = MIN_WEIGHT_SHARE * here.weights.iter().sum::<f64>();
         if here.weights.iter().all(|w| *w > smallest) {
             return Some(here);
         }
@@ -233,7 +236,8 @@ impl<'a> Bank<'a> {
         self.at(kept.map(|(place, _)| *place).collect())
     }
 
-    /// By how much each place should move: least squares in weights and moves, to half of the way to the next place at most.
+    /// Returns the step of each place: least squares in weights and steps, at most half of the distance to the next
+    /// place.
     fn step(&self, here: &Placed) -> Option<Vec<f64>> {
         let (m, n) = (self.always.len(), here.places.len());
         let mut gram = here.gram.clone();
@@ -254,10 +258,10 @@ impl<'a> Bank<'a> {
         Some(z.iter().skip(m + n).copied().collect())
     }
 
-    /// Places that an element can have: from almost nothing to the last candidate.
+    /// Returns the range of places: from a small value to the last candidate.
     fn limits(&self) -> (f64, f64) {
         let (first, last) = crate::samples::range(self.candidates.iter().copied());
-        (LEAST * first, last)
+        (MIN_PLACE_SHARE * first, last)
     }
 
     fn at(&self, places: Vec<f64>) -> Option<Placed> {
@@ -277,7 +281,7 @@ impl<'a> Bank<'a> {
         Some(Placed { weights: self.weights(&z, n), squares: own.error(&z), places, gram })
     }
 
-    /// Outputs of elements over the rows that count.
+    /// Returns the outputs of elements over the rows that count.
     fn columns(&self, places: &[f64]) -> Vec<Vec<f64>> {
         over(&self.rows, self.elements, places)
     }
@@ -286,7 +290,7 @@ impl<'a> Bank<'a> {
         self.gram(columns, (0..self.rows.len()).collect())
     }
 
-    /// Normal equations over some of the rows that count.
+    /// Returns the normal equations over some of the rows that count.
     fn gram(&self, columns: &[Vec<f64>], rows: Vec<usize>) -> Gram {
         let m = self.always.len();
         let x = DMatrix::from_fn(rows.len(), m + columns.len() + 1, |r, c| {
@@ -297,7 +301,7 @@ impl<'a> Bank<'a> {
         Gram::of(&x)
     }
 
-    /// The normal equations with these of its elements only.
+    /// Returns the normal equations with only these elements.
     fn only(&self, gram: &Gram, elements: &[usize]) -> Gram {
         let m = self.always.len();
         let kept: Vec<usize> =
@@ -316,15 +320,15 @@ impl<'a> Bank<'a> {
     }
 }
 
-/// Outputs of elements at these places over some rows.
+/// Returns the outputs of elements at given places over some rows.
 fn over(rows: &[usize], elements: &Elements<'_>, places: &[f64]) -> Vec<Vec<f64>> {
     let thinned = |column: Vec<f64>| rows.iter().map(|k| column[*k]).collect();
     let some = |places: &[f64]| elements(places).into_iter().map(thinned).collect::<Vec<Vec<f64>>>();
-    let all: Vec<_> = places.par_chunks(BESIDE).map(some).collect();
+    let all: Vec<_> = places.par_chunks(SIDE_BY_SIDE).map(some).collect();
     all.into_iter().flatten().collect()
 }
 
-/// The weighted mean place of neighbours, and their weight together.
+/// Returns the weighted mean place of neighbours, and the sum of their weights.
 fn middle(places: &[f64], weights: &[f64]) -> (f64, f64) {
     let weight: f64 = weights.iter().sum();
     let moment: f64 = places.iter().zip(weights).map(|(p, w)| p * w).sum();
@@ -339,7 +343,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Plays of ± 50 V with these thresholds and weights beside a part without hysteresis, and noise of `sigma`.
+    /// Play operators of ± 50 V with these thresholds and weights in addition to a part without hysteresis, and noise
+    /// with standard deviation `sigma`.
     fn samples(plays: &[(f64, f64)], sigma: f64) -> Samples {
         let rows = 4000;
         let input: Vec<f64> =
@@ -355,7 +360,7 @@ mod tests {
         Samples::of_columns(1e-3, input, output)
     }
 
-    /// What `ask` gets of a bank of plays.
+    /// Calls `ask` with a bank of play operators.
     fn asked<T>(samples: &Samples, ask: impl Fn(&Bank<'_>) -> T) -> T {
         let element = |r: &[f64]| -> Vec<Vec<f64>> {
             r.iter().map(|r| play_column(&samples.input, &samples.segments, *r)).collect()
@@ -369,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn few_plays_between_candidates_are_found_where_they_are() {
+    fn few_play_operators_between_candidates_are_located() {
         let truth = [(3.3, 0.03), (11.7, 0.05), (38.2, 0.02)];
         let samples = samples(&truth, 0.01);
         for found in
@@ -396,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_that_the_record_does_not_tell_apart_are_one() {
+    fn elements_that_the_record_cannot_separate_are_merged() {
         // All candidates from 20 V on give the same output.
         let samples = samples(&[(20.0, 0.05)], 0.01);
         let element = |r: &[f64]| -> Vec<Vec<f64>> {

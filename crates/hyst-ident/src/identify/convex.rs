@@ -1,16 +1,16 @@
-//! What the normal equations of a convex fit say about its unknowns.
+//! Standard errors of a convex fit from its normal equations.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::uncertainty::{Estimate, Evidence, Noise, VAGUE};
+use super::uncertainty::{Estimate, Evidence, MAX_RELATIVE_ERROR, Noise};
 use crate::lsq::{Bounds, Gram, held};
 use crate::model::ZERO;
 
-/// A column with less than this share of the mean square of all is touched by no row.
+/// Mean square of a column, relative to that of all columns, below which no row determines it.
 const UNTOUCHED: f64 = 1e-6;
 
-/// What a table's elements are.
+/// Kind of a table's elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TableOf {
@@ -20,28 +20,29 @@ pub enum TableOf {
     Nodes,
 }
 
-/// How much of a table of many weights a record determines by itself. The fit gives the others the values of their neighbours.
+/// How much of a table of weights the record determines. The fit gives undetermined elements the values of their
+/// neighbours.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TableEstimate {
-    /// What its elements are.
+    /// Kind of the elements.
     pub of: TableOf,
-    /// How many there are.
+    /// Number of elements.
     pub elements: usize,
-    /// Those whose standard error is below half of the mean element.
+    /// Number of elements with a standard error below half of the mean element.
     pub determined: usize,
-    /// Those at a bound: they are held there, and have no error.
+    /// Number of elements held at a bound; they have no standard error.
     pub held: usize,
-    /// Those that no row touches.
+    /// Number of elements that no row depends on.
     pub untouched: usize,
     /// Mean of all elements \[their unit\].
     pub mean: f64,
-    /// Standard error of each, in the order of the model's file; `None` of one that is held or that no row touches.
+    /// Standard error of each element, in the order of the model's file; `None` if it is held or no row depends on it.
     pub std_errors: Vec<Option<f64>>,
 }
 
 impl TableEstimate {
-    /// Of the first unknowns of a fit, `elements`, whose bounds are `bounds`; the unknowns behind them are zeros of the sensor.
-    /// `mean` is the mean element where the unknowns are not the elements themselves but what they are above one.
+    /// Estimates the table of the first unknowns of a fit, `elements`, with bounds `bounds`; the other unknowns are the
+    /// sensor's zeros. `mean` is the mean element, also if the unknowns are differences between elements and a minimum.
     pub(crate) fn of(of: TableOf, elements: &[f64], mean: f64, total: &Gram, bounds: &[Bounds], noise: &Noise) -> Self {
         let (n, unknowns) = (elements.len(), total.unknowns());
         let untouched = untouched(total, n);
@@ -57,7 +58,7 @@ impl TableEstimate {
         Self {
             of,
             elements: n,
-            determined: std_errors.iter().flatten().filter(|e| **e < VAGUE * mean).count(),
+            determined: std_errors.iter().flatten().filter(|e| **e < MAX_RELATIVE_ERROR * mean).count(),
             held: std_errors.iter().filter(|e| e.is_none()).count() - untouched,
             untouched,
             mean,
@@ -65,27 +66,27 @@ impl TableEstimate {
         }
     }
 
-    /// Those that the record says something about, but too little to determine them.
+    /// Returns the number of elements that the record determines partly.
     pub fn vague(&self) -> usize {
         self.elements - self.determined - self.held - self.untouched
     }
 }
 
-/// Which of the first `n` columns no row touches.
+/// Returns which of the first `n` columns no row depends on.
 pub(crate) fn untouched(total: &Gram, n: usize) -> Vec<bool> {
     let level = (0..n).map(|i| total.matrix[(i, i)]).sum::<f64>() / n.max(1) as f64;
     (0..n).map(|i| total.matrix[(i, i)] <= UNTOUCHED * level).collect()
 }
 
-/// Unknowns that are not held at a bound. One that no row touches is not held: nothing has pushed it there.
+/// Returns the unknowns that are not held at a bound. An unknown that no row depends on is not held.
 pub(crate) fn free(values: &[f64], total: &Gram, bounds: &[Bounds]) -> Vec<usize> {
     let untouched = untouched(total, values.len());
     let held = held(values.iter(), bounds);
     (0..values.len()).filter(|i| untouched[*i] || !held[*i]).collect()
 }
 
-/// Standard errors of the `free` ones of `parameters`, the unknowns of `total`; the others are held. What the fit adds so that
-/// weights which the record hardly tells apart do not alternate is left out: these errors are what the record alone says.
+/// Returns the standard errors of the `free` ones of `parameters`, the unknowns of `total`; the others are held. The
+/// regularisation of the fit is left out, so the errors follow from the record alone.
 pub(crate) fn estimate(
     parameters: Vec<(String, f64)>,
     scales: &[f64],

@@ -1,4 +1,4 @@
-//! What a model has to say to be identified by search.
+//! The interface of a model for identification by search.
 
 use hyst_core::{Error, Sampling, Stage};
 use nalgebra::DMatrix;
@@ -9,7 +9,7 @@ use crate::model::Base;
 use crate::optimize::Variable;
 use crate::{BetweenSamples, Samples};
 
-/// A parameter that the output is linear in.
+/// A parameter in which the output is linear.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Linear {
     pub(crate) name: String,
@@ -26,48 +26,48 @@ impl Linear {
     }
 }
 
-/// A model whose output is `Σ lᵢ φᵢ(v)`: linear in some parameters l, and not in others v.
+/// A model with the output `Σ lᵢ φᵢ(v)`: linear in the parameters l, nonlinear in the variables v.
 pub(crate) trait Family: Sync {
-    /// The variables v, with bounds that suit the record; none if the model is linear in all.
+    /// Returns the variables v with bounds for the record; empty if the model is linear in all parameters.
     fn variables(&self) -> Vec<Variable>;
 
-    /// The parameters l.
+    /// Returns the parameters l.
     fn linear(&self) -> Vec<Linear>;
 
-    /// The columns φ over all rows at some values of v; memory is reset at the start of each segment.
+    /// Computes the columns φ over all rows for values of v; the memory is reset at the start of each segment.
     ///
     /// # Errors
-    /// If the values make no model.
+    /// If the values are no valid model.
     fn columns(&self, values: &[f64], columns: &mut DMatrix<f64>) -> Result<(), Error>;
 
-    /// The model with these parameters.
+    /// Returns the model with these parameters.
     fn base(&self, values: &[f64], linear: &[f64]) -> Base;
 
-    /// The size of a change of a parameter of the model that counts as a large one; `None` for the parameter's own size.
+    /// Returns the size of a large change of a parameter; `None` for its own value.
     fn scale(&self, _base: &Base, _name: &str) -> Option<f64> {
         None
     }
 
-    /// How the drive that the model sees goes on between samples.
+    /// Returns the interpolation of the model's drive between samples.
     fn between_samples(&self) -> BetweenSamples {
         BetweenSamples::Linear
     }
 
-    /// Whether a parameter of the model is told of, if it follows from what was searched or solved for.
+    /// Returns whether a parameter is reported, if it follows from the unknowns.
     fn identified(&self, _name: &str) -> bool {
         true
     }
 
-    /// Whether a parameter of the model that is neither searched nor solved for is unknown all the same.
-    fn beside(&self, _name: &str) -> Beside {
-        Beside::Nothing
+    /// Returns what a parameter is that is neither searched nor solved for.
+    fn other_parameter(&self, _name: &str) -> OtherParameter {
+        OtherParameter::Given
     }
 
-    /// Brings values into the order in which the model has them: where several variables stand for one another, a search ends with any
-    /// of their orders.
+    /// Sorts the values into the order of the model. If several variables are interchangeable, a search may end with
+    /// any order.
     fn in_order(&self, _values: &mut [f64]) {}
 
-    /// What else the model is made of, in words: parameters that are neither the record's nor the caller's.
+    /// Describes the parameters that come neither from the record nor from the caller.
     fn given(&self) -> Option<String> {
         None
     }
@@ -75,16 +75,18 @@ pub(crate) trait Family: Sync {
 
 /// What a parameter is that is neither searched nor solved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Beside {
-    /// Given, or a function of what was searched and solved for.
-    Nothing,
-    /// Chosen by the record before all else: it has an error like the others.
+pub(crate) enum OtherParameter {
+    /// Given, or a function of the unknowns.
+    Given,
+    /// Chosen by the record before the fit: it has a standard error like the others.
     Chosen,
-    /// A convention. With others it can be changed without a trace: its error is that of a number that nobody knows.
+    /// A convention. It can be changed together with others without an effect on the output, so its error is that of an
+    /// unknown number.
     Convention,
 }
 
-/// Output of the stage that `build` makes for a sample period over the rows, one segment after the other; the drive is linear between samples.
+/// Computes the output of the stage that `build` makes for a sample period, segment by segment; the drive is linear
+/// between samples.
 pub(crate) fn run<S: Stage<f64>>(
     samples: &Samples,
     build: impl Fn(&Sampling) -> Result<S, Error>,
@@ -95,7 +97,7 @@ pub(crate) fn run<S: Stage<f64>>(
     Ok(())
 }
 
-/// [`run`] into a column.
+/// Computes [`run`] into a column.
 pub(crate) fn run_into<S: Stage<f64>>(
     samples: &Samples,
     build: impl Fn(&Sampling) -> Result<S, Error>,
@@ -105,7 +107,7 @@ pub(crate) fn run_into<S: Stage<f64>>(
     run(samples, build, rows_of(columns, column))
 }
 
-/// A column's rows.
+/// Returns the rows of a column.
 pub(crate) fn rows_of(columns: &mut DMatrix<f64>, column: usize) -> &mut [f64] {
     let rows = columns.nrows();
     &mut columns.as_mut_slice()[column * rows..(column + 1) * rows]

@@ -1,18 +1,20 @@
-//! Identification of models by search: global, then local, then honest about what the record determines.
+//! Identification of models by search: a global search, a local refinement, and an estimate of what the record
+//! determines.
 //!
-//! A model's output is linear in most of its parameters. A family says in which: those are solved for at every
-//! trial of the others (variable projection, Golub & Pereyra 1973), and only the others are searched. So a Bouc-Wen model
-//! of five parameters is a search in three, an activation-function model one in a single variable.
+//! A model's output is linear in most of its parameters. A family declares which: those are solved for at every trial
+//! of the others (variable projection, Golub & Pereyra 1973), so only the others are searched. A Bouc-Wen model with
+//! five parameters becomes a search in three variables, an activation-function model a search in one.
 //!
-//! - `family.rs`: what a model has to say to be identified; `families/`: one file for each.
-//! - `projection.rs`: the linear parameters for trial values of the others, and the error that remains.
-//! - `polish.rs`: Levenberg-Marquardt on the projected residual, from where the global search ended.
-//! - `profile.rs`: how far a searched variable can go before the record objects.
-//! - `choice.rs`: where a record calls for plays or slipping elements.
-//! - `slopes.rs`: how the output changes with what was searched and solved for, and the file's parameters with it.
-//! - `convex.rs`: the same from the normal equations of a fit in which nothing is searched.
-//! - `uncertainty.rs`: standard errors and correlations at the optimum; parameters that the record cannot determine, by name.
-//! - `search.rs`: all of it in a row.
+//! - `family.rs`: the interface of a model for identification; `families/`: one file for each model.
+//! - `projection.rs`: the linear parameters for trial values of the others, and the remaining error.
+//! - `polish.rs`: Levenberg-Marquardt on the projected residual, from the result of the global search.
+//! - `profile.rs`: the interval of a searched variable that the record allows.
+//! - `choice.rs`: thresholds of play operators or widths of slipping elements, chosen by the record.
+//! - `slopes.rs`: derivatives of the output with respect to the unknowns, and from them the errors of the file's
+//!   parameters.
+//! - `convex.rs`: the same from the normal equations of a fit without a search.
+//! - `uncertainty.rs`: standard errors and correlations at the optimum, and the names of undetermined parameters.
+//! - `search.rs`: the whole sequence.
 
 pub(crate) mod choice;
 pub(crate) mod convex;
@@ -30,7 +32,7 @@ mod uncertainty;
 pub use convex::{TableEstimate, TableOf};
 pub use families::{Form, UnknownForm};
 pub(crate) use families::{family_of, largest_input};
-pub(crate) use family::{Beside, Family, Linear};
+pub(crate) use family::{Family, Linear, OtherParameter};
 pub(crate) use search::{Identification, Located, SearchOptions};
 pub(crate) use slopes::{Ended, parameters_of};
 pub(crate) use uncertainty::Noise;

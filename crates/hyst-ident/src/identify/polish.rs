@@ -7,25 +7,27 @@ use super::projection::{Projected, Projection};
 use crate::optimize::Space;
 
 /// Step of the difference quotients, as a share of the box.
-const STEP: f64 = 1e-4;
-/// Most iterations.
+const STEP_SHARE: f64 = 1e-4;
+/// Maximum number of iterations.
 const ITERATIONS: usize = 60;
-/// Relative fall of the sum of squares below which it has converged.
-pub(crate) const SETTLED: f64 = 1e-12;
+/// Relative fall of the sum of squares below which the iteration has converged.
+pub(crate) const CONVERGED_FALL: f64 = 1e-12;
 
-/// Where a local search ended.
+/// Result of a local search.
 #[derive(Clone, Debug)]
 pub(crate) struct Polished {
-    /// In the unit cube.
+    /// Position in the unit cube.
     pub(crate) point: Vec<f64>,
     pub(crate) projected: Projected,
-    /// Evaluations of the model.
+    /// Number of evaluations of the model.
     pub(crate) evaluations: u64,
 }
 
-/// Goes downhill from `point` (in the unit cube) until the sum of squares falls by no more than its `settled`th part: Levenberg-Marquardt with Marquardt's scaling
-/// on the residual after projection (Golub & Pereyra's functional, its derivative by central differences); variables at a
-/// side of the box stay there while they are pushed outwards. Never ends higher than it began.
+/// Minimises the sum of squares from `point` (in the unit cube) until it falls by at most the fraction `settled` in an
+/// iteration.
+/// Levenberg-Marquardt with Marquardt's scaling on the residual after projection (the functional of Golub & Pereyra,
+/// derivatives by central differences). A variable at a side of the box stays there while the gradient points outwards.
+/// The result is never worse than the start.
 pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64], settled: f64) -> Option<Polished> {
     let at = |x: &[f64]| projection.at(&space.values(x));
     let mut x = point.to_vec();
@@ -36,7 +38,7 @@ pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64], 
         let slopes = jacobian(&x, &now, &at);
         evaluations += 2 * x.len() as u64;
         let gradient = slopes.tr_mul(&now.residual);
-        // Downhill is −gradient.
+        // The descent direction is −gradient.
         let free: Vec<usize> = (0..x.len())
             .filter(|d| !((x[*d] <= 0.0 && gradient[*d] > 0.0) || (x[*d] >= 1.0 && gradient[*d] < 0.0)))
             .collect();
@@ -80,18 +82,18 @@ pub(crate) fn polish(projection: &Projection<'_>, space: &Space, point: &[f64], 
     Some(Polished { point: x, projected: now, evaluations })
 }
 
-/// A place of one variable, and the residual there, if there is a model.
+/// A position of one variable, and the residual there if there is a model.
 type Side = (f64, Option<DVector<f64>>);
 
-/// Slopes of the residual, one column for each variable; zero where no model is on either side.
+/// Returns the derivatives of the residual, one column per variable; zero if there is no model on either side.
 fn jacobian(x: &[f64], now: &Projected, at: &(dyn Fn(&[f64]) -> Option<Projected> + Sync)) -> DMatrix<f64> {
-    // All sides at once: pairs of them would leave a core without work at the end.
+    // All sides in one queue: with pairs a core would be idle at the end.
     let sides: Vec<Side> = (0..2 * x.len())
         .into_par_iter()
         .with_max_len(1)
         .map(|i| {
             let (mut to, d) = (x.to_vec(), i / 2);
-            to[d] = (to[d] + if i % 2 == 0 { STEP } else { -STEP }).clamp(0.0, 1.0);
+            to[d] = (to[d] + if i % 2 == 0 { STEP_SHARE } else { -STEP_SHARE }).clamp(0.0, 1.0);
             (to[d], at(&to).map(|there| there.residual))
         })
         .collect();

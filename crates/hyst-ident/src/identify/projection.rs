@@ -10,33 +10,33 @@ use crate::Samples;
 use crate::lsq::{Bounds, Gram, solve};
 use crate::optimize::{Cost, Space};
 
-/// A family over a record: what is left when its linear parameters, and one sensor zero or one for each file, are solved for.
+/// A family over a record: solves the linear parameters and the sensor's zeros, and returns the residual.
 pub(crate) struct Projection<'a> {
     family: &'a dyn Family,
     samples: &'a Samples,
     linear: Vec<Linear>,
-    /// Of the linear parameters and the zeros.
+    /// Bounds of the linear parameters and the zeros.
     pub(super) bounds: Vec<Bounds>,
     /// Rows that count.
     pub(crate) rows: Vec<usize>,
-    /// How many of them each segment has.
+    /// Number of rows that count in each segment.
     pub(super) lengths: Vec<usize>,
-    /// File of each of them; all 0 with a shared zero.
+    /// File of each row that counts; 0 for all with a shared zero.
     pub(super) group: Vec<usize>,
-    /// Sensor zeros.
+    /// Number of sensor zeros.
     pub(super) groups: usize,
-    /// Rows without a gap that count and have one file, at most [`PIECE`] each, with that file.
+    /// Contiguous rows that count, of one file, at most [`MAX_PIECE_ROWS`] each, with that file.
     pieces: Vec<(Range<usize>, usize)>,
-    /// Rooms for trials, so that a trial makes none, each with the thread that it was last used by: what another one has written
-    /// lies in another core's cache.
-    spare: Mutex<Vec<(Option<usize>, Room)>>,
+    /// Buffers for trials, so that a trial allocates none. Each is stored with the thread that used it last, because
+    /// its data is in the cache of that core.
+    spare: Mutex<Vec<(Option<usize>, Buffers)>>,
 }
 
-/// Rows whose products are summed up at once: so many of each column stay in the processor's cache.
-const PIECE: usize = 256;
+/// Maximum number of rows whose products are summed at once, so that they stay in the cache.
+const MAX_PIECE_ROWS: usize = 256;
 
-/// What a trial writes into.
-struct Room {
+/// Buffers of a trial.
+struct Buffers {
     columns: DMatrix<f64>,
     gram: Gram,
 }
@@ -48,7 +48,7 @@ pub(crate) struct Projected {
     pub(crate) linear: Vec<f64>,
     /// Sensor zeros: one, or one for each file \[y\].
     pub(crate) zeros: Vec<f64>,
-    /// Measured minus predicted, over the rows that count \[y\].
+    /// Measured minus predicted output over the rows that count \[y\].
     pub(crate) residual: DVector<f64>,
 }
 
@@ -76,32 +76,32 @@ impl<'a> Projection<'a> {
         let mut pieces: Vec<(Range<usize>, usize)> = Vec::new();
         for (k, g) in rows.iter().zip(&group) {
             match pieces.last_mut() {
-                Some((piece, own)) if piece.end == *k && own == g && piece.len() < PIECE => piece.end += 1,
+                Some((piece, own)) if piece.end == *k && own == g && piece.len() < MAX_PIECE_ROWS => piece.end += 1,
                 _ => pieces.push((*k..*k + 1, *g)),
             }
         }
         Self { family, samples, linear, bounds, rows, lengths, group, groups, pieces, spare: Mutex::new(Vec::new()) }
     }
 
-    /// Does something in a room for trials, this thread's own.
-    fn within<T>(&self, f: impl FnOnce(&mut Room) -> T) -> T {
+    /// Runs `f` with a buffer of this thread.
+    fn within<T>(&self, f: impl FnOnce(&mut Buffers) -> T) -> T {
         let thread = rayon::current_thread_index();
         let own = self.spare.lock().ok().and_then(|mut spare| {
             let place = spare.iter().position(|(last, _)| *last == thread)?;
             Some(spare.swap_remove(place).1)
         });
-        let mut room = own.unwrap_or_else(|| Room {
+        let mut buffers = own.unwrap_or_else(|| Buffers {
             columns: DMatrix::zeros(self.samples.len(), self.linear.len()),
             gram: Gram::zeros(self.linear.len() + self.groups + 1),
         });
-        let result = f(&mut room);
+        let result = f(&mut buffers);
         if let Ok(mut spare) = self.spare.lock() {
-            spare.push((thread, room));
+            spare.push((thread, buffers));
         }
         result
     }
 
-    /// Normal equations of the columns, the zeros and the output over the rows that count.
+    /// Returns the normal equations of the columns, the zeros and the output over the rows that count.
     pub(super) fn gram(&self, columns: &DMatrix<f64>) -> Gram {
         let mut gram = Gram::zeros(columns.ncols() + self.groups + 1);
         self.gram_into(columns, &mut gram);
@@ -138,20 +138,20 @@ impl<'a> Projection<'a> {
         gram.matrix.fill_lower_triangle_with_upper_triangle();
     }
 
-    /// The columns at `values` over all rows; `None` if there is no model.
+    /// Returns the columns at `values` over all rows; `None` if there is no model.
     pub(super) fn columns(&self, values: &[f64]) -> Option<DMatrix<f64>> {
         let mut columns = DMatrix::zeros(self.samples.len(), self.linear.len());
         self.family.columns(values, &mut columns).ok()?;
         Some(columns)
     }
 
-    /// The model at `values`; `None` if there is none or it is not finite.
+    /// Returns the model at `values`; `None` if there is none or it is not finite.
     pub(crate) fn at(&self, values: &[f64]) -> Option<Projected> {
-        self.within(|room| {
-            let z = self.solved(values, room)?;
+        self.within(|buffers| {
+            let z = self.solved(values, buffers)?;
             let m = self.linear.len();
             let mut residual = Vec::with_capacity(self.rows.len());
-            self.left(&room.columns, &z, |piece| residual.extend_from_slice(piece));
+            self.left(&buffers.columns, &z, |piece| residual.extend_from_slice(piece));
             let residual = DVector::from_vec(residual);
             let projected =
                 Projected { linear: z.as_slice()[..m].to_vec(), zeros: z.as_slice()[m..].to_vec(), residual };
@@ -159,27 +159,28 @@ impl<'a> Projection<'a> {
         })
     }
 
-    /// Output over the rows that count with these linear parameters, without the zeros; `None` if there is no model.
+    /// Returns the output over the rows that count with these linear parameters and no zeros; `None` if there is no
+    /// model.
     pub(super) fn output(&self, values: &[f64], linear: &[f64]) -> Option<Vec<f64>> {
-        self.within(|room| {
-            self.family.columns(values, &mut room.columns).ok()?;
-            let row = |k: &usize| linear.iter().enumerate().map(|(j, l)| l * room.columns[(*k, j)]).sum();
+        self.within(|buffers| {
+            self.family.columns(values, &mut buffers.columns).ok()?;
+            let row = |k: &usize| linear.iter().enumerate().map(|(j, l)| l * buffers.columns[(*k, j)]).sum();
             Some(self.rows.iter().map(row).collect())
         })
     }
 
-    /// Columns and normal equations at `values`, and the best linear parameters and zeros for them.
-    fn solved(&self, values: &[f64], room: &mut Room) -> Option<DVector<f64>> {
-        self.family.columns(values, &mut room.columns).ok()?;
-        self.gram_into(&room.columns, &mut room.gram);
-        solve(&room.gram, None, &self.bounds)
+    /// Computes columns and normal equations at `values`, and returns the best linear parameters and zeros.
+    fn solved(&self, values: &[f64], buffers: &mut Buffers) -> Option<DVector<f64>> {
+        self.family.columns(values, &mut buffers.columns).ok()?;
+        self.gram_into(&buffers.columns, &mut buffers.gram);
+        solve(&buffers.gram, None, &self.bounds)
     }
 
-    /// Measured minus predicted in the rows that count, piece after piece.
+    /// Passes measured minus predicted output to `f`, piece by piece.
     fn left(&self, columns: &DMatrix<f64>, z: &DVector<f64>, mut f: impl FnMut(&[f64])) {
-        let (m, mut room) = (columns.ncols(), [0.0; PIECE]);
+        let (m, mut buffers) = (columns.ncols(), [0.0; MAX_PIECE_ROWS]);
         for (piece, group) in &self.pieces {
-            let left = &mut room[..piece.len()];
+            let left = &mut buffers[..piece.len()];
             left.iter_mut().zip(&self.samples.output[piece.clone()]).for_each(|(r, y)| *r = y - z[m + group]);
             for j in 0..m {
                 let (weight, column) = (z[j], &column(columns, j)[piece.clone()]);
@@ -189,12 +190,12 @@ impl<'a> Projection<'a> {
         }
     }
 
-    /// Σ (measured − predicted)² at `values`, infinite if there is no model.
+    /// Returns Σ (measured − predicted)² at `values`; infinite if there is no model.
     pub(super) fn squares(&self, values: &[f64]) -> f64 {
-        self.within(|room| {
-            let z = self.solved(values, room)?;
+        self.within(|buffers| {
+            let z = self.solved(values, buffers)?;
             let mut sum = 0.0;
-            self.left(&room.columns, &z, |piece| sum += dot(piece, piece));
+            self.left(&buffers.columns, &z, |piece| sum += dot(piece, piece));
             Some(sum)
         })
         .filter(|squares: &f64| squares.is_finite())
@@ -202,12 +203,12 @@ impl<'a> Projection<'a> {
     }
 }
 
-/// A column's rows.
+/// Returns the rows of a column.
 fn column(columns: &DMatrix<f64>, j: usize) -> &[f64] {
     &columns.as_slice()[j * columns.nrows()..][..columns.nrows()]
 }
 
-/// Σ aᵢ bᵢ in four sums side by side, which the compiler makes one instruction of; the same on every processor.
+/// Returns Σ aᵢ bᵢ in four partial sums, which the compiler vectorises; identical on every processor.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a, b) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -220,15 +221,15 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Root mean square of what is left \[y\], as the cost of a search over the variables.
-pub(crate) struct Left<'a> {
+/// RMS of the residual \[y\], as the cost of a search over the variables.
+pub(crate) struct ResidualRms<'a> {
     pub(crate) projection: &'a Projection<'a>,
     pub(crate) dimensions: usize,
 }
 
-impl Cost for Left<'_> {
-    /// No trial is given up: the linear parameters make up for the others so well over the first rows that an eighth of a record
-    /// rules out no more than a tenth of the trials of most families, and would be run twice for the rest.
+impl Cost for ResidualRms<'_> {
+    /// No trial is stopped early. With the linear parameters, an eighth of a record rules out at most a tenth of the
+    /// trials of most families, and the others would be run twice.
     fn costs(&self, points: &[f64], _hopeless: &[f64], costs: &mut [f64]) {
         let rows = self.projection.rows.len().max(1) as f64;
         for (cost, values) in costs.iter_mut().zip(points.chunks_exact(self.dimensions)) {
@@ -237,7 +238,7 @@ impl Cost for Left<'_> {
     }
 }
 
-/// The box of a family's variables, `None` if it has none.
+/// Returns the box of a family's variables; `None` if it has none.
 pub(crate) fn space(family: &dyn Family) -> Option<Result<Space, crate::optimize::SpaceError>> {
     let variables = family.variables();
     if variables.is_empty() { None } else { Some(Space::new(variables)) }

@@ -1,10 +1,10 @@
-//! A whole identification: global search, polish, standard errors.
+//! A complete identification: global search, local refinement, standard errors.
 
 use std::ops::ControlFlow;
 
 use super::Family;
-use super::polish::{Polished, SETTLED, polish};
-use super::projection::{Left, Projected, Projection, space};
+use super::polish::{CONVERGED_FALL, Polished, polish};
+use super::projection::{Projected, Projection, ResidualRms, space};
 use super::slopes::{Ended, Optimum};
 use super::uncertainty::Estimate;
 use crate::Samples;
@@ -12,7 +12,7 @@ use crate::fit::FitError;
 use crate::model::Base;
 use crate::optimize::{Method, Progress, Space, Stop, Trials, trials};
 
-/// How to search.
+/// Options of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchOptions {
     pub(crate) method: Method,
@@ -21,7 +21,7 @@ pub(crate) struct SearchOptions {
     pub(crate) trials: usize,
 }
 
-/// What was identified.
+/// Result of an identification.
 #[derive(Clone, Debug)]
 pub(crate) struct Identified {
     pub(crate) base: Base,
@@ -29,12 +29,12 @@ pub(crate) struct Identified {
     pub(crate) estimate: Estimate,
     /// Searched variables that are held at a side of their box.
     pub(crate) ended: Vec<Ended>,
-    /// The global searches; `None` if nothing had to be searched.
+    /// The global searches; `None` if nothing was searched.
     pub(crate) trials: Option<Trials>,
     pub(crate) evaluations: u64,
 }
 
-/// Where a search and its polish have ended.
+/// Result of a search and its refinement.
 #[derive(Clone, Debug)]
 pub(crate) struct Located {
     pub(super) values: Vec<f64>,
@@ -43,10 +43,10 @@ pub(crate) struct Located {
     evaluations: u64,
 }
 
-/// Relative fall of the sum of squares at which a polish ends that another one follows.
-const ROUGHLY: f64 = 1e-6;
-/// Points from which a polish starts, besides the best: ends of trials are many, valleys few.
-const STARTS: usize = 3;
+/// Relative fall of the sum of squares at which a rough refinement ends; a final one follows.
+const ROUGH_FALL: f64 = 1e-6;
+/// Maximum number of trials whose results are refined: many trials end in the same few valleys.
+const MAX_REFINED_TRIALS: usize = 3;
 
 /// A family and the settled rows that it is identified from.
 pub(crate) struct Identification<'a> {
@@ -60,10 +60,10 @@ pub(crate) struct Identification<'a> {
 }
 
 impl<'a> Identification<'a> {
-    /// `name` is what errors call the record.
+    /// Prepares an identification; `name` is the name of the record in errors.
     ///
     /// # Errors
-    /// If the bounds are no box.
+    /// If the bounds are invalid.
     pub(crate) fn new(
         family: &'a dyn Family,
         samples: &'a Samples,
@@ -79,8 +79,9 @@ impl<'a> Identification<'a> {
         FitError::Unsolvable { record: self.name.into() }
     }
 
-    /// Searches globally and polishes, roughly, where the best trials have ended. Where `beginnings` of the record are given, with the same model
-    /// over them, the global search looks at those alone; the polish sees all.
+    /// Searches globally and refines the best results roughly.
+    /// If `beginnings` of the record are given, with the same model over them, the global search uses only those rows.
+    /// The refinement uses all rows.
     ///
     /// # Errors
     /// If the search is set up wrongly, or no parameters within the bounds give a finite output.
@@ -92,7 +93,8 @@ impl<'a> Identification<'a> {
     ) -> Result<Located, FitError> {
         let Some(space) = &self.space else { return self.at_once() };
         let quick = beginnings.map(|(family, rows)| Projection::new(family, rows, self.zero_per_record));
-        let cost = Left { projection: quick.as_ref().unwrap_or(&self.projection), dimensions: space.dimensions() };
+        let cost =
+            ResidualRms { projection: quick.as_ref().unwrap_or(&self.projection), dimensions: space.dimensions() };
         let stop = Stop { tolerance: 1e-6, stall: 60, ..Stop::after(how.evaluations) };
         let found = trials(space, &cost, &how.method, &stop, how.seed, how.trials, &mut |_, p| watch(p))
             .map_err(|source| FitError::Search { record: self.name.into(), source })?;
@@ -100,13 +102,13 @@ impl<'a> Identification<'a> {
         order.sort_by(|a, b| found.found[*a].cost.total_cmp(&found.found[*b].cost));
         let mut best: Option<Polished> = None;
         let mut evaluations: u64 = found.found.iter().map(|f| f.evaluations).sum();
-        for trial in order.iter().take(STARTS) {
+        for trial in order.iter().take(MAX_REFINED_TRIALS) {
             let start = space.point(&found.found[*trial].values);
-            // Most of the way costs little over few rows.
-            let nearer = quick.as_ref().and_then(|quick| polish(quick, space, &start, ROUGHLY));
+            // First over the few rows, which costs little.
+            let nearer = quick.as_ref().and_then(|quick| polish(quick, space, &start, ROUGH_FALL));
             evaluations += nearer.as_ref().map_or(0, |p| p.evaluations);
             let start = nearer.map_or(start, |p| p.point);
-            let Some(p) = polish(&self.projection, space, &start, ROUGHLY) else { continue };
+            let Some(p) = polish(&self.projection, space, &start, ROUGH_FALL) else { continue };
             evaluations += p.evaluations;
             if best.as_ref().is_none_or(|b| p.projected.squares() < b.projected.squares()) {
                 best = Some(p);
@@ -117,21 +119,21 @@ impl<'a> Identification<'a> {
         Ok(Located { values, projected: best.projected, trials: Some(found), evaluations })
     }
 
-    /// Polishes, roughly, from where another identification with the same variables has ended: of a drive that goes on otherwise
-    /// between its samples.
+    /// Refines roughly from the result of another identification with the same variables, for another interpolation of
+    /// the drive between samples.
     ///
     /// # Errors
-    /// If there is no finite output at that point.
+    /// If the output at that point is not finite.
     pub(crate) fn roughly_from(&self, from: &Located) -> Result<Located, FitError> {
-        self.from(from, ROUGHLY)
+        self.from(from, ROUGH_FALL)
     }
 
-    /// Polishes to the end from where another identification with the same variables has ended: of other rows.
+    /// Refines to convergence from the result of another identification with the same variables, over other rows.
     ///
     /// # Errors
-    /// If there is no finite output at that point.
+    /// If the output at that point is not finite.
     pub(crate) fn polish(&self, from: &Located) -> Result<Located, FitError> {
-        self.from(from, SETTLED)
+        self.from(from, CONVERGED_FALL)
     }
 
     fn from(&self, from: &Located, settled: f64) -> Result<Located, FitError> {
@@ -146,13 +148,13 @@ impl<'a> Identification<'a> {
         })
     }
 
-    /// Where there is nothing to search.
+    /// Solves without a search.
     fn at_once(&self) -> Result<Located, FitError> {
         let projected = self.projection.at(&[]).ok_or_else(|| self.unsolvable())?;
         Ok(Located { values: Vec::new(), projected, trials: None, evaluations: 1 })
     }
 
-    /// Measured minus predicted in every row, `NaN` in those that do not count.
+    /// Returns measured minus predicted output in every row, `NaN` in rows that do not count.
     pub(crate) fn residual(&self, at: &Located) -> Vec<f64> {
         let mut residual = vec![f64::NAN; self.samples.len()];
         for (k, r) in self.projection.rows.iter().zip(at.projected.residual.as_slice()) {
@@ -161,7 +163,7 @@ impl<'a> Identification<'a> {
         residual
     }
 
-    /// The model there, and what the rows say about its parameters.
+    /// Returns the model, and what the rows say about its parameters.
     pub(crate) fn conclude(&self, mut at: Located) -> Identified {
         self.in_order(&mut at.values);
         let base = self.family.base(&at.values, &at.projected.linear);
@@ -177,7 +179,7 @@ impl<'a> Identification<'a> {
         Identified { base, zeros: at.projected.zeros, estimate, ended, trials: at.trials, evaluations: at.evaluations }
     }
 
-    /// Brings values into the model's order, if each is within the bounds of its new place.
+    /// Sorts the values into the model's order, if each is within the bounds of its new position.
     fn in_order(&self, values: &mut Vec<f64>) {
         let Some(space) = &self.space else { return };
         let mut other = values.clone();

@@ -1,4 +1,4 @@
-//! Parameters that the papers print, recovered from records simulated with them plus noise.
+//! Recovers published parameters from records simulated with them plus noise.
 
 use crate::stop::Stop;
 use std::ops::ControlFlow;
@@ -18,7 +18,7 @@ fn noise(rng: &mut ChaCha8Rng) -> f64 {
     (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
 }
 
-/// A record of `base`: one segment for each temperature, noise of 0.1 % of the output's span.
+/// Simulates a record of `base`: one segment per temperature, noise of 0.1 % of the output's span.
 fn record(
     base: &Base,
     period: f64,
@@ -82,8 +82,8 @@ fn identified(kind: Kind, samples: &Samples, form: &Form, method: &str) -> Ident
     identification.conclude(located(&identification, &how))
 }
 
-/// These are the parameters that the record does not determine, every other one is within three standard errors of the truth, and what
-/// is left is the noise.
+/// Asserts that exactly these parameters are undetermined, that every other one is within three standard errors of the
+/// truth, and that the residual is the noise.
 fn agrees(found: &Identified, truth: &Base, samples: &Samples, sigma: f64, undetermined: &[&str]) {
     assert_eq!(found.estimate.undetermined(), undetermined, "{:#?}", found.estimate.parameters);
     let true_values = parameters_of(truth);
@@ -105,7 +105,7 @@ fn bouc_wen_of_the_paper_by_particle_swarm() {
     let (samples, sigma) = record(&truth, 1e-3, 4000, &[23.0], drive, 3);
     let found = identified(Kind::BoucWen, &samples, &Form::default(), "pso");
     agrees(&found, &truth, &samples, sigma, &[]);
-    // Γ is printed as nothing, and found to be.
+    // Γ is printed as zero and found to be zero.
     assert_eq!(found.estimate.parameter("gamma").unwrap().determined, Determined::NearZero);
 }
 
@@ -116,17 +116,17 @@ fn activation_functions_at_10_hz_by_particle_swarm() {
     let tanh = ActivationParams { k0: 0.1461, alpha: -9e-5, beta: 0.3857, gamma: 500_032.0 };
     let (samples, sigma) = record(&Base::Tanh(tanh), 1e-3, 500, &[23.0], drive, 5);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
-    // Saturated over the whole range: γ leaves no trace, and says so.
+    // Saturated over the whole range: γ has no effect and is undetermined.
     agrees(&found, &Base::Tanh(tanh), &samples, sigma, &["gamma"]);
 
     let softsign = ActivationParams::from_scaled_softsign(0.1516, -0.00017, 100.0, 318.2799);
     let (samples, sigma) = record(&Base::Softsign(softsign), 1e-3, 500, &[23.0], drive, 6);
     let found = identified(Kind::Softsign, &samples, &Form::default(), "pso");
     agrees(&found, &Base::Softsign(softsign), &samples, sigma, &[]);
-    // Its long tails tell a γ that tanh hides.
+    // Its long tails determine γ, which tanh hides.
     let gamma = found.estimate.parameter("gamma").unwrap();
     assert!(gamma.determined == Determined::Yes && gamma.std_error > 0.05 * gamma.value, "{gamma:?}");
-    // One that bends within the range is known.
+    // A tanh that bends within the range is determined.
     let bent = ActivationParams { gamma: 0.05, ..tanh };
     let (samples, sigma) = record(&Base::Tanh(bent), 1e-3, 500, &[23.0], drive, 7);
     let found = identified(Kind::Tanh, &samples, &Form::default(), "pso");
@@ -139,7 +139,7 @@ fn five_sines(t: f64) -> f64 {
     50.0 + 8.0 * (wave(5.0, 0.0) + wave(10.0, 1.0) + wave(15.0, 2.0) + wave(20.0, 3.0) + wave(30.0, 4.0))
 }
 
-/// Largest relative distance of two responses over 5 … 30 Hz.
+/// Returns the largest relative distance of two responses over 5 … 30 Hz.
 fn apart(a: impl Fn(f64) -> Complex, b: impl Fn(f64) -> Complex) -> f64 {
     (5..=30).map(|hz| (a(f64::from(hz)) - b(f64::from(hz))).abs() / b(f64::from(hz)).abs()).fold(0.0, f64::max)
 }
@@ -171,20 +171,20 @@ fn improved_fractional_model_by_differential_evolution() {
     assert!(off < 1e-3, "{off}");
 }
 
-/// The seven numbers that TD-PI leaves a trace of.
+/// The seven numbers that determine the output of TD-PI.
 fn invariants(p: &TdPiParams) -> [f64; 7] {
     [p.epsilon * p.alpha, p.alpha * p.tau, p.a0 / p.alpha, p.a1 / p.alpha, p.b0 / p.alpha, p.b1 / p.alpha, p.eta]
 }
 
 #[test]
-fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
+fn td_pi_by_grey_wolves_predicts_other_temperatures() {
     let truth = TdPiParams::PRINTED;
     let drive = |t: f64| 200.0 * (0.2 * std::f64::consts::PI * t).sin();
     let (samples, sigma) = record(&Base::TdPi(truth), 4e-3, 5000, &[23.0, 33.0, 39.0], drive, 10);
     let found = identified(Kind::TdPi, &samples, &Form::default(), "gwo");
     let Base::TdPi(p) = &found.base else { panic!() };
     assert!((found.estimate.left / sigma - 1.0).abs() < 0.02);
-    // α is one by choice; in that unit each of the others is one of the invariants.
+    // α is one by convention; in that unit each of the others is one of the invariants.
     let own = ["epsilon", "tau", "a0", "a1", "b0", "b1", "eta"];
     for ((name, value), expected) in own.iter().zip(invariants(p)).zip(invariants(&truth)) {
         let gradient: Vec<f64> =
@@ -195,14 +195,14 @@ fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
             "{name}: {value} ± {error}, {expected}"
         );
     }
-    // The scale is found to be free, and what it moves; seven numbers were chosen.
+    // The scale and the parameters that it moves are undetermined; seven numbers were fitted.
     let scaled = ["alpha", "epsilon", "tau", "a0", "a1", "b0", "b1"];
     assert_eq!((found.estimate.undetermined(), found.estimate.fitted), (scaled.to_vec(), 7));
     let free = &found.estimate.trade_offs[0];
     let sign = |name: &str| free.changes.iter().find(|(n, _)| n == name).map(|(_, x)| x.signum());
     assert!(sign("alpha").is_some() && sign("alpha") == sign("a0") && sign("alpha") != sign("epsilon"), "{free:?}");
     assert_eq!(sign("epsilon"), sign("tau"));
-    // Temperatures that it has not seen.
+    // Temperatures outside of the record.
     let (other, _) = record(&Base::TdPi(truth), 4e-3, 2500, &[29.0, 35.0], drive, 11);
     let mut y = vec![0.0; other.len()];
     family::run(&other, |sampling| Operator::new(&found.base, [-200.0, 200.0], sampling), &mut y).unwrap();
@@ -211,7 +211,7 @@ fn td_pi_by_grey_wolves_and_tested_at_other_temperatures() {
     assert!((squares / y.len() as f64).sqrt() < 1.05 * sigma);
 }
 
-/// Slope of one of [`invariants`] (named after its parameter) with respect to a parameter.
+/// Derivative of one of [`invariants`] (named after its parameter) with respect to a parameter.
 fn invariant_gradient(p: &TdPiParams, invariant: &str, by: &str) -> f64 {
     match (invariant, by) {
         ("epsilon", "epsilon") | ("tau", "tau") => p.alpha,
@@ -228,12 +228,12 @@ fn invariant_gradient(p: &TdPiParams, invariant: &str, by: &str) -> f64 {
 }
 
 #[test]
-fn electromechanical_model_and_its_products() {
+fn the_electromechanical_model_is_recovered_as_products() {
     let printed = TdEmParams::PRINTED;
     let truth = Base::TdEm(TdEmParams {
         slip: MaxwellSlipParams {
             reading: printed.slip.reading,
-            // Multiples of the first one, to the printed digits.
+            // Multiples of the first width, to the printed digits.
             widths: (1..=10).map(|i| 7.9475 * f64::from(i)).collect(),
             gains: printed.slip.gains.to_vec(),
         },
@@ -252,19 +252,20 @@ fn electromechanical_model_and_its_products() {
     let (Base::TdEm(p), Base::TdEm(q)) = (&found.base, &truth) else { panic!() };
     assert!((p.slip.widths[0] - q.slip.widths[0]).abs() < 0.01 * q.slip.widths[0]);
     let psi = |p: &TdEmParams<Vec<f64>>, t: f64| p.coupling[0] + t * (p.coupling[1] + t * p.coupling[2]);
-    // ψ(T) R Σ gᵢ: what all elements together give at each temperature.
+    // ψ(T) R Σ gᵢ: the joint gain of all elements at each temperature.
     for t in [23.0, 29.0, 33.0, 35.0, 39.0] {
         let product =
             |p: &TdEmParams<Vec<f64>>| psi(p, t) * p.resistance * p.slip.gains.iter().sum::<f64>() / p.stiffness;
         assert!((product(p) / product(q) - 1.0).abs() < 2e-3, "{t}: {} {}", product(p), product(q));
     }
-    // ψ and the gains belong together.
+    // ψ and the gains are determined only together.
     let estimate = &found.estimate;
     let free = (0..10).filter(|i| p.slip.gains[*i] > 0.0);
     let mut scaled: Vec<String> = free.map(|i| format!("slip.gains[{i}]")).collect();
     scaled.extend((0..3).map(|i| format!("coupling[{i}]")));
     assert_eq!(estimate.undetermined(), scaled, "{:#?}", estimate.parameters);
-    // One width was searched, two numbers of the coupling, and ten gains solved for; the other widths are multiples.
+    // One width was searched, two numbers of the coupling, and ten gains were solved for; the other widths are
+    // multiples.
     assert_eq!(estimate.fitted, 13);
     let width = |i: usize| estimate.parameters.iter().position(|p| p.name == format!("slip.widths[{i}]")).unwrap();
     for i in 1..10 {
@@ -275,7 +276,7 @@ fn electromechanical_model_and_its_products() {
     assert!(estimate.parameter("mass").is_none());
 }
 
-/// The printed widths and a bank of springs, each with a drive that lets all of them slip.
+/// The printed widths and a bank of springs, each with a drive that makes all of them slip.
 #[test]
 fn maxwell_slip_fits_its_own_record_to_the_noise() {
     let printed = TdEmParams::PRINTED.slip;
@@ -300,9 +301,9 @@ fn maxwell_slip_fits_its_own_record_to_the_noise() {
     }
 }
 
-/// Over twelve draws of the noise the parameters scatter about the truth as their standard errors say.
+/// Over twelve noise realisations the parameters scatter about the truth by their standard errors.
 #[test]
-fn standard_errors_are_the_scatter_of_repeated_records() {
+fn standard_errors_equal_the_scatter_over_repeated_records() {
     let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
     let true_values = parameters_of(&truth);
@@ -315,12 +316,12 @@ fn standard_errors_are_the_scatter_of_repeated_records() {
             assert_eq!(p.determined, Determined::Yes, "{p:?}");
         }
     }
-    // χ² of twelve: outside of these in one of a thousand.
+    // χ² with twelve degrees of freedom: outside of these limits with a probability of 1/1000.
     assert!(squares.iter().all(|s| (0.18..2.75).contains(s)), "{squares:?}");
 }
 
 #[test]
-fn the_exponent_of_bouc_wen_is_found_too() {
+fn the_exponent_of_bouc_wen_is_identified() {
     let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.6 });
     let drive = |t: f64| 50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos();
     let (samples, sigma) = record(&truth, 1e-3, 2000, &[23.0], drive, 2);
@@ -329,13 +330,13 @@ fn the_exponent_of_bouc_wen_is_found_too() {
     assert_eq!(found.estimate.parameter("n").unwrap().determined, Determined::Yes);
 }
 
-/// A drive with loops inside of loops.
+/// A drive with nested loops.
 fn loops(t: f64) -> f64 {
     50.0 + 50.0 * (31.0 * t).sin() * (2.0 * t).cos()
 }
 
 #[test]
-fn errors_belong_to_the_thresholds_in_whatever_order_a_search_ends() {
+fn errors_belong_to_sorted_thresholds() {
     let truth = Base::Pi(PiParams { gain: 0.1, thresholds: vec![3.0, 15.0], weights: vec![0.05, 0.01] });
     let (samples, sigma) = record(&truth, 1e-3, 3000, &[23.0], loops, 4);
     let form = Form { elements: Some(2), ..Form::default() };
@@ -347,7 +348,7 @@ fn errors_belong_to_the_thresholds_in_whatever_order_a_search_ends() {
     let [one, other] = [one, other].map(|at| identification.conclude(at));
     agrees(&one, &truth, &samples, sigma, &[]);
     assert_eq!(one.estimate, other.estimate);
-    // Another seed ends there too.
+    // Another seed ends at the same thresholds.
     let again = located(&identification, &SearchOptions { seed: 4, ..search("de", 2) });
     let again = identification.conclude(again);
     for (p, q) in one.estimate.parameters.iter().zip(&again.estimate.parameters) {
@@ -356,7 +357,7 @@ fn errors_belong_to_the_thresholds_in_whatever_order_a_search_ends() {
 }
 
 #[test]
-fn a_parameter_that_is_zero_is_known_to_be_zero() {
+fn a_zero_parameter_is_determined_to_be_zero() {
     let drive = |t: f64| 20.0 - 20.0 * (20.0 * std::f64::consts::PI * t).cos();
     let tanh = ActivationParams { k0: 0.1461, alpha: 0.0, beta: 0.3857, gamma: 0.05 };
     let alone = ActivationParams { k0: 0.0, ..tanh };
@@ -364,7 +365,7 @@ fn a_parameter_that_is_zero_is_known_to_be_zero() {
     for (truth, zeros, undetermined) in [
         (tanh, &["alpha"][..], &[][..]),
         (alone, &["k0", "alpha"], &[]),
-        // That there is no activation is known, and of its shape nothing.
+        // The activation is determined to be zero, its shape is undetermined.
         (straight, &["alpha"], &["gamma"]),
     ] {
         let (samples, sigma) = record(&Base::Tanh(truth), 1e-3, 2000, &[23.0], drive, 5);
@@ -384,8 +385,8 @@ fn a_parameter_that_is_zero_is_known_to_be_zero() {
 }
 
 #[test]
-fn what_follows_from_one_number_counts_once_and_what_is_at_a_bound_is_held() {
-    // Thresholds where the family has them.
+fn dependent_parameters_count_once_and_bound_ones_are_held() {
+    // The thresholds of the family.
     let (low, high) = crate::samples::range((0..3000).map(|k| loops(f64::from(k) * 1e-3)));
     let thresholds: Vec<f64> = (1..=4).map(|i| 0.5 * (high - low) * f64::from(i) / 5.0).collect();
     let gap = 8.0;
@@ -405,7 +406,7 @@ fn what_follows_from_one_number_counts_once_and_what_is_at_a_bound_is_held() {
         agrees(&found, &truth, &samples, sigma, &[]);
         let error = |name: &str| estimate.parameter(name).unwrap().std_error;
         assert!((error("left.linear.offset") / error("right.linear.offset") - 1.0).abs() < 1e-6);
-        // Slope and gap of the right side, gain, four weights.
+        // Slope and gap of the right envelope, gain, four weights.
         assert_eq!(estimate.fitted, 7);
         let Base::Gpi(p) = &found.base else { panic!() };
         for (i, w) in p.weights.iter().enumerate() {
@@ -418,7 +419,7 @@ fn what_follows_from_one_number_counts_once_and_what_is_at_a_bound_is_held() {
 }
 
 #[test]
-fn a_variable_that_ends_on_a_side_of_its_box_is_held_and_named() {
+fn a_variable_at_a_side_of_its_box_is_held_and_reported() {
     /// A family with other bounds of its first variable.
     struct Within<'a>(Box<dyn Family + 'a>, f64, f64);
     impl Family for Within<'_> {
@@ -454,7 +455,7 @@ fn a_variable_that_ends_on_a_side_of_its_box_is_held_and_named() {
     // Inside of the box nothing is held.
     let (ended, estimate) = ends(Kind::BoucWen, &truth, &Form::default(), 0.01, 0.5);
     assert!(ended.is_empty() && estimate.held.is_empty());
-    // So is a threshold.
+    // The same for a threshold.
     let tight = Base::Pi(PiParams { gain: 0.1, thresholds: vec![20.0], weights: vec![0.05] });
     let form = Form { elements: Some(1), ..Form::default() };
     let (ended, _) = ends(Kind::Pi, &tight, &form, 25.0, 30.0);
@@ -462,7 +463,7 @@ fn a_variable_that_ends_on_a_side_of_its_box_is_held_and_named() {
 }
 
 #[test]
-fn rows_that_repeat_others_add_nothing() {
+fn repeated_rows_add_no_information() {
     let truth = Base::BoucWen(BoucWenParams { k0: 0.12, alpha: -0.05, beta: 0.02, gamma: -0.008, n: 1.0 });
     let (samples, _) = record(&truth, 1e-3, 400, &[23.0], |t| loops(7.0 * t), 3);
     let held = |times: usize| {

@@ -1,54 +1,57 @@
-//! What the record says about each parameter, and what it cannot say.
+//! What the record determines about each parameter.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 
-/// A parameter that may be off by more than this share of its scale is not determined: the scale is half of where it may plausibly be.
-pub(super) const VAGUE: f64 = 0.5;
-/// An error of this share of its scale is a small one.
-const SOME: f64 = 0.05;
-/// By how much the others make a parameter less certain that is known only together with them.
-const ALONE: f64 = 20.0;
-/// Share of a direction's largest entry from which on a parameter takes part in a trade.
-const PART: f64 = 0.1;
+/// Relative standard error above which a parameter is not determined. The error is relative to the scale, which is half
+/// of the plausible range.
+pub(super) const MAX_RELATIVE_ERROR: f64 = 0.5;
+/// Relative standard error above which an error is not small.
+const SMALL_RELATIVE_ERROR: f64 = 0.05;
+/// Minimum ratio of a parameter's error to its error with all others known, for a parameter that is known only together
+/// with others.
+const MIN_INFLATION: f64 = 20.0;
+/// Minimum entry of a parameter in a trade-off, relative to the largest one.
+const MIN_TRADE_OFF_ENTRY: f64 = 0.1;
 
-/// How well a parameter is known.
+/// How well a parameter is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Determined {
     /// The record determines it.
     Yes,
-    /// It is known, and known to be about zero: within two standard errors, which are small ones.
+    /// Determined and close to zero: within two standard errors, which are small.
     NearZero,
-    /// Only together with others: alone it would be known twenty times as well, and it may be off by more than a twentieth. What
-    /// the model does with this record is known; this number is not.
+    /// Determined only together with others: with the others known its error would be twenty times smaller, and the
+    /// error exceeds a twentieth of its value. The prediction for this record is known; this number is not.
     Together,
-    /// The record does not determine it: its standard error is more than half of a large change of it, whatever its own size; or more
-    /// than a twentieth, and it may as well be zero. A large change is half of the bounds of what is searched, at most a factor of e;
-    /// that of a weight or gain makes an output like the measured one, or one part of a curve the whole of it.
+    /// Not determined: its standard error exceeds half of a large change, or it exceeds a twentieth and the value may
+    /// be zero.
+    /// A large change is half of the bounds for a searched variable (at most a factor of e). For a weight or gain it is
+    /// the value that makes an output like the measured one; for a part of a curve, the whole curve.
     No,
 }
 
 /// One identified parameter.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Parameter {
-    /// Its path in the model's file; elements of lists with their number, `weights[3]`.
+    /// Path in the model's file; elements of lists with an index, `weights[3]`.
     pub name: String,
-    /// Its value.
+    /// Value.
     pub value: f64,
-    /// Its standard error: of noise as large, and as correlated, as what the model leaves.
+    /// Standard error, for noise of the size and the correlation of the residual.
     pub std_error: f64,
-    /// How well it is known.
+    /// How well it is determined.
     pub determined: Determined,
 }
 
-/// Parameters that can be changed together without a trace in the record.
+/// Parameters that can be changed together without an effect on the prediction of the record.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct TradeOff {
-    /// Names, and by how much each changes, as a share of its scale; the largest change is 1.
+    /// Names and relative changes, as shares of their scales; the largest is 1.
     pub changes: Vec<(String, f64)>,
-    /// How far along this direction the record lets the parameters go: one standard error, in the same shares.
+    /// Standard error along this direction, in the same shares.
     pub std_error: f64,
 }
 
@@ -57,52 +60,53 @@ pub struct TradeOff {
 pub struct Estimate {
     /// The parameters.
     pub parameters: Vec<Parameter>,
-    /// Correlation of each two of them.
+    /// Correlation of each pair of parameters.
     pub correlations: Vec<Vec<f64>>,
     /// Directions that the record does not determine.
     pub trade_offs: Vec<TradeOff>,
-    /// Root mean square of what is left \[y\].
+    /// Root mean square of the residual \[y\].
     pub left: f64,
-    /// By how much what is left is correlated: rows per independent one.
+    /// Correlation of the residual: rows per independent row.
     pub rows_per_independent: f64,
-    /// Numbers that the fit has chosen, those at a bound with them and sensor zeros without. Where several parameters of a file follow
-    /// from one number, they are more than these.
+    /// Number of fitted numbers, including those at a bound and without sensor zeros. A file may have more parameters,
+    /// if several follow from one number.
     pub fitted: usize,
-    /// Parameters at a bound: they are held there, and have no error.
+    /// Parameters held at a bound; they have no standard error.
     pub held: Vec<String>,
     #[serde(skip)]
     covariance: DMatrix<f64>,
 }
 
-/// What standard errors are made of: the normal equations of a fit, and what it has left.
+/// Inputs of the standard errors: the normal equations of a fit and its residual.
 pub(crate) struct Evidence<'a> {
     /// Names and values of the parameters.
     pub(crate) parameters: Vec<(String, f64)>,
-    /// The change of each that counts as a large one.
+    /// Large change of each parameter.
     pub(crate) scales: Vec<f64>,
-    /// What the error of one that is not about zero is small beside, or not: its own size, or the curve that it is a part of.
+    /// Size that the error of a parameter is compared with: its own value, or the whole of the curve that it is a part
+    /// of.
     pub(crate) sizes: Vec<f64>,
     /// Change of each parameter with each unknown of the fit, both in units of their scales.
     pub(crate) map: DMatrix<f64>,
-    /// `JᵀJ`, J the change of the output with each unknown, in units of its scale.
+    /// `JᵀJ`, with J the change of the output with each unknown, in units of its scale.
     pub(crate) normal: DMatrix<f64>,
-    /// What is left in the rows that were fitted.
+    /// Residual in the rows that were fitted.
     pub(crate) noise: &'a Noise,
-    /// Unknowns of the fit that are not at a bound, sensor zeros with them.
+    /// Number of unknowns that are not at a bound, sensor zeros included.
     pub(crate) unknowns: usize,
-    /// Numbers that the fit has chosen.
+    /// Number of fitted numbers.
     pub(crate) fitted: usize,
-    /// What the standard error of each unknown is at least, in units of its scale, whatever the slope at the optimum says.
+    /// Minimum standard error of each unknown, in units of its scale, independent of the slope at the optimum.
     pub(crate) at_least: Vec<f64>,
     /// Parameters at a bound.
     pub(crate) held: Vec<String>,
 }
 
 impl Estimate {
-    /// Standard errors from normal equations.
+    /// Computes standard errors from normal equations.
     ///
-    /// The covariance of the unknowns is `σ² κ (JᵀJ)⁻¹` with J the slopes of the output, σ² the mean square of what is left and κ its
-    /// rows per independent one.
+    /// The covariance of the unknowns is `σ² κ (JᵀJ)⁻¹`, with J the derivatives of the output, σ² the mean square of
+    /// the residual and κ the number of rows per independent row.
     pub(crate) fn of(evidence: Evidence<'_>) -> Self {
         let Evidence { parameters: all, scales, sizes, map, mut normal, .. } = evidence;
         let Evidence { noise, unknowns, fitted, at_least, held, .. } = evidence;
@@ -112,7 +116,7 @@ impl Estimate {
         for (u, least) in at_least.iter().enumerate() {
             let own = (variance * covariance[(u, u)]).sqrt();
             if *least > own {
-                // As if the output changed so much less with it: correlations stay.
+                // As if the output changed less with it by this factor; correlations are kept.
                 normal.row_mut(u).scale_mut(own / least);
                 normal.column_mut(u).scale_mut(own / least);
             }
@@ -124,15 +128,15 @@ impl Estimate {
             let direction = &map * direction;
             let largest = direction.iter().fold(0.0f64, |m, x| if x.abs() > m.abs() { *x } else { m });
             let std_error = (variance * spread).sqrt() * largest.abs();
-            if std_error > SOME {
-                let entries = direction.iter().zip(&all).filter(|(x, _)| x.abs() > PART * largest.abs());
+            if std_error > SMALL_RELATIVE_ERROR {
+                let entries = direction.iter().zip(&all).filter(|(x, _)| x.abs() > MIN_TRADE_OFF_ENTRY * largest.abs());
                 let changes = entries.map(|(x, (name, _))| (name.clone(), x / largest)).collect();
                 trade_offs.push(TradeOff { changes, std_error });
             }
         }
         trade_offs.sort_by(|a, b| b.std_error.total_cmp(&a.std_error));
         let size = |i: usize| covariance[(i, i)].max(0.0).sqrt();
-        // Standard error if each unknown that it follows from were found with all others known.
+        // Standard error if each unknown were estimated with all others known.
         let alone = |i: usize| {
             let of = |u: usize| map[(i, u)] * map[(i, u)] / normal[(u, u)].max(f64::MIN_POSITIVE);
             (variance * (0..map.ncols()).map(of).sum::<f64>()).sqrt()
@@ -141,11 +145,11 @@ impl Estimate {
             let (name, value) = all[i].clone();
             let (share, std_error) = (size(i), size(i) * scales[i]);
             let zero = value.abs() < 2.0 * std_error;
-            let determined = if share > VAGUE || (zero && share > SOME) {
+            let determined = if share > MAX_RELATIVE_ERROR || (zero && share > SMALL_RELATIVE_ERROR) {
                 Determined::No
             } else if zero {
                 Determined::NearZero
-            } else if std_error > SOME * sizes[i] && share > ALONE * alone(i) {
+            } else if std_error > SMALL_RELATIVE_ERROR * sizes[i] && share > MIN_INFLATION * alone(i) {
                 Determined::Together
             } else {
                 Determined::Yes
@@ -169,26 +173,27 @@ impl Estimate {
         }
     }
 
-    /// Standard error of a quantity with this gradient with respect to [`parameters`](Self::parameters): a product, a ratio.
+    /// Returns the standard error of a quantity with this gradient with respect to [`parameters`](Self::parameters),
+    /// such as a product or a ratio.
     pub fn std_error_of(&self, gradient: &[f64]) -> f64 {
         let g = DVector::from_column_slice(gradient);
         (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
     }
 
-    /// The parameter of that name.
+    /// Returns the parameter with this name.
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Names of what the record does not determine, or only together with others.
+    /// Returns the names of the parameters that the record does not determine, or only together with others.
     pub fn undetermined(&self) -> Vec<&str> {
         let vague = |p: &&Parameter| matches!(p.determined, Determined::No | Determined::Together);
         self.parameters.iter().filter(vague).map(|p| p.name.as_str()).collect()
     }
 }
 
-/// The inverse of normal equations, and its directions with their spreads. What difference quotients cannot tell from nothing is not
-/// determined, but not infinitely so.
+/// Returns the inverse of normal equations, and its eigenvectors with their variances. Eigenvalues below the accuracy
+/// of difference quotients are limited, so the variances stay finite.
 fn inverse(normal: &DMatrix<f64>) -> (DMatrix<f64>, Vec<(DVector<f64>, f64)>) {
     let n = normal.nrows();
     let eigen = SymmetricEigen::new(normal.clone());
@@ -199,17 +204,18 @@ fn inverse(normal: &DMatrix<f64>) -> (DMatrix<f64>, Vec<(DVector<f64>, f64)>) {
     (sum, directions)
 }
 
-/// What a fit has left in the rows that it used, taken as noise.
+/// Residual of a fit in the rows that it used, treated as noise.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     squares: f64,
     rows: usize,
-    /// By how much a mean over the rows varies more than if they were independent.
+    /// Ratio of the variance of a mean over the rows to that of independent rows.
     rows_per_independent: f64,
 }
 
 impl Noise {
-    /// Of measured minus predicted output, row after row; `lengths` of them belong to each segment.
+    /// Estimates the noise from measured minus predicted output, row by row; `lengths` is the number of rows of each
+    /// segment.
     pub(crate) fn of(residual: &[f64], lengths: &[usize]) -> Self {
         Self {
             squares: residual.iter().map(|r| r * r).sum(),
@@ -218,7 +224,7 @@ impl Noise {
         }
     }
 
-    /// Variance that an independent row would need to make parameters as uncertain as these correlated ones do.
+    /// Returns the variance of independent rows that would make the parameters as uncertain as these correlated ones.
     pub(crate) fn variance(&self, unknowns: usize) -> f64 {
         self.squares / self.rows.saturating_sub(unknowns).max(1) as f64 * self.rows_per_independent
     }
@@ -228,8 +234,9 @@ impl Noise {
     }
 }
 
-/// `1 + 2 Σ ρₗ` over the first lags at which the correlation within segments is clearly positive: more than two of its standard errors
-/// (Bartlett's), which grow with the correlations before. So ten rows in place of each one count for no more than that.
+/// Returns `1 + 2 Σ ρₗ` over the first lags with a clearly positive correlation within segments: more than two of its
+/// standard errors (Bartlett's), which grow with the earlier correlations. So repeating each row ten times does not
+/// reduce the standard errors.
 fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
     let n = residual.len();
     let mean = residual.iter().sum::<f64>() / n.max(1) as f64;
@@ -250,7 +257,7 @@ fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
     let mut all = Vec::new();
     let (mut sum, mut squares) = (1.0, 1.0);
     for lag in 1..longest {
-        if lag == FEW {
+        if lag == DIRECT_LAGS {
             all = products(&segments, mean, longest);
         }
         let rho = all.get(lag).copied().unwrap_or_else(|| product(lag)) / variance;
@@ -263,10 +270,10 @@ fn rows_per_independent(residual: &[f64], lengths: &[usize]) -> f64 {
     sum
 }
 
-/// Lags up to which products are summed one by one: white noise needs no more.
-const FEW: usize = 16;
+/// Number of lags whose products are summed directly: white noise needs no more.
+const DIRECT_LAGS: usize = 16;
 
-/// The products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` within segments, of all lags.
+/// Returns the products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` within segments, for all lags.
 fn products(segments: &[&[f64]], mean: f64, longest: usize) -> Vec<f64> {
     let mut planner = RealFftPlanner::new();
     let mut products = vec![0.0; longest];
@@ -276,12 +283,12 @@ fn products(segments: &[&[f64]], mean: f64, longest: usize) -> Vec<f64> {
     products
 }
 
-/// Adds the products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` of one segment, lag after lag.
+/// Adds the products `Σ (rₖ − mean) (rₖ₊ₗ − mean)` of one segment, for all lags.
 fn autocorrelate(planner: &mut RealFftPlanner<f64>, own: &[f64], mean: f64, products: &mut [f64]) {
     if own.is_empty() {
         return;
     }
-    // Room for zeros: a transform goes round.
+    // Zero padding, because a transform is circular.
     let length = (2 * own.len()).next_power_of_two();
     let (forward, back) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
     let (mut time, mut spectrum) = (forward.make_input_vec(), forward.make_output_vec());
@@ -304,7 +311,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// An autoregression over `rows`, each with the share `kept` of the one before, of variance 1.
+    /// Autoregressive noise over `rows` with the coefficient `kept` and variance 1.
     fn correlated(rows: usize, kept: f64, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
@@ -318,10 +325,10 @@ mod tests {
     }
 
     #[test]
-    fn independent_rows_count_one_by_one_and_an_autoregression_as_it_should() {
+    fn rows_per_independent_row_match_white_and_autoregressive_noise() {
         let white = Noise::of(&correlated(20_000, 0.0, 1), &[20_000]).rows_per_independent;
         assert!((white - 1.0).abs() < 0.1, "{white}");
-        // (1 + r) / (1 − r), over lags far beyond two hundred.
+        // (1 + r) / (1 − r), over far more than two hundred lags.
         for (kept, expected) in [(0.5, 3.0), (0.98, 99.0), (0.998, 999.0)] {
             let found = Noise::of(&correlated(400_000, kept, 2), &[400_000]).rows_per_independent;
             assert!((found / expected - 1.0).abs() < 0.25, "{kept}: {found}, {expected} expected");
@@ -329,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn ten_rows_in_place_of_one_count_as_one() {
+    fn ten_repeated_rows_count_as_one() {
         let slow = correlated(4000, 0.9, 3);
         let once = Noise::of(&slow, &[4000]);
         let held: Vec<f64> = slow.iter().flat_map(|x| [*x; 10]).collect();
@@ -337,15 +344,15 @@ mod tests {
         let smooth: Vec<f64> = (0..40_000).map(between).collect();
         for (what, finer) in [("held", held), ("on lines", smooth)] {
             let finer = Noise::of(&finer, &[40_000]);
-            // Ten times the normal equations, and as certain as before.
+            // Ten times the normal equations, but the same certainty.
             let ratio = finer.variance(0) / 10.0 / once.variance(0);
             assert!((ratio - 1.0).abs() < 0.2, "{what}: {ratio}");
         }
     }
 
     #[test]
-    fn segments_have_nothing_to_do_with_each_other() {
-        // Each segment has a level of its own: rows of one belong together, neighbours across a border do not.
+    fn segments_are_independent() {
+        // Each segment has its own level: rows of one segment are correlated, neighbours across a border are not.
         let levels = correlated(400, 0.0, 4);
         let rows: Vec<f64> = levels.iter().flat_map(|x| [*x; 50]).collect();
         let found = Noise::of(&rows, &vec![50; 400]).rows_per_independent;
@@ -353,10 +360,10 @@ mod tests {
     }
 
     #[test]
-    fn what_a_section_says_of_an_unknown_reaches_all_that_follows_from_it() {
+    fn a_minimum_error_of_an_unknown_reaches_all_dependent_parameters() {
         let noise = Noise::of(&correlated(1000, 0.0, 5), &[1000]);
         let sigma = noise.variance(0).sqrt();
-        // Two unknowns of one standard error, correlated; the second parameter is the sum of both.
+        // Two correlated unknowns with equal standard errors; the second parameter is the sum of both.
         let of = |at_least: f64| {
             Estimate::of(Evidence {
                 parameters: vec![("a".into(), 5.0), ("b".into(), 7.0)],

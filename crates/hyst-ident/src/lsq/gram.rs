@@ -1,8 +1,8 @@
-//! Normal equations: of all rows while a fit goes on, per block once it has converged.
+//! Normal equations: of all rows during a fit, and per block after convergence.
 //!
-//! A block is a contiguous piece of one segment. With the matrices `XᵀX` of every block at hand, a
-//! fit to any union of blocks and its error on the others cost no further pass over the record: that
-//! is what makes cross-validation and block-wise standard errors cheap.
+//! A block is a contiguous piece of one segment. With the matrices `XᵀX` of all blocks, a fit to any union of blocks
+//! and its error on the others take no further pass over the record. This makes cross-validation and block-wise
+//! standard errors cheap.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -11,18 +11,18 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Samples;
 
-/// How a record is cut into blocks.
+/// Division of a record into blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks {
     /// Rows of each block.
     pub(crate) rows: Vec<Range<usize>>,
-    /// Every `stride`-th row counts.
+    /// One of `stride` rows counts.
     pub(crate) stride: usize,
 }
 
 impl Blocks {
-    /// About `count` blocks of equal length, none across the border of two segments, using at most
-    /// about `budget` rows.
+    /// Returns about `count` blocks of equal length, none across a segment border, with at most about `budget` rows
+    /// that count.
     pub(crate) fn new(samples: &Samples, count: usize, budget: usize) -> Self {
         let target = (samples.len() / count.max(1)).max(1);
         let mut rows = Vec::new();
@@ -36,10 +36,10 @@ impl Blocks {
         Self { rows, stride: samples.len().div_ceil(budget.max(1)).max(1) }
     }
 
-    /// The rows of block `b` that count.
+    /// Returns the rows of block `b` that count.
     pub(crate) fn used<'a>(&'a self, b: usize, samples: &'a Samples) -> impl Iterator<Item = usize> + 'a {
         let rows = self.rows[b].clone();
-        // One row of each stretch, at a scattered place: an even stride would show a tone as a constant.
+        // One row of each stretch, at a scattered position: with an even stride a tone would alias to a constant.
         let scattered = move |first: usize| {
             let place = (first as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33;
             (first + place as usize % self.stride).min(rows.end - 1)
@@ -47,12 +47,12 @@ impl Blocks {
         self.rows[b].clone().step_by(self.stride).map(scattered).filter(|k| !samples.settling[*k])
     }
 
-    /// The rows that count, of all blocks, in their order.
+    /// Returns the rows of all blocks that count, in order.
     pub(crate) fn all_used<'a>(&'a self, samples: &'a Samples) -> impl Iterator<Item = usize> + 'a {
         (0..self.rows.len()).flat_map(|b| self.used(b, samples))
     }
 
-    /// How many of [`all_used`](Self::all_used) belong to each segment.
+    /// Returns how many of [`all_used`](Self::all_used) are in each segment.
     pub(crate) fn used_of_segments(&self, samples: &Samples) -> Vec<usize> {
         let of = |segment: &Range<usize>| {
             let own = (0..self.rows.len()).filter(|b| segment.contains(&self.rows[*b].start));
@@ -65,7 +65,7 @@ impl Blocks {
 /// Columns of a strip of [`own_products`].
 const STRIP: usize = 48;
 
-/// `XᵀX`, strip by strip of the upper triangle: half of the work of a product of two different matrices.
+/// Returns `XᵀX`, computed strip by strip in the upper triangle: half the work of a general product.
 fn own_products(x: &DMatrix<f64>) -> DMatrix<f64> {
     let n = x.ncols();
     let mut products = DMatrix::zeros(n, n);
@@ -79,7 +79,7 @@ fn own_products(x: &DMatrix<f64>) -> DMatrix<f64> {
     products
 }
 
-/// `XᵀX` of one set of rows, the target being X's last column.
+/// `XᵀX` of a set of rows; the target is the last column of X.
 #[derive(Clone, Debug)]
 pub(crate) struct Gram {
     pub(crate) matrix: DMatrix<f64>,
@@ -91,12 +91,12 @@ impl Gram {
         Self { matrix: DMatrix::zeros(columns, columns), rows: 0 }
     }
 
-    /// Of these rows.
+    /// Returns the normal equations of these rows.
     pub(crate) fn of(rows: &DMatrix<f64>) -> Self {
         Self { matrix: own_products(rows), rows: rows.nrows() }
     }
 
-    /// Of all of these blocks of rows, which are `columns` wide.
+    /// Returns the normal equations of all blocks of rows, each `columns` wide.
     pub(crate) fn of_all(blocks: &[DMatrix<f64>], columns: usize) -> Self {
         let mut total = Self::zeros(columns);
         blocks.iter().for_each(|rows| total.add(&Self::of(rows)));
@@ -114,12 +114,12 @@ impl Gram {
         total
     }
 
-    /// Unknowns: all columns but the target.
+    /// Returns the number of unknowns: all columns but the target.
     pub(crate) fn unknowns(&self) -> usize {
         self.matrix.ncols() - 1
     }
 
-    /// Σ (y − X z)² over the rows.
+    /// Returns Σ (y − X z)² over the rows.
     pub(crate) fn error(&self, z: &DVector<f64>) -> f64 {
         let n = self.unknowns();
         let mut full = z.clone().insert_row(n, -1.0);
@@ -127,16 +127,17 @@ impl Gram {
         (full.transpose() * &self.matrix * &full)[(0, 0)].max(0.0)
     }
 
-    /// Xᵀ(y − X z): the gradient that these rows contribute.
+    /// Returns Xᵀ(y − X z): the gradient that these rows contribute.
     pub(crate) fn score(&self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.unknowns();
         self.matrix.view((0, n), (n, 1)).column(0) - self.matrix.view((0, 0), (n, n)) * z
     }
 }
 
-/// What one block adds to the normal equations: its rows, or their products where those are fewer numbers.
+/// Contribution of a block to the normal equations: its rows, or their products if those are fewer numbers.
 ///
-/// A block of 25 rows of a base with 250 columns is a tenth of its products, and a diagnosis holds some dozen fits of a hundred blocks.
+/// With 25 rows and 250 columns, a block's rows take a tenth of the memory of its products. A diagnosis holds several
+/// dozen fits of a hundred blocks.
 #[derive(Clone, Debug)]
 pub(crate) enum Share {
     /// The target is the last column.
@@ -145,7 +146,7 @@ pub(crate) enum Share {
 }
 
 impl Share {
-    /// Of these rows.
+    /// Stores these rows.
     pub(crate) fn of(rows: DMatrix<f64>) -> Self {
         if rows.nrows() < rows.ncols() { Self::Rows(rows) } else { Self::Products(Gram::of(&rows)) }
     }
@@ -164,7 +165,7 @@ impl Share {
         }
     }
 
-    /// The products `XᵀX`.
+    /// Returns the products `XᵀX`.
     pub(crate) fn gram(&self) -> Cow<'_, Gram> {
         match self {
             Self::Rows(rows) => Cow::Owned(Gram::of(rows)),
@@ -172,7 +173,7 @@ impl Share {
         }
     }
 
-    /// The products of all of these, which are `columns` wide.
+    /// Returns the sum of the products, which are `columns` wide.
     pub(crate) fn sum<'a>(columns: usize, shares: impl Iterator<Item = &'a Self>) -> Gram {
         let mut total = Gram::zeros(columns);
         let mut blocks = Vec::new();
@@ -182,7 +183,7 @@ impl Share {
                 Self::Products(gram) => total.add(gram),
             }
         }
-        // One product of many rows costs less than many of few.
+        // One product of many rows costs less than many products of few rows.
         let mut rows = DMatrix::zeros(blocks.iter().map(|block| block.nrows()).sum(), columns);
         let mut next = 0;
         for block in blocks {
@@ -195,7 +196,7 @@ impl Share {
         total
     }
 
-    /// Σ (y − X z)² over the rows.
+    /// Returns Σ (y − X z)² over the rows.
     pub(crate) fn error(&self, z: &DVector<f64>) -> f64 {
         match self {
             Self::Rows(rows) => residual(rows, z).norm_squared(),
@@ -203,7 +204,7 @@ impl Share {
         }
     }
 
-    /// Xᵀ(y − X z): the gradient that these rows contribute.
+    /// Returns Xᵀ(y − X z): the gradient that these rows contribute.
     pub(crate) fn score(&self, z: &DVector<f64>) -> DVector<f64> {
         match self {
             Self::Rows(rows) => rows.columns(0, z.len()).tr_mul(&residual(rows, z)),
@@ -212,12 +213,13 @@ impl Share {
     }
 }
 
-/// y − X z, y being the last column.
+/// Returns y − X z, where y is the last column.
 fn residual(rows: &DMatrix<f64>, z: &DVector<f64>) -> DVector<f64> {
     rows.column(z.len()) - rows.columns(0, z.len()) * z
 }
 
-/// What further columns add to the normal equations of others: their products with those, and with each other.
+/// Contribution of further columns to given normal equations: their products with the given columns and with each
+/// other.
 #[derive(Clone, Debug)]
 pub(crate) struct Bordered {
     cross: DMatrix<f64>,
@@ -225,19 +227,20 @@ pub(crate) struct Bordered {
 }
 
 impl Bordered {
-    /// No rows, for `further` columns beside `columns`.
+    /// Returns zero products for `further` columns added to `columns`.
     pub(crate) fn zeros(columns: usize, further: usize) -> Self {
         Self { cross: DMatrix::zeros(columns, further), own: DMatrix::zeros(further, further) }
     }
 
-    /// Adds rows: the columns that there are, and those that come.
+    /// Adds rows of the given and of the further columns.
     pub(crate) fn add(&mut self, x: &DMatrix<f64>, further: &DMatrix<f64>) {
         // Transposing the few columns costs less than transposing the many.
         self.cross += (further.transpose() * x).transpose();
         self.own += own_products(further);
     }
 
-    /// The normal equations of all columns: the old ones keep their place, the target moves behind the new ones.
+    /// Returns the normal equations of all columns: the given columns keep their positions, the target moves behind the
+    /// further ones.
     pub(crate) fn around(&self, gram: &Gram) -> Gram {
         let (n, q) = self.cross.shape();
         let target = n - 1 + q;
@@ -261,13 +264,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn products_by_strips_are_those_of_the_whole() {
+    fn products_by_strips_equal_the_full_product() {
         let x = DMatrix::from_fn(70, 2 * STRIP + 5, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
         assert!((own_products(&x) - x.transpose() * &x).amax() < 1e-12);
     }
 
     #[test]
-    fn rows_and_their_products_say_the_same() {
+    fn rows_and_products_give_equal_results() {
         let x = DMatrix::from_fn(9, 12, |k, c| ((c + 2) as f64 * 0.3 * k as f64).cos());
         let z = DVector::from_fn(11, |i, _| (i as f64).sin());
         let (rows, products) = (Share::of(x.clone()), Share::Products(Gram::of(&x)));
@@ -279,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn further_columns_stand_between_the_old_ones_and_the_target() {
+    fn further_columns_are_inserted_before_the_target() {
         let of = |columns: &[usize], rows: Range<usize>| {
             let at = |k: usize, c: usize| ((c + 2) as f64 * 0.3 * (k + rows.start) as f64).cos();
             DMatrix::from_fn(rows.len(), columns.len(), |k, c| at(k, columns[c]))

@@ -1,4 +1,4 @@
-//! Least squares by normal equations, of the whole record and of each of its blocks, and the nearest values in an order.
+//! Least squares by normal equations, for the whole record and for each block; and the closest values in a given order.
 
 mod gram;
 mod ordered;

@@ -1,9 +1,9 @@
-//! The nearest values that keep an order.
+//! The closest values that satisfy order constraints.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// `x[upper] − x[lower] ≥ least`; without a lower one, `x[upper] ≥ least`.
+/// An order constraint: `x[upper] − x[lower] ≥ least`; without a lower index, `x[upper] ≥ least`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Order {
     pub(crate) upper: usize,
@@ -11,23 +11,25 @@ pub(crate) struct Order {
     pub(crate) least: f64,
 }
 
-/// Weights are kept within this ratio of their largest: an error of nothing would make the equations singular.
-const SPREAD: f64 = 1e6;
+/// Maximum ratio of two weights: a standard error of zero would make the equations singular.
+const MAX_WEIGHT_RATIO: f64 = 1e6;
 
-/// Minimises `Σ wᵢ (xᵢ − tᵢ)²` where every order holds. `None` if a number is not finite or the solver gives up.
+/// Minimises `Σ wᵢ (xᵢ − tᵢ)²` under all order constraints. Returns `None` if a number is not finite or the solver
+/// fails.
 ///
-/// An interior point ends within its tolerance (10⁻⁸ of the largest target) of an order that binds.
+/// The interior-point solution satisfies an active constraint within its tolerance (10⁻⁸ of the largest target).
 pub(crate) fn nearest_ordered(target: &[f64], weight: &[f64], orders: &[Order]) -> Option<Vec<f64>> {
     let n = target.len();
-    // Targets and weights of unit size: the solver's tolerances are absolute.
+    // Targets and weights are scaled to unit size, because the solver's tolerances are absolute.
     let size = target.iter().fold(0.0f64, |m, t| m.max(t.abs())).max(f64::MIN_POSITIVE);
     let finite = weight.iter().copied().filter(|w| w.is_finite()).fold(0.0f64, f64::max);
     let heaviest = if finite > 0.0 { finite } else { 1.0 };
-    let w: Vec<f64> = weight.iter().map(|w| (w / heaviest).clamp(1.0 / SPREAD, 1.0)).collect();
+    let w: Vec<f64> = weight.iter().map(|w| (w / heaviest).clamp(1.0 / MAX_WEIGHT_RATIO, 1.0)).collect();
     if !target.iter().chain(&w).all(|x| x.is_finite()) {
         return None;
     }
-    // Nothing has to move where every order holds; a solver would end near it, and far from it where a weight is small.
+    // If every constraint holds, nothing has to move. The solver would only come close, and less so with a small
+    // weight.
     if orders.iter().all(|o| target[o.upper] - o.lower.map_or(0.0, |l| target[l]) >= o.least) {
         return Some(target.to_vec());
     }
@@ -62,8 +64,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_out_of_order_meets_at_its_weighted_mean() {
-        // 3 of weight 1 above 1 of weight 3, in the wrong order: both go to 1.5. The third is free.
+    fn values_out_of_order_meet_at_their_weighted_mean() {
+        // 3 with weight 1 above 1 with weight 3, in the wrong order: both become 1.5. The third is free.
         let order = |upper, lower, least| Order { upper, lower, least };
         let x = nearest_ordered(&[1.0, 3.0, -2.0], &[3.0, 1.0, 1.0], &[order(0, Some(1), 0.0)]).unwrap();
         for (x, expected) in x.iter().zip([1.5, 1.5, -2.0]) {
@@ -77,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_order_stays() {
+    fn values_in_order_stay() {
         let target = [5.0, 2.0, 1.0];
         let orders = [Order { upper: 0, lower: Some(1), least: 1.0 }, Order { upper: 1, lower: Some(2), least: 0.5 }];
         let x = nearest_ordered(&target, &[1.0, f64::INFINITY, 1e-9], &orders).unwrap();

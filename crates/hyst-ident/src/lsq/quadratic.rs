@@ -1,4 +1,4 @@
-//! Least squares with bounds, from normal equations.
+//! Bounded least squares from normal equations.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
@@ -16,7 +16,7 @@ pub(crate) struct Bounds {
 impl Bounds {
     pub(crate) const FREE: Self = Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
 
-    /// Whether there is nothing to choose.
+    /// Returns whether both bounds are equal.
     fn is_fixed(self) -> bool {
         self.lower == self.upper
     }
@@ -30,33 +30,34 @@ impl Bounds {
     }
 }
 
-/// How near to a bound an unknown counts as held there, as a share of the sum of all that are bounded: solvers end within a rounding of it.
+/// Maximum distance from a bound at which an unknown counts as held there, relative to the sum of all bounded unknowns:
+/// a solver ends within rounding of it.
 const NEAR_BOUND: f64 = 1e-9;
 
-/// Which of some values are held at a bound.
+/// Returns which values are held at a bound.
 pub(crate) fn held<'a>(values: impl Iterator<Item = &'a f64> + Clone, bounds: &[Bounds]) -> Vec<bool> {
     let bounded = values.clone().zip(bounds).filter(|(_, b)| b.lower.is_finite());
     let near = NEAR_BOUND * bounded.map(|(value, _)| value.abs()).sum::<f64>();
     values.zip(bounds).map(|(value, b)| *value <= b.lower + near || *value >= b.upper - near).collect()
 }
 
-/// Relative ridge on scaled columns: keeps two collinear columns from growing against each other
-/// without moving what the record determines.
+/// Relative ridge on scaled columns. It prevents two collinear columns from growing against each other, without
+/// changing what the record determines.
 const RIDGE: f64 = 1e-10;
 
-/// Exchanges of a block pivoting after which an interior point is tried.
-const EXCHANGES: usize = 60;
-/// How many in a row may leave no fewer in their wrong place than there have been before.
-const CHANCES: usize = 5;
+/// Maximum number of exchanges of the block pivoting; the interior-point solver is tried after that.
+const MAX_EXCHANGES: usize = 60;
+/// Maximum number of successive exchanges without fewer wrongly placed unknowns than before.
+const MAX_STALLED_EXCHANGES: usize = 5;
 
-/// Minimises `|y − X z|² + zᵀ P z` within bounds. `penalty` is P's upper triangle or `None`.
+/// Minimises `|y − X z|² + zᵀ P z` within bounds. `penalty` is the upper triangle of P, or `None`.
 ///
-/// Returns `None` if the equations are not finite or the solver gives up.
+/// Returns `None` if the equations are not finite or the solver fails.
 pub(crate) fn solve(gram: &Gram, penalty: Option<&DMatrix<f64>>, bounds: &[Bounds]) -> Option<DVector<f64>> {
     solve_near(gram, penalty, bounds, None)
 }
 
-/// [`solve`] from the answer to nearly the same equations: which bounds bind there is nearly right, and costs less than to find out.
+/// Solves as [`solve`] does, starting from the solution of similar equations: its active bounds are nearly right.
 pub(crate) fn solve_near(
     gram: &Gram,
     penalty: Option<&DMatrix<f64>>,
@@ -69,9 +70,9 @@ pub(crate) fn solve_near(
     if let Some(p) = penalty {
         h += p;
     }
-    // The target of unit length, whatever its unit: the solver's tolerances are absolute.
+    // The target is scaled to unit length, because the solver's tolerances are absolute.
     let size = gram.matrix[(n, n)].sqrt().max(f64::MIN_POSITIVE);
-    // Columns of unit length: volts, micrometres and hertz stand side by side here.
+    // Columns are scaled to unit length, because their units differ.
     let scale: Vec<f64> = (0..n).map(|i| if h[(i, i)] > 0.0 { h[(i, i)].sqrt() } else { 1.0 }).collect();
     for i in 0..n {
         g[i] /= scale[i] * size;
@@ -88,7 +89,7 @@ pub(crate) fn solve_near(
         .zip(&scale)
         .map(|(b, s)| Bounds { lower: b.lower * s / size, upper: b.upper * s / size })
         .collect();
-    // From nothing, from where no bound binds.
+    // Without a start, no bound is active.
     let place = |i: usize| match (bounds[i], near.map(|near| (near[i], 1e-12 * near[i].abs()))) {
         (b, _) if b.is_fixed() => At::Lower,
         (b, Some((z, room))) if z - b.lower <= room => At::Lower,
@@ -100,7 +101,7 @@ pub(crate) fn solve_near(
         Some(z) => z,
         None => bounded(&h, &g, &scaled)?,
     };
-    // Scaling back may miss a bound by a last digit.
+    // Scaling back may exceed a bound by rounding.
     Some(DVector::from_fn(n, |i, _| (z[i] / scale[i] * size).max(bounds[i].lower).min(bounds[i].upper)))
 }
 
@@ -139,7 +140,7 @@ fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVec
     ) {
         return None;
     }
-    // An interior point ends just inside or, within its tolerance, outside.
+    // An interior point ends just inside the bounds or, within its tolerance, outside.
     let z = DVector::from_iterator(n, solver.solution.x.iter().zip(bounds).map(|(z, b)| z.max(b.lower).min(b.upper)));
     if !z.iter().all(|x| x.is_finite()) {
         return None;
@@ -147,7 +148,7 @@ fn bounded(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds]) -> Option<DVec
     Some(polish(h, g, bounds, z))
 }
 
-/// Where an unknown stands.
+/// Position of an unknown relative to its bounds.
 #[derive(Clone, Copy, PartialEq)]
 enum At {
     Lower,
@@ -155,13 +156,14 @@ enum At {
     Free,
 }
 
-/// The optimum by block principal pivoting: all unknowns that stand wrongly change their place together, one alone where that does not
-/// help (Júdice and Pires 1994). `None` if it takes too long, or where what is free is not determined.
+/// Finds the optimum by block principal pivoting: all wrongly placed unknowns change their position together, a single
+/// one if that does not help (Júdice and Pires 1994). Returns `None` if it takes too long or the free unknowns are not
+/// determined.
 fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At>) -> Option<DVector<f64>> {
     let n = g.len();
     let tolerance = 1e-11 * g.amax();
-    let (mut least, mut chances) = (usize::MAX, CHANCES);
-    for _ in 0..EXCHANGES {
+    let (mut least, mut chances) = (usize::MAX, MAX_STALLED_EXCHANGES);
+    for _ in 0..MAX_EXCHANGES {
         let mut z = DVector::from_fn(n, |i, _| match at[i] {
             At::Lower => bounds[i].lower,
             At::Upper => bounds[i].upper,
@@ -174,7 +176,7 @@ fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At
             return None;
         }
         let pull = g - h * &z;
-        let belongs = |i: usize| match at[i] {
+        let correct_position = |i: usize| match at[i] {
             stays if bounds[i].is_fixed() => stays,
             At::Free if z[i] < bounds[i].lower => At::Lower,
             At::Free if z[i] > bounds[i].upper => At::Upper,
@@ -182,10 +184,11 @@ fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At
             At::Upper if -pull[i] > tolerance => At::Free,
             stays => stays,
         };
-        let wrong: Vec<(usize, At)> = (0..n).map(|i| (i, belongs(i))).filter(|(i, to)| *to != at[*i]).collect();
+        let wrong: Vec<(usize, At)> =
+            (0..n).map(|i| (i, correct_position(i))).filter(|(i, to)| *to != at[*i]).collect();
         let Some(last) = wrong.last() else { return Some(z) };
         if wrong.len() < least {
-            (least, chances) = (wrong.len(), CHANCES);
+            (least, chances) = (wrong.len(), MAX_STALLED_EXCHANGES);
         } else if chances > 0 {
             chances -= 1;
         } else {
@@ -197,10 +200,10 @@ fn pivoted(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut at: Vec<At
     None
 }
 
-/// Carries an answer that is nearly right to the exact optimum by a primal active-set search.
+/// Moves a nearly right solution to the exact optimum by a primal active-set search.
 ///
-/// Plays with near thresholds make the problem so ill-conditioned that a duality gap of 10⁻⁸ still
-/// leaves several times the smallest possible residual; the active set it points to is nearly right.
+/// Play operators with similar thresholds make the problem ill-conditioned: a duality gap of 10⁻⁸ still leaves several
+/// times the smallest possible residual. Its active set is nearly right.
 fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<f64>) -> DVector<f64> {
     let n = g.len();
     let size = z.amax().max(f64::MIN_POSITIVE);
@@ -224,7 +227,7 @@ fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<
             Some(target) => target,
             None => return z,
         };
-        // Towards the minimum over the free ones, as far as the bounds allow.
+        // Towards the minimum over the free unknowns, as far as the bounds allow.
         let (mut reach, mut hit) = (1.0, None);
         for (i, t) in free.iter().zip(&target) {
             let d = t - z[*i];
@@ -244,7 +247,7 @@ fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<
             z[i] = bound(i, side);
             continue;
         }
-        // Which bound holds the answer back most?
+        // Release the bound with the largest gradient towards the inside.
         let pull = g - h * &z;
         let outward = |i: usize| match at[i] {
             At::Lower => pull[i],
@@ -259,7 +262,7 @@ fn polish(h: &DMatrix<f64>, g: &DVector<f64>, bounds: &[Bounds], mut z: DVector<
     z
 }
 
-/// The minimum over the free unknowns, the others held.
+/// Returns the minimum over the free unknowns, with the others held.
 fn minimum(h: &DMatrix<f64>, g: &DVector<f64>, z: &DVector<f64>, free: &[usize]) -> Option<Vec<f64>> {
     let mut held = z.clone();
     free.iter().for_each(|i| held[*i] = 0.0);
@@ -273,11 +276,11 @@ fn minimum(h: &DMatrix<f64>, g: &DVector<f64>, z: &DVector<f64>, free: &[usize])
 mod tests {
     use super::*;
 
-    /// From wherever it starts, the answer is that from scratch: near it, far from it, and outside of the bounds.
+    /// From any start (near, far, outside of the bounds) the solution is the same as without one.
     #[test]
-    fn an_answer_does_not_depend_on_where_the_search_for_it_begins() {
+    fn the_solution_does_not_depend_on_the_start() {
         let n = 40;
-        // Neighbouring hats over 300 rows, whose weights alternate: half of them end at a bound.
+        // Overlapping hat functions over 300 rows with alternating weights: half of them end at a bound.
         let hat = |k: usize, c: usize| (1.0 - (k as f64 / 7.5 - c as f64).abs() / 3.0).max(0.0);
         let y =
             |k: usize| (0..n).map(|c| hat(k, c) * if c % 2 == 0 { 1.0 } else { -0.6 }).sum::<f64>() + (k as f64).sin();
@@ -295,9 +298,9 @@ mod tests {
         }
     }
 
-    /// Whichever way what is fixed is pulled, and wherever the search begins.
+    /// For any gradient at the fixed unknown and any start.
     #[test]
-    fn what_is_fixed_stays() {
+    fn a_fixed_unknown_stays() {
         let column = |c: usize, k: usize| ((c + 1) as f64 * 0.7 * k as f64).sin() + 0.2;
         for fixed in [-3.0, 0.4, 3.0] {
             let y = |k: usize| 0.5 * column(0, k) + column(1, k) + 0.8 * column(2, k);
@@ -311,8 +314,8 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_that_binds_holds_and_the_rest_is_refitted() {
-        // y = 2 a − b on orthogonal columns; b ≥ 0 leaves a = 2.
+    fn an_active_bound_holds_and_the_rest_is_refitted() {
+        // y = 2 a − b on orthogonal columns; with b ≥ 0 the solution is a = 2.
         let a: Vec<f64> = (0..40).map(|k| f64::from(k % 2)).collect();
         let b: Vec<f64> = (0..40).map(|k| f64::from((k + 1) % 2)).collect();
         let y: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - b).collect();

@@ -1,6 +1,6 @@
-//! How much the operators and chains of the host hold. Firmware chooses its own.
+//! Capacities of the operators and chains of the host. Firmware chooses its own capacities.
 
-/// Plays of a Prandtl-Ishlinskii operator, elements of a Maxwell-slip one.
+/// Play operators of a Prandtl-Ishlinskii model, elements of a Maxwell-slip model.
 pub const PLAYS: usize = 64;
 /// Nodes along one edge of a Preisach triangle.
 pub const NODES: usize = 65;

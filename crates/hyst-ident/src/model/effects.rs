@@ -1,4 +1,4 @@
-//! The optional stages around the hysteresis, as parameters.
+//! The effects: optional stages around the base model, as parameters.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +10,7 @@ use hyst_core::{
 };
 use serde::{Deserialize, Serialize};
 
-/// An effect that an actuator may show besides hysteresis. In the chain's order.
+/// An effect in addition to the hysteresis, in the order of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Effect {
@@ -18,28 +18,28 @@ pub enum Effect {
     Delay,
     /// First-order lag of the amplifier.
     Lag,
-    /// A curve behind or before the hysteresis: one end of the loop is steeper.
+    /// A static nonlinearity before or after the hysteresis: one end of the loop is steeper.
     Asymmetry,
-    /// Loops that widen with the rate of the drive.
+    /// Rate-dependent hysteresis: the loop widens with the rate of the drive.
     RateDependence,
-    /// Gain and zero that follow temperature.
+    /// Gain and zero depend on temperature.
     Temperature,
     /// Slow relaxation after the drive has stopped.
     Creep,
-    /// The actuator yields under a force.
+    /// Compliance under an external force.
     Load,
     /// A structural mode.
     Resonance,
-    /// A stop of the motion.
+    /// A mechanical stop.
     Saturation,
     /// Drift of the sensor.
     Drift,
-    /// A tone in the sensor.
+    /// A tone in the sensor signal.
     Interference,
 }
 
 impl Effect {
-    /// All effects, in the chain's order.
+    /// All effects, in the order of the chain.
     pub const ALL: [Self; 11] = [
         Self::Delay,
         Self::Lag,
@@ -54,7 +54,7 @@ impl Effect {
         Self::Interference,
     ];
 
-    /// The name that commands and files use.
+    /// Returns the name in commands and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Delay => "delay",
@@ -71,8 +71,9 @@ impl Effect {
         }
     }
 
-    /// Parameters that it brings: between two effects that a record cannot tell apart, the one with
-    /// fewer is the simpler explanation.
+    /// Returns the number of parameters.
+    ///
+    /// Of two effects that a record does not distinguish, the one with fewer parameters is the simpler explanation.
     pub(crate) fn complexity(self) -> usize {
         match self {
             Self::Delay | Self::Lag | Self::Temperature | Self::Load | Self::Drift => 1,
@@ -83,7 +84,7 @@ impl Effect {
         }
     }
 
-    /// Whether the effect moves the actuator, or only what the sensor shows.
+    /// Returns whether the effect acts on the motion; false if it acts only on the sensor signal.
     pub fn acts_on_the_motion(self) -> bool {
         !matches!(self, Self::Drift | Self::Interference)
     }
@@ -100,31 +101,31 @@ impl FromStr for Effect {
     fn from_str(s: &str) -> Result<Self, String> {
         let names = || Self::ALL.map(Self::name).join(", ");
         let found = Self::ALL.into_iter().find(|e| e.name() == s);
-        found.ok_or_else(|| format!("no effect is called {s:?}; it is one of {}", names()))
+        found.ok_or_else(|| format!("there is no effect {s:?}; the effects are {}", names()))
     }
 }
 
-/// Lower bound of the change of slope at one place of a curve: the curve may not fall.
-const LEAST_BEND: f64 = -0.9;
+/// Lower bound of a weight of an input curve (change of slope at a threshold). It keeps the curve increasing.
+const MIN_CURVE_WEIGHT: f64 = -0.9;
 
 /// A bank of creep elements, as parameters.
 pub type CreepBank = CreepParams<Vec<f64>>;
 
-/// Plays whose thresholds grow with the rate, as parameters.
+/// Play operators whose thresholds grow with the rate, as parameters.
 pub type Widening = WideningParams<Vec<f64>>;
 
-/// Which effects a chain has, and their parameters.
+/// The effects of a chain, and their parameters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects {
     /// Dead time.
     pub delay: Option<DelayParams>,
     /// Lag.
     pub lag: Option<LagParams>,
-    /// Loops that widen with the rate of the drive, whatever the base; `pi` also has plays with drag.
+    /// Rate dependence for any base model. `pi` also has play operators with drag.
     pub rate: Option<RateParams>,
-    /// Loops that widen with the rate in proportion to their width, whatever the base.
+    /// Rate dependence in proportion to the width of the loop, for any base model.
     pub widening: Option<Widening>,
-    /// Gain and expansion over temperature.
+    /// Temperature dependence of gain and expansion.
     pub temperature: Option<TemperatureParams>,
     /// Creep bank.
     pub creep: Option<CreepBank>,
@@ -134,15 +135,15 @@ pub struct Effects {
     pub drift: Option<DriftParams>,
     /// Tone.
     pub interference: Option<InterferenceParams>,
-    /// Curve behind or before the hysteresis.
+    /// Curve before or after the hysteresis.
     pub asymmetry: Option<AsymmetryParams<Vec<f64>>>,
-    /// Compliance under the load.
+    /// Compliance under load.
     pub load: Option<LoadParams>,
-    /// Ends of the motion.
+    /// Limits of the motion.
     pub saturation: Option<SaturationParams>,
 }
 
-/// The stages that act before the hysteresis, in their order.
+/// The stages before the hysteresis, in order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct InputSide<'a> {
     pub(crate) delay: Option<DelayParams>,
@@ -151,7 +152,7 @@ pub(crate) struct InputSide<'a> {
     pub(crate) curve: Option<&'a AsymmetryParams<Vec<f64>>>,
 }
 
-/// A parameter as it is searched, with what moves it.
+/// A parameter of a search, with its bounds and a reference to its value.
 pub(crate) struct Parameter<'a> {
     pub(crate) effect: Effect,
     pub(crate) name: String,
@@ -161,7 +162,7 @@ pub(crate) struct Parameter<'a> {
 }
 
 impl Effects {
-    /// Effects that are present, in the chain's order; a second mode counts once more.
+    /// Returns the effects that are present, in the order of the chain. A second mode is listed again.
     pub fn names(&self) -> Vec<Effect> {
         let mut names = Vec::new();
         let mut push = |present: bool, e: Effect| {
@@ -185,7 +186,7 @@ impl Effects {
         names
     }
 
-    /// The same effects as the core has them.
+    /// Converts the effects to the parameters of `hyst-core`.
     pub fn to_params(&self) -> EffectParams<Vec<f64>> {
         let mut modes = self.resonances.iter().copied();
         EffectParams {
@@ -204,18 +205,18 @@ impl Effects {
         }
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no effect.
     pub fn is_empty(&self) -> bool {
         self.names().is_empty()
     }
 
-    /// Whether the chain has room for (another) one.
+    /// Returns whether the chain can have this effect, or another mode.
     pub(crate) fn has_room(&self, effect: Effect) -> bool {
         let count = self.names().iter().filter(|e| **e == effect).count();
         count < if effect == Effect::Resonance { MAX_RESONANCES } else { 1 }
     }
 
-    /// The same effects without `effect` (the last one, if there are two).
+    /// Returns the effects without `effect` (without the last one, if there are two modes).
     pub fn without(&self, effect: Effect) -> Self {
         let mut less = self.clone();
         match effect {
@@ -236,19 +237,20 @@ impl Effects {
         less
     }
 
-    /// The stages that act before the hysteresis.
+    /// Returns the stages before the hysteresis.
     pub(crate) fn input_side(&self) -> InputSide<'_> {
         InputSide { delay: self.delay, lag: self.lag, rate: self.rate, curve: self.curve(CurveSide::Input) }
     }
 
-    /// The curve, if it is on this side of the hysteresis.
+    /// Returns the curve, if it is on this side of the hysteresis.
     pub(crate) fn curve(&self, side: CurveSide) -> Option<&AsymmetryParams<Vec<f64>>> {
         self.asymmetry.as_ref().filter(|p| p.side == side)
     }
 
     /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
-    /// The rate and the height of a drift, load, a thermal expansion, the weights of a widening and of an asymmetry behind the hysteresis, and the amplitude and phase of a tone enter linearly and are
-    /// not among them.
+    ///
+    /// Linear parameters are not visited: rate and height of a drift, load, thermal expansion, weights of a widening and of an asymmetry after the
+    /// hysteresis, amplitude and phase of a tone.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Parameter<'_>)) {
         fn pass(effect: Effect, suffix: &str, params: &mut dyn Params, f: &mut dyn FnMut(Parameter<'_>)) {
             params.visit(&mut |meta, value| {
@@ -282,7 +284,7 @@ impl Effects {
             p.visit(&mut |meta, value| {
                 if meta.name == "weights" {
                     let name = format!("weights[{at}]");
-                    f(Parameter { effect: Effect::Asymmetry, name, lower: LEAST_BEND, upper: meta.upper, value });
+                    f(Parameter { effect: Effect::Asymmetry, name, lower: MIN_CURVE_WEIGHT, upper: meta.upper, value });
                     at += 1;
                 }
             });
@@ -328,7 +330,9 @@ impl Effects {
     }
 }
 
-/// Name of the share of a creep element with this time constant \[s\]: three decimals, more where they would not tell it from others.
+/// Returns the name of the share of a creep element with this time constant \[s\].
+///
+/// The name has three decimals, or more for short time constants, so that names are unique.
 pub(crate) fn creep_share(seconds: f64) -> String {
     let decimals = (2.0 - seconds.log10().floor()).clamp(3.0, 12.0) as usize;
     format!("share_{seconds:.decimals$}s")

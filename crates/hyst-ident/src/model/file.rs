@@ -1,4 +1,4 @@
-//! `model.json`: reading, checking, writing.
+//! Reading, checking and writing of `model.json`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,27 +11,27 @@ use super::operator::inverse_ends;
 use super::{Base, Compensator, Effects, HostChain, Operator, stages, units};
 use crate::{BetweenSamples, Samples};
 
-/// Schema of the files that this version writes.
+/// The schema of the files that this version writes.
 pub const SCHEMA: &str = "hyst.model/1";
 
-/// Under which name [`Model::std_errors`] and estimates have the sensor's zero, which belongs to no stage.
+/// The key of the sensor zero, which belongs to no stage, in [`Model::std_errors`] and estimates.
 pub const ZERO: &str = "zero";
 
-/// One end of the actuator.
+/// The input or the output of the actuator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Channel {
-    /// Column of the record, unit included.
+    /// The column of the record, with its unit.
     pub column: String,
-    /// Unit: `V` or `N` of an input, the column's ending (`um`, `nm`, `mm`, `n`) of an output.
+    /// The unit: `V` or `N` of an input, the suffix of the column (`um`, `nm`, `mm`, `n`) of an output.
     pub unit: String,
-    /// Lowest value in the record that the model was fitted to.
+    /// The minimum in the record that the model was fitted to.
     pub low: f64,
-    /// Highest value in that record.
+    /// The maximum in that record.
     pub high: f64,
 }
 
 impl Channel {
-    /// The unit as it stands beside numbers: `N` for the ending `n`, which beside `s` would read as nano.
+    /// Returns the symbol of the unit: `N` for the suffix `n`, because `n` before `s` would mean nano.
     pub fn symbol(&self) -> &str {
         if self.unit == "n" { "N" } else { &self.unit }
     }
@@ -40,17 +40,17 @@ impl Channel {
 /// A file that a model was fitted to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittedOn {
-    /// File name without its folder.
+    /// The file name without its folder.
     pub file: String,
-    /// SHA-256 of its bytes, hexadecimal.
+    /// SHA-256 of the bytes, hexadecimal.
     pub sha256: String,
-    /// Rows that were fitted.
+    /// The number of fitted rows.
     pub rows: usize,
-    /// Rows that were left out: a start-up transient, a sensor at the end of its range.
+    /// The number of rows that were not fitted: start-up rows, and rows with the sensor at the end of its range.
     pub settling_rows: usize,
 }
 
-/// The input's end, with what only it has.
+/// The input in the file.
 #[derive(Serialize, Deserialize)]
 struct Input {
     column: String,
@@ -77,43 +77,44 @@ struct File<S> {
     zero_std_error: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rmse: Option<f64>,
-    /// Sample period of the record; the parameters do not depend on it.
+    /// The sample rate of the record. The parameters do not depend on it.
     recorded_at_hz: f64,
     fitted_on: Vec<FittedOn>,
     stages: Vec<S>,
 }
 
-/// A fitted chain: base, effects, and what they were fitted on.
+/// A fitted model: base model, effects, and the files that they were fitted to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The input.
     pub input: Channel,
-    /// How the drive goes on between samples: a whole record is simulated so. A [`chain`](Self::build) that takes one sample after
-    /// the other sees it linear.
+    /// The interpolation of the drive between samples in simulations of a record.
+    ///
+    /// A [`chain`](Self::build) that processes one sample at a time interpolates linearly.
     pub between_samples: BetweenSamples,
     /// The output.
     pub output: Channel,
-    /// Whether the output falls where the hysteresis rises: its gain is negative.
+    /// Whether the output falls when the hysteresis rises (negative gain).
     pub falls: bool,
-    /// What the sensor shows at rest \[output unit\].
+    /// The sensor zero: reading of the sensor at rest \[output unit\].
     pub zero: f64,
-    /// The hysteresis.
+    /// The base model.
     pub base: Base,
-    /// The stages around it.
+    /// The effects.
     pub effects: Effects,
-    /// Standard errors by `stage.parameter`, of the sensor's zero by [`ZERO`].
+    /// Standard errors by `stage.parameter`; that of the sensor zero by [`ZERO`].
     pub std_errors: BTreeMap<String, f64>,
-    /// Parameters, by `stage.parameter`, that the record does not determine, or only together with others.
+    /// Parameters, by `stage.parameter`, that the record does not determine, or only in combination with others.
     pub undetermined: BTreeSet<String>,
-    /// What the model leaves of the rows that it was fitted to, as root of the mean square \[output unit\].
+    /// RMS of the residual over the fitted rows \[output unit\].
     pub rmse: Option<f64>,
     /// Sample rate of the record \[Hz\].
     pub recorded_at_hz: f64,
-    /// The record's files.
+    /// The files of the record.
     pub fitted_on: Vec<FittedOn>,
-    /// Seed of the search.
+    /// The seed of the search.
     pub seed: u64,
-    /// Version that wrote the file.
+    /// The version that wrote the file.
     pub version: String,
 }
 
@@ -122,47 +123,47 @@ pub struct Model {
 #[non_exhaustive]
 pub enum ModelError {
     /// The file cannot be read.
-    #[error("{path}: {source}; give the model.json that `fit` or `diagnose` wrote")]
+    #[error("{path}: {source}; give the model.json that hystctl fit or diagnose wrote")]
     Read {
         /// The file.
         path: String,
-        /// The system's reason.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Not JSON, cut off, or with a field that is none.
+    /// The file is not JSON, is truncated, or has an invalid field.
     #[error("{path}: line {line}, column {column}: {message}; {advice}")]
     Syntax {
         /// The file.
         path: String,
-        /// Line, from 1.
+        /// The line, counted from 1.
         line: usize,
-        /// Column, from 1.
+        /// The column, counted from 1.
         column: usize,
-        /// What is wrong there.
+        /// What is wrong.
         message: String,
         /// What to do.
         advice: &'static str,
     },
-    /// Another schema.
-    #[error("{path}: schema {found:?}, this version reads {SCHEMA:?}: {advice}")]
+    /// The file has another schema.
+    #[error("{path}: the schema is {found:?}, but this version reads {SCHEMA:?}: {advice}")]
     Schema {
         /// The file.
         path: String,
-        /// Its schema.
+        /// The schema of the file.
         found: String,
         /// What to do.
         advice: &'static str,
     },
-    /// A parameter is not usable.
-    #[error("{path}: {source}; fit the model anew or correct that field")]
+    /// A parameter is out of range.
+    #[error("{path}: {source}; correct that field, or fit the model again")]
     Parameter {
         /// The file.
         path: String,
-        /// Which and why.
+        /// The parameter, and what is wrong.
         source: Error,
     },
     /// The stages do not make a chain.
-    #[error("{path}: {message}; fit the model anew or correct that field")]
+    #[error("{path}: {message}; correct that field, or fit the model again")]
     Stages {
         /// The file.
         path: String,
@@ -172,10 +173,10 @@ pub enum ModelError {
 }
 
 impl Model {
-    /// The chain at a sample period.
+    /// Builds the chain for a sample period \[s\].
     ///
     /// # Errors
-    /// Names the parameter that is out of range.
+    /// If a parameter is out of range. The error names it.
     pub fn build(&self, period: f64) -> Result<HostChain, Error> {
         let cx = Sampling { period };
         let chain: HostChain =
@@ -183,12 +184,12 @@ impl Model {
         Ok(chain.with_falling(self.falls).with_zero(self.zero))
     }
 
-    /// The stages as the file has them: a JSON object each, with name, parameters, units and standard errors.
+    /// Returns one JSON object per stage, with name, parameters, units and standard errors.
     pub fn stages(&self) -> Vec<serde_json::Value> {
         stages::write(self)
     }
 
-    /// The parameters as firmware takes them.
+    /// Returns the parameters for firmware.
     pub fn to_params(&self) -> ChainParams<Vec<f64>> {
         ChainParams {
             operator: self.base.clone(),
@@ -199,44 +200,45 @@ impl Model {
         }
     }
 
-    /// The compensator at a sample period.
+    /// Builds the compensator for a sample period \[s\].
     ///
     /// # Errors
-    /// As [`build`](Self::build), and if the chain has no inverse.
+    /// Those of [`build`](Self::build), and if the chain has no inverse.
     pub fn compensator(&self, period: f64, options: &CompensatorOptions) -> Result<Compensator, Error> {
         let mut chain = self.build(period)?;
         chain.hysteresis = chain.hysteresis.with_bandwidth(options.bandwidth_hz);
         chain.compensator(&Sampling { period }, options)
     }
 
-    /// Inputs that the compensator's memory operator does not leave, if there are such, lowest and highest, and how near it comes
-    /// to the exact one \[input unit\]: for outputs beyond what they reach it takes the nearer end.
+    /// Returns the input range that limits the inverse of the base model, and its tolerance \[input unit\].
+    ///
+    /// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer end.
     pub fn inverse_ends(&self) -> Option<([f64; 2], f64)> {
         inverse_ends(&self.base, [self.input.low, self.input.high])
     }
 
-    /// Whether the model needs a temperature.
+    /// Returns whether the model needs a temperature.
     pub fn needs_temperature(&self) -> bool {
         self.effects.temperature.is_some() || matches!(self.base, Base::TdPi(_) | Base::TdEm(_))
     }
 
-    /// Whether the model needs a load.
+    /// Returns whether the model needs a load.
     pub fn needs_load(&self) -> bool {
         self.effects.load.is_some()
     }
 
-    /// The surroundings that the model cannot do without and these rows lack: the column, and why.
+    /// Returns the column that the model needs but these rows do not have, and the reason.
     pub(crate) fn lacking(&self, samples: &Samples) -> Option<(&'static str, &'static str)> {
         if self.needs_temperature() && samples.temperature.is_none() {
             return Some((
                 "temperature_degc",
-                "the model's gain depends on it; if it was constant, give --temperature",
+                "the gain of the model depends on temperature; if it was constant, type --temperature DEGC",
             ));
         }
-        (self.needs_load() && samples.load.is_none()).then_some(("load_n", "the model yields under it"))
+        (self.needs_load() && samples.load.is_none()).then_some(("load_n", "the model has a load effect"))
     }
 
-    /// The file's text.
+    /// Returns the text of the file.
     pub fn to_json(&self) -> String {
         let Channel { column, unit, low, high } = self.input.clone();
         let file = File {
@@ -254,30 +256,30 @@ impl Model {
             fitted_on: self.fitted_on.clone(),
             stages: self.stages(),
         };
-        // Plain numbers, strings and lists: this cannot fail.
+        // Serialization of numbers, strings and lists cannot fail.
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
     }
 
     /// Reads a model file.
     ///
     /// # Errors
-    /// See [`ModelError`].
+    /// Those of [`ModelError`].
     pub fn read(path: &Path) -> Result<Self, ModelError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| ModelError::Read { path: name.clone(), source })?;
         Self::parse(&name, &text)
     }
 
-    /// Whether one of the record's files is one that the model was fitted to, byte for byte.
+    /// Returns whether the model was fitted to one of the files of the record, compared byte for byte.
     pub fn was_fitted_to(&self, record: &crate::record::Record) -> bool {
         let fitted = |sum: &str| self.fitted_on.iter().any(|file| file.sha256 == sum);
         record.sources().iter().any(|source| source.sha256.as_deref().is_some_and(fitted))
     }
 
-    /// Reads a model from text; `path` is what errors call it.
+    /// Parses a model. `path` is the file name in errors.
     ///
     /// # Errors
-    /// See [`ModelError`].
+    /// Those of [`ModelError`].
     pub fn parse(path: &str, text: &str) -> Result<Self, ModelError> {
         #[derive(Deserialize)]
         struct Head {
@@ -288,13 +290,13 @@ impl Model {
             path: path.clone(),
             line: e.line(),
             column: e.column(),
-            // The place stands before it.
+            // The message ends with the place, which is stated separately.
             message: e.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
             advice: match e.classify() {
-                Category::Data => "correct that field, or fit the model anew",
-                Category::Eof => "the file is truncated: fit the model anew",
+                Category::Data => "correct that field, or fit the model again",
+                Category::Eof => "the file is truncated: copy it again, or fit the model again",
                 Category::Syntax | Category::Io => {
-                    "this is no JSON: give the model.json that `fit` or `diagnose` wrote"
+                    "the file is not valid JSON: give the model.json that hystctl fit or diagnose wrote"
                 }
             },
         };
@@ -302,12 +304,12 @@ impl Model {
         let found = head.schema.unwrap_or_default();
         if found != SCHEMA {
             let newer = found.strip_prefix("hyst.model/").and_then(|n| n.parse::<u32>().ok()).is_some_and(|n| n > 1);
-            let advice = if newer { "update hystctl to read it" } else { "give a model.json" };
+            let advice = if newer { "update hystctl" } else { "give a model.json" };
             return Err(ModelError::Schema { path, found, advice });
         }
         let file: File<serde_json::Value> = serde_json::from_str(text).map_err(syntax)?;
         let model = Self::from_file(file).map_err(|message| ModelError::Stages { path: path.clone(), message })?;
-        // Whatever the sample period, a chain must come of it and every number must be finite.
+        // The parameters must give a chain, and every number must be finite.
         let period = 1.0 / model.recorded_at_hz;
         let usable = units::agree(&model.base, &model.output).and_then(|()| model.build(period).map(|_| ()));
         usable.map_err(|source| ModelError::Parameter { path: path.clone(), source })?;
@@ -333,11 +335,11 @@ impl Model {
             }
         }
         if !(file.recorded_at_hz > 0.0 && file.recorded_at_hz.is_finite()) {
-            return Err("recorded_at_hz must be positive".into());
+            return Err("recorded_at_hz must be a positive number of Hz".into());
         }
         if between_samples != BetweenSamples::Linear && file.kind != Kind::BoucWenOscillator {
             return Err(format!(
-                "input.between_samples is {between_samples}, which is for {} in this version, not for {}",
+                "input.between_samples is {between_samples}, which this version supports for {} only, not for {}",
                 Kind::BoucWenOscillator,
                 file.kind
             ));

@@ -1,4 +1,4 @@
-//! The hysteresis of a model as the host runs it, and the host's chain and compensator around it.
+//! The hysteresis operators of the host, with their chain and compensator.
 
 use super::activation::{self, HostActivationInverse};
 use super::capacity::{CREEP, DELAY, MIRROR, NODES, PLAYS, TAPS};
@@ -8,31 +8,31 @@ use hyst_core::{
     Search, Stage, TdEm, TdEmInverse, TdPi, TdPiInverse, ViscousPi, ViscousPiInverse,
 };
 
-/// The hysteresis of a model, as parameters.
+/// The base model, as parameters.
 pub type Base = OperatorParams<Vec<f64>>;
 
-/// The chain as the host runs it.
+/// The chain of the host.
 pub type HostChain = Chain<f64, Operator, DELAY, CREEP>;
-/// The compensator as the host runs it.
+/// The compensator of the host.
 pub type Compensator = hyst_core::Compensator<f64, OperatorInverse, DELAY, CREEP, TAPS>;
 
-/// The dynamic Preisach model with a mirror of at most [`MIRROR`]² nodes.
+/// The dynamic Preisach model with a mirror grid of at most [`MIRROR`]² nodes.
 type HostDpm = Dpm<f64, NODES, MIRROR, MIRROR>;
 
-/// Memory of the host's fractional models: all of it, to 3e-7.
+/// Memory of the fractional models of the host: the full history, with a relative error of 3e-7.
 type FullMemory = Exponentials<f64, 40>;
 
-/// Temperature where none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured one.
-pub(crate) const ROOM: f64 = 23.0;
+/// Temperature if none is stated \[°C\]. The filter of an electromechanical model is made for it; its gain follows the measured temperature.
+pub(crate) const DEFAULT_DEGC: f64 = 23.0;
 
-/// What the preview of an activation-function model's inverse may miss, of the largest |α u̇|.
+/// Error of the preview of the inverse of an activation-function model, relative to the largest |α u̇|.
 const PREVIEW_TOLERANCE: f64 = 1e-10;
 
 const NO_OSCILLATOR_INVERSE: Error = Error::NotInvertible(
-    "the drive of an oscillator takes the reference's acceleration and jerk; track it with feedback instead",
+    "the inverse of an oscillator needs acceleration and jerk of the reference; track the reference with feedback instead",
 );
 
-/// Declares the operators of the host: type, type of the inverse, how it is made, and its preview.
+/// Declares the operators of the host: type, type of the inverse, function that makes the inverse, and preview of the inverse.
 macro_rules! operators {
     ($($name:ident($operator:ty) => $inverse:ty, $invert:expr, $lead:expr;)+) => {
         #[derive(Clone, Debug)]
@@ -90,7 +90,7 @@ macro_rules! operators {
             fn reset(&self, s: &mut $outer_state, e: &Env<f64>, u0: f64) -> f64 {
                 match (&self.$field, &mut s.0) {
                     $(($any::$name(o), $any_state::$name(s)) => o.reset(s, e, u0),)+
-                    // A state of another operator: begin one of this one.
+                    // The state belongs to another operator: replace it.
                     (_, other) => {
                         *other = self.state().0;
                         self.reset(s, e, u0)
@@ -114,14 +114,14 @@ pub struct Operator {
     inversion: Inversion,
 }
 
-/// What inverses take besides the operator.
+/// Settings of the inverse.
 #[derive(Clone, Copy, Debug)]
 struct Inversion {
-    /// Inputs among which one may have to search.
+    /// Input range of an inverse by search.
     range: [f64; 2],
-    /// Band of one with dynamics of its own \[Hz\]; chosen if not given.
+    /// Bandwidth of the inverse of a model with dynamics \[Hz\]; `None` selects it automatically.
     bandwidth_hz: Option<f64>,
-    /// Why a search could end at an output that is not the reference, if it could.
+    /// The reason why a search may not reach the reference, if any.
     searchable: Result<(), Error>,
 }
 /// The inverse of a hysteresis operator of the host.
@@ -129,30 +129,32 @@ struct Inversion {
 pub struct OperatorInverse {
     any: AnyInverse,
 }
-/// History of an operator of the host.
+/// State of an operator of the host.
 #[derive(Clone, Debug)]
 pub struct OperatorState(AnyState);
-/// History of the inverse of an operator of the host.
+/// State of the inverse of an operator of the host.
 #[derive(Clone, Debug)]
 pub struct InverseState(AnyInverseState);
 
-fn closed<O: Invert<f64>>(operator: &O, _: Inversion) -> Result<O::Inverse, Error> {
+fn closed_form<O: Invert<f64>>(operator: &O, _: Inversion) -> Result<O::Inverse, Error> {
     operator.invert()
 }
 
-/// Share of the range to which a search finds the input.
+/// Tolerance of a search, as a share of the input range.
 const TOLERANCE: f64 = 1e-12;
 
-/// Whether a search finds the inverse of a dynamic Preisach model: only where its output is continuous in the input.
+/// Checks that a search finds the inverse of a dynamic Preisach model.
+///
+/// The output of the model must be continuous in the input.
 ///
 /// # Errors
-/// [`Error::NotInvertible`] for `fade` = 0: no input reaches what lies inside a step, and a search ends beside it without a word.
+/// [`Error::NotInvertible`] for `fade` = 0: no input reaches an output inside a jump, and the search would not report this.
 pub fn searchable<L>(params: &DpmParams<L>) -> Result<(), Error> {
     if params.fade > 0.0 {
         Ok(())
     } else {
         Err(Error::NotInvertible(
-            "with dpm.fade = 0 the output steps where loops close, and no input reaches what lies inside a step; set fade above 0",
+            "with dpm.fade = 0 the output jumps when a loop closes, and no input reaches the outputs within the jump; set fade above 0",
         ))
     }
 }
@@ -163,14 +165,15 @@ fn searched<O: Probe<f64> + Clone>(operator: &O, how: Inversion) -> Result<Searc
     Search::new(operator.clone(), low, high, TOLERANCE * (high - low))
 }
 
-/// What was never driven may have to be reached by an inverse: as much again on either side.
+/// Returns the input range of a search: the identified range, extended by its width on either side.
 pub(crate) fn searched_range([low, high]: [f64; 2]) -> [f64; 2] {
     let reach = (high - low).abs().max(f64::MIN_POSITIVE);
     [low - reach, high + reach]
 }
 
-/// Inputs that the inverse of a model identified on `range` does not leave, if there are such, and how near it comes to the exact
-/// one: for outputs beyond what they reach it takes the nearer end.
+/// Returns the input range to which the inverse of a model identified on `range` is limited, and its tolerance.
+///
+/// `None` if the inverse is not limited. For outputs that this range does not reach, the inverse returns the nearer end.
 pub(super) fn inverse_ends(base: &Base, range: [f64; 2]) -> Option<([f64; 2], f64)> {
     let [low, high] = searched_range(range);
     match base {
@@ -179,33 +182,35 @@ pub(super) fn inverse_ends(base: &Base, range: [f64; 2]) -> Option<([f64; 2], f6
     }
 }
 
-fn at_once<I>(_: &I) -> usize {
+fn no_lead<I>(_: &I) -> usize {
     0
 }
 
 operators! {
-    Pi(Pi<f64, PLAYS>) => Pi<f64, PLAYS>, closed, at_once;
-    ViscousPi(ViscousPi<f64, PLAYS>) => ViscousPiInverse<f64, PLAYS>, closed, at_once;
-    Gpi(Gpi<f64, PLAYS>) => GpiInverse<f64, PLAYS>, closed, at_once;
-    TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, closed, at_once;
-    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>, how: Inversion| o.band_limited(ROOM, how.bandwidth_hz),
+    Pi(Pi<f64, PLAYS>) => Pi<f64, PLAYS>, closed_form, no_lead;
+    ViscousPi(ViscousPi<f64, PLAYS>) => ViscousPiInverse<f64, PLAYS>, closed_form, no_lead;
+    Gpi(Gpi<f64, PLAYS>) => GpiInverse<f64, PLAYS>, closed_form, no_lead;
+    TdPi(TdPi<f64, PLAYS>) => TdPiInverse<f64, PLAYS>, closed_form, no_lead;
+    TdEm(TdEm<f64, PLAYS>) => TdEmInverse<f64, PLAYS, TAPS>, |o: &TdEm<f64, PLAYS>, how: Inversion| o.band_limited(DEFAULT_DEGC, how.bandwidth_hz),
         TdEmInverse::lead;
-    Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed, at_once;
-    Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed, at_once;
+    Lfdm(Lfdm<f64, FullMemory>) => Lfdm<f64, FullMemory>, closed_form, no_lead;
+    Ifm(Ifm<f64, FullMemory, DELAY>) => IfmInverse<f64, FullMemory, DELAY>, closed_form, no_lead;
     BoucWen(BoucWen<f64>) => Search<f64, BoucWen<f64>>,
-        |o: &BoucWen<f64>, Inversion { range: [low, high], .. }| o.inverse(low, high, TOLERANCE * (high - low)), at_once;
-    BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), at_once;
-    Dpm(HostDpm) => Search<f64, HostDpm>, searched, at_once;
+        |o: &BoucWen<f64>, Inversion { range: [low, high], .. }| o.inverse(low, high, TOLERANCE * (high - low)), no_lead;
+    BoucWenOscillator(BoucWenOscillator<f64>) => Pi<f64, 1>, |_: &_, _| Err(NO_OSCILLATOR_INVERSE), no_lead;
+    Dpm(HostDpm) => Search<f64, HostDpm>, searched, no_lead;
     Activation(Activation<f64>) => HostActivationInverse,
         |o: &Activation<f64>, _| activation::inverse(o, PREVIEW_TOLERANCE), activation::lead;
-    Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed, at_once;
+    Preisach(Everett<f64, NODES>) => EverettInverse<f64, NODES>, closed_form, no_lead;
 }
 
 impl Operator {
-    /// The operator with these parameters at a sample period; `low` and `high` are the inputs that it was identified on.
+    /// Builds the operator for a sample period.
+    ///
+    /// `low` and `high` are the input range that the model was identified on.
     ///
     /// # Errors
-    /// Names the parameter that is not finite, out of range or too long.
+    /// If a parameter is not finite, out of range or too long. The error names it.
     pub fn new(base: &Base, [low, high]: [f64; 2], cx: &Sampling) -> Result<Self, Error> {
         let any = match base {
             Base::Pi(p) => Any::Pi(Box::new(p.build(&())?)),
@@ -235,7 +240,7 @@ impl Operator {
         Ok(Self { any, inversion: Inversion { range: searched_range([low, high]), bandwidth_hz: None, searchable } })
     }
 
-    /// The same, whose inverse holds in this band if it has dynamics of its own \[Hz\].
+    /// Sets the bandwidth of the inverse \[Hz\]. It applies to models with dynamics.
     pub fn with_bandwidth(mut self, bandwidth_hz: Option<f64>) -> Self {
         self.inversion.bandwidth_hz = bandwidth_hz;
         self
@@ -249,7 +254,7 @@ mod tests {
     use hyst_core::CompensatorOptions;
 
     #[test]
-    fn a_model_whose_output_steps_has_no_inverse() {
+    fn a_model_whose_output_jumps_has_no_inverse() {
         let mut model = Model::parse("dpm", include_str!("../../../../docs/models/dpm.json")).unwrap();
         let inverse = |model: &Model| model.compensator(1e-4, &CompensatorOptions::default()).map(|_| ());
         assert_eq!(inverse(&model), Ok(()));

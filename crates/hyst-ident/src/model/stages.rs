@@ -1,4 +1,4 @@
-//! The stages of a model file: each a JSON object with its name, its parameters, their units and standard errors.
+//! The stages of a model file: JSON objects with name, parameters, units and standard errors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::{Base, Effects, Model, units};
 
-/// What the stages of a file say.
+/// The contents of the stages of a file.
 pub(super) struct Stages {
     pub(super) base: Base,
     pub(super) effects: Effects,
@@ -17,11 +17,11 @@ pub(super) struct Stages {
     pub(super) undetermined: BTreeSet<String>,
 }
 
-/// Drag of the plays of a Prandtl-Ishlinskii base, in the file a stage of its own.
+/// Drag of the play operators of a Prandtl-Ishlinskii base model, a separate stage in the file.
 #[derive(Serialize, Deserialize)]
 struct RateDependence {
     seconds: f64,
-    /// Older files have none.
+    /// Missing in older files.
     #[serde(default)]
     volt_seconds: f64,
 }
@@ -32,7 +32,7 @@ impl RateDependence {
     }
 }
 
-/// The parameters of dragging plays that are not those of the plays.
+/// The parameters of the drag, without those of the play operators.
 struct Drag<'a>(&'a mut ViscousPiParams<Vec<f64>>);
 
 impl Params for Drag<'_> {
@@ -45,7 +45,7 @@ impl Params for Drag<'_> {
     }
 }
 
-/// The stages of a model, in the chain's order.
+/// Returns the stages of a model, in the order of the chain.
 pub(super) fn write(model: &Model) -> Vec<Value> {
     let (u, y) = (model.input.symbol(), model.output.symbol());
     let mut list = Vec::new();
@@ -63,13 +63,13 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
         if !errors.is_empty() {
             entry.insert("std_errors".into(), Value::Object(errors));
         }
-        let vague: Vec<Value> = model.undetermined.iter().filter_map(own).map(Value::from).collect();
-        if !vague.is_empty() {
-            entry.insert("undetermined".into(), Value::Array(vague));
+        let undetermined: Vec<Value> = model.undetermined.iter().filter_map(own).map(Value::from).collect();
+        if !undetermined.is_empty() {
+            entry.insert("undetermined".into(), Value::Array(undetermined));
         }
         list.push(Value::Object(entry));
     };
-    // Plain numbers, strings and lists: writing them cannot fail.
+    // Serialization of numbers, strings and lists cannot fail.
     fn value(x: &impl Serialize) -> Value {
         serde_json::to_value(x).unwrap_or_default()
     }
@@ -94,7 +94,7 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
         }
         base => {
             let name = base.kind().name();
-            // The enum writes { "name": { fields } }.
+            // The enum is serialized as { "name": { fields } }.
             let fields = match value(base) {
                 Value::Object(outer) => outer.into_iter().next().map(|(_, fields)| fields).unwrap_or_default(),
                 other => other,
@@ -129,9 +129,9 @@ pub(super) fn write(model: &Model) -> Vec<Value> {
     list
 }
 
-/// Reads the parameters of the stage `name`, so that an error names the stage and the field.
+/// Reads the parameters of the stage `name`. An error names the stage and the field.
 ///
-/// A field that the stage does not have is refused: a misspelt one would mean its default.
+/// An unknown field is refused, because a misspelt field would silently get its default.
 fn fields<S: DeserializeOwned + Serialize>(name: &str, value: &Value) -> Result<S, String> {
     let read: S = serde_path_to_error::deserialize(value).map_err(|e| match e.path().to_string() {
         path if path == "." => format!("stage {name}: {}", e.inner()),
@@ -143,7 +143,7 @@ fn fields<S: DeserializeOwned + Serialize>(name: &str, value: &Value) -> Result<
     }
 }
 
-/// The path of a field that `known` does not have.
+/// Returns the path of a field that `known` does not have.
 fn unknown(given: &Value, known: &Value, path: &str) -> Option<String> {
     let (Value::Object(given), Value::Object(known)) = (given, known) else { return None };
     given.iter().find_map(|(key, value)| {
@@ -156,12 +156,16 @@ fn unknown(given: &Value, known: &Value, path: &str) -> Option<String> {
     })
 }
 
-/// Puts a stage where none may be yet.
+/// Reads a stage into an empty slot; refuses a second stage of the same name.
 fn only<S: DeserializeOwned + Serialize>(slot: &mut Option<S>, name: &str, value: &Value) -> Result<(), String> {
-    if slot.replace(fields(name, value)?).is_some() { Err(format!("there are two stages {name:?}")) } else { Ok(()) }
+    if slot.replace(fields(name, value)?).is_some() {
+        Err(format!("there are two stages {name:?}; remove one"))
+    } else {
+        Ok(())
+    }
 }
 
-/// The base model of a stage with this name; `None` if it is no base model.
+/// Reads the base model of a stage with this name; `None` if the stage is not a base model.
 fn base(name: &str, v: &Value) -> Result<Option<Base>, String> {
     Ok(Some(match name {
         "pi" => Base::Pi(fields(name, v)?),
@@ -224,21 +228,23 @@ pub(super) fn read(stages: Vec<Value>) -> Result<Stages, String> {
                 "saturation" => only(&mut effects.saturation, name, value)?,
                 "drift" => only(&mut effects.drift, name, value)?,
                 "interference" => only(&mut effects.interference, name, value)?,
-                other => return Err(format!("there is no stage called {other:?} in this version")),
+                other => return Err(format!("this version has no stage {other:?}")),
             }
         }
         let errors: BTreeMap<String, f64> =
             value.get("std_errors").map_or_else(|| Ok(BTreeMap::new()), |v| fields(name, v))?;
         std_errors.extend(errors.into_iter().map(|(k, v)| (format!("{key}.{k}"), v)));
-        let vague: Vec<String> = value.get("undetermined").map_or_else(|| Ok(Vec::new()), |v| fields(name, v))?;
-        undetermined.extend(vague.into_iter().map(|k| format!("{key}.{k}")));
+        let own: Vec<String> = value.get("undetermined").map_or_else(|| Ok(Vec::new()), |v| fields(name, v))?;
+        undetermined.extend(own.into_iter().map(|k| format!("{key}.{k}")));
     }
     let base = match (bases.ok_or("there is no hysteresis stage")?, drag) {
         (base, None) => base,
         (Base::Pi(pi), Some(drag)) => Base::ViscousPi(drag.of(pi)),
         (other, Some(_)) => {
             let kind = other.kind();
-            return Err(format!("rate-dependence is a variant of pi; {kind} has none (of preisach it is dpm)"));
+            return Err(format!(
+                "the stage rate-dependence is for pi only, not for {kind}; for rate dependence of preisach use dpm"
+            ));
         }
     };
     Ok(Stages { base, effects, std_errors, undetermined })
@@ -262,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn rate_dependence_belongs_to_plays() {
+    fn the_stage_rate_dependence_is_for_pi_only() {
         let stage = |text: &str| serde_json::from_str::<Value>(text).unwrap();
         let pi = stage(r#"{"stage":"pi","gain":0.1,"thresholds":[1.0],"weights":[0.1]}"#);
         let drag = stage(r#"{"stage":"rate-dependence","seconds":0.002}"#);
@@ -275,7 +281,7 @@ mod tests {
         let misspelt = stage(r#"{"stage":"rate-dependence","seconds":0.002,"voltseconds":0.5}"#);
         assert!(with(&misspelt).is_err_and(|e| e.contains("no field \"voltseconds\"")));
         let slip = stage(r#"{"stage":"maxwell-slip","reading":"backlash","widths":[1.0],"gains":[0.1]}"#);
-        assert!(read(vec![slip, drag]).is_err_and(|e| e.contains("variant of pi")));
+        assert!(read(vec![slip, drag]).is_err_and(|e| e.contains("is for pi only")));
         assert!(read(vec![pi.clone(), pi]).is_err_and(|e| e.contains("two hysteresis")));
     }
 }

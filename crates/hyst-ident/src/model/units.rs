@@ -1,4 +1,4 @@
-//! The units of a stage's numbers, by their paths in the file, and whether they are the model's.
+//! The units of the numbers of a stage, by their paths in the file.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::{Base, Channel};
 use crate::record::OutputUnit;
 
-/// `unit` with `u` and `y` replaced by the model's own units.
+/// Replaces `u` and `y` in `unit` by the units of the model.
 fn unit(unit: &str, input: &str, output: &str) -> String {
     if unit.is_empty() {
         return "1".into();
@@ -27,7 +27,7 @@ fn unit(unit: &str, input: &str, output: &str) -> String {
     text
 }
 
-/// The unit of a number that is given and never searched, so that no visit shows it.
+/// Returns the unit of a number that is given and never searched. `Params::visit` does not visit such numbers.
 fn of_given(field: &str) -> Option<&'static str> {
     Some(match field {
         "reference_degc" => "degC",
@@ -40,7 +40,7 @@ fn of_given(field: &str) -> Option<&'static str> {
     })
 }
 
-/// Calls `f` with the path of every number and of every list with numbers in it.
+/// Calls `f` with the path of every number and of every list of numbers.
 fn paths(fields: &Value, path: &str, f: &mut dyn FnMut(&str)) {
     match fields {
         Value::Object(fields) => {
@@ -54,8 +54,9 @@ fn paths(fields: &Value, path: &str, f: &mut dyn FnMut(&str)) {
     }
 }
 
-/// The unit of every number of a stage by its path, of a list as a whole; where its elements have units of their own, these in
-/// the elements' order with commas between them.
+/// Returns the unit of every number of a stage, by its path.
+///
+/// A list has one unit. If its elements have different units, these are listed in order, separated by commas.
 pub(super) fn of(fields: &Value, params: &mut dyn Params, input: &str, output: &str) -> Map<String, Value> {
     let mut visited: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     params.visit(&mut |meta, _| visited.entry(meta.name).or_default().push(meta.unit));
@@ -76,7 +77,7 @@ pub(super) fn of(fields: &Value, params: &mut dyn Params, input: &str, output: &
     units
 }
 
-/// Refuses a base that says itself what unit its output has, if that is not the output's.
+/// Refuses a base model that states a unit of its output other than that of the model.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] with the field and what it must be.
@@ -102,7 +103,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn units_are_the_models_own() {
+    fn units_of_the_model_are_inserted() {
         assert_eq!(unit("y/u", "V", "um"), "um/V");
         assert_eq!(unit("u s/y", "V", "um"), "V s/um");
         assert_eq!(unit("1/u", "V", "um"), "1/V");
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_has_one_unit_or_one_for_each_element() {
+    fn a_list_has_one_unit_or_one_per_element() {
         let mut params = TdEmParams::PRINTED;
         let fields = json!({ "slip": { "widths": [1.0], "gains": [1.0], "reading": "backlash" }, "per_metre": 1e6, "empty": [] });
         let units = Value::Object(of(&fields, &mut params, "V", "um"));
@@ -141,17 +142,17 @@ mod tests {
         for (unit, size) in units.into_iter().zip(sizes) {
             let file = model(size, unit).unwrap();
             assert_eq!(Model::parse("file", &file.to_json()).unwrap(), file);
-            // Metres among them.
+            // Including metres.
             for other in [1.0, 1e3, 1e6, 1e9, f64::NAN].into_iter().filter(|other| *other != size) {
                 let why = model(other, unit).unwrap_err();
                 assert!(matches!(why, Error::OutOfRange { name: "td-em.per_metre", .. }), "{why}");
                 let Base::TdEm(p) = &file.base else { panic!("{file:?}") };
                 let wrong = Model { base: Base::TdEm(TdEmParams { per_metre: other, ..p.clone() }), ..file.clone() };
                 if other.is_finite() {
-                    let said = Model::parse("file", &wrong.to_json()).unwrap_err().to_string();
+                    let message = Model::parse("file", &wrong.to_json()).unwrap_err().to_string();
                     let expected =
                         format!("td-em.per_metre must be {size:e}, because the output is in {}", unit.suffix());
-                    assert!(said.contains(&expected), "{said}");
+                    assert!(message.contains(&expected), "{message}");
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Steps and bounds of the nonlinear parameters on a record.
+//! Steps and bounds of the nonlinear parameters for a record.
 
 use std::ops::Range;
 
@@ -7,11 +7,12 @@ use crate::Samples;
 use crate::lsq::Bounds;
 use crate::model::Effect;
 
-/// Largest overdrive at the reference rate, in ranges of the input: beyond it a loop is all rate and no hysteresis.
+/// Largest overdrive at the reference rate, in ranges of the input: above it the loop is all rate-dependence and no
+/// hysteresis.
 const LARGEST_OVERDRIVE: f64 = 0.3;
 
-/// Bounds of a nonlinear parameter for this record.
-pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
+/// Returns the bounds of a nonlinear parameter for this record.
+pub(super) fn bounds_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
     let nyquist = 0.5 / samples.period;
     let bounds = match (p.cause, p.name.starts_with("hz")) {
         (Cause::SlewLimit, _) => {
@@ -25,7 +26,7 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
             Bounds { lower: 2.0 / samples.longest_segment(), upper: nyquist }
         }
         (Cause::Effect(Effect::Drift), _) => {
-            // Faster is a creep of each step, slower a line.
+            // A faster drift is a creep of each step, a slower one is a line.
             Bounds { lower: 0.02 * whole(samples), upper: 2.0 * whole(samples) }
         }
         (Cause::Effect(Effect::Temperature), _) if p.name == "seconds" => {
@@ -43,52 +44,53 @@ pub(super) fn box_of(p: &Unknown<'_>, samples: &Samples) -> Bounds {
         }
         _ => Bounds { lower: p.lower, upper: p.upper },
     };
-    // Segments of a few rows leave no room between the two.
+    // Segments of a few rows leave no room between the bounds.
     Bounds { upper: bounds.upper.max(bounds.lower), ..bounds }
 }
 
-/// Time from the first to the last row \[s\].
+/// Returns the time from the first to the last row \[s\].
 fn whole(samples: &Samples) -> f64 {
     samples.time.last().zip(samples.time.first()).map_or(0.0, |(last, first)| last - first)
 }
 
-/// Shares of their upper bounds up to which a time and the gain of a mode count as found, not as stopped by the bound.
-const INSIDE: f64 = 0.9;
-const GAIN_INSIDE: f64 = 0.99;
+/// Fraction of the upper bound below which a time constant, and the gain of a mode, count as inside their bounds.
+const MAX_SHARE_OF_BOUND: f64 = 0.9;
+const MAX_GAIN_SHARE_OF_BOUND: f64 = 0.99;
 
-/// Damping ratio below which a mode rings: it is seen at its own frequency then, however much too small a coarse base takes the motion there.
-const RINGS: f64 = 0.1;
+/// Damping ratio below which a mode rings. A ringing mode is visible at its own frequency, even if a coarse base
+/// distorts its gain.
+const MAX_RINGING_DAMPING: f64 = 0.1;
 
-/// Whether the search for a slew limit, a delay, a lag, a drag or the gain of a mode that does not ring has run up against its upper bound.
+/// Returns whether the search for a slew limit, a delay, a lag, a drag or the gain of a damped mode ended at its bound.
 pub(crate) fn ends_at_a_bound(h: &Hypothesis, samples: &Samples) -> bool {
     let mut ends = false;
     let mut dampings = h.effects.resonances.iter().map(|mode| mode.damping);
     h.clone().visit_nonlinear(&mut |p| {
         let inside = match p.cause {
-            // An exponent of one is a law like any other.
+            // An exponent of one is a valid law.
             Cause::Effect(Effect::RateDependence) if p.name == "exponent" => return,
-            // Slower than the bound, a settling drift is a line or a bend, and its time constant means nothing.
+            // A drift that settles more slowly than the bound is a line or a bend; its time constant is meaningless.
             Cause::Effect(Effect::Delay | Effect::Lag | Effect::RateDependence | Effect::Drift) | Cause::SlewLimit => {
-                INSIDE
+                MAX_SHARE_OF_BOUND
             }
-            // As a thermal lag that is slower.
-            Cause::Effect(Effect::Temperature) if p.name == "seconds" => INSIDE,
+            // The same holds for a thermal lag.
+            Cause::Effect(Effect::Temperature) if p.name == "seconds" => MAX_SHARE_OF_BOUND,
             Cause::Effect(Effect::Resonance) if p.name.starts_with("gain") => {
-                if dampings.next().is_some_and(|damping| damping < RINGS) {
+                if dampings.next().is_some_and(|damping| damping < MAX_RINGING_DAMPING) {
                     return;
                 }
-                GAIN_INSIDE
+                MAX_GAIN_SHARE_OF_BOUND
             }
             _ => return,
         };
-        let bounds = box_of(&p, samples);
+        let bounds = bounds_of(&p, samples);
         ends |= *p.value >= inside * bounds.upper || (p.cause == Cause::SlewLimit && *p.value <= bounds.lower);
     });
     ends
 }
 
-/// Slopes \[V/s\] of an amplifier that follows next to nothing of the drive, and of one that follows all of it. A single jump may be far
-/// steeper than all else.
+/// Returns the slopes \[V/s\] of an amplifier that follows next to nothing of the drive, and of one that follows all of
+/// it. A single jump may be far steeper than the rest.
 pub(crate) fn slopes(samples: &Samples) -> (f64, f64) {
     let steepest_of = |(i, rows): (usize, &Range<usize>)| {
         let rises = samples.input[rows.clone()].windows(2);
@@ -98,18 +100,19 @@ pub(crate) fn slopes(samples: &Samples) -> (f64, f64) {
     (f64::min(range_of(samples) / samples.longest_segment(), steepest), steepest)
 }
 
-/// Highest minus lowest input.
+/// Returns the range of the input.
 fn range_of(samples: &Samples) -> f64 {
     let (low, high) = samples.input_range();
     high - low
 }
 
-/// Distance beyond the motion, in spans of it, from which on nothing reaches a stop. It stays where it is: far away, only its distance
-/// times the knee leaves a trace.
+/// Distance of a saturation limit from the motion, in spans of it, beyond which it is not reached. Such a limit is not
+/// moved: only the product of its distance and the knee has an effect.
 const OUT_OF_REACH: f64 = 1.0;
 
-/// The hypothesis with the `index`-th nonlinear parameter moved a little, and by how much: not at all where it leaves no trace.
-/// `motion` is the lowest and the highest motion that the hypothesis gives in the rows that count \[y\].
+/// Returns the hypothesis with the `index`-th nonlinear parameter moved by a small step, the step and its cause. The
+/// step is zero if the parameter has no effect.
+/// `motion` is the minimum and maximum of the motion in the rows that count \[y\].
 pub(super) fn stepped(
     h: &Hypothesis,
     index: usize,
@@ -140,9 +143,9 @@ pub(super) fn stepped(
                     (Effect::Saturation, "low" | "high") => 1e-5 * span,
                     _ => 1e-5,
                 },
-                Cause::ZeroWanders | Cause::GainWanders | Cause::GoesOn => 0.0,
+                Cause::ZeroWanders | Cause::GainWanders | Cause::InitialState => 0.0,
             };
-            // Downwards where the upper bound is near: beyond it the stage may not exist.
+            // Downwards near the upper bound: beyond it the stage may not exist.
             let step = if *p.value + step > p.upper { -step } else { step };
             *p.value += step;
             found = Some((step, p.cause));
@@ -159,7 +162,7 @@ mod tests {
     use crate::model::Effects;
     use hyst_core::{DelayParams, LagParams, ResonanceParams, SaturationParams};
 
-    /// Rows of a millisecond, the drive from 0 to 1, the output from 100 to 110.
+    /// Rows with a period of 1 ms, the drive from 0 to 1, the output from 100 to 110.
     fn samples(rows: usize) -> Samples {
         let share = |k: usize| k as f64 / (rows - 1) as f64;
         let output = (0..rows).map(|k| 100.0 + 10.0 * share(k)).collect();
@@ -167,17 +170,17 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_at_the_bound_of_its_search_has_ended_there() {
+    fn a_lag_at_its_bound_is_reported() {
         let ends = |rows: usize, seconds: f64| {
             let effects = Effects { lag: Some(LagParams { seconds }), ..Effects::default() };
             ends_at_a_bound(&Hypothesis::of(effects), &samples(rows))
         };
         // A tenth of a segment of 2 s.
         assert!(ends(2000, 0.2) && !ends(2000, 0.1));
-        // However long the record is, no search goes on beyond one second.
+        // No search goes beyond one second, however long the record is.
         assert!(ends(40_000, 1.0) && !ends(40_000, 0.5));
         assert!(!ends_at_a_bound(&Hypothesis::default(), &samples(2000)));
-        // A delay, a drag, and what a mode carries.
+        // A delay, a drag, and the gain of a mode.
         let of = |effects: Effects| ends_at_a_bound(&Hypothesis::of(effects), &samples(2000));
         let delay = |seconds: f64| of(Effects { delay: Some(DelayParams { seconds }), ..Effects::default() });
         assert!(delay(0.19) && !delay(0.17));
@@ -189,12 +192,12 @@ mod tests {
             of(Effects { resonances: vec![mode(0.02, 1.2), mode(damping, gain)], ..Effects::default() })
         };
         assert!(carries(0.2, 1.195) && !carries(0.2, 1.1));
-        // What rings is there, however much it carries.
+        // A ringing mode is accepted with any gain.
         assert!(!carries(0.02, 1.2));
     }
 
     #[test]
-    fn a_stop_that_nothing_reaches_stays_where_it_is() {
+    fn a_saturation_limit_out_of_reach_is_not_moved() {
         let samples = samples(2);
         let moves = |low: f64, high: f64| {
             let stop = SaturationParams { low, high, knee: 0.1 };
@@ -203,7 +206,7 @@ mod tests {
             assert_eq!((step(2), step(3)), (Some(true), None));
             (step(0), step(1))
         };
-        // By its distance from the motion, wherever zero is.
+        // The distance from the motion counts, not the value.
         assert_eq!(moves(95.0, 130.0), (Some(true), Some(false)));
         assert_eq!(moves(0.0, 115.0), (Some(false), Some(true)));
     }

@@ -1,4 +1,4 @@
-//! The base's columns behind what leads to the hysteresis: kept where they are few, made anew where they would fill the memory.
+//! Columns of the basis for a drive: kept if they fit into memory, otherwise recomputed when needed.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -7,38 +7,38 @@ use rayon::prelude::*;
 
 use super::{Hypothesis, Problem, SignalPath};
 use crate::Samples;
-use crate::base::{BESIDE, Basis, Drag};
+use crate::base::{Basis, Drag, SIDE_BY_SIDE};
 use crate::memory;
 
-/// Numbers that are kept at most: 64 MB.
-const KEPT: usize = 8_000_000;
-/// Numbers that are made in one pass over a drive at most, unless [`BESIDE`] columns are more: 16 MB.
-const PASS: usize = 2_000_000;
-/// Rows of many columns that stay in the nearest memory while they are added.
-const ROWS: usize = 2048;
+/// Maximum number of values that are kept: 64 MB.
+const MAX_KEPT_VALUES: usize = 8_000_000;
+/// Maximum number of values that are computed in one pass over a drive, unless [`SIDE_BY_SIDE`] columns are more: 16 MB.
+const MAX_VALUES_PER_PASS: usize = 2_000_000;
+/// Number of rows that stay in the cache while many columns are added.
+const ROWS_IN_CACHE: usize = 2048;
 
-/// Whether the columns of a base of this width are kept for a record.
+/// Returns whether the columns of a basis of this width are kept for a record.
 pub(super) fn may_be_kept(samples: &Samples, width: usize) -> bool {
-    samples.len().saturating_mul(width) <= KEPT
+    samples.len().saturating_mul(width) <= MAX_KEPT_VALUES
 }
 
-/// Numbers of the columns that are made in one pass each, in order.
+/// Returns the indices of the columns that are computed in each pass, in order.
 pub(super) fn passes(basis: &dyn Basis, rows: usize) -> Vec<Range<usize>> {
-    let (width, together) = (basis.len(), basis.together().min(PASS / rows.max(1)).max(BESIDE));
+    let (width, together) = (basis.len(), basis.together().min(MAX_VALUES_PER_PASS / rows.max(1)).max(SIDE_BY_SIDE));
     (0..width).step_by(together).map(|first| first..(first + together).min(width)).collect()
 }
 
-/// Columns of one base for one drive.
+/// Columns of a basis for one drive.
 pub(super) enum BaseColumns<'a> {
     Kept(Cow<'a, [Vec<f64>]>),
     Made { problem: &'a Problem<'a>, drive: Vec<f64>, pasts: Cow<'a, [Vec<f64>]>, drag: Drag },
 }
 
 impl BaseColumns<'_> {
-    /// What `f` makes of all columns, some of them at a time, in order.
+    /// Applies `f` to all columns, a few at a time, in order.
     pub(super) fn map<T: Send>(&self, f: impl Fn(Vec<Vec<f64>>) -> T + Sync) -> Vec<T> {
         match self {
-            Self::Kept(columns) => columns.par_chunks(2 * BESIDE).map(|columns| f(columns.to_vec())).collect(),
+            Self::Kept(columns) => columns.par_chunks(2 * SIDE_BY_SIDE).map(|columns| f(columns.to_vec())).collect(),
             Self::Made { problem, drive, pasts, drag } => {
                 let Problem { samples, basis, .. } = problem;
                 let passes = passes(*basis, samples.len());
@@ -48,13 +48,13 @@ impl BaseColumns<'_> {
         }
     }
 
-    /// Σ wᵢ φᵢ over the rows of a record.
+    /// Returns Σ wᵢ φᵢ over the rows of a record.
     pub(super) fn combined(&self, weights: &[f64], rows: usize) -> Vec<f64> {
         match self {
             Self::Kept(columns) => {
                 let mut v = vec![0.0; rows];
-                v.par_chunks_mut(ROWS).enumerate().for_each(|(i, v)| {
-                    let own = ROWS * i..ROWS * i + v.len();
+                v.par_chunks_mut(ROWS_IN_CACHE).enumerate().for_each(|(i, v)| {
+                    let own = ROWS_IN_CACHE * i..ROWS_IN_CACHE * i + v.len();
                     for (w, column) in weights.iter().zip(columns.iter()) {
                         v.iter_mut().zip(&column[own.clone()]).for_each(|(v, x)| *v += w * x);
                     }
@@ -71,8 +71,8 @@ impl BaseColumns<'_> {
                         Self::Kept(Cow::Owned(columns)).combined(&weights[of], rows)
                     };
                     let mut v = vec![0.0; rows];
-                    // Some at a time, whatever the number of threads: each is as long as the record.
-                    for some in passes.chunks(BESIDE) {
+                    // A few at a time, independent of the number of threads: each is as long as the record.
+                    for some in passes.chunks(SIDE_BY_SIDE) {
                         let parts: Vec<Vec<f64>> = some.par_iter().cloned().map(part).collect();
                         parts.iter().for_each(|part| v.iter_mut().zip(part).for_each(|(v, x)| *v += x));
                     }
@@ -84,7 +84,7 @@ impl BaseColumns<'_> {
 }
 
 impl Problem<'_> {
-    /// The base's columns for what leads to the hysteresis.
+    /// Returns the columns of the basis for the drive of the hysteresis.
     pub(super) fn columns<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         if let (false, Some(raw)) = (h.changes_the_base(), &self.raw) {
             return BaseColumns::Kept(Cow::Borrowed(raw));
@@ -96,13 +96,13 @@ impl Problem<'_> {
         BaseColumns::Kept(Cow::Owned(made.map(|columns| columns).into_iter().flatten().collect()))
     }
 
-    /// The same, none of them kept.
+    /// Returns the same columns without keeping them.
     fn made<'b>(&'b self, path: &SignalPath<'b>, h: &Hypothesis) -> BaseColumns<'b> {
         let drag = h.drag.map_or(Drag::NONE, |p| p.over(self.samples));
         BaseColumns::Made { problem: self, drive: path.input_side(), pasts: path.pasts(), drag }
     }
 
-    /// The output of the operator with these weights, where nothing else is asked of its columns.
+    /// Returns the output of the operator with these weights, if its columns are not needed otherwise.
     pub(super) fn operator(&self, path: &SignalPath<'_>, h: &Hypothesis, weights: &[f64]) -> Vec<f64> {
         match &self.raw {
             Some(_) if !h.changes_the_base() => self.columns(path, h),

@@ -1,4 +1,4 @@
-//! Cross-validation inside the training record, from the blocks' normal equations.
+//! Cross-validation inside the training record, from the normal equations of the blocks.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -7,10 +7,10 @@ use super::Fitted;
 use crate::Samples;
 use crate::lsq::{Blocks, Bounds, Gram, Share, solve_near};
 
-/// Blocks dealt out in turn to `count` folds: each fold has pieces of every segment.
+/// Deals the blocks in turn to `count` folds, so that each fold has blocks of every segment.
 pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>> {
     let n = blocks.rows.len();
-    // Shifted by one each round, so that equal segments do not lose the same piece together.
+    // Shifted by one in each round, so that segments of equal length do not lose the same part together.
     let fold = |b: usize| (b + b / count) % count;
     (0..count.min(n))
         .map(|f| (0..n).filter(|b| fold(*b) == f).collect())
@@ -18,8 +18,8 @@ pub(crate) fn folds_interleaved(blocks: &Blocks, count: usize) -> Vec<Vec<usize>
         .collect()
 }
 
-/// Whole experiments left out, one fold each: the segments of a record, or `parts` stretches of one that has a single segment. What helps
-/// only where it was fitted does not transfer.
+/// Returns one fold for each experiment: the segments of a record, or `parts` equal stretches of a record with a single
+/// segment. Leaving out whole experiments tests whether a fit transfers.
 pub(crate) fn folds_by_experiment(blocks: &Blocks, samples: &Samples, parts: usize) -> Vec<Vec<usize>> {
     let n = blocks.rows.len();
     let experiment = |b: usize| match samples.segments.len() {
@@ -32,11 +32,12 @@ pub(crate) fn folds_by_experiment(blocks: &Blocks, samples: &Samples, parts: usi
     folds
 }
 
-/// Mean variance of a block's prediction by the other folds, in variances of a row, beyond which they say nothing about it.
-const UNKNOWN: f64 = 1.0;
+/// Maximum mean variance of the prediction of a block by the other folds, in variances of a row. Above it the block is
+/// unpredictable.
+const MAX_PREDICTION_VARIANCE: f64 = 1.0;
 
-/// Blocks that move the base where no block outside their own fold does (a first rise from rest, say): the others cannot predict
-/// them. `shares` and `penalty` are those of the base.
+/// Returns which blocks are unpredictable: they move the base where no block outside their own fold does (a first rise
+/// from rest, for example). `shares` and `penalty` are those of the base.
 pub(super) fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[Vec<usize>]) -> Vec<bool> {
     let mut unknown = vec![false; shares.len()];
     let Some(columns) = shares.first().map(Share::columns) else { return unknown };
@@ -51,9 +52,9 @@ pub(super) fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[V
         own.iter().for_each(|own| others -= own);
         (0..n).for_each(|i| others[(i, i)] += 1e-12);
         let inverse = others.cholesky().map(|f| f.inverse());
-        // The trace of a product of two symmetric matrices is the sum of their products element by element.
+        // The trace of a product of two symmetric matrices is the sum of the products of their elements.
         let spread = |own: &DMatrix<f64>| inverse.as_ref().map(|inverse| inverse.dot(own));
-        let is = |b: usize, own| spread(own).is_none_or(|s| s > UNKNOWN * shares[b].rows() as f64);
+        let is = |b: usize, own| spread(own).is_none_or(|s| s > MAX_PREDICTION_VARIANCE * shares[b].rows() as f64);
         fold.iter().zip(&own).map(|(b, own)| (*b, is(*b, own))).collect()
     };
     let found: Vec<Vec<(usize, bool)>> = folds.par_iter().map(of_fold).collect();
@@ -61,11 +62,11 @@ pub(super) fn unpredictable(shares: &[Share], penalty: &DMatrix<f64>, folds: &[V
     unknown
 }
 
-/// Σ residual² of each block, predicted by a fit to the blocks of all other folds; of the `unpredictable` ones as they are fitted.
+/// Returns Σ residual² of each block, predicted by a fit to the blocks of all other folds; fitted for the
+/// `unpredictable` blocks.
 ///
-/// The fit to the others is one Gauss-Newton step away from the fit to all, taken with every weight
-/// and parameter free: exact for what is linear, and close for the rest, since one fold moves the
-/// solution little.
+/// The fit to the other folds is one Gauss-Newton step from the fit to all, with every weight and parameter free. This
+/// is exact for the linear unknowns and close for the others, since one fold changes the solution only a little.
 pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: &[bool]) -> Option<Vec<f64>> {
     let columns = fit.shares.first()?.columns();
     let own: Vec<Gram> =
@@ -76,9 +77,9 @@ pub(super) fn cross_validate(fit: &Fitted, folds: &[Vec<usize>], unpredictable: 
     for i in nonlinear_from..columns - 1 {
         penalty[(i, i)] += 1e-6 * total.matrix[(i, i)];
     }
-    // How a segment begins is no law that other parts of the record could tell.
+    // The initial state of a segment cannot be predicted from other parts of the record.
     let mut bounds = fit.bounds.clone();
-    fit.layout().owed.for_each(|i| bounds[i] = Bounds::fixed(fit.solution[i]));
+    fit.layout().initial.for_each(|i| bounds[i] = Bounds::fixed(fit.solution[i]));
     let mut squares = vec![0.0; fit.shares.len()];
     let of_fold = |(fold, own): (&Vec<usize>, &Gram)| -> Option<Vec<(usize, f64)>> {
         let others = Gram { matrix: &total.matrix - &own.matrix, rows: total.rows - own.rows };

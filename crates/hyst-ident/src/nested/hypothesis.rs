@@ -1,39 +1,39 @@
-//! What a trial assumes besides the rate-independent base.
+//! A hypothesis: the causes that a trial adds to the rate-independent base.
 
 use hyst_core::{CurveSide, TemperatureParams};
 
 use crate::base::DragParams;
 use crate::model::{Effect, Effects, InputSide};
 
-/// Something that a trial may add to the base: an effect that has a name, or what has none.
+/// A cause that a trial may add to the base: a listed effect, or an unlisted cause.
 ///
-/// Those without a name compete with the effects so that what nobody put on the list (a jump, a step of the gain, a force that was not
-/// recorded, an amplifier at its limit) finds its place there and draws no wrong name.
+/// Unlisted causes compete with the effects. They absorb disturbances that are not on the list (a jump, a step of the
+/// gain, an unrecorded force, an amplifier at its limit), so that no wrong effect is named for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Cause {
-    /// An effect of the closed list.
+    /// An effect of the list.
     Effect(Effect),
-    /// The zero wanders in time.
+    /// The sensor's zero wanders in time.
     ZeroWanders,
     /// The gain wanders in time.
     GainWanders,
-    /// What is slow, a creep or the warming of the actuator, goes on from what was before each segment.
-    GoesOn,
-    /// The drive is not followed where it is steep: an amplifier whose current is limited.
+    /// Slow states (creep, thermal expansion) are not at rest at the start of a segment.
+    InitialState,
+    /// The output does not follow steep slopes of the drive: the amplifier is current-limited.
     SlewLimit,
 }
 
 impl Cause {
-    /// The effect, if it is one.
+    /// Returns the effect, if the cause is one.
     pub(crate) fn effect(self) -> Option<Effect> {
         match self {
             Self::Effect(e) => Some(e),
-            Self::ZeroWanders | Self::GainWanders | Self::GoesOn | Self::SlewLimit => None,
+            Self::ZeroWanders | Self::GainWanders | Self::InitialState | Self::SlewLimit => None,
         }
     }
 
-    /// Whether it stands for what is on no list.
-    pub(crate) fn is_nameless(self) -> bool {
+    /// Returns whether the cause is not on the list of effects.
+    pub(crate) fn is_unlisted(self) -> bool {
         matches!(self, Self::ZeroWanders | Self::GainWanders | Self::SlewLimit)
     }
 }
@@ -43,22 +43,22 @@ impl Cause {
 pub(crate) struct Hypothesis {
     /// Stages around the hysteresis.
     pub(crate) effects: Effects,
-    /// Drag of the plays: rate-dependence. In a model it belongs to the base.
+    /// Drag of the play operators (rate-dependence). In a model it belongs to the base.
     pub(crate) drag: Option<DragParams>,
-    /// Whether the zero wanders.
+    /// Whether the sensor's zero wanders.
     pub(crate) zero_wanders: bool,
     /// Whether the gain wanders.
     pub(crate) gain_wanders: bool,
-    /// Whether what is slow goes on from before each segment.
-    pub(crate) goes_on: bool,
-    /// Steepest slope that the amplifier follows \[V/s\], if it has one.
+    /// Whether slow states have their own initial values in each segment.
+    pub(crate) initial_state: bool,
+    /// Steepest slope that the amplifier follows \[V/s\], if it is limited.
     pub(crate) slew_limit: Option<f64>,
 }
 
-/// Relative difference up to which two values of a parameter lead to the same optimum.
-const SAME: f64 = 0.02;
+/// Relative difference of a parameter up to which two starts count as the same.
+const SAME_START_TOLERANCE: f64 = 0.02;
 
-/// A parameter as it is searched, with the cause that it belongs to.
+/// A nonlinear parameter with its cause and bounds.
 pub(crate) struct Unknown<'a> {
     pub(crate) cause: Cause,
     pub(crate) name: String,
@@ -68,12 +68,12 @@ pub(crate) struct Unknown<'a> {
 }
 
 impl Hypothesis {
-    /// These effects alone.
+    /// Returns a hypothesis with these effects only.
     pub(crate) fn of(effects: Effects) -> Self {
         Self { effects, ..Self::default() }
     }
 
-    /// Causes that are present, in the chain's order; a second mode counts once more.
+    /// Returns the causes in the order of the signal chain; a second mode is listed again.
     pub(crate) fn causes(&self) -> Vec<Cause> {
         let mut list: Vec<Effect> = self.effects.names();
         if self.drag.is_some() && !list.contains(&Effect::RateDependence) {
@@ -83,22 +83,22 @@ impl Hypothesis {
         let mut causes: Vec<Cause> = list.into_iter().map(Cause::Effect).collect();
         causes.extend(self.zero_wanders.then_some(Cause::ZeroWanders));
         causes.extend(self.gain_wanders.then_some(Cause::GainWanders));
-        causes.extend(self.goes_on.then_some(Cause::GoesOn));
+        causes.extend(self.initial_state.then_some(Cause::InitialState));
         causes.extend(self.slew_limit.map(|_| Cause::SlewLimit));
         causes
     }
 
-    /// Whether something has states that need not be at rest when a segment begins, and that a record may show.
+    /// Returns whether there are slow states that need not be at rest at the start of a segment.
     fn is_slow(&self) -> bool {
         self.effects.creep.is_some() || self.expands_late().is_some()
     }
 
-    /// Time by which an expansion comes later than the temperature \[s\].
+    /// Returns the time constant of a late thermal expansion \[s\].
     pub(super) fn expands_late(&self) -> Option<f64> {
         self.effects.temperature.filter(|p| p.expansion != 0.0 && p.seconds > 0.0).map(|p| p.seconds)
     }
 
-    /// Whether there is room for (another) one.
+    /// Returns whether the cause can be added (once more).
     pub(crate) fn has_room(&self, cause: Cause) -> bool {
         match cause {
             Cause::Effect(Effect::RateDependence) => {
@@ -107,12 +107,12 @@ impl Hypothesis {
             Cause::Effect(e) => self.effects.has_room(e),
             Cause::ZeroWanders => !self.zero_wanders,
             Cause::GainWanders => !self.gain_wanders,
-            Cause::GoesOn => self.is_slow() && !self.goes_on,
+            Cause::InitialState => self.is_slow() && !self.initial_state,
             Cause::SlewLimit => self.slew_limit.is_none(),
         }
     }
 
-    /// The same without `cause` (the last one, if there are two).
+    /// Returns the hypothesis without `cause` (without the last one, if there are two).
     pub(crate) fn without(&self, cause: Cause) -> Self {
         let mut less = self.clone();
         match cause {
@@ -122,9 +122,9 @@ impl Hypothesis {
             }
             Cause::Effect(e) => {
                 less.effects = self.effects.without(e);
-                less.goes_on &= less.is_slow();
+                less.initial_state &= less.is_slow();
             }
-            Cause::GoesOn => less.goes_on = false,
+            Cause::InitialState => less.initial_state = false,
             Cause::ZeroWanders => less.zero_wanders = false,
             Cause::GainWanders => less.gain_wanders = false,
             Cause::SlewLimit => less.slew_limit = None,
@@ -132,13 +132,15 @@ impl Hypothesis {
         less
     }
 
-    /// Numbers that a cause brings here: of two that a record cannot tell apart, the one with fewer is the simpler.
+    /// Returns the number of parameters of a cause. Of two causes that a record cannot separate, the one with fewer is
+    /// the simpler.
     pub(crate) fn complexity(&self, cause: Cause) -> usize {
         match cause {
-            // A curve of time is free of the drive and imitates all that happens once in a record; a creep is tied to the drive.
+            // A function of time is independent of the drive and imitates any single event of a record; a creep depends
+            // on the drive.
             Cause::Effect(Effect::Drift) if self.effects.drift.is_some_and(|p| p.seconds > 0.0) => {
-                let goes_on = self.effects.drift.is_some_and(|p| p.per_second != 0.0);
-                Effect::Creep.complexity() + 1 + usize::from(goes_on)
+                let has_slope = self.effects.drift.is_some_and(|p| p.per_second != 0.0);
+                Effect::Creep.complexity() + 1 + usize::from(has_slope)
             }
             Cause::Effect(Effect::Temperature) => {
                 let more = |p: TemperatureParams| usize::from(p.expansion != 0.0) + usize::from(p.seconds > 0.0);
@@ -150,31 +152,32 @@ impl Hypothesis {
             }
             Cause::Effect(e) => e.complexity(),
             // No cause of its own: an actuator is seldom at rest when a record begins.
-            Cause::GoesOn => 0,
+            Cause::InitialState => 0,
             Cause::ZeroWanders | Cause::GainWanders => super::HATS,
             Cause::SlewLimit => 1,
         }
     }
 
-    /// Whether anything changes what drives the hysteresis, or how it follows.
+    /// Returns whether a cause changes the drive of the hysteresis or its rate-dependence.
     pub(super) fn changes_the_base(&self) -> bool {
         self.effects.input_side() != InputSide::default() || self.drag.is_some() || self.slew_limit.is_some()
     }
 
-    /// Whether the hysteresis is driven, and follows, as in another set.
-    pub(super) fn drives_alike(&self, other: &Self) -> bool {
+    /// Returns whether the hysteresis has the same drive and rate-dependence as in another hypothesis.
+    pub(super) fn has_same_drive(&self, other: &Self) -> bool {
         self.drag == other.drag
             && self.slew_limit == other.slew_limit
             && self.effects.input_side() == other.effects.input_side()
             && self.effects.widening == other.effects.widening
     }
 
-    /// Whether the output depends on the weights by more than a sum: it is then solved in rounds, each linear around the one before.
-    pub(super) fn is_bent(&self) -> bool {
+    /// Returns whether the output is nonlinear in the weights. It is then solved in rounds, each linearised around the
+    /// previous one.
+    pub(super) fn is_nonlinear_in_weights(&self) -> bool {
         self.effects.curve(CurveSide::Output).is_some() || self.effects.saturation.is_some() || self.gain_wanders
     }
 
-    /// Calls `f` for every parameter that enters the output nonlinearly, always in the same order.
+    /// Calls `f` for every nonlinear parameter, always in the same order.
     pub(crate) fn visit_nonlinear(&mut self, f: &mut dyn FnMut(Unknown<'_>)) {
         if let Some(value) = &mut self.slew_limit {
             let (lower, upper) = (0.0, f64::INFINITY);
@@ -193,16 +196,16 @@ impl Hypothesis {
         });
     }
 
-    /// Whether both hold the same parameters of nearly the same values.
+    /// Returns whether both have the same parameters with nearly the same values.
     pub(crate) fn is_near(&self, other: &Self) -> bool {
         let (own, others) = (self.nonlinear(), other.nonlinear());
-        let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
+        let near = |a: f64, b: f64| (a - b).abs() <= SAME_START_TOLERANCE * a.abs().max(b.abs());
         self.causes() == other.causes()
             && own.len() == others.len()
             && own.iter().zip(&others).all(|((a, _), (b, _))| near(*a, *b))
     }
 
-    /// Values and bounds of the nonlinear parameters.
+    /// Returns the values and bounds of the nonlinear parameters.
     pub(super) fn nonlinear(&self) -> Vec<(f64, crate::lsq::Bounds)> {
         let mut values = Vec::new();
         self.clone()

@@ -1,4 +1,4 @@
-//! Which unknown stands where.
+//! Positions of the unknowns in the solution vector.
 
 use std::ops::Range;
 
@@ -7,34 +7,34 @@ use nalgebra::DVector;
 
 use super::Hypothesis;
 
-/// Hats of a wandering over a record.
+/// Number of hat functions of a wander over a record.
 pub(crate) const HATS: usize = 32;
 
-/// Places of the unknowns that are solved for, in this order; the nonlinear parameters come behind them.
+/// Positions of the linear unknowns, in this order. The nonlinear parameters follow.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
     pub(crate) weights: Range<usize>,
     pub(crate) zeros: Range<usize>,
-    /// A line, then what settles.
+    /// Slope, then settling amplitude.
     pub(crate) drift: Range<usize>,
-    /// Sine and cosine, then those of the harmonics.
+    /// Sine and cosine of the fundamental, then of the harmonics.
     pub(crate) tone: Range<usize>,
     pub(crate) load: Range<usize>,
     /// Thermal expansion.
     pub(crate) expansion: Range<usize>,
-    /// Plays of the widening.
+    /// Play operators of the widening.
     pub(crate) widening: Range<usize>,
     /// Dead zones of the asymmetry.
     pub(crate) zones: Range<usize>,
     pub(crate) zero_hats: Range<usize>,
     pub(crate) gain_hats: Range<usize>,
-    /// What is still owed to the time before each segment.
-    pub(crate) owed: Range<usize>,
+    /// Initial deviations of slow states.
+    pub(crate) initial: Range<usize>,
 }
 
 impl Layout {
-    /// Of a record in which what goes on from before takes `owed` unknowns.
-    pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize, owed: usize) -> Self {
+    /// Returns the layout for a record whose initial deviations have `initial` unknowns.
+    pub(crate) fn of(h: &Hypothesis, weights: usize, zeros: usize, initial: usize) -> Self {
         let mut end = 0;
         let mut next = |count: usize| {
             end += count;
@@ -53,19 +53,20 @@ impl Layout {
             zones: next(e.curve(CurveSide::Output).map_or(0, |a| a.thresholds.len())),
             zero_hats: next(some(h.zero_wanders, HATS)),
             gain_hats: next(some(h.gain_wanders, HATS)),
-            owed: next(some(h.goes_on, owed)),
+            initial: next(some(h.initial_state, initial)),
         }
     }
 
-    /// The places of each kind, in order.
+    /// Returns the positions of each kind, in order.
     fn kinds(&self) -> [Range<usize>; 11] {
-        let Self { weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, owed } =
+        let Self { weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, initial } =
             self.clone();
-        [weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, owed]
+        [weights, zeros, drift, tone, load, expansion, widening, zones, zero_hats, gain_hats, initial]
     }
 
-    /// A solution in this layout as it stands in another one, and the places there that this one does not have, or has in another number.
-    pub(super) fn carried(&self, solution: &DVector<f64>, to: &Self) -> (DVector<f64>, Vec<usize>) {
+    /// Maps a solution to another layout. Returns the mapped solution, and the positions there of the kinds that this
+    /// layout does not have or has in another number.
+    pub(super) fn mapped(&self, solution: &DVector<f64>, to: &Self) -> (DVector<f64>, Vec<usize>) {
         let mut z = DVector::zeros(to.len());
         let mut places = Vec::new();
         for (from, to) in self.kinds().into_iter().zip(to.kinds()) {
@@ -78,9 +79,9 @@ impl Layout {
         (z, places)
     }
 
-    /// How many there are.
+    /// Returns the number of linear unknowns.
     pub(crate) fn len(&self) -> usize {
-        self.owed.end
+        self.initial.end
     }
 }
 
@@ -92,12 +93,12 @@ mod tests {
     use crate::model::Effects;
 
     #[test]
-    fn what_a_layout_lacks_is_told_and_the_rest_keeps_its_values() {
+    fn a_mapped_solution_keeps_its_values_and_lists_missing_positions() {
         let load = Hypothesis::of(Effects { load: Some(LoadParams { per_newton: 0.0 }), ..Effects::default() });
         let (three, one) = (Layout::of(&load, 2, 3, 0), Layout::of(&load, 2, 1, 0));
         let z = DVector::from_vec(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         // Two weights, the zeros of three files, the load.
-        let (carried, places) = three.carried(&z, &one);
-        assert_eq!((carried.as_slice(), places.as_slice()), ([1.0, 2.0, 0.0, 6.0].as_slice(), [2].as_slice()));
+        let (mapped, places) = three.mapped(&z, &one);
+        assert_eq!((mapped.as_slice(), places.as_slice()), ([1.0, 2.0, 0.0, 6.0].as_slice(), [2].as_slice()));
     }
 }

@@ -1,9 +1,10 @@
-//! What is still owed to the time before a segment.
+//! Initial values of slow states at the start of a segment.
 //!
-//! An element of a creep that was not at rest when a segment began, `x(0) ≠ v(0)`, adds `c (x(0) − v(0)) exp(−t/τ)` to what it adds from
-//! rest. Nothing that the record holds says how far each was away: these are unknowns of their own, but each element was somewhere within the motion. Few
-//! unknowns for each segment stand for all elements, since those of neighbouring time constants were in neighbouring places. In the same way an actuator need
-//! not have had the temperature that the thermometer showed first: a late expansion adds `ε (x(0) − T(0)) exp(−t/τ)`.
+//! A creep element that is not at rest when a segment begins, `x(0) ≠ v(0)`, adds `c (x(0) − v(0)) exp(−t/τ)` to its
+//! response from rest. The record does not contain the initial values, so they are unknowns, bounded by the range of
+//! the motion. A few unknowns per segment represent all elements, since elements with similar time constants have
+//! similar states. In the same way the actuator need not have had the first measured temperature: a late expansion adds
+//! `ε (x(0) − T(0)) exp(−t/τ)`.
 
 use std::ops::Range;
 
@@ -11,20 +12,20 @@ use super::Hypothesis;
 use crate::Samples;
 use crate::samples::range;
 
-/// Unknowns of a segment: how far its quick, its middle and its slow elements were away.
+/// Number of unknowns per segment: for fast, medium and slow elements.
 const BANDS: usize = 3;
-/// Segments, the longest ones, that get unknowns.
-const MOST_SEGMENTS: usize = 8;
+/// Maximum number of segments with unknowns; the longest ones are used.
+const MAX_SEGMENTS: usize = 8;
 
 /// Elements of one band in one segment.
 pub(super) struct Relaxation {
     rows: Range<usize>,
-    /// Shares, and the rows until 1/e is left of each.
+    /// Share and time constant in rows of each element.
     elements: Vec<(f64, f64)>,
 }
 
 impl Relaxation {
-    /// Adds what they add when they were `away`.
+    /// Adds the response of the elements to an initial deviation `away`.
     pub(super) fn add_to(&self, motion: &mut [f64], away: f64) {
         for (c, rows) in self.elements.iter().filter(|_| away != 0.0) {
             let (mut left, kept) = (c * away, (-1.0 / rows).exp());
@@ -36,21 +37,21 @@ impl Relaxation {
     }
 }
 
-/// How many there are in a record.
+/// Returns the number of unknowns of a record.
 pub(super) fn count(samples: &Samples, h: &Hypothesis) -> usize {
     let bands = if h.effects.creep.is_some() { BANDS } else { 0 } + usize::from(h.expands_late().is_some());
-    bands * samples.segments.len().min(MOST_SEGMENTS)
+    bands * samples.segments.len().min(MAX_SEGMENTS)
 }
 
-/// All of a record where something goes on, segment by segment: those of a creep, then those of a warming.
+/// Returns all relaxations of a record, segment by segment: first those of the creep, then those of the expansion.
 pub(super) fn relaxations(samples: &Samples, h: &Hypothesis) -> Vec<Relaxation> {
-    if !h.goes_on {
+    if !h.initial_state {
         return Vec::new();
     }
     let mut longest: Vec<(usize, f64)> =
         samples.segments.iter().enumerate().map(|(i, s)| (i, s.len() as f64 * samples.period_of(i))).collect();
     longest.sort_by(|a, b| b.1.total_cmp(&a.1));
-    longest.truncate(MOST_SEGMENTS);
+    longest.truncate(MAX_SEGMENTS);
     longest.sort_by_key(|(i, _)| *i);
     let mut bands: Vec<Vec<(f64, f64)>> = Vec::new();
     if let Some(creep) = &h.effects.creep {
@@ -66,7 +67,7 @@ pub(super) fn relaxations(samples: &Samples, h: &Hypothesis) -> Vec<Relaxation> 
     bands.iter().flat_map(|band| longest.iter().map(|(i, _)| relaxation(*i, band))).collect()
 }
 
-/// What each adds in each row.
+/// Returns the column of each relaxation.
 pub(crate) fn columns(samples: &Samples, h: &Hypothesis) -> Vec<Vec<f64>> {
     let column = |of: &Relaxation| {
         let mut column = vec![0.0; samples.len()];
@@ -76,7 +77,7 @@ pub(crate) fn columns(samples: &Samples, h: &Hypothesis) -> Vec<Vec<f64>> {
     relaxations(samples, h).iter().map(column).collect()
 }
 
-/// How far an element was away at most, or by how much the output was, as far as the sensor has shown \[y\].
+/// Returns the largest possible initial deviation: the range of the measured output \[y\].
 pub(super) fn farthest(samples: &Samples) -> f64 {
     let (low, high) = range(samples.output.iter().copied());
     high - low
@@ -89,13 +90,13 @@ mod tests {
     use hyst_core::CreepParams;
 
     #[test]
-    fn elements_that_were_away_add_up_to_what_a_creep_adds_that_was() {
+    fn bands_of_equal_deviation_add_up_to_that_of_the_whole_creep() {
         let mut samples = Samples::of_columns(0.1, vec![0.0; 300], vec![0.0; 300]);
         samples.segments = vec![0..100, 100..300];
         samples.file_of_segment = vec![0, 0];
         let creep = CreepParams { seconds: vec![0.5, 2.0, 7.0, 30.0], shares: vec![0.01, 0.02, 0.03, 0.04] };
         let h = Hypothesis {
-            goes_on: true,
+            initial_state: true,
             ..Hypothesis::of(Effects { creep: Some(creep.clone()), ..Effects::default() })
         };
         let all = columns(&samples, &h);

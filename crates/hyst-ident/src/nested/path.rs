@@ -1,4 +1,4 @@
-//! The stages around the hysteresis, over whole columns.
+//! The stages around the hysteresis, applied to whole columns.
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -12,35 +12,35 @@ use rayon::prelude::*;
 
 use super::Hypothesis;
 use crate::Samples;
-use crate::base::BESIDE;
+use crate::base::SIDE_BY_SIDE;
 use crate::model::InputSide;
 use crate::model::capacity::{CREEP, DELAY};
 use crate::samples::PerSegment;
 
-/// What leads to the hysteresis and what follows it, for one set of causes.
+/// The stages before and behind the hysteresis, for one hypothesis.
 pub(crate) struct SignalPath<'a> {
     samples: &'a Samples,
-    /// Slope that the amplifier follows at most \[V/s\].
+    /// Slope limit of the amplifier \[V/s\].
     slew_limit: Option<f64>,
     delay: Option<PerSegment<Delay<f64, DELAY>>>,
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
-    /// Each play of the widening by itself, of weight one.
+    /// Each play operator of the widening, with weight one.
     widening: Vec<PerSegment<Widening<f64>>>,
-    /// What each of them adds, once somebody has asked.
-    wider: OnceLock<Vec<Vec<f64>>>,
-    warmth: Option<Warmth>,
+    /// Their columns; computed on first use.
+    widening_columns: OnceLock<Vec<Vec<f64>>>,
+    thermal_state: Option<ThermalState>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
     resonances: Vec<PerSegment<Resonance<f64>>>,
     stop: Option<Stop>,
 }
 
-/// A stop of the motion, both ways.
+/// Saturation of the motion and its inverse.
 struct Stop {
     forward: Saturation<f64>,
     inverse: SaturationInverse<f64>,
-    /// Step of its difference quotients.
+    /// Step of the difference quotients.
     step: f64,
 }
 
@@ -48,7 +48,7 @@ impl<'a> SignalPath<'a> {
     pub(crate) fn new(samples: &'a Samples, h: &Hypothesis) -> Result<Self, Error> {
         let effects = &h.effects;
         let InputSide { delay, lag, rate, curve } = effects.input_side();
-        let warmth = effects.temperature.as_ref().map(|p| warmth(samples, p)).transpose()?;
+        let thermal_state = effects.temperature.as_ref().map(|p| thermal_state(samples, p)).transpose()?;
         let stop = effects.saturation.as_ref().map(|p| {
             let forward: Saturation<f64> = p.build(&())?;
             Ok(Stop { forward, inverse: forward.invert()?, step: 1e-6 * (p.high - p.low) })
@@ -60,21 +60,21 @@ impl<'a> SignalPath<'a> {
             lag: lag.map(|p| for_each(samples, &p)).transpose()?,
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
-            wider: OnceLock::new(),
+            widening_columns: OnceLock::new(),
             widening: effects
                 .widening
                 .iter()
                 .flat_map(each_play)
                 .map(|p| for_each(samples, &p))
                 .collect::<Result<_, _>>()?,
-            warmth: warmth.flatten(),
+            thermal_state: thermal_state.flatten(),
             creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
             resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
             stop: stop.transpose()?,
         })
     }
 
-    /// What the hysteresis is driven with.
+    /// Returns the drive of the hysteresis.
     pub(crate) fn input_side(&self) -> Vec<f64> {
         let mut drive = self.samples.input.clone();
         if let Some(v_per_s) = self.slew_limit {
@@ -95,23 +95,25 @@ impl<'a> SignalPath<'a> {
         drive
     }
 
-    /// The drive of the hysteresis before each segment began: slow enough for all that leads to it but a curve.
+    /// Returns the drive history of the hysteresis before each segment. It is slow, so all stages before the hysteresis
+    /// but a curve pass it unchanged.
     pub(crate) fn pasts(&self) -> Cow<'a, [Vec<f64>]> {
         let Some(curve) = &self.curve else { return Cow::Borrowed(&self.samples.pasts) };
         let through = |past: &Vec<f64>| past.iter().map(|u| curve.reset(&mut (), &Env::default(), *u)).collect();
         Cow::Owned(self.samples.pasts.iter().map(through).collect())
     }
 
-    /// What each play of the widening adds to the output of the operator, for a weight of one; none without a widening.
+    /// Returns the output column of each play operator of the widening, with weight one; empty without a widening.
     pub(crate) fn widening(&self) -> &[Vec<f64>] {
-        // Found outside of the cell: a thread that waits for others in here may come by again with another job.
-        if self.wider.get().is_none() {
-            let _ = self.wider.set(self.widened());
+        // Computed outside of the cell, because a thread that waits inside may execute another job that enters here
+        // again.
+        if self.widening_columns.get().is_none() {
+            let _ = self.widening_columns.set(self.computed_widening());
         }
-        self.wider.get().map_or(&[], Vec::as_slice)
+        self.widening_columns.get().map_or(&[], Vec::as_slice)
     }
 
-    fn widened(&self) -> Vec<Vec<f64>> {
+    fn computed_widening(&self) -> Vec<Vec<f64>> {
         if self.widening.is_empty() {
             return Vec::new();
         }
@@ -134,21 +136,21 @@ impl<'a> SignalPath<'a> {
         self.widening.par_iter().map(column).collect()
     }
 
-    /// Adds what the widening does with these weights.
+    /// Adds the widening with these weights.
     pub(super) fn widen(&self, operator: &mut [f64], weights: &[f64]) {
         for (column, w) in self.widening().iter().zip(weights) {
             operator.iter_mut().zip(column).for_each(|(v, x)| *v += w * x);
         }
     }
 
-    /// Carries what the hysteresis gives on to the stop, in place.
+    /// Passes the output of the hysteresis through the stages up to the saturation, in place.
     pub(crate) fn output_side(&self, v: &mut [f64]) {
         self.carry([v]);
     }
 
-    /// The same for several columns.
+    /// Passes several columns through the stages.
     pub(crate) fn output_side_of(&self, columns: &mut [Vec<f64>]) {
-        for columns in columns.chunks_mut(BESIDE) {
+        for columns in columns.chunks_mut(SIDE_BY_SIDE) {
             match columns {
                 [a, b, c, d] => self.carry([a, b, c, d]),
                 [a, b, c] => self.carry([a, b, c]),
@@ -159,7 +161,7 @@ impl<'a> SignalPath<'a> {
     }
 
     fn carry<const N: usize>(&self, mut columns: [&mut [f64]; N]) {
-        if let Some(Warmth { factor, .. }) = &self.warmth {
+        if let Some(ThermalState { factor, .. }) = &self.thermal_state {
             for v in &mut columns {
                 v.iter_mut().zip(factor).for_each(|(v, f)| *v *= f);
             }
@@ -170,9 +172,9 @@ impl<'a> SignalPath<'a> {
         self.modes(&mut columns);
     }
 
-    /// What a thermal expansion of one unit per kelvin adds to the motion.
+    /// Returns the contribution of a thermal expansion of one unit per kelvin to the motion.
     pub(crate) fn expansion(&self) -> Option<Vec<f64>> {
-        let mut shift = self.warmth.as_ref()?.kelvin.clone();
+        let mut shift = self.thermal_state.as_ref()?.kelvin.clone();
         if let Some(creep) = &self.creep {
             self.creep(creep, &mut [&mut shift]);
         }
@@ -180,7 +182,7 @@ impl<'a> SignalPath<'a> {
         Some(shift)
     }
 
-    /// Carries a deflection through the modes, in place.
+    /// Passes a deflection through the modes, in place.
     pub(crate) fn structure(&self, v: &mut [f64]) {
         self.modes(&mut [v]);
     }
@@ -189,15 +191,15 @@ impl<'a> SignalPath<'a> {
         self.resonances.iter().for_each(|mode| self.filter(mode, columns));
     }
 
-    /// Where the motion is stopped, and by how much the output there follows it: value and slope.
-    pub(crate) fn stopped(&self, motion: f64) -> (f64, f64) {
+    /// Returns the saturated output for a motion, and its slope.
+    pub(crate) fn saturated(&self, motion: f64) -> (f64, f64) {
         let Some(Stop { forward, step, .. }) = &self.stop else { return (motion, 1.0) };
         let at = |m: f64| forward.step(&mut (), &Env::default(), m);
         (at(motion), (at(motion + step) - at(motion - step)) / (2.0 * step))
     }
 
-    /// The motion that would show this output without the stop; beyond its end, the end.
-    pub(crate) fn unstopped(&self, output: f64) -> f64 {
+    /// Returns the motion for a saturated output; outside of the limits, the limit.
+    pub(crate) fn unsaturated(&self, output: f64) -> f64 {
         self.stop.as_ref().map_or(output, |s| s.inverse.step(&mut (), &Env::default(), output))
     }
 
@@ -234,43 +236,45 @@ impl<'a> SignalPath<'a> {
     }
 }
 
-/// A widening of one play, of weight one, for each of its plays.
+/// Returns one widening per play operator, with weight one.
 fn each_play(p: &WideningParams<Vec<f64>>) -> impl Iterator<Item = WideningParams<[f64; 1]>> + use<> {
     let WideningParams { growth, exponent, reference_rate, seconds, .. } = *p;
     let of = move |r| WideningParams { growth, exponent, reference_rate, seconds, thresholds: [r], weights: [1.0] };
     p.thresholds.clone().into_iter().map(of)
 }
 
-/// What the temperature does in each row.
-pub(crate) struct Warmth {
-    /// Gain.
+/// Effect of the temperature in each row.
+pub(crate) struct ThermalState {
+    /// Gain factor.
     factor: Vec<f64>,
-    /// How much warmer than the reference the actuator is \[K\].
+    /// Temperature of the actuator above the reference \[K\].
     pub(crate) kelvin: Vec<f64>,
 }
 
-/// What the temperature does; `None` where none was recorded. Each segment begins as after a long time at its first temperature.
-pub(crate) fn warmth(samples: &Samples, p: &TemperatureParams) -> Result<Option<Warmth>, Error> {
+/// Returns the effect of the temperature; `None` without a temperature column. Each segment starts in equilibrium at
+/// its first temperature.
+pub(crate) fn thermal_state(samples: &Samples, p: &TemperatureParams) -> Result<Option<ThermalState>, Error> {
     if samples.temperature.is_none() {
         return Ok(None);
     }
     let stages: PerSegment<Temperature<f64>> = for_each(samples, &TemperatureParams { expansion: 1.0, ..*p })?;
     let mut state = stages.of(0).state();
     let rows = samples.segments.iter().enumerate().flat_map(|(i, s)| s.clone().map(move |k| (i, k == s.start, k)));
-    let warmth = rows.map(|(i, first, k)| match first {
+    let thermal_state = rows.map(|(i, first, k)| match first {
         true => stages.of(i).reset_felt(&mut state, &samples.env(k)),
         false => stages.of(i).step_felt(&mut state, &samples.env(k)),
     });
-    let (factor, kelvin) = warmth.unzip();
-    Ok(Some(Warmth { factor, kelvin }))
+    let (factor, kelvin) = thermal_state.unzip();
+    Ok(Some(ThermalState { factor, kelvin }))
 }
 
-/// A stage of these parameters for each segment.
+/// Builds a stage for each segment.
 fn for_each<S, P: Build<S, Context = Sampling>>(samples: &Samples, params: &P) -> Result<PerSegment<S>, Error> {
     PerSegment::new(samples, |period| params.build(&Sampling { period }))
 }
 
-/// Makes of a drive what an amplifier puts out that changes by `v_per_s` at most \[V/s\] and has rested at the first voltage of each segment.
+/// Limits the slope of a drive to `v_per_s` \[V/s\], as an amplifier does that has rested at the first voltage of each
+/// segment.
 pub(crate) fn limit_slope(drive: &mut [f64], samples: &Samples, v_per_s: f64) {
     for (i, rows) in samples.segments.iter().enumerate() {
         let most = v_per_s * samples.period_of(i);
@@ -289,9 +293,9 @@ mod tests {
     use crate::model::Effects;
     use hyst_core::{CreepParams, ResonanceParams};
 
-    /// Its plays, each with its weight, are what the chain's stage adds, after a past too.
+    /// The weighted play operators add up to the chain's stage, also after a drive history.
     #[test]
-    fn a_widening_is_that_of_the_chain() {
+    fn a_widening_matches_the_stage_of_the_chain() {
         let input: Vec<f64> = (0..600).map(|k| 20.0 * (0.002 * f64::from(k * k) / 10.0).sin()).collect();
         let past = vec![35.0, -20.0];
         let samples = Samples {
@@ -328,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_side_by_side_are_each_as_alone() {
+    fn columns_processed_together_equal_single_columns() {
         let rows = 500;
         let signal = |c: usize| (0..rows).map(|k| (0.05 * (c + 1) as f64 * k as f64).sin()).collect::<Vec<f64>>();
         let samples = Samples {

@@ -1,27 +1,28 @@
-//! A first estimate of what a cause would take, the base's columns held where a fit has left them.
+//! A first estimate of the gain of a cause, with the columns of the basis held as in an existing fit.
 //!
-//! Only the new parameters are searched. The weights follow through the columns that the fit has already: what those imitate is projected off, so
-//! that an iteration costs one pass over the record for each new parameter instead of one for each column of the base.
+//! Only the new parameters are searched. The weights follow through the existing columns: what those can imitate is
+//! projected off. So an iteration costs one pass over the record for each new parameter instead of one for each column
+//! of the basis.
 
 use hyst_core::Error;
 use nalgebra::{DMatrix, DVector};
 
 use super::assembly::Point;
-use super::bounds::box_of;
+use super::bounds::bounds_of;
 use super::{Fitted, Hypothesis, Problem, Projector, SignalPath};
 use crate::lsq::{Bounds, solve_near};
 
-/// Iterations of a probe.
+/// Maximum number of iterations of a probe.
 const ITERATIONS: usize = 8;
-/// Relative fall of the objective at which it has converged.
+/// Relative fall of the objective at which a probe has converged.
 const TOLERANCE: f64 = 1e-4;
-/// Damped steps that are tried in one iteration.
+/// Number of damped steps that are tried in one iteration.
 const TRIES: usize = 4;
-/// Iterations of an exact fit where the base's columns cannot be held.
+/// Iterations of an exact fit, if the columns of the basis cannot be held.
 const EXACT_ITERATIONS: usize = 3;
 
-/// A fit, with what all probes from it share.
-pub(crate) struct Vantage<'a> {
+/// A fit, with the data that all probes from it share.
+pub(crate) struct Prober<'a> {
     problem: &'a Problem<'a>,
     fit: &'a Fitted,
     pub(crate) projector: Projector<'a>,
@@ -29,23 +30,23 @@ pub(crate) struct Vantage<'a> {
     operator: Vec<f64>,
 }
 
-/// Where a probe has come to.
+/// Result of a probe.
 pub(crate) struct Probe {
     pub(crate) hypothesis: Hypothesis,
     /// Σ residual² over the rows that count.
     pub(crate) squares: f64,
 }
 
-/// Residual and what follows from it, at one set of the new parameters.
+/// Residual and its consequences at one set of the new parameters.
 struct Place {
     hypothesis: Hypothesis,
     point: Point,
-    /// In the rows that count \[y\].
+    /// Residual in the rows that count \[y\].
     residual: Vec<f64>,
     squares: f64,
 }
 
-impl<'a> Vantage<'a> {
+impl<'a> Prober<'a> {
     /// # Errors
     /// If a stage cannot be built.
     pub(crate) fn new(problem: &'a Problem<'a>, fit: &'a Fitted) -> Result<Self, Error> {
@@ -53,12 +54,12 @@ impl<'a> Vantage<'a> {
         Ok(Self { problem, fit, projector, operator })
     }
 
-    /// Searches what `start` holds beyond the fit. `None` if the equations cannot be solved.
+    /// Searches the parameters of `start` that the fit does not have. Returns `None` if the equations cannot be solved.
     ///
     /// # Errors
     /// If a stage cannot be built at the start.
     pub(crate) fn probe(&self, start: &Hypothesis) -> Result<Option<Probe>, Error> {
-        // Behind a stop the weights are others, and so is what the columns show.
+        // Another saturation changes the weights and the slopes of all columns.
         if start.effects.saturation != self.fit.hypothesis.effects.saturation {
             let fit = self.problem.fit_in(start, EXACT_ITERATIONS)?;
             return Ok(fit.map(|fit| Probe { hypothesis: fit.hypothesis, squares: fit.squares }));
@@ -78,26 +79,31 @@ impl<'a> Vantage<'a> {
         Ok(Some(Probe { hypothesis: here.hypothesis, squares: here.squares }))
     }
 
-    /// The fit's linear unknowns in the layout of `h`, and the places of those that it does not have.
+    /// Returns the fit's linear unknowns in the layout of `h`, and the positions of those that the fit does not have.
     fn solution(&self, h: &Hypothesis) -> (DVector<f64>, Vec<usize>) {
         let before = self.problem.layout(&self.fit.hypothesis);
-        before.carried(&self.fit.solution, &self.problem.layout(h))
+        before.mapped(&self.fit.solution, &self.problem.layout(h))
     }
 
     fn place(&self, h: &Hypothesis, z: &DVector<f64>) -> Result<Option<Place>, Error> {
         let problem = self.problem;
         let path = SignalPath::new(problem.samples, h)?;
-        let point = match h.drives_alike(&self.fit.hypothesis) {
+        let point = match h.has_same_drive(&self.fit.hypothesis) {
             true => problem.point(h, &path, self.operator.clone(), z),
             false => problem.point_at(h, &path, z),
         };
         let residual = problem.residual_along(h, &path, &point.motion, z);
-        let residual = problem.thinned(|k| residual[k]);
-        let off = self.projector.off(&DMatrix::from_column_slice(residual.len(), 1, &residual));
-        Ok(off.map(|gram| Place { hypothesis: h.clone(), point, residual, squares: gram.matrix[(0, 0)].max(0.0) }))
+        let residual = problem.at_used_rows(|k| residual[k]);
+        let projected = self.projector.projected(&DMatrix::from_column_slice(residual.len(), 1, &residual));
+        Ok(projected.map(|gram| Place {
+            hypothesis: h.clone(),
+            point,
+            residual,
+            squares: gram.matrix[(0, 0)].max(0.0),
+        }))
     }
 
-    /// One damped step that lowers the error, or `None` if none does.
+    /// Takes one damped step that lowers the error; returns `None` if there is none.
     fn step(
         &self,
         here: &Place,
@@ -109,14 +115,14 @@ impl<'a> Vantage<'a> {
         let (problem, h) = (self.problem, &here.hypothesis);
         let path = SignalPath::new(problem.samples, h)?;
         let mut columns = problem.jacobian_at(h, &path, &here.point, new)?;
-        let thinned = |column: &[f64]| problem.thinned(|k| column[k]);
-        let mut beside = problem.beside_base(h, &path, Some(&here.point), &thinned);
+        let at_used_rows = |column: &[f64]| problem.at_used_rows(|k| column[k]);
+        let mut beside = problem.other_columns(h, &path, Some(&here.point), &at_used_rows);
         beside.retain(|(place, _)| places.contains(place));
         beside.sort_by_key(|(place, _)| *place);
         columns.extend(beside.into_iter().map(|(_, column)| column));
         columns.push(here.residual.clone());
         let all = DMatrix::from_fn(here.residual.len(), columns.len(), |k, c| columns[c][k]);
-        let Some(gram) = self.projector.off(&all) else { return Ok(None) };
+        let Some(gram) = self.projector.projected(&all) else { return Ok(None) };
         let values = h.nonlinear();
         let linear = problem.bounds(h);
         let around = |value: f64, b: Bounds| Bounds { lower: b.lower - value, upper: b.upper - value };
@@ -135,7 +141,7 @@ impl<'a> Vantage<'a> {
                 let mut i = 0;
                 there.visit_nonlinear(&mut |p| {
                     if let Some(at) = new.iter().position(|n| *n == i) {
-                        let limit = box_of(&p, problem.samples);
+                        let limit = bounds_of(&p, problem.samples);
                         *p.value = (*p.value + change[at]).clamp(limit.lower, limit.upper);
                     }
                     i += 1;
@@ -154,7 +160,7 @@ impl<'a> Vantage<'a> {
     }
 }
 
-/// Numbers of the parameters of `start` that a hypothesis does not have.
+/// Returns the indices of the parameters of `start` that the `known` hypothesis does not have.
 fn new_parameters(known: &Hypothesis, start: &Hypothesis) -> Vec<usize> {
     let names = |h: &Hypothesis| {
         let mut names = Vec::new();
@@ -174,14 +180,15 @@ mod tests {
     use crate::model::{CreepBank, Effects};
     use hyst_core::{CreepParams, DriftParams, LagParams, TemperatureParams, play};
 
-    /// Plays under a drive of several rates, its drive late by 4 ms, and what else `also` adds in each row \[y\].
+    /// Play operators under a drive of several rates. The drive is late by 4 ms if `late`; `also` adds a further output
+    /// in each row \[y\].
     fn samples(late: bool, also: impl Fn(usize, f64) -> f64) -> Samples {
         let rows = 6000;
         let drive = |t: f64| 50.0 * (1.0 - (5.0 * t * (1.0 + t)).cos()) * (0.6 + 0.4 * (1.1 * t).cos());
         let input: Vec<f64> = (0..rows).map(|k| drive(1e-3 * f64::from(k))).collect();
         let (mut v, mut before, mut plays) = (0.0, 0.0, [0.0; 6]);
         let output = input.iter().enumerate().map(|(k, u)| {
-            // In the middle between the rows: with the drive at either end the lag would be half a period off.
+            // The mean of both rows: with the drive at either row the lag would be half a period off.
             let between = 0.5 * (before + u);
             before = *u;
             v = if late { v + (between - v) * (1.0 - (-0.25f64).exp()) } else { *u };
@@ -193,32 +200,32 @@ mod tests {
         Samples::of_columns(1e-3, input, output)
     }
 
-    /// What a probe and a full fit from the same start come to.
+    /// Returns the results of a probe and of a full fit from the same start.
     fn both(samples: &Samples, start: Effects) -> (Probe, Fitted, f64) {
         let basis = ScreeningBasis::for_samples(samples, false, None);
         let blocks = Blocks::new(samples, 40, 3000);
         let problem = Problem::new(samples, &basis, &blocks, false);
         let from = problem.fit(&Hypothesis::default()).unwrap().unwrap();
-        let vantage = Vantage::new(&problem, &from).unwrap();
-        let probe = vantage.probe(&Hypothesis::of(start.clone())).unwrap().unwrap();
+        let prober = Prober::new(&problem, &from).unwrap();
+        let probe = prober.probe(&Hypothesis::of(start.clone())).unwrap().unwrap();
         let fit = problem.fit(&Hypothesis::of(start)).unwrap().unwrap();
         (probe, fit, from.squares)
     }
 
     #[test]
-    fn what_a_probe_finds_is_what_a_fit_finds() {
+    fn a_probe_finds_the_parameters_of_a_full_fit() {
         let lag = Effects { lag: Some(LagParams { seconds: 1e-3 }), ..Effects::default() };
         let (probe, fit, before) = both(&samples(true, |_, _| 0.0), lag);
         let seconds = |h: &Hypothesis| h.effects.lag.unwrap().seconds;
-        // The columns are held at a drive that does not lag: an eighth stays, of the second order.
+        // The columns are held at a drive without lag: an eighth of second order remains.
         assert!(probe.squares < 0.15 * before, "{} of {before}", probe.squares);
         let (probed, fitted) = (seconds(&probe.hypothesis), seconds(&fit.hypothesis));
         assert!((probed / fitted - 1.0).abs() < 0.1 && (fitted / 4e-3 - 1.0).abs() < 0.05, "{probed} {fitted}");
     }
 
-    /// What is solved for takes its height in the first step; what only settles has its time constant searched.
+    /// A linear amplitude is found in the first step; only the time constant is searched.
     #[test]
-    fn a_drift_needs_no_more_than_its_columns() {
+    fn a_probe_finds_a_settling_drift() {
         let settles = |k: usize, _: f64| 0.4 * (1.0 - (-1e-3 * k as f64 / 1.5).exp());
         let drift = DriftParams { seconds: 0.8, ..DriftParams::default() };
         let (probe, fit, before) = both(&samples(false, settles), Effects { drift: Some(drift), ..Effects::default() });
@@ -238,7 +245,7 @@ mod tests {
         let (probe, ..) = both(&warm, Effects { temperature: Some(gain), ..Effects::default() });
         let per_kelvin = probe.hypothesis.effects.temperature.unwrap().per_kelvin;
         assert!((per_kelvin / 0.01 - 1.0).abs() < 0.05, "{per_kelvin}");
-        // Nothing creeps there: shares stay at nothing.
+        // Without creep in the record, the shares stay at zero.
         let bank: CreepBank = CreepParams { seconds: vec![0.2, 2.0], shares: vec![0.0, 0.0] };
         let (probe, _, before) = both(&samples(false, |_, _| 0.0), Effects { creep: Some(bank), ..Effects::default() });
         assert!(probe.squares > 0.9 * before, "{} of {before}", probe.squares);

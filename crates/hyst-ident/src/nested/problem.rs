@@ -7,10 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::assembly::{Assembly, Point};
-use super::bounds::{box_of, stepped};
+use super::bounds::{bounds_of, stepped};
 use super::columns::{may_be_kept, passes};
 use super::cross_validation::{cross_validate, folds_by_experiment, folds_interleaved, unpredictable};
-use super::{Cause, Hypothesis, Layout, Projector, SignalPath, owed};
+use super::{Cause, Hypothesis, Layout, Projector, SignalPath, initial};
 use crate::Samples;
 use crate::base::{Basis, Drag};
 use crate::lsq::{Blocks, Bordered, Bounds, Gram, Share, held, solve_near};
@@ -19,7 +19,7 @@ use crate::model::Effect;
 use crate::repetition::only_loop;
 use crate::samples::range;
 
-/// A record, a base and how rows are cut into blocks.
+/// A record, a basis and the division of the rows into blocks.
 pub(crate) struct Problem<'a> {
     pub(crate) samples: &'a Samples,
     pub(crate) basis: &'a dyn Basis,
@@ -28,34 +28,34 @@ pub(crate) struct Problem<'a> {
     pub(super) used: Vec<Vec<usize>>,
     /// One zero for each file instead of one for all.
     pub(crate) zero_per_file: bool,
-    /// Whether load, drift and tone are what a hypothesis says, though they could be solved for.
-    holds: bool,
-    /// Whether thresholds that grow with the rate may be tried: of what an operator beside plays misses, their weights would take a part.
+    /// Whether load, expansion, drift and tone keep the values of the hypothesis instead of being solved.
+    linear_effects_fixed: bool,
+    /// Whether a widening may be tried. Next to an operator without play operators its weights would take up misfit.
     pub(crate) may_widen: bool,
-    /// The base's columns for the drive as it was recorded, if they are few enough to be kept.
+    /// Columns of the basis for the recorded drive, if they fit into memory.
     pub(super) raw: Option<Vec<Vec<f64>>>,
-    /// How many columns the base has.
+    /// Number of columns of the basis.
     pub(super) width: usize,
     penalty: Option<DMatrix<f64>>,
-    /// Frequency of the one loop that the record repeats \[Hz\], if it does nothing else.
+    /// Frequency of the loop \[Hz\], if the record only repeats one loop.
     pub(crate) only_loop: Option<f64>,
-    /// Blocks that the other folds cannot predict, once somebody has asked.
+    /// Blocks that the other folds cannot predict; computed on first use.
     unpredictable: OnceLock<Vec<bool>>,
 }
 
 /// Folds of the cross-validation.
 const FOLDS: usize = 8;
-/// Stretches of a record that has a single segment, each left out once where whole experiments are.
+/// Number of stretches of a record with a single segment; each is left out once.
 const STRETCHES: usize = 4;
 
 /// Highest frequency of a harmonic, in sample rates.
-const HIGHEST_TONE: f64 = 0.475;
-/// Weight of the expectation that all was at rest, in that of the rows that show it was not.
-const OWED: f64 = 1e-3;
-/// Standard deviations of white noise that both parts of a harmonic together have to exceed.
+const MAX_HARMONIC_FREQUENCY: f64 = 0.475;
+/// Weight of the assumption of rest, relative to the rows that show the initial deviations.
+const INITIAL_PENALTY: f64 = 1e-3;
+/// Minimum amplitude of a harmonic, in standard deviations of its estimate from white noise.
 const MIN_HARMONIC: f64 = 4.0;
 
-/// A fit that has converged.
+/// A converged fit.
 #[derive(Clone)]
 pub(crate) struct Fitted {
     pub(crate) hypothesis: Hypothesis,
@@ -65,8 +65,9 @@ pub(crate) struct Fitted {
     /// Σ residual² over the rows that count.
     pub(crate) squares: f64,
     pub(crate) rows: usize,
-    /// What each block adds to the normal equations at the solution. Columns: the linear unknowns in the order of their
-    /// [`Layout`], change of every nonlinear parameter, and the measured output. Most of the memory of a fit, so its copies share them.
+    /// Contribution of each block to the normal equations at the solution. Columns: the linear unknowns in the order of
+    /// their [`Layout`], the derivatives with respect to the nonlinear parameters, and the measured output. This is
+    /// most of the memory of a fit, so copies share it.
     pub(crate) shares: Arc<[Share]>,
     pub(crate) solution: DVector<f64>,
     pub(crate) bounds: Vec<Bounds>,
@@ -79,14 +80,14 @@ const ITERATIONS: usize = 14;
 const TOLERANCE: f64 = 1e-5;
 
 impl Fitted {
-    /// Root mean square of what is left in the rows that count \[y\].
+    /// Returns the RMS of the residual over the rows that count \[y\].
     pub(crate) fn rmse(&self) -> f64 {
         (self.squares / self.rows.max(1) as f64).sqrt()
     }
 
-    /// Where each of its linear unknowns stands.
+    /// Returns the positions of the linear unknowns.
     pub(crate) fn layout(&self) -> Layout {
-        let of = |owed| Layout::of(&self.hypothesis, self.weights.len(), self.zeros.len(), owed);
+        let of = |initial| Layout::of(&self.hypothesis, self.weights.len(), self.zeros.len(), initial);
         let linear = self.solution.len() - self.hypothesis.nonlinear().len();
         of(linear - of(0).len())
     }
@@ -117,7 +118,7 @@ impl<'a> Problem<'a> {
             blocks,
             used,
             zero_per_file,
-            holds: false,
+            linear_effects_fixed: false,
             may_widen: basis.may_widen(),
             raw,
             width,
@@ -127,22 +128,24 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Keeps what load, drift and tone add as a hypothesis says it: solved on a coarse base, they would take up its misfit.
-    pub(crate) fn holding(self) -> Self {
-        Self { holds: true, ..self }
+    /// Fixes load, expansion, drift and tone at the values of the hypothesis. On a coarse base they would take up its
+    /// misfit.
+    pub(crate) fn with_linear_effects_fixed(self) -> Self {
+        Self { linear_effects_fixed: true, ..self }
     }
 
-    /// Tries thresholds that grow only where another problem of the same model does.
+    /// Allows a widening only if another problem of the same model does.
     pub(crate) fn widening_as(self, other: &Self) -> Self {
         Self { may_widen: other.may_widen, ..self }
     }
 
-    /// Counts the same blocks as unpredictable as another base over the same rows: only then their errors can be compared.
-    pub(crate) fn beside(self, other: &Self) -> Self {
+    /// Uses the unpredictable blocks of a problem with another basis over the same rows, so that the errors are
+    /// comparable.
+    pub(crate) fn with_blocks_of(self, other: &Self) -> Self {
         Self { unpredictable: OnceLock::from(other.unpredictable().to_vec()), ..self }
     }
 
-    /// Where a zero that wanders goes: times \[s\], evenly over the record's rows, and heights \[y\].
+    /// Returns the course of a wandering zero: times \[s\], evenly over the rows of the record, and heights \[y\].
     pub(crate) fn wandered_zero(&self, fit: &Fitted) -> Vec<(f64, f64)> {
         let heights = &fit.solution.as_slice()[self.layout(&fit.hypothesis).zero_hats];
         let (steps, last) = (heights.len().saturating_sub(1).max(1), self.samples.len().saturating_sub(1));
@@ -153,13 +156,13 @@ impl<'a> Problem<'a> {
         if let Some(known) = self.unpredictable.get() {
             return known;
         }
-        // The same for all that are compared: what moves the base depends little on the effects. Found outside of the cell: a thread that
-        // waits for others in here may come by again with another job.
+        // The same for all trials that are compared: the effects hardly change what moves the base. Computed outside of
+        // the cell, because a thread that waits inside may execute another job that enters here again.
         let found = self.unpredictable_in(&folds_interleaved(self.blocks, FOLDS));
         self.unpredictable.get_or_init(|| found)
     }
 
-    /// Blocks that move the base where no block of another fold does.
+    /// Returns the blocks that move the base where no block of another fold does.
     fn unpredictable_in(&self, folds: &[Vec<usize>]) -> Vec<bool> {
         let base = self.assemble(&Hypothesis::default(), None).ok().flatten();
         base.map_or_else(
@@ -172,8 +175,8 @@ impl<'a> Problem<'a> {
         )
     }
 
-    /// Σ residual² of the whole record, each experiment predicted by a fit to the others, for two fits of this problem. `None` if the
-    /// equations cannot be solved, or if nothing is predictable.
+    /// Returns Σ residual² of the whole record for two fits of this problem, each experiment predicted by a fit to the
+    /// others. Returns `None` if the equations cannot be solved or nothing is predictable.
     pub(crate) fn transferred(&self, fits: [&Fitted; 2]) -> Option<[f64; 2]> {
         let folds = folds_by_experiment(self.blocks, self.samples, STRETCHES);
         let unpredictable = self.unpredictable_in(&folds);
@@ -181,7 +184,7 @@ impl<'a> Problem<'a> {
         Some([first?.iter().sum(), second?.iter().sum()])
     }
 
-    /// Σ residual² of each block, predicted from others. `None` if the equations cannot be solved.
+    /// Returns Σ residual² of each block, predicted from the other folds; `None` if the equations cannot be solved.
     pub(crate) fn cross_validated(&self, fit: &Fitted) -> Option<Vec<f64>> {
         cross_validate(fit, &folds_interleaved(self.blocks, FOLDS), self.unpredictable())
     }
@@ -194,28 +197,28 @@ impl<'a> Problem<'a> {
         let mut bounds = self.basis.bounds();
         let layout = self.layout(h);
         bounds.resize(layout.len(), Bounds::FREE);
-        // Loops that narrow are another effect.
+        // A loop that narrows with rate is another effect.
         bounds[layout.widening.clone()].fill(Bounds::above(0.0));
-        // A curve that falls would have no inverse.
+        // A decreasing curve has no inverse.
         bounds[layout.zones.clone()].fill(Bounds::above(-0.9));
-        if h.goes_on {
-            let farthest = owed::farthest(self.samples);
-            bounds[layout.owed.clone()].fill(Bounds { lower: -farthest, upper: farthest });
+        if h.initial_state {
+            let farthest = initial::farthest(self.samples);
+            bounds[layout.initial.clone()].fill(Bounds { lower: -farthest, upper: farthest });
         }
         if h.effects.drift.is_some_and(|p| p.seconds > 0.0 && p.per_second == 0.0) {
-            // A law that only settles.
+            // A law that only settles has no slope.
             bounds[layout.drift.start] = Bounds::fixed(0.0);
         }
         if let Some(tone) = &h.effects.interference {
-            // What lies beyond half the sample rate would appear as another tone.
+            // Frequencies above half the sample rate would alias.
             for (i, bound) in bounds[layout.tone.clone()].iter_mut().enumerate() {
                 let order = 1 + i / 2;
-                if order > 1 && order as f64 * tone.hz > HIGHEST_TONE / self.samples.period {
+                if order > 1 && order as f64 * tone.hz > MAX_HARMONIC_FREQUENCY / self.samples.period {
                     *bound = Bounds::fixed(0.0);
                 }
             }
         }
-        if self.holds {
+        if self.linear_effects_fixed {
             let e = &h.effects;
             let load = e.load.iter().map(|p| p.per_newton);
             let drift = e.drift.iter().flat_map(|p| [p.per_second, p.settling]);
@@ -235,26 +238,28 @@ impl<'a> Problem<'a> {
         bounds
     }
 
-    /// The base's penalty, that which keeps what goes on from before at zero where no row shows it, and zero for everything else.
+    /// Returns the penalty: that of the basis, one that keeps initial deviations at zero where no row shows them, and
+    /// zero for everything else.
     pub(super) fn penalty(&self, h: &Hypothesis, total: &Gram, unknowns: usize) -> DMatrix<f64> {
         let mut p = DMatrix::zeros(unknowns, unknowns);
         if let Some(own) = &self.penalty {
             p.view_mut((0, 0), own.shape()).copy_from(own);
         }
-        for c in self.layout(h).owed {
-            p[(c, c)] = OWED * total.matrix[(c, c)];
+        for c in self.layout(h).initial {
+            p[(c, c)] = INITIAL_PENALTY * total.matrix[(c, c)];
         }
         p
     }
 
-    /// The output of the motion (without the sensor's zero, drift and tone, and without any wandering).
+    /// Returns the motion of the output, without the sensor's zero, drift and tone, and without any wander.
     pub(crate) fn motion(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, h)?;
         let motion = self.point_at(h, &path, solution).motion;
-        Ok(motion.into_iter().map(|m| path.stopped(m).0).collect())
+        Ok(motion.into_iter().map(|m| path.saturated(m).0).collect())
     }
 
-    /// What a fit of this problem says of the motion in other rows, as the sensor would show it without zero, drift and tone.
+    /// Returns the motion that a fit of this problem predicts for other rows, without zero, drift and tone of the
+    /// sensor.
     pub(crate) fn motion_in(&self, fit: &Fitted, samples: &Samples) -> Result<Vec<f64>, Error> {
         let over = self.basis.over(samples);
         let there = Problem {
@@ -267,18 +272,19 @@ impl<'a> Problem<'a> {
             unpredictable: OnceLock::new(),
             ..*self
         };
-        // Fewer files have fewer zeros, which are no part of the motion.
-        let (solution, _) = self.layout(&fit.hypothesis).carried(&fit.solution, &there.layout(&fit.hypothesis));
+        // Fewer files have fewer zeros. Zeros are no part of the motion.
+        let (solution, _) = self.layout(&fit.hypothesis).mapped(&fit.solution, &there.layout(&fit.hypothesis));
         there.motion(&fit.hypothesis, &solution)
     }
 
-    /// The output of the operator alone, before any curve behind it.
+    /// Returns the output of the operator, before any curve behind it.
     pub(crate) fn operator_output(&self, fit: &Fitted) -> Result<Vec<f64>, Error> {
         let path = SignalPath::new(self.samples, &fit.hypothesis)?;
         Ok(self.point_at(&fit.hypothesis, &path, &fit.solution).operator)
     }
 
-    /// Change of the output in the rows that count with every nonlinear parameter, by forward differences.
+    /// Returns the derivatives of the output with respect to every nonlinear parameter in the rows that count, by
+    /// forward differences.
     pub(super) fn jacobian(&self, h: &Hypothesis, solution: &DVector<f64>) -> Result<Vec<Vec<f64>>, Error> {
         let path = SignalPath::new(self.samples, h)?;
         let point = self.point_at(h, &path, solution);
@@ -286,7 +292,7 @@ impl<'a> Problem<'a> {
         self.jacobian_at(h, &path, &point, &all)
     }
 
-    /// The same of the parameters with these numbers, around a course of the motion.
+    /// Returns the derivatives for the parameters with these indices, around a given motion.
     pub(super) fn jacobian_at(
         &self,
         h: &Hypothesis,
@@ -295,7 +301,7 @@ impl<'a> Problem<'a> {
         of: &[usize],
     ) -> Result<Vec<Vec<f64>>, Error> {
         let Point { operator, motion, solution } = point;
-        let here = self.thinned(|k| path.stopped(motion[k]).0);
+        let here = self.at_used_rows(|k| path.saturated(motion[k]).0);
         let reached = range(here.iter().copied());
         let column = |at: usize| -> Result<Vec<f64>, Error> {
             let Some((moved, step, cause)) = stepped(h, at, self.samples, reached).filter(|(_, step, _)| *step != 0.0)
@@ -306,7 +312,7 @@ impl<'a> Problem<'a> {
                 let drift = h.effects.drift.unwrap_or_default();
                 let height = solution[self.layout(h).drift.start + 1];
                 let passed = |k: usize| ((self.samples.time[k] - drift.since_s) / drift.seconds).max(0.0);
-                return Ok(self.thinned(|k| -height * passed(k) / drift.seconds * (-passed(k)).exp()));
+                return Ok(self.at_used_rows(|k| -height * passed(k) / drift.seconds * (-passed(k)).exp()));
             }
             if cause == Cause::Effect(Effect::Interference) {
                 let first = self.layout(h).tone.start;
@@ -322,30 +328,30 @@ impl<'a> Problem<'a> {
                     let turned: f64 = parts.chunks_exact(2).enumerate().map(of).sum();
                     2.0 * std::f64::consts::PI * (t - self.samples.time[0]) * turned
                 };
-                return Ok(self.thinned(|k| slope(self.samples.time[k])));
+                return Ok(self.at_used_rows(|k| slope(self.samples.time[k])));
             }
             let path = SignalPath::new(self.samples, &moved)?;
-            // What follows the operator leaves its output as it is.
-            let there = match moved.drives_alike(h) {
+            // Stages behind the operator do not change its output.
+            let there = match moved.has_same_drive(h) {
                 true => self.point(&moved, &path, operator.clone(), solution),
                 false => self.point_at(&moved, &path, solution),
             };
-            let there = self.thinned(|k| path.stopped(there.motion[k]).0);
+            let there = self.at_used_rows(|k| path.saturated(there.motion[k]).0);
             Ok(there.iter().zip(&here).map(|(a, b)| (a - b) / step).collect())
         };
-        // Of several errors the first one, whichever thread was quicker.
+        // Of several errors the first one, independent of the order of the threads.
         let columns: Vec<Result<Vec<f64>, Error>> = of.par_iter().map(|at| column(*at)).collect();
         columns.into_iter().collect()
     }
 
-    /// The normal equations of an assembly with the Jacobian's columns before the target.
+    /// Returns the normal equations of an assembly with the columns of the Jacobian inserted before the target.
     fn with_jacobian(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Gram {
         let mut bordered = Bordered::zeros(assembly.total.matrix.ncols(), jacobian.len());
         assembly.blocks.iter().zip(self.in_blocks(jacobian)).for_each(|(x, j)| bordered.add(x, &j));
         bordered.around(&assembly.total)
     }
 
-    /// The same of each block.
+    /// Returns the same for each block.
     fn shares(&self, assembly: &Assembly, jacobian: &[Vec<f64>]) -> Arc<[Share]> {
         let jacobian: Vec<DMatrix<f64>> = self.in_blocks(jacobian).collect();
         let of = |(x, j): (&DMatrix<f64>, &DMatrix<f64>)| {
@@ -358,7 +364,7 @@ impl<'a> Problem<'a> {
         assembly.blocks.par_iter().zip(&jacobian).map(of).collect::<Vec<_>>().into()
     }
 
-    /// Columns over the rows that count, cut into blocks.
+    /// Divides columns over the rows that count into blocks.
     fn in_blocks(&self, columns: &[Vec<f64>]) -> impl Iterator<Item = DMatrix<f64>> {
         let mut next = 0;
         self.used.iter().map(move |rows| {
@@ -368,7 +374,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Fits everything, searching from `start`. `None` if the equations cannot be solved.
+    /// Fits all unknowns, searching the nonlinear ones from `start`. Returns `None` if the equations cannot be solved.
     ///
     /// # Errors
     /// If a stage cannot be built at the start.
@@ -376,7 +382,7 @@ impl<'a> Problem<'a> {
         self.fit_in(start, ITERATIONS)
     }
 
-    /// The same in at most this many iterations.
+    /// Fits with at most this many iterations.
     pub(super) fn fit_in(&self, start: &Hypothesis, iterations: usize) -> Result<Option<Fitted>, Error> {
         let mut h = start.clone();
         let Some(mut here) = self.assemble(&h, None)? else { return Ok(None) };
@@ -399,7 +405,7 @@ impl<'a> Problem<'a> {
         Ok(Some(self.finish(h, &here, &jacobian)))
     }
 
-    /// One damped step that lowers the objective, or `None` if none does.
+    /// Takes one damped step that lowers the objective; returns `None` if there is none.
     fn step(
         &self,
         h: &Hypothesis,
@@ -421,11 +427,11 @@ impl<'a> Problem<'a> {
                 let mut trial = h.clone();
                 let mut i = 0;
                 trial.visit_nonlinear(&mut |p| {
-                    let limit = box_of(&p, self.samples);
+                    let limit = bounds_of(&p, self.samples);
                     *p.value = (*p.value + z[n + i]).clamp(limit.lower, limit.upper);
                     i += 1;
                 });
-                // Two limits that cross make no stop.
+                // Crossing saturation limits cannot be assembled.
                 let there = self.assemble(&trial, Some(here)).ok().flatten();
                 if let Some(there) = there.filter(|t| t.objective < here.objective) {
                     *damping = (*damping * 0.1).max(1e-9);
@@ -442,18 +448,18 @@ impl<'a> Problem<'a> {
         let z = at.solution.as_slice();
         let mut zeros = z[layout.zeros.clone()].to_vec();
         if let Some(drift) = &mut h.effects.drift {
-            let goes_on = drift.per_second != 0.0;
+            let has_slope = drift.per_second != 0.0;
             let per_second = z[layout.drift.start];
-            drift.per_second = if goes_on && per_second == 0.0 { f64::MIN_POSITIVE } else { per_second };
+            drift.per_second = if has_slope && per_second == 0.0 { f64::MIN_POSITIVE } else { per_second };
             drift.settling = z[layout.drift.clone()].get(1).copied().unwrap_or(0.0);
-            // The column started at the record's first instant, the stage's clock is the lab's.
+            // The column starts at the record's first instant, the stage uses the lab clock.
             zeros.iter_mut().for_each(|x| *x -= z[layout.drift.start] * self.samples.time[0]);
         }
         if let Some(tone) = &mut h.effects.interference {
             let (sine, cosine) = (z[layout.tone.start], z[layout.tone.start + 1]);
             tone.amplitude = sine.hypot(cosine);
             tone.phase = cosine.atan2(sine);
-            // A harmonic that noise alone could make is none.
+            // A harmonic that noise alone can produce is dropped.
             let rows = at.total.rows.max(1) as f64;
             let least = MIN_HARMONIC * (2.0 * at.total.error(&at.solution)).sqrt() / rows;
             let parts = &z[layout.tone.start + 2..layout.tone.end];
@@ -465,7 +471,7 @@ impl<'a> Problem<'a> {
             load.per_newton = z[layout.load.start];
         }
         if let (Some(temperature), [expansion]) = (&mut h.effects.temperature, &z[layout.expansion.clone()]) {
-            // Nothing but zero is none.
+            // Exactly zero would mean that there is no expansion.
             temperature.expansion = if *expansion == 0.0 { f64::MIN_POSITIVE } else { *expansion };
         }
         if let Some(widening) = &mut h.effects.widening {
@@ -492,17 +498,17 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Solves the linear unknowns only, every nonlinear parameter as given.
+    /// Solves the linear unknowns only, with every nonlinear parameter as given.
     ///
     /// # Errors
     /// If a stage cannot be built.
     pub(crate) fn fit_linear(&self, h: &Hypothesis) -> Result<Option<Fitted>, Error> {
         let Some(here) = self.assemble(h, None)? else { return Ok(None) };
-        let columns = vec![self.thinned(|_| 0.0); h.nonlinear().len()];
+        let columns = vec![self.at_used_rows(|_| 0.0); h.nonlinear().len()];
         Ok(Some(self.finish(h.clone(), &here, &columns)))
     }
 
-    /// What separates a new column from all that a fit has, its nonlinear parameters too.
+    /// Returns a projector that removes the part of a column that a fit can imitate, nonlinear parameters included.
     pub(crate) fn projector(&self, fit: &Fitted) -> Result<Projector<'_>, Error> {
         let Some(at) = self.assemble(&fit.hypothesis, None)? else { return Ok(Projector::new(self, Vec::new())) };
         let jacobian = self.jacobian(&fit.hypothesis, &at.solution)?;
@@ -514,10 +520,10 @@ impl<'a> Problem<'a> {
         };
         let blocks = at.blocks.iter().zip(self.in_blocks(&jacobian)).map(beside);
         let mut blocks: Vec<DMatrix<f64>> = blocks.collect();
-        // What is held at a bound imitates nothing: to first order it cannot move.
+        // An unknown at a bound cannot move to first order, so it imitates nothing.
         let mut held = held(at.solution.iter(), &self.bounds(&fit.hypothesis));
         fit.hypothesis.clone().visit_nonlinear(&mut |p| {
-            let limit = box_of(&p, self.samples);
+            let limit = bounds_of(&p, self.samples);
             held.push(*p.value <= limit.lower || *p.value >= limit.upper);
         });
         for x in &mut blocks {
@@ -526,7 +532,7 @@ impl<'a> Problem<'a> {
         Ok(Projector::new(self, blocks))
     }
 
-    /// Measured minus fitted output, all rows.
+    /// Returns measured minus fitted output in all rows.
     pub(crate) fn residual(&self, fit: &Fitted) -> Result<Vec<f64>, Error> {
         self.residual_of(&fit.hypothesis, &fit.solution)
     }

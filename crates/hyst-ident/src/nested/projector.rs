@@ -1,11 +1,11 @@
-//! How much of a residual a new column would take.
+//! The gain of a new column: by how much it would lower Σ residual².
 
 use nalgebra::{DMatrix, DVector};
 
 use super::Problem;
 use crate::lsq::Gram;
 
-/// Projects columns off those of a fit.
+/// Projects columns onto the complement of a fit's columns.
 pub(crate) struct Projector<'a> {
     problem: &'a Problem<'a>,
     blocks: Vec<DMatrix<f64>>,
@@ -17,14 +17,14 @@ impl<'a> Projector<'a> {
         let n = blocks.first().map_or(0, |x| x.ncols() - 1);
         let mut h = Gram::of_all(&blocks, n + 1).matrix.view((0, 0), (n, n)).into_owned();
         for i in 0..n {
-            // A column of zeros takes nothing.
+            // A column of zeros contributes nothing.
             h[(i, i)] = if h[(i, i)] > 0.0 { h[(i, i)] * (1.0 + 1e-9) } else { 1.0 };
         }
         Self { problem, blocks, factor: h.cholesky() }
     }
 
-    /// Σ squares of what the fit cannot imitate of a column.
-    pub(crate) fn left(&self, column: &[f64]) -> f64 {
+    /// Returns Σ squares of the part of a column that the fit cannot imitate.
+    pub(crate) fn unexplained(&self, column: &[f64]) -> f64 {
         let Some(factor) = &self.factor else { return 0.0 };
         let mut cross = DVector::zeros(factor.l_dirty().ncols());
         let mut own = 0.0;
@@ -37,9 +37,9 @@ impl<'a> Projector<'a> {
         if left <= 1e-9 * own { 0.0 } else { left }
     }
 
-    /// Normal equations of what the fit cannot imitate of some columns over the rows that count, the last being the target; `None` if the fit is
-    /// singular.
-    pub(super) fn off(&self, columns: &DMatrix<f64>) -> Option<Gram> {
+    /// Returns the normal equations of the projected columns over the rows that count, the last column being the
+    /// target; `None` if the fit is singular.
+    pub(super) fn projected(&self, columns: &DMatrix<f64>) -> Option<Gram> {
         let factor = self.factor.as_ref()?;
         let mut cross = DMatrix::zeros(factor.l_dirty().ncols(), columns.ncols());
         let mut first = 0;
@@ -52,18 +52,18 @@ impl<'a> Projector<'a> {
         Some(Gram { matrix: all.matrix - cross.transpose() * factor.solve(&cross), ..all })
     }
 
-    /// How much of Σ residual² some columns would take together, all unknowns refitted.
+    /// Returns the joint gain of some columns in Σ residual², with all unknowns refitted.
     pub(crate) fn joint_gain(&self, columns: &[Vec<f64>], residual: &[f64]) -> f64 {
-        let thinned = |column: &[f64]| self.problem.thinned(|k| column[k]);
-        let all: Vec<Vec<f64>> = columns.iter().map(|c| thinned(c)).chain([thinned(residual)]).collect();
+        let at_used_rows = |column: &[f64]| self.problem.at_used_rows(|k| column[k]);
+        let all: Vec<Vec<f64>> = columns.iter().map(|c| at_used_rows(c)).chain([at_used_rows(residual)]).collect();
         let rows = all[0].len();
-        let Some(Gram { mut matrix, .. }) = self.off(&DMatrix::from_fn(rows, all.len(), |k, i| all[i][k])) else {
+        let Some(Gram { mut matrix, .. }) = self.projected(&DMatrix::from_fn(rows, all.len(), |k, i| all[i][k])) else {
             return 0.0;
         };
         let n = columns.len();
         let with: DVector<f64> = matrix.view((0, n), (n, 1)).column(0).into_owned();
         for i in 0..n {
-            // What the fit imitates takes nothing, and columns that are alike share.
+            // Regularisation: a column that the fit imitates gains nothing, and equal columns share the gain.
             let own = all[i].iter().map(|x| x * x).sum::<f64>();
             matrix[(i, i)] += 1e-9 * own.max(f64::MIN_POSITIVE);
         }
@@ -71,9 +71,9 @@ impl<'a> Projector<'a> {
         factor.map_or(0.0, |factor| with.dot(&factor.solve(&with)))
     }
 
-    /// How much of Σ residual² a column would take, all unknowns refitted, and the factor at which it does.
+    /// Returns the gain of a column in Σ residual², with all unknowns refitted, and its best factor.
     pub(crate) fn gain(&self, column: &[f64], residual: &[f64]) -> (f64, f64) {
-        let left = self.left(column);
+        let left = self.unexplained(column);
         let with: f64 = self.problem.used.iter().flatten().map(|k| column[*k] * residual[*k]).sum();
         if left > 0.0 { (with * with / left, with / left) } else { (0.0, 0.0) }
     }

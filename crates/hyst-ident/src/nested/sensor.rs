@@ -1,10 +1,10 @@
-//! What a sensor adds to the motion: its zero, its drift, a tone.
+//! Effects of the sensor: zero, drift, a tone.
 
 use super::Fitted;
 use crate::Samples;
 use crate::model::Effects;
 
-/// The record with drift and tone taken from its output.
+/// Returns the record with drift and tone subtracted from its output.
 pub(crate) fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Samples {
     let mut motion = samples.clone();
     for (y, t) in motion.output.iter_mut().zip(&samples.time) {
@@ -18,12 +18,12 @@ pub(crate) fn without_sensor_effects(samples: &Samples, effects: &Effects) -> Sa
     motion
 }
 
-/// The motion that a sensor has shown in the settled rows, as a fit sees it: the output without drift, tone and zero \[y\].
+/// Returns the motion in the settled rows: the measured output without drift, tone and zero of a fit \[y\].
 pub(crate) fn shown_motion(samples: &Samples, fit: &Fitted) -> Vec<f64> {
     let motion = without_sensor_effects(samples, &fit.hypothesis.effects);
     let mut shown = Vec::with_capacity(samples.len());
     for (segment, file) in samples.segments.iter().zip(&samples.file_of_segment) {
-        // One zero for all files, or one for each.
+        // One zero for all files, or one for each file.
         let zero = fit.zeros.get(*file).or(fit.zeros.first()).copied().unwrap_or(0.0);
         let settled = segment.clone().filter(|k| !samples.settling[*k]);
         shown.extend(settled.map(|k| motion.output[k] - zero));
@@ -52,7 +52,7 @@ mod tests {
         (0.7 * (t - 1e4)).sin()
     }
 
-    /// A motion with zero, drift, tone, and what a load adds.
+    /// A motion with zero, drift, tone and a load.
     fn samples(per_newton: f64) -> Samples {
         let tone = |t: f64| 0.2 * (std::f64::consts::TAU * (20.0 * t).fract() + 0.4).sin();
         let output = rows().map(|t| motion(t) + per_newton * load(t) + 0.05 * (t - 1e4) + tone(t) + 7.0);
@@ -66,14 +66,14 @@ mod tests {
         Samples::from_record(&record.unwrap())
     }
 
-    /// Found elsewhere, they are kept, and what the base leaves is what they leave.
+    /// Effects found elsewhere stay fixed, and their error stays in the residual.
     #[test]
-    fn what_is_held_is_not_solved_for() {
+    fn fixed_effects_are_not_solved_for() {
         let samples = samples(0.3);
         let basis = PiBasis::for_samples(&samples);
         let blocks = Blocks::new(&samples, 20, 4000);
         let solved = Problem::new(&samples, &basis, &blocks, false);
-        let held = Problem::new(&samples, &basis, &blocks, false).holding();
+        let held = Problem::new(&samples, &basis, &blocks, false).with_linear_effects_fixed();
         let found = Hypothesis::of(Effects {
             load: Some(LoadParams { per_newton: 0.25 }),
             drift: Some(DriftParams { per_second: 0.06, ..DriftParams::default() }),
@@ -91,16 +91,17 @@ mod tests {
         assert!((kept.drift.unwrap().per_second - 0.06).abs() < 1e-12, "{kept:?}");
         let (kept, given) = (kept.interference.unwrap(), given.interference.unwrap());
         assert!((kept.amplitude - given.amplitude).abs() + (kept.phase - given.phase).abs() < 1e-12, "{kept:?}");
-        // In the residual stands, of the tone, what was held too small: a correlation with its sine of (0.2 cos 0.4 − 0.17 cos 0.5) / 2.
+        // The residual contains the error of the fixed tone: a correlation with its sine of (0.2 cos 0.4 − 0.17 cos
+        // 0.5) / 2.
         let sine = |t: f64| (std::f64::consts::TAU * (20.0 * t).fract()).sin();
         let left = rows().zip(&residual).map(|(t, left)| left * sine(t)).sum::<f64>() / residual.len() as f64;
         let expected = 0.5 * (0.2 * 0.4_f64.cos() - 0.17 * 0.5_f64.cos());
         assert!((left - expected).abs() < 0.1 * expected, "{left} {expected}");
     }
 
-    /// A lab clock is seldom at zero when a record begins.
+    /// The lab clock is seldom at zero when a record begins.
     #[test]
-    fn motion_is_shown_without_zero_drift_and_tone_whatever_the_clock_says() {
+    fn motion_is_shown_without_zero_drift_and_tone_at_any_clock_time() {
         let samples = samples(0.0);
         let basis = PiBasis::for_samples(&samples);
         let blocks = Blocks::new(&samples, 20, 4000);

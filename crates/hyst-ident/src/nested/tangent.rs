@@ -1,4 +1,4 @@
-//! A record as the operator alone sees it.
+//! Linearisation of a record around the operator of a fit.
 
 use hyst_core::{CurveSide, Error};
 
@@ -6,20 +6,21 @@ use super::assembly::dead_zone_slope;
 use super::{Fitted, Problem, SignalPath};
 use crate::Samples;
 
-/// What a record says about the operator of a fit while all that surrounds it is held: to first order, the output changes with the
-/// operator's as [`through`](Self::through) says.
+/// A record as seen by the operator of a fit, with everything around the operator held. To first order,
+/// [`through`](Self::through) maps a change of the operator's output to a change of the measured output.
 pub(crate) struct Tangent<'a> {
-    /// What the operator is driven with, and the part of the output that comes from it, with what the fit has left.
+    /// The record with the drive of the operator as input, and with the operator's contribution plus the residual as
+    /// output.
     pub(crate) samples: Samples,
     path: SignalPath<'a>,
-    /// In each row, by how much the curve behind the operator follows it, where there is one.
+    /// Slope of the curve behind the operator in each row, if there is one.
     curve: Option<Vec<f64>>,
-    /// And by how much the output follows the motion, where there is a stop or the gain wanders.
+    /// Slope of the output over the motion in each row, if there is a saturation or a gain wander.
     gain: Option<Vec<f64>>,
 }
 
 impl Tangent<'_> {
-    /// Puts the changes of the output that they make in the place of changes of the operator's.
+    /// Replaces changes of the operator's output by the changes of the measured output that they cause.
     pub(crate) fn through(&self, changes: &mut [Vec<f64>]) {
         changes.iter_mut().for_each(|change| times(change, self.curve.as_deref()));
         self.path.output_side_of(changes);
@@ -34,7 +35,7 @@ fn times(change: &mut [f64], slope: Option<&[f64]>) {
 }
 
 impl<'a> Problem<'a> {
-    /// The record as the operator of a fit sees it.
+    /// Returns the record as seen by the operator of a fit.
     ///
     /// # Errors
     /// If a stage cannot be built.
@@ -53,11 +54,11 @@ impl<'a> Problem<'a> {
         });
         let gain = (h.effects.saturation.is_some() || h.gain_wanders).then(|| {
             let wandered = |k| self.wandering(&z[layout.gain_hats.clone()], k);
-            point.motion.iter().enumerate().map(|(k, m)| path.stopped(*m).1 + wandered(k)).collect()
+            point.motion.iter().enumerate().map(|(k, m)| path.saturated(*m).1 + wandered(k)).collect()
         });
         let input = path.input_side();
         let mut tangent = Tangent { samples: Samples { input, ..self.samples.clone() }, path, curve, gain };
-        // A widening stands beside the operator.
+        // The widening is added to the operator's output; it is removed here.
         let mut operator = point.operator;
         let without: Vec<f64> = z[layout.widening.clone()].iter().map(|w| -w).collect();
         tangent.path.widen(&mut operator, &without);
@@ -82,7 +83,7 @@ mod tests {
         AsymmetryParams, CreepParams, DelayParams, LagParams, ResonanceParams, SaturationParams, TemperatureParams,
     };
 
-    /// A drive of growing swing and an output that follows it somehow.
+    /// A drive with a growing amplitude and a nonlinear output.
     fn samples() -> Samples {
         let rows = 3000;
         let time: Vec<f64> = (0..rows).map(|k| f64::from(k) * 1e-3).collect();
@@ -94,9 +95,9 @@ mod tests {
         }
     }
 
-    /// What a parameter leaves as it is need not be computed anew.
+    /// Columns that a parameter does not change need not be recomputed.
     #[test]
-    fn the_jacobian_is_how_the_output_changes() {
+    fn the_jacobian_matches_differences_of_the_output() {
         let samples = samples();
         let effects = Effects {
             delay: Some(DelayParams { seconds: 0.0023 }),
@@ -128,7 +129,7 @@ mod tests {
         for (at, column) in jacobian.iter().enumerate() {
             let (moved, step, _) = stepped(&h, at, &samples, range(here.iter().copied())).unwrap();
             let there = motion(&moved);
-            let slopes = problem.thinned(|k| (there[k] - here[k]) / step);
+            let slopes = problem.at_used_rows(|k| (there[k] - here[k]) / step);
             let largest = slopes.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!(largest > 0.0, "parameter {at}");
             for (said, seen) in column.iter().zip(&slopes) {
@@ -138,14 +139,14 @@ mod tests {
     }
 
     #[test]
-    fn a_small_change_of_the_operator_arrives_as_its_tangent_says() {
-        // Rows in which a stop hides it; a wandering gain shows it there too.
+    fn the_tangent_maps_a_small_change_of_the_operator() {
+        // In some rows a saturation hides the change; a wandering gain shows it there too.
         let hidden = arrives_as_its_tangent_says(false);
         assert!(hidden > 20, "{hidden}");
         arrives_as_its_tangent_says(true);
     }
 
-    /// In how many rows next to nothing of a change arrives although the drive is high.
+    /// Returns the number of rows with a high drive in which the change is hidden.
     fn arrives_as_its_tangent_says(gain_wanders: bool) -> usize {
         let samples = samples();
         let effects = Effects {
@@ -168,7 +169,7 @@ mod tests {
         let problem = Problem::new(&samples, &basis, &blocks, false);
         let fit = problem.fit_linear(&h).unwrap().unwrap();
         let tangent = problem.tangent(&fit).unwrap();
-        // Its drive lags; its output is the operator's as it arrives, and what is left.
+        // The drive lags. The output is the operator's contribution plus the residual.
         assert_ne!(tangent.samples.input, samples.input);
         let through = |change: Vec<f64>| {
             let mut changes = [change];

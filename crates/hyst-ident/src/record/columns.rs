@@ -1,15 +1,15 @@
-//! Which column of a file plays which role.
+//! The roles of columns, and the `--map` arguments that assign them.
 
 use super::unit::{OutputUnit, TimeUnit};
 
-/// What a caller needs a record for, and hence which columns have to be there.
+/// The columns that a caller needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// Time, input and output: a record to train or test on.
     InputAndOutput,
-    /// Time and input; the output is read where there is one: a record to simulate.
+    /// Time and input; the output is read if the file has one: a record to simulate.
     Input,
-    /// Time and output; an input column is carried through unread: a reference to follow.
+    /// Time and output; an input column is copied without being read: a reference.
     Output,
 }
 
@@ -18,14 +18,15 @@ pub enum Need {
 #[non_exhaustive]
 pub enum MapError {
     /// Not of the form `name=column`.
-    #[error("--map \"{argument}\" is not of the form NAME=COLUMN, as voltage_v=Vin")]
+    #[error("--map \"{argument}\" does not have the form NAME=COLUMN; type for example --map voltage_v=Vin")]
     Malformed {
         /// The argument.
         argument: String,
     },
-    /// The left side is no name of the record format.
+    /// The left side is not a column name of the record format.
     #[error(
-        "--map \"{argument}\": \"{name}\" is no column of the record format; the left side has to be one of segment, {}, {}, {}, temperature_degc, load_n",
+        "--map \"{argument}\": \"{name}\" is not a column name of the record format; \
+         the left side must be one of segment, {}, {}, {}, temperature_degc, load_n",
         Role::Time.accepted(), Role::Input.accepted(), Role::Output.accepted()
     )]
     UnknownName {
@@ -34,12 +35,12 @@ pub enum MapError {
         /// Its left side.
         name: String,
     },
-    /// A minus where a sign means nothing.
-    #[error("--map \"{argument}\": {role} takes no sign and no factor; leave it out")]
+    /// A sign or factor of a role that allows neither.
+    #[error("--map \"{argument}\": {role} cannot have a sign or a factor; remove it")]
     Signless {
         /// The argument.
         argument: String,
-        /// What it names.
+        /// The role that it names.
         role: &'static str,
     },
     /// Two arguments give the same role to two columns.
@@ -49,7 +50,7 @@ pub enum MapError {
         first: String,
         /// The second argument.
         second: String,
-        /// What both name.
+        /// The role that both name.
         role: &'static str,
     },
     /// Two arguments give two roles to the same column.
@@ -62,11 +63,12 @@ pub enum MapError {
     },
 }
 
-/// Which columns of a file stand for which names of the record format (`--map voltage_v=Vin`).
+/// Assigns columns of a file to names of the record format (`--map voltage_v=Vin`).
 ///
-/// A minus before the column (`--map displacement_um=-Sensor`) turns the sign of an input, an output or a load; a factor
-/// (`--map displacement_um=2.5*CH2`) says how many of the role's unit one of the column's is, whatever unit the file states. A mapped role is taken from the mapped column only, so that `--map displacement_um=displacement_um` also settles
-/// which of two possible outputs is meant. The default maps nothing.
+/// A minus before the column (`--map displacement_um=-Sensor`) inverts the sign of an input, an output or a load. A factor
+/// (`--map displacement_um=2.5*CH2`) converts the values of the column to the unit of the name; a unit in the file is then
+/// ignored. A mapped role is read from the mapped column only: `--map displacement_um=displacement_um` also selects one of
+/// two possible outputs. The default maps nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColumnMap {
     pub(crate) entries: Vec<Entry>,
@@ -76,20 +78,20 @@ pub struct ColumnMap {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
     pub(crate) role: Role,
-    /// Name in the record format.
+    /// The name in the record format.
     pub(crate) canonical: String,
     pub(crate) column: String,
-    /// Factor of its values to those of the role: −1 turns the sign.
+    /// The factor from the values of the column to those of the role; −1 inverts the sign.
     pub(crate) factor: Option<f64>,
-    /// As it was given.
+    /// The argument as the user typed it.
     argument: String,
 }
 
 impl ColumnMap {
-    /// Reads arguments of the form `name=column`.
+    /// Parses arguments of the form `name=column`.
     ///
     /// # Errors
-    /// When an argument is malformed, its left side is unknown, or two of them contradict each other.
+    /// If an argument is malformed, its left side is unknown, or two arguments contradict each other.
     pub fn parse<I>(arguments: I) -> Result<Self, MapError>
     where
         I: IntoIterator,
@@ -127,7 +129,7 @@ impl ColumnMap {
     }
 }
 
-/// A column and the factor before it, as `-Sensor` or `2.5*CH2` have one.
+/// Splits the right side of a `--map` into column and factor: `-Sensor`, `2.5*CH2`.
 fn factor_of(column: &str) -> (&str, Option<f64>) {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|factor| factor.is_finite() && *factor != 0.0);
     if let Some((factor, rest)) = column.split_once('*').and_then(|(factor, rest)| Some((number(factor)?, rest))) {
@@ -136,7 +138,7 @@ fn factor_of(column: &str) -> (&str, Option<f64>) {
     column.strip_prefix('-').map_or((column, None), |rest| (rest.trim(), Some(-1.0)))
 }
 
-/// What a column is for.
+/// The role of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     Segment,
@@ -147,13 +149,13 @@ pub(crate) enum Role {
     Load,
 }
 
-/// Whether an input's column may have this name: `voltage_v`, or `<quantity>_in_<unit>`.
+/// Returns whether `name` is a column name of an input: `voltage_v` or `<quantity>_in_<unit>`.
 pub fn is_input_column(name: &str) -> bool {
     Role::of_column(name) == Some(Role::Input)
 }
 
 impl Role {
-    /// The role that a name of the record format has. Inputs other than a voltage are named `<quantity>_in_<unit>`.
+    /// Returns the role of a name of the record format. Inputs other than a voltage are named `<quantity>_in_<unit>`.
     pub(crate) fn of_column(name: &str) -> Option<Self> {
         match name {
             "segment" => Some(Self::Segment),
@@ -169,7 +171,7 @@ impl Role {
         }
     }
 
-    /// The role in one word.
+    /// Returns the role as one word.
     pub(crate) fn word(self) -> &'static str {
         self.words().trim_start_matches("the ")
     }
@@ -196,7 +198,7 @@ impl Role {
         }
     }
 
-    /// A name of this role.
+    /// Returns an example of a column name with this role.
     pub(crate) fn example(self) -> &'static str {
         match self {
             Self::Segment => "segment",

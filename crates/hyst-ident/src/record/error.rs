@@ -1,13 +1,13 @@
-//! What can be wrong with a record. Every message says where, and what to do.
+//! Errors of records. Every message states the place, the problem, and what to do.
 
 use std::fmt;
 
-/// A row of a record, as its reader would look for it.
+/// The place of a row in a file or in a table in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A line of a file; the first line is 1, so that the header usually is line 1.
+    /// A line of a file, counted from 1. The header is usually line 1.
     Line(u64),
-    /// A row of a record that was made in memory; the first is 0.
+    /// A row of a record made in memory, counted from 0.
     Row(usize),
 }
 
@@ -29,19 +29,19 @@ pub enum RecordError {
     Io {
         /// The file.
         file: String,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// An MCAP file that is no log of a run.
-    #[error("{file}: {what}; records are read from logs that hystctl run --log writes, and from CSV files")]
+    /// An MCAP file that is not a log of a run.
+    #[error("{file}: {what}; give a log that hystctl run --log wrote")]
     Log {
         /// The file.
         file: String,
-        /// What is not as it should be.
+        /// What is wrong.
         what: String,
     },
-    /// A log without a row of the drive or reference that was asked for.
-    #[error("{file}: the log has nothing of what was to be played: {what}")]
+    /// A log without a sample of the requested drive or reference.
+    #[error("{file}: the log has no sample of the requested drive or reference: {what}")]
     NothingAsked {
         /// The file.
         file: String,
@@ -57,39 +57,41 @@ pub enum RecordError {
         file: String,
     },
     /// There is a header but no row below it.
-    #[error("{file}: the record has a header but no rows; rows of numbers have to follow it from line 2 on")]
+    #[error("{file}: the record has a header but no rows; add one row of numbers per sample, from line 2 on")]
     NoRows {
         /// The file.
         file: String,
     },
-    /// The bytes are of no format that is read.
+    /// The format of the file is not supported.
     #[error(
-        "{file}: the format is not recognised (read are {formats}); in Python, pandas.DataFrame(dict(time_s=t, voltage_v=u, displacement_um=y)).to_csv(\"record.csv\", index=False) writes a record", formats = super::source::FORMATS
+        "{file}: the format is not recognised (supported: {formats}); in Python, \
+         pandas.DataFrame(dict(time_s=t, voltage_v=u, displacement_um=y)).to_csv(\"record.csv\", index=False) writes a record",
+        formats = super::source::FORMATS
     )]
     UnknownFormat {
         /// The file.
         file: String,
     },
-    /// A file of a known format that is damaged, or holds something else than columns.
+    /// A file of a supported format that is damaged or does not hold columns of numbers.
     #[error("{file}: {format}: {what}")]
     Damaged {
         /// The file.
         file: String,
-        /// The format, as `MATLAB 5`.
+        /// The format, such as `MATLAB 5`.
         format: &'static str,
         /// What is wrong, and what to do.
         what: String,
     },
     /// A text without rows of numbers.
     #[error(
-        "{file}: no row of numbers was found; a record has a row for each sample, with the same number of columns in each"
+        "{file}: no row of numbers was found; a record has one row per sample, with the same number of columns in each row"
     )]
     NoNumbers {
         /// The file.
         file: String,
     },
-    /// Columns that are needed are missing, of unknown unit, or several.
-    #[error("{file}: {problems}; {advice}{}", if_right(options))]
+    /// Needed columns are missing, ambiguous, or have an unknown unit.
+    #[error("{file}: {problems}; {advice}{}", options_hint(options))]
     Columns {
         /// The file and the line of its header.
         file: String,
@@ -97,14 +99,14 @@ pub enum RecordError {
         problems: String,
         /// What to do.
         advice: String,
-        /// The options to type if columns and units are right; empty where none are known.
+        /// The options to type if the columns and units are right; empty if they are not known.
         options: String,
-        /// How many columns the file has.
+        /// The number of columns of the file.
         columns: usize,
     },
-    /// A column has hardly any values.
+    /// More than half of the values of a column are missing.
     #[error(
-        "{file}, column \"{column}\": {missing} of {rows} rows have no value; choose another column with --map, or repair the file"
+        "{file}, column \"{column}\": {missing} of {rows} rows have no value; select another column with --map NAME=COLUMN, or complete the file"
     )]
     MostlyMissing {
         /// The file.
@@ -127,7 +129,7 @@ pub enum RecordError {
         column: String,
         /// The header's names.
         found: String,
-        /// A further remark, or nothing.
+        /// A hint, or empty.
         hint: String,
     },
     /// A row has more or fewer fields than the header.
@@ -145,12 +147,13 @@ pub enum RecordError {
         expected: usize,
         /// The header's last column.
         column: String,
-        /// A further remark, or nothing.
+        /// A hint, or empty.
         hint: &'static str,
     },
     /// A field is not a number.
     #[error(
-        "{file}, {place}, column \"{column}\": \"{text}\" is not a number; write it as 1.25 or 1.25e-3, or leave the cell empty if the value is unknown"
+        "{file}, {place}, column \"{column}\": \"{text}\" is not a number; \
+         write it as 1.25 or 1.25e-3, or leave the cell empty if the value is unknown"
     )]
     NotANumber {
         /// The file.
@@ -159,12 +162,13 @@ pub enum RecordError {
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// What stands there, shortened.
+        /// The text of the cell, shortened.
         text: String,
     },
     /// A value is NaN or infinite.
     #[error(
-        "{file}, {place}, column \"{column}\": the value is {value}, not a finite number; repair the value, or give the rows before and after it different integers in \"segment\" and remove it"
+        "{file}, {place}, column \"{column}\": the value is {value}, not a finite number; \
+         correct it, or remove the row and give the rows before and after it different integers in the column \"segment\""
     )]
     NotFinite {
         /// The file.
@@ -176,9 +180,10 @@ pub enum RecordError {
         /// The value.
         value: String,
     },
-    /// A temperature that no thing has.
+    /// A temperature below absolute zero.
     #[error(
-        "{file}, {place}, column \"{column}\": {value} degC is below absolute zero, -273.15 degC; repair the sensor's value, or leave the column out"
+        "{file}, {place}, column \"{column}\": {value} degC is below absolute zero (-273.15 degC); \
+         correct the value or the unit, or remove the column"
     )]
     TooCold {
         /// The file.
@@ -199,12 +204,13 @@ pub enum RecordError {
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// What stands there, shortened.
+        /// The text of the cell, shortened.
         text: String,
     },
-    /// A segment label comes back after another one.
+    /// A segment label appears again after another label.
     #[error(
-        "{file}, {place}, column \"{column}\": segment {label} returns after segment {previous}; the rows of a segment have to follow one another: sort them or give the later part a new label"
+        "{file}, {place}, column \"{column}\": segment {label} returns after segment {previous}; \
+         the rows of a segment must be contiguous: sort the rows, or give the later rows a new label"
     )]
     SegmentReturns {
         /// The file.
@@ -213,14 +219,15 @@ pub enum RecordError {
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// The label that comes back.
+        /// The label that appears again.
         label: i64,
-        /// The label just before.
+        /// The label of the row before.
         previous: i64,
     },
-    /// Time stands still or goes back.
+    /// Time does not increase.
     #[error(
-        "{file}, {place}, column \"{column}\": time has to increase from row to row and across segments, but {found} s follows {previous} s; if another run begins there, split the file; if the times have too few decimals, give the sample rate with --rate"
+        "{file}, {place}, column \"{column}\": time must increase from row to row and across segments, but {found} s follows {previous} s; \
+         if another run begins there, split the file; if the times have too few decimals, give the sample rate with --rate HZ"
     )]
     TimeNotIncreasing {
         /// The file.
@@ -236,23 +243,26 @@ pub enum RecordError {
     },
     /// The rows of a segment are not evenly spaced in time.
     #[error(
-        "{file}, {place}, column \"{column}\": uneven time: expected {expected} s, found {found} s; resample to even steps (or print more decimals, if it is only rounding), or, where the device rested in between, give the two parts different integers in a column \"segment\""
+        "{file}, {place}, column \"{column}\": uneven time step: expected {expected} s, found {found} s; \
+         if the times are rounded, write more decimals; if the actuator rested before this row, give the rows before and after the pause \
+         different integers in a column \"segment\"; otherwise resample to even steps"
     )]
     UnevenTime {
         /// The file.
         file: String,
-        /// The first row off the grid.
+        /// The first row that is not on the grid.
         place: Place,
         /// The column's name in the file.
         column: String,
-        /// The time that the even grid has there \[s\].
+        /// The time of the even grid \[s\].
         expected: String,
         /// The time found \[s\].
         found: String,
     },
-    /// Two segments are sampled at different rates, where one rate is needed.
+    /// Two segments have different sample periods, but one period is needed.
     #[error(
-        "{file}: {why} needs one sample period, but segment {label} has {period:.9} s and segment {other_label} {other_period:.9} s; use the segments of one of them, in a file of their own"
+        "{file}: {why} needs one sample period, but segment {label} has {period:.9} s and segment {other_label} {other_period:.9} s; \
+         write the segments of each sample period to a separate file"
     )]
     MixedPeriods {
         /// The files.
@@ -265,10 +275,10 @@ pub enum RecordError {
         other_label: i64,
         /// Its sample period \[s\].
         other_period: f64,
-        /// Who needs one.
+        /// What needs one sample period.
         why: String,
     },
-    /// No segment has two rows, so that there is no sample period.
+    /// No segment has two rows, so there is no sample period.
     #[error(
         "{file}, {place}, column \"{column}\": no segment has two rows, so there is no sample period; a record needs at least two rows in a segment"
     )]
@@ -282,7 +292,7 @@ pub enum RecordError {
     },
     /// Columns given in memory differ in length.
     #[error(
-        "{name}, column \"{column}\": {found} values, but \"time_s\" has {expected}; every column needs one value per time: find out which rows lack one"
+        "{name}, column \"{column}\": {found} values, but \"time_s\" has {expected}; give every column one value per time"
     )]
     Lengths {
         /// The record.
@@ -301,28 +311,30 @@ pub enum RecordError {
         file: String,
         /// The column.
         column: String,
-        /// What for.
+        /// Why the column is needed.
         why: String,
     },
-    /// Records to be joined do not fit each other.
-    #[error("{file}, line 1: {what} is {found}, but {other_file} has {expected}; join only records of the same kind")]
+    /// The records to be joined have different columns.
+    #[error(
+        "{file}, line 1: {what} is {found}, but {other_file} has {expected}; join only records with the same columns"
+    )]
     Unlike {
         /// The file that differs.
         file: String,
         /// The first file.
         other_file: String,
-        /// What differs, as `the output column`.
+        /// What differs, such as `the output column`.
         what: &'static str,
-        /// In the file that differs.
+        /// Its value in the file that differs.
         found: String,
-        /// In the first file.
+        /// Its value in the first file.
         expected: String,
     },
-    /// Nothing was given to join.
+    /// There is no record to join.
     #[error("no record was given")]
     Nothing,
 }
 
-fn if_right(options: &str) -> String {
+fn options_hint(options: &str) -> String {
     if options.is_empty() { String::new() } else { format!("; if the columns and units are right: {options}") }
 }

@@ -1,31 +1,31 @@
-//! The even time grid behind printed times.
+//! The even time grid of rounded times.
 //!
-//! A 750 Hz record written with six decimals reads 0.000000, 0.001333, 0.002667: its steps differ, yet it is even to
-//! the last printed digit. Here `t_k` are the printed times of a segment, `r` the printed resolution, and the record
-//! is even when one period `h` fits every row, `|t_k − t_0 − k·h| ≤ r`. Each row bounds `h` from both sides, so the
-//! periods that fit are an interval; the period is the simplest one in it.
+//! A 750 Hz record with six decimals has the times 0.000000, 0.001333, 0.002667. Its steps differ, but it is even to
+//! the last printed digit. Let `t_k` be the printed times of a segment and `r` the printed resolution. The segment is
+//! even if one period `h` fits every row: `|t_k − t_0 − k·h| ≤ r`. Each row gives a lower and an upper bound of `h`, so
+//! the valid periods form an interval. [`fit`] returns the simplest number in it.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// How finely times are printed, in decimals of a second.
+/// The printed resolution of times, in decimals of a second.
 ///
-/// Both figures are needed: fixed decimals (`10.920000`) are limited by `decimals`, a fixed number of digits
-/// (`10.9213`, `1.09213e1`) by `digits`.
+/// Both values are needed: `decimals` limits times with fixed decimals (`10.920000`), `digits` limits times with a fixed
+/// number of digits (`10.9213`, `1.09213e1`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Printed {
-    /// The most digits after the decimal point of any row.
+    /// The maximum number of digits after the decimal point.
     pub(crate) decimals: i32,
-    /// The most digits of any row, leading zeros not counted.
+    /// The maximum number of digits without leading zeros.
     pub(crate) digits: i32,
 }
 
 impl Printed {
-    /// Times that come from memory with all their bits.
+    /// The resolution of times that were never printed.
     pub(crate) const EXACT: Self = Self { decimals: 30, digits: 30 };
 
-    /// Takes the figures of one more number into account.
+    /// Updates the maxima with one printed number.
     pub(crate) fn take(&mut self, text: &[u8]) {
         let (mut digits, mut decimals) = (0, 0);
         let (mut leading, mut after_point) = (true, false);
@@ -49,38 +49,40 @@ impl Printed {
         self.decimals = self.decimals.max(decimals.saturating_sub(exponent).clamp(-300, 300));
     }
 
-    /// Takes the figures of other rows into account.
+    /// Updates the maxima with those of other rows.
     pub(crate) fn join(&mut self, other: Self) {
         self.digits = self.digits.max(other.digits);
         self.decimals = self.decimals.max(other.decimals);
     }
 
-    /// The units of the last printed digit of times.
+    /// Returns the resolution of the last printed digit.
     fn resolution(self) -> Resolution {
         let fixed = 10_f64.powi(-self.decimals);
-        // With more digits than a double has, rounding alone counts.
+        // A double has 17 digits: with more printed digits only its own rounding counts.
         let below =
             if self.digits > 17 { f64::INFINITY } else { 10_f64.powi(self.digits.saturating_sub(self.decimals)) };
         Resolution { fixed, below, digits: self.digits }
     }
 }
 
-/// How finely a time is printed.
+/// The printed resolution as a function of time.
 #[derive(Clone, Copy, Debug)]
 struct Resolution {
-    /// One unit of the last decimal \[s\], which holds for times `below` this.
+    /// One unit of the last decimal \[s\], for times smaller than `below`.
     fixed: f64,
+    /// The time from which `digits` limits the resolution \[s\].
     below: f64,
+    /// The number of printed digits.
     digits: i32,
 }
 
 impl Resolution {
-    /// One unit of the last printed digit of the time `t` \[s\].
+    /// Returns one unit of the last printed digit of the time `t` \[s\].
     fn at(self, t: f64) -> f64 {
         if t.abs() < self.below {
             return self.fixed;
         }
-        // 1e-3 decades of slack keep 10 from counting as 9.99…
+        // The offset of 1e-3 decades prevents 10 from being classified as 9.99….
         let leading = (t.abs().log10() + 1e-3).floor();
         let own = || 10_f64.powf(leading + 1.0 - f64::from(self.digits));
         if leading.is_finite() { self.fixed.max(own()) } else { self.fixed }
@@ -92,14 +94,14 @@ impl Resolution {
 pub(crate) struct Period {
     /// The period \[s\].
     pub(crate) value: f64,
-    /// The shortest and the longest period that fit every row \[s\].
+    /// The shortest and the longest valid period \[s\].
     pub(crate) fits: (f64, f64),
 }
 
-/// Why no period fits.
+/// The reason why no period fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fault {
-    /// A row off its segment's grid.
+    /// A row is not on the grid of its segment.
     Uneven { row: usize, expected: f64 },
     /// No segment has two rows.
     TooShort,
@@ -133,13 +135,15 @@ impl Fits {
     }
 }
 
-/// Finds the period of each segment of increasing times \[s\], or the first place where they are not even. Segments whose times allow it share one
-/// period: the longer a segment is, the better it knows it.
+/// Fits the period of each segment of increasing times \[s\].
+///
+/// Segments share one period if their times allow it, because a longer segment determines the period more accurately. The error is the first
+/// uneven row.
 pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Vec<Period>, Fault> {
     if let Some(period) = shared(time, segments, printed)? {
         return Ok(vec![period; segments.len()]);
     }
-    // The first group has the longest segment, and any that is too short to have a period of its own.
+    // Longest first: a segment that is too short to determine its own period then joins the first group.
     let mut by_length: Vec<usize> = (0..segments.len()).collect();
     by_length.sort_by_key(|s| std::cmp::Reverse(segments[*s].len()));
     let mut groups: Vec<(Fits, Vec<usize>)> = Vec::new();
@@ -166,16 +170,17 @@ pub(crate) fn fit(time: &[f64], segments: &[Range<usize>], printed: Printed) -> 
     periods.into_iter().map(|period| period.ok_or(Fault::TooShort)).collect()
 }
 
-/// Rows of a segment that one thread looks at.
+/// Rows per parallel task.
 const PART_ROWS: usize = 1 << 16;
 
-/// How far rows may be off their grid beyond the printed digits \[s\]: times summed up step by step drift off it by more than a rounding, and a
-/// millionth of a period is no matter.
+/// Returns the tolerance of a row in addition to the printed resolution \[s\].
+///
+/// Times that are accumulated step by step drift by more than one rounding. A millionth of a period is negligible.
 fn slack(t: &[f64]) -> f64 {
     rounding(t) + 1e-6 * if t.len() < 2 { 0.0 } else { mean_step(t) }
 }
 
-/// The periods that fit a segment's times, for each of some slacks \[s\].
+/// Returns the valid periods of the times of a segment, for each slack \[s\].
 fn fits<const N: usize>(t: &[f64], printed: Printed, slacks: [f64; N]) -> [Fits; N] {
     let Some(start) = t.first() else { return [Fits::ALL; N] };
     let resolution = printed.resolution();
@@ -193,16 +198,17 @@ fn fits<const N: usize>(t: &[f64], printed: Printed, slacks: [f64; N]) -> [Fits;
     if t.len() <= PART_ROWS {
         return part((0, t));
     }
-    // The interval is the same in whatever order the rows narrow it.
+    // The result does not depend on the order of the rows.
     let both = |a: [Fits; N], b: [Fits; N]| std::array::from_fn(|n| a[n].and(b[n]));
     t.par_chunks(PART_ROWS).enumerate().map(part).reduce(|| [Fits::ALL; N], both)
 }
 
+/// Returns the rounding error of sums and differences of the times \[s\].
 fn rounding(time: &[f64]) -> f64 {
     4.0 * f64::EPSILON * time.iter().fold(0.0_f64, |m, t| m.max(t.abs()))
 }
 
-/// The period that segments share, none if they have none in common.
+/// Returns the common period of segments; `None` if each segment is even but they have no period in common.
 fn shared(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<Option<Period>, Fault> {
     let Some(longest) = segments.iter().filter(|rows| rows.len() >= 2).max_by_key(|rows| rows.len()) else {
         return Err(Fault::TooShort);
@@ -219,14 +225,14 @@ fn shared(time: &[f64], segments: &[Range<usize>], printed: Printed) -> Result<O
             odd = Some(rows);
         }
     }
-    // Segments that have each a period but none in common differ in it, unless the rows of one are uneven by themselves.
+    // Every segment is even, but no period fits all of them.
     if all.is_empty() && odd.is_none() {
         return Ok(None);
     }
     if let Some(fault) = gap(time, segments, printed, guess) {
         return Err(fault);
     }
-    // Where all have a period in common, none is uneven.
+    // One segment is uneven.
     if let Some(rows) = odd {
         return Err(uneven(&time[rows.clone()], printed, slack, rows.start));
     }
@@ -251,11 +257,11 @@ struct Grid<'a> {
 }
 
 impl Grid<'_> {
-    /// A period that the printed digits spell out, or else a whole rate, or else the guess.
+    /// Returns the period that equals its printed value, else that of a whole rate \[Hz\], else `guess`.
     fn simplest(&self, guess: f64) -> f64 {
         let spelled = || self.spelled_out(guess);
         let whole = || whole_rate(guess, self.strict);
-        // Times with all their bits spell out anything: then a whole rate goes first.
+        // With many decimals every period equals its printed value, so a whole rate takes precedence.
         let coarse = 10_f64.powi(-self.printed.decimals) > 1e-9 * guess;
         let found = if coarse { spelled().or_else(whole) } else { whole().or_else(spelled) };
         found
@@ -263,7 +269,7 @@ impl Grid<'_> {
             .unwrap_or(guess)
     }
 
-    /// The period with as many decimals as the times have, if it gives every printed time exactly.
+    /// Returns the period rounded to the decimals of the times, if it reproduces every printed time exactly.
     fn spelled_out(&self, guess: f64) -> Option<f64> {
         let decimals = self.printed.decimals.clamp(0, 12);
         let scale = 10_f64.powi(decimals);
@@ -276,7 +282,7 @@ impl Grid<'_> {
     }
 }
 
-/// The roundest whole rate \[Hz\] near `1 / guess` whose period fits.
+/// Returns the period of the whole rate \[Hz\] near `1 / guess` with the most trailing zeros that fits.
 fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
     let rate = 1.0 / guess;
     if !(0.5..1e15).contains(&rate) {
@@ -288,16 +294,16 @@ fn whole_rate(guess: f64, fits: Fits) -> Option<f64> {
     })
 }
 
-/// Finds a missing row where the period is so few printed units that rounding could account for it.
+/// Finds a missing row if the period is at most three printed units.
 ///
-/// At 1 kHz with three decimals a missing row reads 0.003, 0.005: one unit off, as if the rate were a little below
-/// 1 kHz. Rounding makes such longer steps again and again; those that come once or twice, or less than every
-/// twentieth time, are gaps. Where a period is more than three units, the tolerance of one unit shows any gap.
+/// At 1 kHz with three decimals, a missing row shows as 0.003, 0.005. This is one unit off the grid, which rounding of a
+/// slightly lower rate could also explain. Rounding makes such long steps regularly. Long steps that occur once or twice, or in
+/// less than 5 % of the rows, are gaps. If a period has more than three units, the tolerance of one unit detects every gap.
 fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) -> Option<Fault> {
     let resolution = printed.resolution();
     let is_coarse = |row: &usize| guess <= 3.0 * resolution.at(time[*row]);
     let steps = || segments.iter().flat_map(|rows| rows.clone().skip(1)).filter(is_coarse);
-    // Steps that differ by less than any tolerance are none of them odd; most records end here.
+    // Early exit for most records: all steps are equal within the resolution.
     let (mut low, mut high, mut finest) = (f64::INFINITY, 0.0_f64, f64::INFINITY);
     for row in steps() {
         let step = time[row] - time[row - 1];
@@ -315,20 +321,20 @@ fn gap(time: &[f64], segments: &[Range<usize>], printed: Printed, guess: f64) ->
     (odd < 3 || 20 * odd < count).then(|| Fault::Uneven { row, expected: time[row - 1] + usual })
 }
 
-/// Names the first row off the grid of a segment that has no common period.
+/// Returns the first row that is not on the grid of an uneven segment.
 fn uneven(t: &[f64], printed: Printed, slack: f64, first_row: usize) -> Fault {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    // Of two steps the shorter: a row is sooner missing than added.
+    // The lower median: a missing row (longer step) is more likely than an added one.
     let middle = (steps.len() - 1) / 2;
     let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let resolution = printed.resolution();
     let tolerance = |tk: f64| resolution.at(tk) + slack;
-    // A step that is missing, added or moved stands out against the usual step.
+    // A row that is missing, added or shifted makes a step that differs from the usual one.
     let jump = t.windows(2).position(|w| (w[1] - w[0] - usual).abs() > 2.0 * tolerance(w[1]));
     if let Some(k) = jump {
         return Fault::Uneven { row: first_row + k + 1, expected: t[k] + usual };
     }
-    // Else the rate creeps: the row that is farthest from the mean grid.
+    // Otherwise the rate drifts: return the row that is farthest from the mean grid.
     let h = mean_step(t);
     let off = |k: usize| (t[k] - t[0] - k as f64 * h).abs();
     let k = (1..t.len()).max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0);
@@ -359,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_of_printed_numbers() {
+    fn decimals_and_digits_of_printed_numbers_are_counted() {
         let of = |text: &str| {
             let mut p = Printed::default();
             p.take(text.as_bytes());
@@ -374,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_rates_are_found_behind_rounded_times() {
+    fn whole_rates_are_found_from_rounded_times() {
         for (rate, decimals) in [
             (750.0, 6),
             (750.0, 4),
@@ -392,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn a_period_that_is_spelled_out_is_taken_as_it_stands() {
+    fn a_period_that_is_printed_exactly_is_not_changed() {
         for (h, decimals) in [(0.0012, 4), (0.0012, 17), (0.0015, 4), (2.5, 1), (60.0, 0)] {
             let texts: Vec<_> = (0..3).map(|k| format!("{:.decimals$}", k as f64 * h)).collect();
             assert_eq!(period_of(&texts).unwrap().value, h, "{h} with {decimals} decimals");
@@ -400,8 +406,8 @@ mod tests {
     }
 
     #[test]
-    fn a_fixed_number_of_digits_is_even_too() {
-        // As "%g" and "%.5e" print: the resolution falls as time goes on.
+    fn times_with_a_fixed_number_of_digits_are_even() {
+        // "%g" and "%.5e" print such times: the resolution decreases with time.
         let g = |k: usize| {
             let t = k as f64 / 750.0;
             let decimals = if k == 0 { 0 } else { (5 - t.log10().floor() as i32) as usize };
@@ -413,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn summed_up_times_are_even() {
+    fn accumulated_times_are_even() {
         let mut t = 0.0;
         let texts: Vec<_> = (0..100_000)
             .map(|_| {
@@ -425,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_row_is_found_where_it_is_missing() {
+    fn a_missing_row_is_found_at_its_place() {
         let mut texts = fixed(1000.0, 100, 6);
         texts.remove(12);
         let fault = period_of(&texts).unwrap_err();
@@ -435,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_row_is_found_though_the_period_is_one_printed_unit() {
+    fn a_missing_row_is_found_if_the_period_is_one_printed_unit() {
         for (rate, decimals, missing) in [(1000.0, 3, 400), (1000.0, 3, 1), (1000.0, 3, 998), (500.0, 3, 400)] {
             let mut texts = fixed(rate, 1000, decimals);
             assert_eq!(period_of(&texts).unwrap().value, 1.0 / rate);
@@ -457,13 +463,13 @@ mod tests {
     }
 
     #[test]
-    fn a_creeping_rate_is_uneven() {
+    fn a_drifting_rate_is_uneven() {
         let texts: Vec<_> = (0..1000).map(|k| format!("{:.6}", k as f64 * 1e-3 + (k * k) as f64 * 1e-9)).collect();
         assert!(matches!(period_of(&texts), Err(Fault::Uneven { .. })));
     }
 
     #[test]
-    fn segments_of_two_rates_have_each_their_own() {
+    fn segments_of_two_rates_keep_their_own_periods() {
         let (mut time, figures) = printed(&fixed(1000.0, 100, 6));
         time.extend((0..100).map(|k| 1.0 + f64::from(k) * 2e-3));
         time.extend((0..50).map(|k| 2.0 + f64::from(k) * 1e-3));
@@ -476,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_times_give_an_answer() {
+    fn extreme_times_do_not_panic() {
         for time in [[-1.7e308, 0.0, 1.7e308], [0.0, 5e-324, 1e-323], [1e15, 2e15, 3e15]] {
             let _ = fit(&time, &one(3), Printed::EXACT);
             let _ = fit(&time, &one(3), Printed::default());

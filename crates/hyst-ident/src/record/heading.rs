@@ -1,9 +1,8 @@
-//! What the heading of a column says: a quantity in words and a unit, as people and instruments write them.
+//! Parsing of column headings into words and a unit.
 //!
-//! `Time (s)`, `Voltage [mV]`, `disp_nm`, `U / V`, `t_ms` and `/group/Position, µm` are understood. A unit is read, never assumed: a
-//! heading without one has none.
+//! `Time (s)`, `Voltage [mV]`, `disp_nm`, `U / V`, `t_ms` and `/group/Position, µm` are recognised. A unit is never assumed.
 
-/// What is measured.
+/// A physical quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dimension {
     Time,
@@ -13,20 +12,22 @@ pub(crate) enum Dimension {
     Temperature,
 }
 
-/// A unit as a factor to the dimension's own: s, V, µm, N, °C. Division by `per_base` rounds once where the factor is a whole number.
+/// A unit, with its conversion to the base unit of its dimension: s, V, µm, N, °C.
+///
+/// Division by `per_base` rounds once if the factor is a whole number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Unit {
     pub(crate) dimension: Dimension,
-    /// How many of this unit make one of the base unit.
+    /// The number of this unit per base unit.
     pub(crate) per_base: f64,
-    /// The base unit's value at zero of this unit, before the scaling: 0 for all but absolute temperatures.
+    /// The value in this unit at zero of the base unit; 0 for all units but K and °F.
     pub(crate) zero: f64,
-    /// How the unit is written.
+    /// The symbol of the unit.
     pub(crate) symbol: &'static str,
 }
 
 impl Unit {
-    /// A value in this unit, in the base unit of its dimension.
+    /// Converts a value to the base unit of the dimension.
     pub(crate) fn to_base(self, value: f64) -> f64 {
         if self.per_base >= 1.0 {
             (value - self.zero) / self.per_base
@@ -35,7 +36,7 @@ impl Unit {
         }
     }
 
-    /// Values in this unit, in `other`; `None` where they measure different things.
+    /// Returns the conversion to the unit `other`; `None` if the dimensions differ.
     pub(crate) fn to(self, other: Self) -> Option<impl Fn(f64) -> f64> {
         let same = self.per_base == other.per_base && self.zero == other.zero;
         (self.dimension == other.dimension).then_some(move |value: f64| {
@@ -51,7 +52,7 @@ impl Unit {
         })
     }
 
-    /// The unit that `text` names, as `mV`, `µm`, `um`, `sec`, `°C`. Capitals count in symbols: Nm and F are no nm and °F.
+    /// Parses a unit such as `mV`, `µm`, `um`, `sec`, `°C`. Symbols are case-sensitive: Nm is not nm.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let text = text.trim().trim_matches(['"', '\'']).trim();
         let word = text.chars().count() > 3;
@@ -59,7 +60,7 @@ impl Unit {
         UNITS.iter().find(|(names, _)| names.iter().any(|name| is(name))).map(|(_, unit)| *unit)
     }
 
-    /// The unit at the end of a name such as `voltage_v`, where all letters are small.
+    /// Parses the lower-case unit at the end of a name such as `voltage_v`.
     pub(crate) fn parse_suffix(text: &str) -> Option<Self> {
         let is = |name: &str| name.to_lowercase() == text && !matches!(text, "min" | "h");
         Self::parse(text)
@@ -102,8 +103,8 @@ const UNITS: &[(&[&str], Unit)] = &[
     (&["degF", "°F", "℉", "F", "fahrenheit"], Unit { dimension: Temperature, per_base: 1.8, zero: 32.0, symbol: "°F" }),
 ];
 
-/// Words of a temperature.
-const WARM: &[&str] = &[
+/// Words that show that a column is a temperature.
+const TEMPERATURE_WORDS: &[&str] = &[
     "temperature",
     "temp",
     "temperatur",
@@ -118,31 +119,31 @@ const WARM: &[&str] = &[
     "kelvin",
 ];
 
-/// A heading taken apart.
+/// A parsed heading.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Heading {
     /// The words without the unit, in lower case.
     pub(crate) words: Vec<String>,
-    /// The unit, where the heading has one that is known.
+    /// The unit, if the heading has a known unit.
     pub(crate) unit: Option<Unit>,
-    /// What stands in brackets where a unit does, and is none that is known.
+    /// The text in brackets at the end, if it is not a known unit.
     pub(crate) unknown: Option<String>,
 }
 
 impl Heading {
-    /// Takes `name` apart; `unit` is what the file says of it elsewhere, as a row of units or an attribute, and goes first.
+    /// Parses `name`. A `unit` that the file states elsewhere (a row of units, an attribute) takes precedence.
     pub(crate) fn parse(name: &str, unit: Option<&str>) -> Self {
-        // Of a path the last part names the column.
+        // The last part of a path names the column.
         let leaf = leaf(name);
         let (rest, own) = split_unit(leaf);
         let words = words(rest);
         let found = unit.and_then(Unit::parse).or(own);
-        // C, K and F alone are units of much else.
+        // The single letters C, K and F are temperatures only if a word of the heading says so (C may be coulomb, F farad).
         let text = unit.filter(|unit| Unit::parse(unit).is_some()).unwrap_or(leaf);
         let mut ending = text.trim_end_matches([')', ']', '}', '>', ' ']).chars().rev();
         let is_letter = matches!(ending.next(), Some('C' | 'K' | 'F' | 'c' | 'k' | 'f'));
         let alone = is_letter && ending.next().is_none_or(|before| !before.is_alphabetic() && before != '°');
-        let warm = words.iter().any(|word| WARM.contains(&word.as_str()));
+        let warm = words.iter().any(|word| TEMPERATURE_WORDS.contains(&word.as_str()));
         let found = found.filter(|unit| unit.dimension != Temperature || warm || !alone);
         let unknown = in_brackets(leaf)
             .filter(|(_, text)| found.is_none() && text.contains(char::is_alphabetic))
@@ -150,13 +151,13 @@ impl Heading {
         Self { words, unit: found, unknown }
     }
 
-    /// Whether the words suggest `role`, as "piezo drive voltage" does the input.
+    /// Returns whether the heading contains one of `words`.
     pub(crate) fn suggests(&self, words: &[&str]) -> bool {
         self.words.iter().any(|word| words.contains(&word.as_str()))
     }
 }
 
-/// The last part of a path as `/group/name`, `struct.field` or `Sheet!Heading`; a `/` that stands before a unit divides nothing.
+/// Returns the last part of a path such as `/group/name`, `struct.field` or `Sheet!Heading`. A `/` before a unit is not a separator.
 pub(crate) fn leaf(name: &str) -> &str {
     let cut = name.rfind(['/', '!']).filter(|at| {
         let (before, after) = (&name[..*at], &name[*at + 1..]);
@@ -164,7 +165,7 @@ pub(crate) fn leaf(name: &str) -> &str {
         !before.ends_with(' ') && !after.starts_with(' ') && !unit
     });
     let last = cut.map_or(name, |at| &name[at + 1..]);
-    // Points divide the parts of a path, but not words or numbers.
+    // A point separates the parts of a path, but not words or numbers.
     match last.rsplit_once('.') {
         Some((before, field))
             if !last.contains(' ') && !before.is_empty() && field.starts_with(char::is_alphabetic) =>
@@ -175,7 +176,7 @@ pub(crate) fn leaf(name: &str) -> &str {
     }
 }
 
-/// What is before the brackets at the end of a heading, and in them.
+/// Splits a heading into the text before the brackets at its end and the text in them.
 fn in_brackets(name: &str) -> Option<(&str, &str)> {
     let name = name.trim().trim_matches('"').trim();
     [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')].into_iter().find_map(|(open, close)| {
@@ -185,37 +186,37 @@ fn in_brackets(name: &str) -> Option<(&str, &str)> {
     })
 }
 
-/// The heading without its unit, and the unit.
+/// Splits a heading into the text without the unit and the unit.
 fn split_unit(name: &str) -> (&str, Option<Unit>) {
     let name = name.trim().trim_matches('"').trim();
     if let Some((rest, unit)) = in_brackets(name) {
         return (rest, Unit::parse(unit));
     }
-    // Behind a separator: "U / V", "disp, nm", "x in µm", "disp_nm", "Position nm".
+    // A unit after a separator: "U / V", "disp, nm", "x in µm", "disp_nm", "Position nm".
     for separator in [" / ", "/", ", ", " in ", "_in_", "_", " ", "-"] {
         if let Some((rest, last)) = name.rsplit_once(separator)
             && !rest.trim().is_empty()
             && let Some(unit) = if separator.contains('_') { Unit::parse_suffix(last) } else { Unit::parse(last) }
-            // "Channel C" has a letter, not a unit; "velocity_um_s" has two units, and so another one.
+            // "Channel C" ends in a letter, not a unit. "velocity_um_s" ends in a compound unit.
             && (last.trim().chars().count() > 1 || !matches!(separator, " " | "-"))
             && !(separator == "_" && rest.rsplit('_').next().and_then(Unit::parse_suffix).is_some())
         {
             return (rest.trim(), Some(unit));
         }
     }
-    // A heading may be a unit and nothing else, but "t", "s" or "V" alone may as well be a symbol: only longer ones are taken.
+    // A heading may consist of a unit only. Single letters such as "t", "s" or "V" may be symbols of a quantity and are ignored.
     let whole = Unit::parse(name).filter(|_| name.chars().count() > 1 && name.to_lowercase() != "min");
     if whole.is_some() { ("", whole) } else { (name, None) }
 }
 
-/// Words of a heading, in lower case; `VinputVoltage` has two.
+/// Splits a heading into words in lower case. An upper-case letter after a lower-case one begins a word: `piezoVoltage`.
 pub(crate) fn words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut word = String::new();
     let mut before = None;
     for c in name.chars() {
-        let turn = c.is_uppercase() && before.is_some_and(char::is_lowercase);
-        if (turn || !c.is_alphanumeric()) && !word.is_empty() {
+        let begins = c.is_uppercase() && before.is_some_and(char::is_lowercase);
+        if (begins || !c.is_alphanumeric()) && !word.is_empty() {
             words.push(std::mem::take(&mut word));
         }
         if c.is_alphanumeric() {
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn headings_are_taken_apart() {
+    fn headings_are_split_into_words_and_unit() {
         assert_eq!(of("Time (s)"), ("time".into(), Some("s")));
         assert_eq!(of("Voltage [mV]"), ("voltage".into(), Some("mV")));
         assert_eq!(of("disp_nm"), ("disp".into(), Some("nm")));

@@ -4,12 +4,14 @@ use super::grid::Period;
 use super::{OutputUnit, Record, RecordError};
 
 impl Record {
-    /// Joins records in the order given. Segments keep to their files ([`Record::file_of_segment`]), and each file
-    /// keeps its own clock. Columns that play no role are left behind.
+    /// Joins records in the given order.
+    ///
+    /// [`Record::file_of_segment`] states the file of each segment. Each file keeps its own time origin and sample period. Columns
+    /// without a role are dropped.
     ///
     /// # Errors
-    /// When there is no record, or two of them differ in the input's or output's column, in whether temperature or
-    /// load was measured. Each keeps its sample period.
+    /// If there is no record, or if two records differ in the column of the input or output, or in whether temperature
+    /// or load was measured.
     pub fn join(records: Vec<Self>) -> Result<Self, RecordError> {
         let mut records = records.into_iter();
         let Some(mut all) = records.next() else {
@@ -78,7 +80,7 @@ impl Record {
         self.text = None;
     }
 
-    /// Gives periods of two records that may be the same to the printed digits one value: that of the longer record, which knows it better.
+    /// Sets periods of two records that are equal within the printed digits to one value, that of the longer record.
     fn share_periods(&mut self, next: &mut Self) {
         let next_is_longer = next.rows() > self.rows();
         for mine in 0..self.periods.len() {

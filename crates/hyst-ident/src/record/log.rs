@@ -1,7 +1,7 @@
 //! Logs of runs: MCAP files of samples, read as records.
 //!
-//! A log says every sample as JSON on the channel [`TOPIC`]; a metadata record `run` says what ran, and the model is attached as `model.json`. Of a log
-//! that was cut off, as by a loss of power, everything up to the cut is read; of one that was damaged, every chunk that was not.
+//! A log has every sample as JSON on the channel [`TOPIC`]. The metadata record `run` describes the run, and the model is attached as
+//! `model.json`. A truncated log (for example after a loss of power) is read up to its end. Of a damaged log every intact chunk is read.
 
 mod records;
 
@@ -15,86 +15,86 @@ use super::{OutputUnit, Record};
 pub use records::LogRecords;
 use records::MAGIC;
 
-/// Channel of the samples.
+/// The channel of the samples.
 pub const TOPIC: &str = "/actuator/sample";
-/// Channel of what happens on the way.
+/// The channel of the events during a run.
 pub const EVENTS: &str = "/actuator/event";
 
-/// One sample of a log, as it stands there.
+/// One sample of a log.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct LogSample {
-    /// Time of the device's clock \[s\].
+    /// Time of the clock of the device \[s\].
     pub time_s: f64,
-    /// Segment, from 0.
+    /// Segment, counted from 0.
     pub segment: u64,
-    /// What it is part of: `approach`, `record` or `retreat`.
+    /// Phase of the run: `approach`, `record` or `retreat`.
     pub phase: String,
     /// Voltage that was applied \[V\].
     pub drive_v: f64,
-    /// Measured output \[output unit\]; no number where the sensor showed none.
-    #[serde(deserialize_with = "or_none")]
+    /// Measured output \[output unit\]; NaN if the sensor gave no value.
+    #[serde(deserialize_with = "null_as_nan")]
     pub output: f64,
-    /// Wanted output \[output unit\].
+    /// Reference \[output unit\].
     pub reference: Option<f64>,
     /// Temperature \[°C\].
     pub temperature_degc: Option<f64>,
     /// Load \[N\].
     pub load_n: Option<f64>,
-    /// Force that was estimated on the way \[N\].
+    /// Force that was estimated during the run \[N\].
     pub estimated_force_n: Option<f64>,
 }
 
-/// Something that happened on the way.
+/// An event during a run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct LogEvent {
-    /// Time of the device's clock \[s\].
+    /// Time of the clock of the device \[s\].
     pub time_s: f64,
-    /// What, in one word.
+    /// The kind of event, in one word.
     pub kind: String,
-    /// What, in a sentence.
+    /// The event in one sentence.
     pub text: String,
 }
 
-/// JSON has no other word for what is no number than null.
-fn or_none<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+/// Deserializes null as NaN, which JSON cannot represent.
+fn null_as_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 impl LogSample {
-    /// Whether it belongs to what was asked for, and not to a ramp before or after.
+    /// Returns whether the sample belongs to the record, and not to the ramp before or after it.
     pub fn is_record(&self) -> bool {
         self.phase == "record"
     }
 }
 
-/// A log as read.
+/// The contents of a log.
 #[derive(Clone, Debug, Default)]
 pub struct RunLog {
-    /// What ran, by key: device, unit, version and more; with its name and a point in front what other metadata records say.
+    /// Metadata of the run by key: device, unit, version and more. Keys of other metadata records begin with the name of the record and a point.
     pub metadata: BTreeMap<String, String>,
-    /// The text of the model's file, if one made the drive.
+    /// The text of the model file, if a model computed the drive.
     pub model: Option<String>,
     /// The samples, in order.
     pub samples: Vec<LogSample>,
-    /// What happened on the way, in order.
+    /// The events, in order.
     pub events: Vec<LogEvent>,
-    /// What is missing of the run.
+    /// What is missing.
     pub lost: Losses,
 }
 
-/// What a log lost of the run that it tells.
+/// What is missing from a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Losses {
-    /// Whether its writer was cut off: the log was never closed.
+    /// Whether the log is truncated: the writer did not close it.
     pub cut_off: bool,
-    /// Chunks and other records that are left out because they are damaged.
+    /// Number of chunks and other records that are damaged and not read.
     pub damaged: usize,
-    /// Holes in time within a segment, where samples are lost; behind each another segment begins.
+    /// Number of gaps in time within a segment. A new segment begins after each gap.
     pub holes: usize,
 }
 
 impl Losses {
-    /// Those of several logs together.
+    /// Returns the sum over two logs.
     pub(super) fn and(self, other: Self) -> Self {
         Self {
             cut_off: self.cut_off || other.cut_off,
@@ -104,15 +104,15 @@ impl Losses {
     }
 }
 
-/// A step in time of so many periods is a hole.
-const HOLE: f64 = 1.5;
+/// Longest time step without a gap \[sample periods\].
+const MAX_STEP_PERIODS: f64 = 1.5;
 
-/// Whether these are the bytes of an MCAP file.
+/// Returns whether `bytes` begin as an MCAP file does.
 pub fn is_log(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Whether these are the bytes of a log of a run, and no other program's MCAP file with messages of its own.
+/// Returns whether `bytes` are a log of a run, and not an MCAP file with messages of another program.
 pub(super) fn is_run_log(bytes: &[u8]) -> bool {
     let Some(entries) = is_log(bytes).then(|| LogRecords::new(bytes)).flatten() else { return false };
     let mut messages = false;
@@ -127,21 +127,21 @@ pub(super) fn is_run_log(bytes: &[u8]) -> bool {
 }
 
 impl RunLog {
-    /// Reads a log; `name` stands for the file in messages.
+    /// Parses a log. `name` is the file name in messages.
     ///
     /// # Errors
-    /// If the bytes are no MCAP file, or one without samples of a run.
+    /// If the bytes are not an MCAP file, or the file has no samples of a run.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, RecordError> {
         let foreign = |what: String| RecordError::Log { file: name.to_owned(), what };
-        let mut entries = LogRecords::new(bytes).ok_or_else(|| foreign("it is no MCAP file".to_owned()))?;
+        let mut entries = LogRecords::new(bytes).ok_or_else(|| foreign("it is not an MCAP file".to_owned()))?;
         let mut log = Self::default();
         let (mut channel, mut happened) = (None, None);
         log.lost.cut_off = true;
-        // What is not whole at the end is what a cut takes.
+        // An incomplete entry at the end ends the iteration.
         for entry in &mut entries {
             match entry {
                 Entry::Metadata(Metadata { name, metadata }) if name == "run" => log.metadata.extend(metadata),
-                // What was asked for, and what was known only at the end, as how the device's clock went.
+                // The request, and results known only at the end of the run, such as the accuracy of the clock of the device.
                 Entry::Metadata(Metadata { name, metadata }) => {
                     log.metadata.extend(metadata.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)));
                 }
@@ -152,11 +152,11 @@ impl RunLog {
                 Entry::Message { header, data } if Some(header.channel_id) == channel => {
                     let number = log.samples.len() + 1;
                     let sample = serde_json::from_slice(&data)
-                        .map_err(|error| foreign(format!("message {number} of {TOPIC} is no sample: {error}")))?;
+                        .map_err(|error| foreign(format!("message {number} of {TOPIC} is not a sample: {error}")))?;
                     log.samples.push(sample);
                 }
                 Entry::Channel(c) if c.topic == EVENTS && c.message_encoding == "json" => happened = Some(c.id),
-                // What is said there is for people: one that is no event is no reason to leave the samples.
+                // Events are information only: an invalid event does not invalidate the samples.
                 Entry::Message { header, data } if Some(header.channel_id) == happened => {
                     log.events.extend(serde_json::from_slice::<LogEvent>(&data));
                 }
@@ -165,20 +165,22 @@ impl RunLog {
             }
         }
         log.lost.damaged = entries.damaged();
-        log.split_at_holes();
+        log.split_at_gaps();
         match channel {
             Some(_) => Ok(log),
             None if log.lost.cut_off && log.lost.damaged == 0 => {
-                Err(foreign(format!("it was cut off before the channel {TOPIC}: nothing of a run is in it")))
+                Err(foreign(format!("it was cut off before the channel {TOPIC} and has no samples of a run")))
             }
             None => Err(foreign(format!("it has no channel {TOPIC} of JSON messages"))),
         }
     }
 
-    /// What the actuator did meanwhile is not known: the rows behind a hole are no continuation of those before it.
-    fn split_at_holes(&mut self) {
+    /// Begins a new segment after each gap, because the drive during the gap is not known.
+    fn split_at_gaps(&mut self) {
         let rate = self.metadata.get("sample_rate_hz").and_then(|rate| rate.parse::<f64>().ok());
-        let Some(longest) = rate.map(|rate| HOLE / rate).filter(|longest| longest.is_finite() && *longest > 0.0) else {
+        let Some(longest) =
+            rate.map(|rate| MAX_STEP_PERIODS / rate).filter(|longest| longest.is_finite() && *longest > 0.0)
+        else {
             return;
         };
         let mut before: Option<(u64, f64)> = None;
@@ -192,60 +194,62 @@ impl RunLog {
         }
     }
 
-    /// Unit of output and reference; `None` where the log does not say it.
+    /// Returns the unit of output and reference; `None` if the log does not state it.
     pub fn unit(&self) -> Option<OutputUnit> {
         self.metadata.get("output_column").and_then(|column| OutputUnit::of_column(column))
     }
 
-    /// The samples that make a record: what was asked for, without rows in which a device that looks ahead had no reference yet.
+    /// Returns the samples of the record, without the ramps.
+    ///
+    /// The first rows of a device with preview have no reference yet and are omitted too.
     pub fn record_samples(&self) -> Vec<&LogSample> {
         self.chosen(false)
     }
 
-    /// The samples that belong to a record: those that were asked for, or the ramps too.
+    /// Returns the samples of the record, with or without the ramps before and after it.
     fn chosen(&self, with_ramps: bool) -> Vec<&LogSample> {
         let has = |of: fn(&LogSample) -> Option<f64>| self.samples.iter().any(|s| of(s).is_some());
         let (thermometer, load, followed) = (has(|s| s.temperature_degc), has(|s| s.load_n), has(|s| s.reference));
         let shown = |s: &LogSample| {
             s.output.is_finite() && (!thermometer || s.temperature_degc.is_some()) && (!load || s.load_n.is_some())
         };
-        // A sensor that has lost its number has ended the run.
+        // If the last sample lacks a measured value, this ended the run, and the sample is dropped.
         let end = self.samples.len() - usize::from(self.samples.last().is_some_and(|last| !shown(last)));
         let mut follows = None;
         let wanted = |s: &&LogSample| {
             follows = s.reference.map(|_| s.segment).or(follows);
-            // The first rows of a device that looks ahead have no reference: its output is later.
+            // A device with preview outputs the reference later, so its first rows have no reference.
             with_ramps || s.is_record() && (!followed || follows == Some(s.segment))
         };
         self.samples[..end].iter().filter(wanted).filter(|s| s.output.is_finite()).collect()
     }
 
-    /// Why there is nothing of what was asked for.
+    /// Returns why the log has no samples of the record, and what to do.
     fn why_empty(&self) -> String {
         let samples = self.samples.len();
         if self.lost.damaged > 0 {
             return format!(
-                "{} pieces of it are damaged, and of the {samples} samples that are left none is of it",
+                "{} parts of the log are damaged, and none of the {samples} samples in the other parts belongs to it",
                 self.lost.damaged
             );
         }
         if samples == 0 {
-            return "it ends before the first sample; let the run come further".to_owned();
+            return "it ends before the first sample; repeat the run and let it finish".to_owned();
         }
         if self.samples.iter().any(LogSample::is_record) {
-            return "the sensor shows no number there; look at it, and run again".to_owned();
+            return "the sensor gave no value; check the sensor and repeat the run".to_owned();
         }
-        format!("its samples, {samples} in all, are of the ramps before and after; let the run come further")
+        format!("all {samples} samples belong to the ramps before and after it; repeat the run and let it finish")
     }
 
-    /// The samples as a record file: those that were asked for, or the ramps too.
+    /// Returns the samples of the record as CSV in the record format, with or without the ramps.
     ///
     /// # Errors
-    /// If the log does not say its unit.
+    /// If the log does not state the unit of the output.
     pub fn csv(&self, name: &str, with_ramps: bool) -> Result<String, RecordError> {
         let no_unit = || RecordError::Log {
             file: name.to_owned(),
-            what: "its metadata do not say the unit of the output".into(),
+            what: "its metadata do not state the unit of the output (key output_column)".into(),
         };
         type Of = fn(&LogSample) -> Option<f64>;
         let unit = self.unit().ok_or_else(no_unit)?;
@@ -257,7 +261,7 @@ impl RunLog {
             ("load_n", |s| s.load_n),
             ("estimated_force_n", |s| s.estimated_force_n),
         ];
-        // A column that some samples lack has no place in a record.
+        // A column is written only if every sample has a value.
         let optional: Vec<(&str, Of)> = optional
             .into_iter()
             .filter(|(_, of)| !chosen.is_empty() && chosen.iter().all(|s| of(s).is_some()))
@@ -275,7 +279,7 @@ impl RunLog {
 }
 
 impl Record {
-    /// A log's samples as a record, checked as a record file is; lines in messages are those of [`RunLog::csv`].
+    /// Makes a record of the samples of a log. Lines in messages are those of [`RunLog::csv`].
     pub(super) fn parse_log(
         name: &str,
         bytes: &[u8],
@@ -296,7 +300,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// A sample of a segment; what is `None` is not there.
+    /// Makes a sample with optional reference and temperature.
     fn sample(k: u8, segment: u64, phase: &str, reference: Option<f64>, degc: Option<f64>) -> LogSample {
         LogSample {
             time_s: f64::from(k),
@@ -317,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_has_neither_ramps_nor_late_rows_nor_the_one_that_lost_its_sensor() {
+    fn ramps_rows_without_a_reference_and_a_last_row_without_a_value_are_dropped() {
         let warm = Some(20.0);
         let log = log(vec![
             sample(0, 0, "approach", None, warm),
@@ -337,17 +341,17 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_hole_in_time_another_segment_begins() {
+    fn a_segment_begins_after_a_gap_in_time() {
         let times = [(0, 0), (1, 0), (2, 0), (5, 0), (6, 0), (9, 1), (10, 1)];
         let mut log = log(times.map(|(k, segment)| sample(k, segment, "record", None, None)).to_vec());
         log.metadata.insert("sample_rate_hz".into(), "1".into());
-        log.split_at_holes();
+        log.split_at_gaps();
         let segments: Vec<u64> = log.samples.iter().map(|s| s.segment).collect();
         assert_eq!((segments, log.lost.holes), (vec![0, 0, 0, 1, 1, 2, 2], 1));
     }
 
     #[test]
-    fn a_column_with_holes_is_left_out_and_its_rows_are_not() {
+    fn a_column_with_missing_values_is_dropped_but_its_rows_are_kept() {
         let log = log((0..6).map(|k| sample(k, 0, "record", None, (k % 2 == 1).then_some(20.0))).collect());
         let text = log.csv("run.mcap", false).unwrap();
         assert_eq!((text.lines().count(), text.contains("temperature")), (7, false));

@@ -1,16 +1,16 @@
-//! Records: what an actuator was told, what it did, and the surroundings, over the lab's clock.
+//! Records: measured time series of an actuator (input, output, temperature, load).
 //!
-//! The product's own form is a CSV file with one header line whose column names end in their unit: `segment` (integer, optional;
-//! the device rests and its state resets between segments), `time_s|time_ms|time_us`, the input `voltage_v` (or
-//! another, as `force_in_n`), one output of `displacement_um|_nm|_mm` and `force_n`, and optionally
-//! `temperature_degc` and `load_n`. Further columns are carried through. Time increases across segments; within a
-//! segment it is even to the last printed digit; segments may differ in their sample period.
+//! The record format is a CSV file with one header line. Column names end in their unit: `segment` (integer, optional;
+//! the actuator rests and its state resets between segments), `time_s|time_ms|time_us`, the input `voltage_v` (or
+//! another quantity, such as `force_in_n`), one output (`displacement_um|_nm|_mm` or `force_n`), and optionally
+//! `temperature_degc` and `load_n`. Further columns are copied unchanged. Time increases across segments. Within a
+//! segment the time steps are equal to the last printed digit. Each segment may have its own sample period.
 //!
-//! Files of others are read as they are: `source` finds the columns of a file, `roles` which of them play which role,
-//! `repair` makes even rows of what clocks and sensors gave. What was done is in [`Record::notes`].
+//! Other file formats are read in three steps: `source` finds the columns of a file, `roles` assigns a role to each
+//! column, and `repair` produces evenly spaced rows. [`Record::notes`] lists every change.
 //!
-//! Reading checks all of that, so that a [`Record`] in hand is sound: finite values, increasing time, at least one
-//! row, columns of one length.
+//! Reading checks these rules. A [`Record`] has finite values, increasing time, at least one row and columns of equal
+//! length.
 
 mod columns;
 mod error;
@@ -47,10 +47,10 @@ use grid::{Fault, Printed};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// Where rows come from.
+/// The file that rows come from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
-    /// The file's path as it was given, or the name of a record made in memory.
+    /// The path of the file as given by the user, or the name of a record made in memory.
     pub name: String,
     /// SHA-256 of the file's bytes in lower-case hexadecimal digits; `None` for a record made in memory.
     pub sha256: Option<String>,
@@ -59,24 +59,24 @@ pub struct Source {
 /// A column of a table in memory, for [`Record::from_table`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableColumn {
-    /// Its heading, which may state a unit: `Voltage [mV]`.
+    /// The heading, with or without a unit: `Voltage [mV]`.
     pub name: String,
-    /// The unit, if it is stated elsewhere.
+    /// The unit, if the heading does not state it.
     pub unit: Option<String>,
-    /// Values; NaN where one is missing.
+    /// The values; NaN where a value is missing.
     pub values: Vec<f64>,
 }
 
-/// Columns in memory from which [`Record::from_samples`] makes a record. All have the length of `time`.
+/// Columns in memory for [`Record::from_samples`]. All have the length of `time`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
-    /// What to call the record in messages and in the models fitted to it.
+    /// The name of the record in messages and in the models that are fitted to it.
     pub name: String,
-    /// A label per row; without it the record is one segment.
+    /// The segment label of each row; `None` makes one segment of all rows.
     pub segment: Option<Vec<i64>>,
-    /// Time \[s\] of the lab's clock.
+    /// Time \[s\].
     pub time: Vec<f64>,
-    /// The input's column name, with its unit; empty stands for `voltage_v`.
+    /// The column name of the input, with its unit; empty means `voltage_v`.
     pub input_column: String,
     /// The input, in the unit of its column.
     pub input: Option<Vec<f64>>,
@@ -88,7 +88,7 @@ pub struct Columns {
     pub load: Option<Vec<f64>>,
 }
 
-/// A sound record of one or more files; see the [module](self).
+/// A checked record of one or more files; see the [module](self).
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     sources: Vec<Source>,
@@ -96,7 +96,7 @@ pub struct Record {
     labels: Vec<i64>,
     segments: Vec<Range<usize>>,
     file_of_segment: Vec<usize>,
-    /// Of each segment.
+    /// The sample period of each segment.
     periods: Vec<grid::Period>,
     time: Vec<f64>,
     input_column: String,
@@ -105,19 +105,19 @@ pub struct Record {
     temperature: Option<Vec<f64>>,
     load: Option<Vec<f64>>,
     lost: Losses,
-    /// Rows whose output is missing; empty where none is.
+    /// True for rows whose output is missing; empty if no output is missing.
     missing: Vec<bool>,
-    /// Whether values were interpolated at even times.
+    /// Whether the values were resampled to even times.
     #[serde(default)]
     resampled: bool,
-    /// What was done to read the file.
+    /// The changes that were made while reading the file.
     notes: Vec<String>,
-    /// The file's text, for writing its columns again as they stand.
+    /// The text of the file, from which its columns are written again unchanged.
     #[serde(skip)]
     text: Option<Text>,
 }
 
-/// The bytes of a file of text, and where the text begins behind a byte-order mark.
+/// The bytes of a text file, and the start of the text after a byte-order mark.
 #[derive(Clone, Debug)]
 struct Text {
     bytes: Arc<Vec<u8>>,
@@ -130,15 +130,15 @@ impl Text {
     }
 }
 
-/// Nothing is colder \[°C\].
+/// Absolute zero \[°C\]. Lower temperatures are refused.
 pub const ABSOLUTE_ZERO: f64 = -273.15;
 
 impl Record {
-    /// Makes a record of columns in memory.
+    /// Makes a record from columns in memory.
     ///
     /// # Errors
-    /// As for a file: columns of unequal length, values that are not finite, uneven or unsorted time, a segment label
-    /// that returns. Messages name the row.
+    /// If columns differ in length, a value is not finite, time is uneven or does not increase, or a segment label appears again
+    /// after another label. Messages name the row.
     pub fn from_samples(samples: Columns) -> Result<Self, RecordError> {
         let rows = samples.time.len();
         let (input, output) = (samples.input.as_deref(), samples.output.as_ref());
@@ -182,12 +182,12 @@ impl Record {
         Self::assemble(samples, Printed::EXACT, None, &origin)
     }
 
-    /// The same with another input, as long as its own.
+    /// Returns a copy with another input of the same length.
     pub(crate) fn driven_by(&self, input: Vec<f64>) -> Self {
         Self { input: Some(input), ..self.clone() }
     }
 
-    /// Puts together finite columns of equal length. `periods` are those of the segments, where they are known.
+    /// Makes a record from finite columns of equal length. `periods` are the sample periods of the segments, if known.
     fn assemble(
         samples: Columns,
         printed: Printed,
@@ -262,11 +262,13 @@ impl Record {
         })
     }
 
-    /// Makes a record of a table in memory, with all that is done for the columns of a file: roles and units by heading or by `how`, missing values,
-    /// uneven times.
+    /// Makes a record from a table in memory.
+    ///
+    /// The columns are processed like those of a file: roles and units come from the headings or from `how`, missing values and uneven times are
+    /// repaired.
     ///
     /// # Errors
-    /// As for a file; messages name the row.
+    /// Those of [`read`](Self::read); messages name the row.
     pub fn from_table(
         name: &str,
         columns: Vec<TableColumn>,
@@ -285,7 +287,9 @@ impl Record {
         read::of_contents(name, &table, &how.into(), need)
     }
 
-    /// The same record, with the sum of the file in which it is kept: models that are fitted to it state the sum.
+    /// Sets the SHA-256 of the file that holds the record.
+    ///
+    /// Models that are fitted to the record store this checksum.
     pub fn kept_as(self, file: &[u8]) -> Self {
         self.kept_with(sum_of(file))
     }
@@ -297,7 +301,7 @@ impl Record {
         self
     }
 
-    /// The same, with the sum of the file at `path`, which is read in blocks.
+    /// Sets the SHA-256 of the file at `path`, which is read in blocks.
     fn kept_in(self, path: &Path) -> Result<Self, RecordError> {
         let io = |source| RecordError::Io { file: path.display().to_string(), source };
         let mut sum = Sha256::new();
@@ -305,57 +309,67 @@ impl Record {
         Ok(self.kept_with(format!("{:x}", sum.finalize())))
     }
 
-    /// The files that the rows come from, in order: one, unless records were [joined](Self::join).
+    /// Returns the files that the rows come from, in order.
+    ///
+    /// There is one file, unless records were [joined](Self::join).
     pub fn sources(&self) -> &[Source] {
         &self.sources
     }
 
-    /// Whether the times of a file were uneven, and the values are interpolated at even ones; a note has the size of the jitter.
+    /// Returns whether the times were uneven and the values were resampled to even times.
+    ///
+    /// A note states the size of the jitter.
     pub fn resampled(&self) -> bool {
         self.resampled
     }
 
-    /// What the logs that it was read from, if any, lost of their runs.
+    /// Returns what is missing from the logs that the record was read from.
     pub fn lost(&self) -> Losses {
         self.lost
     }
 
-    /// What was done to read the files that is not the record format's: units converted, rows left out, times resampled; a sentence each.
+    /// Returns the changes made while reading, one sentence each.
+    ///
+    /// Examples are converted units, omitted rows and resampled times.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// Rows whose output is missing in the file; empty where none is. It is interpolated there, and is no measurement.
+    /// Returns true for rows whose output is missing in the file; empty if no output is missing.
+    ///
+    /// The output of these rows is interpolated. It is not a measurement.
     pub fn missing(&self) -> &[bool] {
         &self.missing
     }
 
-    /// The names of all sources, as messages use them.
+    /// Returns the names of all sources, joined with " + " for messages.
     pub fn name(&self) -> String {
         self.sources.iter().map(|source| source.name.as_str()).collect::<Vec<_>>().join(" + ")
     }
 
-    /// How many rows there are, over all segments; at least two.
+    /// Returns the number of rows of all segments; at least two.
     pub fn rows(&self) -> usize {
         self.time.len()
     }
 
-    /// The rows of each segment, in order and without gaps. The device is at rest at the start of each.
+    /// Returns the rows of each segment, in order and contiguous.
+    ///
+    /// The actuator is at rest at the start of each segment.
     pub fn segments(&self) -> &[Range<usize>] {
         &self.segments
     }
 
-    /// The label of each segment in its file; 0 where the file has no column `segment`.
+    /// Returns the label of each segment in its file; 0 if the file has no column `segment`.
     pub fn labels(&self) -> &[i64] {
         &self.labels
     }
 
-    /// For each segment the index of its file in [`sources`](Self::sources).
+    /// Returns for each segment the index of its file in [`sources`](Self::sources).
     pub fn file_of_segment(&self) -> &[usize] {
         &self.file_of_segment
     }
 
-    /// The rows of each file, in the order of [`sources`](Self::sources).
+    /// Returns the rows of each file, in the order of [`sources`](Self::sources).
     pub fn rows_of_files(&self) -> Vec<Range<usize>> {
         let mut files: Vec<Range<usize>> = Vec::with_capacity(self.sources.len());
         for (rows, file) in self.segments.iter().zip(&self.file_of_segment) {
@@ -367,20 +381,22 @@ impl Record {
         files
     }
 
-    /// The shortest time between two rows of any segment \[s\], as exactly as the printed digits tell.
+    /// Returns the shortest sample period of any segment \[s\], as accurate as the printed digits allow.
     pub fn sample_period(&self) -> f64 {
         self.periods.iter().map(|period| period.value).fold(f64::INFINITY, f64::min)
     }
 
-    /// The time between two rows of each segment \[s\].
+    /// Returns the sample period of each segment \[s\].
     pub fn sample_periods(&self) -> Vec<f64> {
         self.periods.iter().map(|period| period.value).collect()
     }
 
-    /// The sample period \[s\] for somebody who needs the same in all segments; `why` completes "needs one sample period".
+    /// Returns the sample period \[s\] that all segments share.
+    ///
+    /// `why` is the subject of "needs one sample period" in the error.
     ///
     /// # Errors
-    /// When two segments differ in it.
+    /// If two segments have different sample periods.
     pub fn need_one_sample_period(&self, why: &str) -> Result<f64, RecordError> {
         let first = self.periods[0].value;
         match self.periods.iter().position(|period| period.value != first) {
@@ -396,82 +412,86 @@ impl Record {
         }
     }
 
-    /// Time of the lab's clock \[s\]. In each segment the first value is as printed and the others lie on the even grid
-    /// behind it, without the jitter of rounding. In a joined record each file has its own clock.
+    /// Returns the time \[s\].
+    ///
+    /// In each segment the first value is as printed and the following values are on an even grid, without rounding
+    /// jitter. In a joined record each file keeps its own time origin.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
 
-    /// The input's name with its unit, as `voltage_v` or `force_in_n`.
+    /// Returns the column name of the input with its unit, such as `voltage_v` or `force_in_n`.
     pub fn input_column(&self) -> &str {
         &self.input_column
     }
 
-    /// The input in the unit of [`input_column`](Self::input_column); empty in a record read as a reference.
+    /// Returns the input in the unit of [`input_column`](Self::input_column).
+    ///
+    /// It is empty if the record was read as a reference.
     pub fn input(&self) -> &[f64] {
         self.input.as_deref().unwrap_or_default()
     }
 
-    /// The measured output (or the reference), in [`output_unit`](Self::output_unit).
+    /// Returns the measured output (or the reference) in [`output_unit`](Self::output_unit).
     pub fn output(&self) -> Option<&[f64]> {
         self.output.as_ref().map(|(_, values)| values.as_slice())
     }
 
-    /// The unit of the output, if there is one.
+    /// Returns the unit of the output, if the record has an output.
     pub fn output_unit(&self) -> Option<OutputUnit> {
         self.output.as_ref().map(|(unit, _)| *unit)
     }
 
-    /// Temperature \[°C\], if it was measured.
+    /// Returns the temperature \[°C\], if it was measured.
     pub fn temperature(&self) -> Option<&[f64]> {
         self.temperature.as_deref()
     }
 
-    /// External load \[N\], if it was measured.
+    /// Returns the external load \[N\], if it was measured.
     pub fn load(&self) -> Option<&[f64]> {
         self.load.as_deref()
     }
 
-    /// The temperature \[°C\] for somebody who cannot do without; `why` completes "is needed here (…)".
+    /// Returns the temperature \[°C\] or an error if it is missing. `why` completes "is needed here (…)".
     ///
     /// # Errors
-    /// When the record has none.
+    /// If the record has no temperature.
     pub fn need_temperature(&self, why: &str) -> Result<&[f64], RecordError> {
-        self.temperature().ok_or_else(|| self.lacks("temperature_degc", why))
+        self.temperature().ok_or_else(|| self.column_needed("temperature_degc", why))
     }
 
-    /// The load \[N\] for somebody who cannot do without; `why` completes "is needed here (…)".
+    /// Returns the load \[N\] or an error if it is missing. `why` completes "is needed here (…)".
     ///
     /// # Errors
-    /// When the record has none.
+    /// If the record has no load.
     pub fn need_load(&self, why: &str) -> Result<&[f64], RecordError> {
-        self.load().ok_or_else(|| self.lacks("load_n", why))
+        self.load().ok_or_else(|| self.column_needed("load_n", why))
     }
 
-    /// The output in `unit` for somebody who cannot do without; `why` completes "is needed here (…)".
+    /// Returns the output in `unit` or an error if it is missing. `why` completes "is needed here (…)".
     ///
     /// # Errors
-    /// When the record has no output, or one in another unit.
+    /// If the record has no output, or the output has another unit.
     pub fn need_output(&self, unit: OutputUnit, why: &str) -> Result<&[f64], RecordError> {
         match &self.output {
             Some((found, values)) if *found == unit => Ok(values),
-            _ => Err(self.lacks(unit.column(), why)),
+            _ => Err(self.column_needed(unit.column(), why)),
         }
     }
 
-    fn lacks(&self, column: &str, why: &str) -> RecordError {
+    fn column_needed(&self, column: &str, why: &str) -> RecordError {
         RecordError::Needed { file: self.name(), column: column.to_owned(), why: why.to_owned() }
     }
 }
 
-/// How rows and columns are called in messages.
+/// The names of columns and the places of rows in messages.
 struct Origin<'a> {
     time_column: &'a str,
     segment_column: &'a str,
     place: &'a dyn Fn(usize) -> Place,
 }
 
-/// Splits rows by their labels, or gives the row at which a label returns.
+/// Splits rows by their labels. The error is the row at which an earlier label appears again.
 fn split(labels: &[i64]) -> Result<(Vec<i64>, Vec<Range<usize>>), usize> {
     let mut seen = HashSet::new();
     let (mut of_segment, mut segments) = (Vec::new(), Vec::new());
@@ -487,7 +507,7 @@ fn split(labels: &[i64]) -> Result<(Vec<i64>, Vec<Range<usize>>), usize> {
     Ok((of_segment, segments))
 }
 
-/// SHA-256 of a file's bytes, in hexadecimal digits.
+/// Returns the SHA-256 of the bytes of a file, in hexadecimal digits.
 fn sum_of(file: &[u8]) -> String {
     format!("{:x}", Sha256::digest(file))
 }

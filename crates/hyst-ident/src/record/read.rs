@@ -20,9 +20,9 @@ use super::{Columns, Origin, Record, Text, sum_of};
 /// How a file is read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// Which columns play which role, where their headings do not say it.
+    /// The columns whose role or unit the headings do not state.
     pub map: ColumnMap,
-    /// Sample rate of files without times \[Hz\]; where it is given, times in a file are not read.
+    /// The sample rate of files without times \[Hz\]. If it is given, times in the file are ignored.
     pub rate: Option<f64>,
 }
 
@@ -33,19 +33,22 @@ impl From<&ColumnMap> for Reading {
 }
 
 impl Record {
-    /// Reads and checks the file at `path`, in any format and dialect that is told apart by its content.
+    /// Reads and checks the file at `path`. The format is detected from its content.
     ///
     /// # Errors
-    /// When the file cannot be read, or a role is not filled or not clear; the message names file, line and column and what to do.
+    /// If the file cannot be read, or the column of a role is missing or ambiguous. The message states the file, line and column and
+    /// what to do.
     pub fn read(path: impl AsRef<Path>, how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
         Self::read_watched(path, how, need, &mut |_| {})
     }
 
-    /// As [`read`](Self::read); `watch` is called with the share of a large file that is read. A text of more than 256 MB is read in blocks, and
-    /// rows beyond two million are averaged, some into one: the memory that it takes does not grow with the file.
+    /// Reads as [`read`](Self::read) does and reports progress.
+    ///
+    /// `watch` is called with the share of a large file that has been read. A text of more than 256 MB is read in blocks. If it has more than two
+    /// million rows, groups of rows are averaged into one, so memory does not grow with the size of the file.
     ///
     /// # Errors
-    /// As those of [`read`](Self::read).
+    /// Those of [`read`](Self::read).
     pub fn read_watched(
         path: impl AsRef<Path>,
         how: impl Into<Reading>,
@@ -62,26 +65,26 @@ impl Record {
         Self::parse_bytes(&file, Cow::Owned(bytes), &how.into(), need)
     }
 
-    /// Checks `bytes` as [`read`](Self::read) does a file's; `name` stands for the file in messages.
+    /// Reads the bytes of a file as [`read`](Self::read) does. `name` is the file name in messages.
     ///
     /// # Errors
-    /// As those of [`read`](Self::read).
+    /// Those of [`read`](Self::read).
     pub fn parse(name: &str, bytes: &[u8], how: impl Into<Reading>, need: Need) -> Result<Self, RecordError> {
         Self::parse_bytes(name, Cow::Borrowed(bytes), &how.into(), need)
     }
 
-    /// A text's bytes are kept without a copy where they are owned.
+    /// The bytes of a text are kept without a copy if they are owned.
     fn parse_bytes(name: &str, bytes: Cow<'_, [u8]>, how: &Reading, need: Need) -> Result<Self, RecordError> {
         if is_run_log(&bytes) {
             return Self::parse_log(name, &bytes, &how.map, need);
         }
-        // The sum over the file's bytes takes as long as reading them.
+        // The checksum takes as long as parsing, so both run in parallel.
         let (found, sum) = rayon::join(
             || {
                 let unpacked = source::unpack(name, &bytes)?;
                 let contents = source::open(name, &unpacked)?;
                 let found = with_layout(name, contents.as_ref(), how, need)?;
-                // A text in UTF-8 ends where its file does; of other encodings the decoded text is kept.
+                // A UTF-8 text is kept as part of the bytes of the file; of other encodings the decoded text is kept.
                 let text = contents.plain_text().filter(|_| found.is_plain).map(|text| {
                     let start = unpacked.len().saturating_sub(text.len());
                     if unpacked.ends_with(text.as_bytes()) { Ok(start) } else { Err(text.as_bytes().to_vec()) }
@@ -101,7 +104,7 @@ impl Record {
     }
 }
 
-/// The record in a file's columns.
+/// Makes a record of the columns of a file.
 pub(super) fn of_contents(
     name: &str,
     contents: &dyn Contents,
@@ -111,16 +114,16 @@ pub(super) fn of_contents(
     Ok(with_layout(name, contents, how, need)?.record)
 }
 
-/// A record in a file's columns.
+/// A record and the columns that it was read from.
 pub(super) struct Found {
     pub(super) record: Record,
     /// The columns that it was read from.
     pub(super) layout: Layout,
-    /// Whether the rows of a plain text are those of the record, and can be carried through as they stand.
+    /// Whether the rows of the record are those of the text, so that further columns can be copied unchanged.
     is_plain: bool,
 }
 
-/// The record in a file's columns, and which of them it was read from.
+/// Makes a record of the columns of a file, and returns also the columns that it was read from.
 pub(super) fn with_layout(
     name: &str,
     contents: &dyn Contents,
@@ -129,7 +132,7 @@ pub(super) fn with_layout(
 ) -> Result<Found, RecordError> {
     if let Some(rate) = how.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
         let problems = format!("the sample rate is {rate} Hz");
-        let advice = "give a positive number of samples a second".to_owned();
+        let advice = "give a positive number of samples per second, for example --rate 1000".to_owned();
         return Err(RecordError::Columns {
             file: name.to_owned(),
             problems,
@@ -141,7 +144,7 @@ pub(super) fn with_layout(
     let heads = contents.heads();
     let file = File { name, header: contents.header(), heads, texts: contents.texts(), counters: &[] };
     let layout = match Layout::resolve(&file, &how.map, need, how.rate) {
-        // The message proposes columns; what only counts rows is none of them.
+        // The message proposes columns. Row counters are excluded from the proposals.
         Err(RecordError::Columns { .. }) => {
             let counters = counters(contents).unwrap_or_default();
             Layout::resolve(&File { counters: &counters, ..file }, &how.map, need, how.rate)?
@@ -164,7 +167,7 @@ pub(super) fn with_layout(
         segment: layout.segment.map(|_| usize::from(clock.is_some())),
     };
     let mut read = contents.values(asked)?.into_iter();
-    // Values come in the order in which they were asked for.
+    // Values arrive in the order of the request.
     let mut next = |asked: bool| if asked { read.next() } else { None };
     let time = next(clock.is_some());
     let labels = next(layout.segment.is_some());
@@ -174,7 +177,7 @@ pub(super) fn with_layout(
             convert(choice, values);
         }
     }
-    let notes = onto_one_clock(contents, &layout, &mut values)?;
+    let notes = align_to_output(contents, &layout, &mut values)?;
     let [input, output, temperature, load] = values;
     let rows = output.as_ref().or(input.as_ref()).map_or(0, Vec::len);
     let (mut time, mut printed) = match (time, &layout.time) {
@@ -188,7 +191,7 @@ pub(super) fn with_layout(
             (seconds, if exact { printed } else { Printed::EXACT })
         }
         (_, Clock::Even { start, step }) => {
-            // A mean of some rows is half of them late.
+            // The mean of n rows belongs to the middle of their times.
             let n = contents.rows_per_row() as f64;
             ((0..rows).map(|k| start + (k as f64 * n + 0.5 * (n - 1.0)) * step).collect(), Printed::EXACT)
         }
@@ -249,7 +252,7 @@ pub(super) fn with_layout(
     Ok(Found { record, layout, is_plain: !done.changed })
 }
 
-/// Columns without a unit that hold the numbers of the rows. Only messages ask for them.
+/// Returns the columns without a unit that count the rows. Only messages need them.
 fn counters(contents: &dyn Contents) -> Result<Vec<usize>, RecordError> {
     if contents.rows_per_row() > 1 {
         return Ok(Vec::new());
@@ -265,9 +268,10 @@ fn counters(contents: &dyn Contents) -> Result<Vec<usize>, RecordError> {
     Ok(unstated.into_iter().zip(values).filter(|(_, values)| is_counter(values)).map(|(at, _)| at).collect())
 }
 
-/// Interpolates columns that have other times than the output (or, without one, the input) to its times, by straight lines. Before its first value
-/// and behind its last a column is missing there.
-fn onto_one_clock(
+/// Interpolates columns with other times linearly to the times of the output (without an output: of the input).
+///
+/// Before the first and after the last value of a column the result is NaN. Returns one note per interpolated column.
+fn align_to_output(
     contents: &dyn Contents,
     layout: &Layout,
     values: &mut [Option<Vec<f64>>; 4],
@@ -276,7 +280,7 @@ fn onto_one_clock(
     let choices = [&layout.input, &layout.output, &layout.temperature, &layout.load];
     let Some(main) = layout.output.as_ref().or(layout.input.as_ref()) else { return Ok(Vec::new()) };
     let axis = |choice: &Choice| heads[choice.column].axis;
-    // A clock that was named, or a rate, holds for all.
+    // A time column named by --map, or a rate, applies to all columns.
     let named = match (layout.time.clone(), axis(main)) {
         (Clock::Column { column, .. }, Axis::Column(own)) => column != own,
         (Clock::Column { .. }, _) => true,
@@ -317,17 +321,17 @@ fn onto_one_clock(
         }
         *values = interpolated(&from, values, to);
         notes.push(format!(
-            "\"{}\" has other times: interpolated to those of \"{}\"",
+            "\"{}\" is sampled at other times: interpolated to the times of \"{}\"",
             heads[choice.column].name, heads[main.column].name
         ));
     }
     Ok(notes)
 }
 
-/// Step in time, as a multiple of the usual one, across which nothing is interpolated.
+/// Longest step in time that is interpolated, as a multiple of the usual step.
 const MAX_STEP: f64 = 1.75;
 
-/// Values at increasing times `from`, at the times `to`; NaN outside.
+/// Interpolates values at increasing times `from` to the times `to`; NaN outside.
 fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
     let mut steps: Vec<f64> = from.windows(2).map(|t| t[1] - t[0]).collect();
     if steps.iter().any(|step| *step <= 0.0 || step.is_nan()) {
@@ -335,7 +339,7 @@ fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
     }
     steps.sort_unstable_by(f64::total_cmp);
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    // A rounding is no time outside.
+    // A time that is outside by rounding only counts as inside.
     let slack = 1e-6 * usual;
     let (Some(first), Some(last)) = (from.first(), from.last()) else { return vec![f64::NAN; to.len()] };
     to.iter()
@@ -357,7 +361,7 @@ fn interpolated(from: &[f64], values: &[f64], to: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Brings values to the unit and sign of their role.
+/// Converts values to the unit and sign of their role.
 fn convert(choice: &Choice, values: &mut [f64]) {
     let own = Unit::of_canonical(&choice.canonical);
     if let Some(to) = choice.unit.zip(own).and_then(|(unit, own)| unit.to(own)) {
@@ -368,7 +372,7 @@ fn convert(choice: &Choice, values: &mut [f64]) {
     }
 }
 
-/// Numbers near the largest that there are can overflow on the way.
+/// Checks that no value overflowed during interpolation.
 fn finite(samples: &Columns, place: &dyn Fn(usize) -> Place) -> Result<(), RecordError> {
     let Columns { name, time, input_column, input, output, temperature, load, .. } = samples;
     let columns = [
@@ -380,7 +384,7 @@ fn finite(samples: &Columns, place: &dyn Fn(usize) -> Place) -> Result<(), Recor
     ];
     for (column, values) in columns.into_iter().filter_map(|(column, values)| Some((column, values?))) {
         if let Some(row) = values.iter().position(|value| !value.is_finite()) {
-            let value = format!("{}, as its neighbours are too large", values[row]);
+            let value = format!("{} (overflow: the neighbouring values are too large)", values[row]);
             let (file, column) = (name.clone(), column.to_owned());
             return Err(RecordError::NotFinite { file, place: place(row), column, value });
         }
@@ -388,10 +392,10 @@ fn finite(samples: &Columns, place: &dyn Fn(usize) -> Place) -> Result<(), Recor
     Ok(())
 }
 
-/// Labels of segments.
+/// Converts segment labels to integers.
 fn integers(file: &str, values: &[f64], column: &str, place: &dyn Fn(usize) -> Place) -> Result<Vec<i64>, RecordError> {
     let of = |(row, value): (usize, &f64)| {
-        // What a double holds exactly.
+        // A double holds integers up to 2^53 ≈ 9e15 exactly.
         if value.fract() == 0.0 && value.abs() < 9e15 {
             return Ok(*value as i64);
         }

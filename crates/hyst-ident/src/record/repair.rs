@@ -1,7 +1,7 @@
-//! Rows as sensors and clocks give them, made into rows that a record can hold.
+//! Repair of measured rows: missing values, repeated rows, interruptions and uneven times.
 //!
-//! Missing values are left out and counted, rows that were written twice are joined, an interruption begins a segment, and times that
-//! jitter are resampled to an even grid by a monotone cubic. Each of these leaves a note.
+//! Missing values are omitted and counted, repeated rows are joined, an interruption begins a segment, and jittering times are
+//! resampled to an even grid by a monotone cubic. Each repair adds a note.
 
 use std::ops::Range;
 
@@ -9,43 +9,44 @@ use super::error::{Place, RecordError};
 use super::grid::{self, Fault, Period, Printed};
 use super::{Columns, Origin};
 
-/// Longest run of missing inputs, temperatures or loads that is bridged by a straight line \[rows\].
-const MAX_BRIDGE: usize = 8;
-/// Share of rows with one time beyond which the times are printed too coarsely to join them.
+/// Longest run of missing inputs, temperatures or loads that is interpolated linearly \[rows\].
+const MAX_INTERPOLATED_ROWS: usize = 8;
+/// Largest share of differing rows with equal times that are joined. A larger share means that the times are printed too coarsely.
 const MAX_JOINED_SHARE: f64 = 0.02;
-/// Share of rows without a value beyond which a column is no measurement.
+/// Largest share of rows without a value in a column.
 const MAX_MISSING_SHARE: f64 = 0.5;
-/// Step in time, as a multiple of the usual one, from which on there is an interruption.
+/// Shortest time step of an interruption, as a multiple of the usual step.
 const MIN_GAP: f64 = 1.5;
-/// Jitter beyond which the times are said to be uneven \[periods, rms\].
+/// Largest deviation from an even grid that the note calls jitter \[periods, rms\].
 const MAX_JITTER: f64 = 0.2;
-/// Share of steps below half of the usual one, or above one and a half, beyond which times follow no grid.
-const MAX_WILD_SHARE: f64 = 0.02;
-/// How far the times around lost rows may be off the grid \[periods\].
+/// Largest share of steps outside 0.5 to 1.5 of the usual step. With more, the times are not resampled.
+const MAX_IRREGULAR_SHARE: f64 = 0.02;
+/// Largest deviation of a step around lost rows from a multiple of the usual step \[periods\].
 const MAX_OFF_GRID: f64 = 0.3;
-/// The same where every step is a multiple of the usual one \[periods\].
+/// Largest deviation of any step from a multiple of the usual step on a clear grid \[periods\].
 const MAX_OFF_CLEAR_GRID: f64 = 0.1;
-/// Share of steps beyond which long steps are no interruptions but the clock.
+/// Largest share of long steps that count as interruptions. With more, the clock itself is uneven.
 const MAX_GAP_SHARE: f64 = 0.05;
 
-/// What became of the rows of a file.
+/// The result of the repair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Repaired {
-    /// Rows whose output is missing; it is interpolated, and counts for nothing.
+    /// True for rows whose output is missing. It is interpolated and has no weight in a fit.
     pub(super) missing: Vec<bool>,
-    /// Row of the file for each row, where rows were left out.
+    /// The row in the file for each row, if rows were omitted or inserted.
     rows: Option<Vec<usize>>,
-    /// Whether anything differs from the file's rows.
+    /// Whether the rows differ from those of the file.
     pub(super) changed: bool,
-    /// Whether values were interpolated at even times.
+    /// Whether the values were resampled to even times.
     pub(super) resampled: bool,
-    /// The period of each segment, where the times are even.
+    /// The period of each segment, if the times are even.
     pub(super) periods: Option<Vec<Period>>,
+    /// One sentence per repair.
     pub(super) notes: Vec<String>,
 }
 
 impl Repaired {
-    /// The row of the file.
+    /// Returns the row in the file.
     pub(super) fn row(&self, row: usize) -> usize {
         self.rows.as_ref().map_or(row, |rows| rows[row])
     }
@@ -56,16 +57,16 @@ impl Repaired {
     }
 }
 
-/// Repairs columns of equal length. `wanted` says that the output is a reference, which has to be complete.
+/// Repairs columns of equal length. `is_reference` says that the output is a reference, which must be complete.
 pub(super) fn repair(
     samples: &mut Columns,
     printed: &mut Printed,
-    wanted: bool,
+    is_reference: bool,
     origin: &Origin<'_>,
 ) -> Result<Repaired, RecordError> {
     let mut done = Repaired::default();
-    leave_out_without(samples, &mut done, wanted, origin)?;
-    continue_clock(samples, &mut done);
+    omit_missing(samples, &mut done, is_reference, origin)?;
+    unwrap_clock(samples, &mut done);
     join_repeated(samples, &mut done);
     let mut times = Times::of(samples, *printed);
     if let Times::Uneven(segments) = &times
@@ -73,22 +74,22 @@ pub(super) fn repair(
     {
         times = Times::of(samples, *printed);
     }
-    bridge(samples);
+    interpolate_missing(samples);
     match times {
         Times::Even(periods) => done.periods = Some(periods),
-        Times::Uneven(segments) => even_out(samples, printed, &mut done, segments),
+        Times::Uneven(segments) => make_even(samples, printed, &mut done, segments),
         Times::Unsorted => {}
     }
     Ok(done)
 }
 
-/// The values of a row's columns.
+/// Returns the columns of values: input, output, temperature, load.
 fn channels(samples: &mut Columns) -> impl Iterator<Item = &mut Vec<f64>> {
     let Columns { input, output, temperature, load, .. } = samples;
     [input.as_mut(), output.as_mut().map(|(_, y)| y), temperature.as_mut(), load.as_mut()].into_iter().flatten()
 }
 
-/// Keeps these rows.
+/// Removes all rows that are not in `kept`.
 fn keep(samples: &mut Columns, done: &mut Repaired, kept: &[bool]) {
     let mut flags = kept.iter();
     let mut is_kept = || flags.next().copied().unwrap_or(true);
@@ -110,37 +111,37 @@ fn rows_word(count: usize) -> String {
     if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
 }
 
-/// Leaves out rows without a time, and without an input where that is longer away than a bridge reaches.
-fn leave_out_without(
+/// Omits rows without a time, and runs of missing inputs, temperatures or loads that are too long to interpolate.
+fn omit_missing(
     samples: &mut Columns,
     done: &mut Repaired,
-    wanted: bool,
+    is_reference: bool,
     origin: &Origin<'_>,
 ) -> Result<(), RecordError> {
     let rows = samples.time.len();
-    let without_time: Vec<bool> = samples.time.iter().map(|t| t.is_finite()).collect();
-    let count = without_time.iter().filter(|there| !**there).count();
-    let few = |file: &str, column: &str, missing: usize| RecordError::MostlyMissing {
+    let has_time: Vec<bool> = samples.time.iter().map(|t| t.is_finite()).collect();
+    let count = has_time.iter().filter(|has_time| !**has_time).count();
+    let mostly_missing = |file: &str, column: &str, missing: usize| RecordError::MostlyMissing {
         file: file.to_owned(),
         column: column.to_owned(),
         missing,
         rows,
     };
     if count as f64 > MAX_MISSING_SHARE * rows as f64 {
-        return Err(few(&samples.name, origin.time_column, count));
+        return Err(mostly_missing(&samples.name, origin.time_column, count));
     }
     if count > 0 {
-        keep(samples, done, &without_time);
-        done.note(format!("{} without a time {} left out", rows_word(count), was(count)));
+        keep(samples, done, &has_time);
+        done.note(format!("{} without a time {} left out", rows_word(count), is_or_are(count)));
     }
     let output = samples.output.as_ref().map(|(unit, y)| (unit.column(), y));
     if let Some((column, y)) = output {
         let missing: Vec<bool> = y.iter().map(|y| !y.is_finite()).collect();
         let count = missing.iter().filter(|missing| **missing).count();
         if count as f64 > MAX_MISSING_SHARE * rows as f64 {
-            return Err(few(&samples.name, column, count));
+            return Err(mostly_missing(&samples.name, column, count));
         }
-        if let Some(row) = missing.iter().position(|missing| *missing).filter(|_| wanted) {
+        if let Some(row) = missing.iter().position(|missing| *missing).filter(|_| is_reference) {
             let place = (origin.place)(done.row(row));
             return Err(RecordError::NotFinite {
                 file: samples.name.clone(),
@@ -155,8 +156,8 @@ fn leave_out_without(
             done.note(format!(
                 "{} without {column} {} not fitted{}",
                 rows_word(count),
-                was(count),
-                first_of(count, first)
+                is_or_are(count),
+                row_hint(count, first)
             ));
         }
     }
@@ -170,23 +171,23 @@ fn leave_out_without(
     for (column, values) in columns.into_iter().filter_map(|(column, values)| Some((column, values?))) {
         let missing = values.iter().filter(|value| !value.is_finite()).count();
         if missing as f64 > MAX_MISSING_SHARE * rows as f64 {
-            return Err(few(&samples.name, &column, missing));
+            return Err(mostly_missing(&samples.name, &column, missing));
         }
         let mut left_out = 0;
         for run in runs(values) {
-            // Nothing to draw a line from or to at an end.
+            // A run at an end has a value on one side only and cannot be interpolated.
             let inner = run.start > 0 && run.end < values.len();
-            if run.len() > MAX_BRIDGE || !inner {
+            if run.len() > MAX_INTERPOLATED_ROWS || !inner {
                 left_out += run.len();
                 kept[run].fill(false);
             }
         }
-        let bridged = missing - left_out;
-        if bridged > 0 {
-            notes.push(format!("{} without {column}: interpolated", rows_word(bridged)));
+        let interpolated = missing - left_out;
+        if interpolated > 0 {
+            notes.push(format!("{} without {column}: interpolated", rows_word(interpolated)));
         }
         if left_out > 0 {
-            notes.push(format!("{} without {column} {} left out", rows_word(left_out), was(left_out)));
+            notes.push(format!("{} without {column} {} left out", rows_word(left_out), is_or_are(left_out)));
         }
     }
     if kept.contains(&false) {
@@ -196,16 +197,16 @@ fn leave_out_without(
     Ok(())
 }
 
-/// Where rows are: the number of the only one, or of the first.
-fn first_of(count: usize, row: usize) -> String {
+/// Returns the number of the only row, or of the first of several rows.
+fn row_hint(count: usize, row: usize) -> String {
     if count == 1 { format!(" (row {row})") } else { format!(" (the first is row {row})") }
 }
 
-fn was(count: usize) -> &'static str {
+fn is_or_are(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// Runs of values that are missing.
+/// Returns the runs of missing values.
 fn runs(values: &[f64]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut start = None;
@@ -223,8 +224,8 @@ fn runs(values: &[f64]) -> Vec<Range<usize>> {
     runs
 }
 
-/// Fills what is missing by straight lines; at an end by the nearest value.
-fn bridge(samples: &mut Columns) {
+/// Replaces missing values by linear interpolation; at an end by the nearest value.
+fn interpolate_missing(samples: &mut Columns) {
     if channels(samples).all(|values| values.iter().all(|value| value.is_finite())) {
         return;
     }
@@ -244,15 +245,15 @@ fn bridge(samples: &mut Columns) {
     }
 }
 
-/// Seconds after which clocks begin again: a time of day without a date, counters of 32 bits that count ns, µs or ms, one of 16 bits that counts ms.
+/// Periods of clocks \[s\]: a time of day without a date; a 32-bit counter of ns, µs or ms; a 16-bit counter of ms.
 const CLOCK_PERIODS_S: [f64; 5] = [86_400.0, 4.294_967_296, 4_294.967_296, 4_294_967.296, 65.536];
-/// Rows that a run has at least before its clock may begin again.
+/// Fewest rows of a run before its clock may restart.
 const MIN_RUN: usize = 10;
-/// Share of the rows beyond which times that decrease are in no order.
+/// Largest share of rows with a decreasing time that count as restarts. With more, the times are unsorted.
 const MAX_RESTART_SHARE: f64 = 0.02;
 
-/// Lets times increase where a clock passes the end of its period, and where it begins again for another run, which becomes a segment.
-fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
+/// Makes times increase if the clock overflows, or if it restarts for another run, which becomes a new segment.
+fn unwrap_clock(samples: &mut Columns, done: &mut Repaired) {
     let rows = samples.time.len();
     let back: Vec<usize> = (1..rows).filter(|row| samples.time[*row] < samples.time[row - 1]).collect();
     if back.is_empty() || back.len() as f64 > (MAX_RESTART_SHARE * rows as f64).max(1.0) {
@@ -274,7 +275,7 @@ fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
                 let step = own + **period - before;
                 step > 0.0 && step <= MIN_GAP * usual && own >= 0.0
             };
-            // A day may pass within an interruption.
+            // Midnight may be within an interruption.
             let midnight = before <= DAY_S && before - own > MIN_MIDNIGHT_S && own >= 0.0;
             if let Some(period) = CLOCK_PERIODS_S.iter().find(continues).or(midnight.then_some(&DAY_S)) {
                 offset += period;
@@ -290,9 +291,11 @@ fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
     }
     samples.time = time;
     let passed = match periods.first() {
-        Some(period) if *period == DAY_S => Some("the clock passes midnight: the times after it continue".to_owned()),
+        Some(period) if *period == DAY_S => {
+            Some("the clock passes midnight: one day is added to the times after it".to_owned())
+        }
         Some(period) => {
-            Some(format!("the clock begins again after {period} s, where its counter is full: the times continue"))
+            Some(format!("the time counter overflows after {period} s: this time is added to the rows after it"))
         }
         None => None,
     };
@@ -306,7 +309,7 @@ fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
         let segments: Vec<Range<usize>> = segments.windows(2).map(|w| w[0]..w[1]).collect();
         relabel(samples, &segments);
         done.note(format!(
-            "the clock begins again {}: a segment begins there, and its times follow those before",
+            "the clock restarts {}: a segment begins there, and its times are shifted to follow the rows before",
             if starts.len() == 2 {
                 format!("in row {}", done.row(starts[1]) + 1)
             } else {
@@ -316,11 +319,12 @@ fn continue_clock(samples: &mut Columns, done: &mut Repaired) {
     }
 }
 
-/// Seconds of a day, and how much of it a clock without a date may go back by at midnight.
+/// One day \[s\].
 const DAY_S: f64 = 86_400.0;
+/// Smallest decrease of a time of day at midnight \[s\].
 const MIN_MIDNIGHT_S: f64 = 80_000.0;
 
-/// Joins rows of one time: their values are averaged.
+/// Joins rows with the same time. Their values are averaged.
 fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let rows = samples.time.len();
     if samples.time.windows(2).all(|t| t[0] != t[1]) {
@@ -330,7 +334,7 @@ fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let repeats = |row: usize| row > 0 && samples.time[row] == samples.time[row - 1] && label(row) == label(row - 1);
     let repeated: Vec<bool> = (0..rows).map(repeats).collect();
     let count = repeated.iter().filter(|repeated| **repeated).count();
-    // Where times are printed too coarsely, many rows share each: these are different samples.
+    // Times that are printed too coarsely repeat in many rows. These rows are different samples.
     let values: Vec<Vec<f64>> = channels(samples).map(|values| values.clone()).collect();
     let differs = |row: usize| values.iter().any(|v| v[row].to_bits() != v[row - 1].to_bits());
     let differing = (1..rows).filter(|row| repeated[*row] && differs(*row)).count();
@@ -356,19 +360,19 @@ fn join_repeated(samples: &mut Columns, done: &mut Repaired) {
     let at = (0..rows).find(|row| repeated[*row]).map_or(0, |row| done.row(row) + 1);
     let how = match differing {
         0 => "with the same values".to_owned(),
-        more => format!("{more} with other values, of which the mean is taken"),
+        more => format!("{more} with other values, which are averaged"),
     };
     keep(samples, done, &kept);
     done.note(format!("{} with the time of the row before ({how}; the first is row {at}): joined", rows_word(count)));
 }
 
-/// How times go on.
+/// The kind of time column.
 enum Times {
-    /// By even steps in each segment.
+    /// Even steps in each segment.
     Even(Vec<Period>),
-    /// They increase in these segments, but not by even steps.
+    /// Increasing times in these segments, with uneven steps.
     Uneven(Vec<Range<usize>>),
-    /// In some other way, which the checks that come later refuse.
+    /// Other times, which later checks refuse.
     Unsorted,
 }
 
@@ -393,12 +397,12 @@ impl Times {
     }
 }
 
-/// Puts back rows that are lost where only a few in sequence are, without values; says whether there were any.
+/// Inserts lost rows without values if only a few in sequence are lost. Returns whether there were any.
 fn insert_lost(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>]) -> bool {
     let rows = samples.time.len();
-    // Rows to insert before each row.
+    // The number of rows to insert before each row.
     let mut lost = vec![0; rows];
-    // Where every step is a multiple of the usual one, many rows may be lost and the grid is clear all the same.
+    // On a clear grid every step is a multiple of the usual one. Then many rows may be lost.
     let mut is_clear = true;
     for rows in segments.iter().filter(|rows| rows.len() > 2) {
         let usual = usual_step(&samples.time[rows.clone()]);
@@ -406,7 +410,7 @@ fn insert_lost(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usi
             let steps = (samples.time[row] - samples.time[row - 1]) / usual;
             let whole = steps.round();
             is_clear &= whole >= 1.0 && (steps - whole).abs() < MAX_OFF_CLEAR_GRID;
-            if whole >= 2.0 && whole <= MAX_BRIDGE as f64 + 1.0 && (steps - whole).abs() < MAX_OFF_GRID {
+            if whole >= 2.0 && whole <= MAX_INTERPOLATED_ROWS as f64 + 1.0 && (steps - whole).abs() < MAX_OFF_GRID {
                 *lost = whole as usize - 1;
             }
         }
@@ -440,15 +444,18 @@ fn insert_lost(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usi
     let mut own = done.rows.take().unwrap_or_else(|| (0..rows).collect());
     insert(&mut own, &lost, |_, row| row);
     done.rows = Some(own);
-    done.note(format!("{} lost between others: interpolated, and not fitted", rows_word(count)));
+    done.note(format!(
+        "{} missing in the time grid: inserted with an interpolated input; the output is not fitted",
+        rows_word(count)
+    ));
     true
 }
 
-/// Begins a segment behind each interruption, and resamples times that jitter. Times that do not increase are left to the checks.
-fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, mut segments: Vec<Range<usize>>) {
+/// Begins a segment after each interruption and resamples uneven times. Irregular times are left to later checks.
+fn make_even(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, mut segments: Vec<Range<usize>>) {
     let rows = samples.time.len();
     let mut gaps = Vec::new();
-    segments = segments.into_iter().flat_map(|rows| at_gaps(&samples.time, rows, &mut gaps)).collect();
+    segments = segments.into_iter().flat_map(|rows| split_at_gaps(&samples.time, rows, &mut gaps)).collect();
     if !gaps.is_empty() {
         let alone = segments.iter().filter(|rows| rows.len() < 2).count();
         let longest = gaps.iter().fold(0.0_f64, |m, g| m.max(*g));
@@ -460,7 +467,7 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
                 "{more} interruptions of up to {longest:.3} s (the longest before row {at}): a segment begins after each"
             ),
         };
-        done.note(format!("{what}; the state that the actuator keeps from before is estimated"));
+        done.note(format!("{what}; the state of the actuator at its start is estimated"));
         if alone > 0 && alone < segments.len() {
             let mut kept = vec![true; rows];
             segments.iter().filter(|rows| rows.len() < 2).for_each(|rows| kept[rows.clone()].fill(false));
@@ -472,13 +479,13 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
         }
     }
     if let Times::Uneven(segments) = Times::of(samples, *printed) {
-        // Times that follow no grid at all are refused by the checks that come later.
-        if segments.iter().any(|rows| wild(&samples.time[rows.clone()])) {
+        // Later checks refuse times that do not follow a grid.
+        if segments.iter().any(|rows| is_irregular(&samples.time[rows.clone()])) {
             return;
         }
         let (rms, most) = resample(samples, done, &segments);
         *printed = Printed::EXACT;
-        let what = if rms > MAX_JITTER { "times are uneven: they are off an even grid" } else { "times jitter" };
+        let what = if rms > MAX_JITTER { "times are uneven: they deviate from an even grid" } else { "times jitter" };
         done.note(format!(
             "{what} by {:.2} % of a sample period (rms; at most {:.2} %): resampled to even steps by a monotone cubic",
             100.0 * rms,
@@ -487,21 +494,21 @@ fn even_out(samples: &mut Columns, printed: &mut Printed, done: &mut Repaired, m
     }
 }
 
-/// Labels segments 0, 1, 2 …
+/// Sets the segment labels to 0, 1, 2 …
 fn relabel(samples: &mut Columns, segments: &[Range<usize>]) {
     samples.segment =
         Some((0..).zip(segments).flat_map(|(label, rows)| std::iter::repeat_n(label, rows.len())).collect());
 }
 
-/// The usual step of increasing times \[s\].
+/// Returns the median step of increasing times \[s\].
 fn usual_step(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
     let middle = (steps.len() - 1) / 2;
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Parts of a segment between its interruptions, whose lengths \[s\] go to `gaps`.
-fn at_gaps(time: &[f64], rows: Range<usize>, gaps: &mut Vec<f64>) -> Vec<Range<usize>> {
+/// Splits a segment at its interruptions and appends their lengths \[s\] to `gaps`.
+fn split_at_gaps(time: &[f64], rows: Range<usize>, gaps: &mut Vec<f64>) -> Vec<Range<usize>> {
     if rows.len() < 3 {
         return vec![rows];
     }
@@ -516,17 +523,19 @@ fn at_gaps(time: &[f64], rows: Range<usize>, gaps: &mut Vec<f64>) -> Vec<Range<u
     std::iter::once(rows.start).chain(starts.iter().copied()).zip(ends).map(|(start, end)| start..end).collect()
 }
 
-/// Whether too many steps are far from the usual one.
-fn wild(time: &[f64]) -> bool {
+/// Returns whether too many steps are far from the usual step.
+fn is_irregular(time: &[f64]) -> bool {
     if time.len() < 3 {
         return false;
     }
     let usual = usual_step(time);
     let off = time.windows(2).filter(|t| !(0.5 * usual..=MIN_GAP * usual).contains(&(t[1] - t[0]))).count();
-    off as f64 > (MAX_WILD_SHARE * time.len() as f64).max(1.0)
+    off as f64 > (MAX_IRREGULAR_SHARE * time.len() as f64).max(1.0)
 }
 
-/// Puts each segment on an even grid with its number of rows; how far its times were off it: their rms and their most, as shares of a period.
+/// Resamples each segment to an even grid with the same number of rows.
+///
+/// Returns the rms and the maximum deviation of the times from the grid \[periods\].
 fn resample(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>]) -> (f64, f64) {
     let old = samples.time.clone();
     let (mut squares, mut most) = (0.0, 0.0_f64);
@@ -535,7 +544,7 @@ fn resample(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>
         let t = &old[rows.clone()];
         periods.push((t[t.len() - 1] - t[0]) / (t.len() - 1) as f64);
     }
-    // Segments of nearly one rate have it.
+    // Segments with nearly the same rate get one period, the median.
     let median = {
         let mut sorted = periods.clone();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -576,15 +585,17 @@ fn resample(samples: &mut Columns, done: &mut Repaired, segments: &[Range<usize>
     ((squares / old.len() as f64).sqrt(), most)
 }
 
-/// The whole rate next to a period that times of a segment cannot tell from it.
+/// Returns the period of the nearest whole rate \[Hz\], if the times of a segment do not distinguish it from `h`.
 fn round_period(h: f64, t: &[f64]) -> f64 {
     let rate = (1.0 / h).round();
     let whole = 1.0 / rate;
     if rate >= 1.0 && (whole - h).abs() * (t.len() - 1) as f64 <= 0.5 * h { whole } else { h }
 }
 
-/// The monotone cubic through `(t, y)` (Fritsch and Butland 1984) at the times `at`, which increase; beyond the ends the end's value. Between
-/// two values it stays between them: a step of a drive is not overshot, and what is constant stays so to the last bit.
+/// Evaluates the monotone cubic through `(t, y)` (Fritsch and Butland 1984) at increasing times `at`.
+///
+/// Outside the data it returns the end value. Between two values the result does not leave their range, so a step does not overshoot and a
+/// constant stays exactly constant.
 fn monotone(t: &[f64], y: &[f64], at: &[f64]) -> Vec<f64> {
     let n = t.len();
     let h = |k: usize| t[k + 1] - t[k];
@@ -617,7 +628,7 @@ fn monotone(t: &[f64], y: &[f64], at: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// A row of the file, as a reader finds it.
+/// Returns a function from a repaired row to its place in the file.
 pub(super) fn place_of<'a>(done: &'a Repaired, place: &'a dyn Fn(usize) -> Place) -> impl Fn(usize) -> Place + 'a {
     move |row| place(done.row(row))
 }
@@ -639,7 +650,7 @@ mod tests {
     }
 
     #[test]
-    fn a_monotone_cubic_follows_and_never_overshoots() {
+    fn a_monotone_cubic_interpolates_without_overshoot() {
         let t: Vec<f64> = (0..30).map(|k| f64::from(k) + 0.3 * f64::from(k % 3)).collect();
         let y: Vec<f64> = t.iter().map(|t| (0.3 * t).sin()).collect();
         let at: Vec<f64> = (0..28).map(f64::from).collect();
@@ -660,7 +671,7 @@ mod tests {
         assert!(record.notes()[0].contains("jitter by 0.15 %"), "{:?}", record.notes());
         let worst =
             record.time().iter().zip(record.input()).map(|(t, u)| ((6.0 * t).sin() - u).abs()).fold(0.0, f64::max);
-        // Times are printed to the microsecond.
+        // The times are printed with a resolution of 1 µs.
         assert!(worst < 1e-5, "{worst}");
     }
 
@@ -673,16 +684,16 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_begins_again_begins_a_segment() {
+    fn a_clock_that_restarts_begins_a_segment() {
         let run = |rows: i32| (0..rows).map(|k| 1e-3 * f64::from(k));
         let record = read(&table(&run(40).chain(run(60)).collect::<Vec<_>>()));
         assert_eq!((record.segments(), record.labels()), (&[0..40, 40..100][..], &[0, 1][..]));
-        assert!(record.notes()[0].contains("begins again in row 41"), "{:?}", record.notes());
+        assert!(record.notes()[0].contains("restarts in row 41"), "{:?}", record.notes());
         assert!((record.time()[99] - 0.099).abs() < 1e-9);
     }
 
     #[test]
-    fn a_full_counter_continues() {
+    fn times_continue_after_a_counter_overflow() {
         let times: Vec<f64> = (0..100).map(|k| (4294.9 + 1e-3 * f64::from(k)) % 4294.967296).collect();
         let record = read(&table(&times));
         assert_eq!((record.rows(), record.segments().len(), record.sample_period()), (100, 1, 1e-3));
@@ -690,11 +701,11 @@ mod tests {
     }
 
     #[test]
-    fn many_rows_may_be_lost_from_a_clear_grid() {
+    fn many_lost_rows_of_a_clear_grid_are_inserted() {
         let times: Vec<f64> = (0..300).filter(|k| k % 7 != 3).map(|k| 1e-3 * f64::from(k)).collect();
         let record = read(&table(&times));
         assert_eq!((record.rows(), record.segments().len()), (300, 1));
-        assert!(record.notes()[0].contains("43 rows lost between others"), "{:?}", record.notes());
+        assert!(record.notes()[0].contains("43 rows missing in the time grid"), "{:?}", record.notes());
     }
 
     #[test]
@@ -712,7 +723,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_values_are_left_out_and_counted() {
+    fn missing_values_are_omitted_and_counted() {
         let mut rows: Vec<String> =
             table(&(0..100).map(|k| 1e-3 * f64::from(k)).collect::<Vec<_>>()).lines().map(str::to_owned).collect();
         rows[11] = "0.010,0.06,NaN".into();

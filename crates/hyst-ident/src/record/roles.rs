@@ -1,7 +1,7 @@
-//! Which column of a file plays which role, in which unit.
+//! Assignment of roles and units to the columns of a file.
 //!
-//! What `--map` says goes first, then names of the record format, then headings that state what they measure: a column in volts is the
-//! input, one in micrometres the output. Where two are possible, words decide; where a unit is not stated, nothing is assumed, and
+//! The order of precedence is: `--map`, names of the record format, headings with a unit (a column in volts is the input, a column in
+//! micrometres the output). If two columns are possible, the words of the headings decide. A unit is never assumed: if it is not stated,
 //! the message ends with the options to paste.
 
 use super::columns::{ColumnMap, Entry, Need, Role};
@@ -10,23 +10,23 @@ use super::heading::{Dimension, Heading, Unit, leaf, words};
 use super::source::{Axis, Head};
 use super::unit::{OutputUnit, TimeUnit};
 
-/// A column in a role.
+/// A column with a role.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Choice {
-    /// Its number; the first is 0.
+    /// The number of the column, counted from 0.
     pub(crate) column: usize,
-    /// Its name in the record format.
+    /// The name in the record format.
     pub(crate) canonical: String,
-    /// Its unit, where that is another than its role's.
+    /// The unit in the file, if it differs from the unit of `canonical`.
     pub(crate) unit: Option<Unit>,
-    /// Factor of its values, after a conversion.
+    /// The factor that is applied to the values after a conversion.
     pub(crate) factor: Option<f64>,
 }
 
-/// Where times come from.
+/// The source of the times.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Clock {
-    /// A column, and how many of its unit make a second.
+    /// A column, and the number of its unit per second.
     Column { column: usize, per_second: f64 },
     /// Even times \[s\].
     Even { start: f64, step: f64 },
@@ -41,28 +41,28 @@ pub(crate) struct Layout {
     pub(crate) output: Option<Choice>,
     pub(crate) temperature: Option<Choice>,
     pub(crate) load: Option<Choice>,
-    /// What was read otherwise than the record format says.
+    /// One sentence per column that does not have a name and unit of the record format.
     pub(crate) notes: Vec<String>,
 }
 
-/// A file's columns as messages name them.
+/// The columns of a file, with the names that messages use.
 pub(crate) struct File<'a> {
     pub(crate) name: &'a str,
     pub(crate) header: Option<Place>,
     pub(crate) heads: &'a [Head],
-    /// Columns of text, with a cell of each.
+    /// Columns of text, each with an example of a cell.
     pub(crate) texts: &'a [(String, String)],
-    /// Columns that number the rows, where somebody has looked: neither inputs nor outputs.
+    /// Columns that count the rows, if they were searched. They are neither inputs nor outputs.
     pub(crate) counters: &'a [usize],
 }
 
-/// Names that a message lists.
-const MOST_LISTED: usize = 12;
-/// Characters of a name that a message shows.
-const MOST_CHARACTERS: usize = 48;
+/// Maximum number of names in a message.
+const MAX_LISTED: usize = 12;
+/// Maximum number of characters of a name in a message.
+const MAX_CHARACTERS: usize = 48;
 
 impl Layout {
-    /// Finds the columns that `need` asks for; `rate` \[Hz\] stands in for times that the file does not have.
+    /// Finds the columns that `need` requires. A `rate` \[Hz\] replaces the times of the file.
     pub(crate) fn resolve(
         file: &File<'_>,
         map: &ColumnMap,
@@ -92,12 +92,12 @@ impl Layout {
         let load = role(Role::Load, false);
         let column = output.as_ref().or(input.as_ref()).map_or(0, |choice| choice.column);
         let axis = file.heads.get(column).map_or(Axis::Unknown, |head| head.axis);
-        // A stated rate stands for a column of time too, where nobody names one.
+        // A rate replaces the time axis of the file.
         let stated = rate.map(|rate| Axis::Even { start: 0.0, step: 1.0 / rate }).or(match axis {
             Axis::Unknown => None,
             axis => Some(axis),
         });
-        // Of several times those of the output's own rows count.
+        // If the file has several time columns, that of the output applies.
         let own = matches!(stated, Some(Axis::Column(_))) && !mapped.iter().any(|(role, _)| *role == Role::Time);
         let clock = if rate.is_some() || own { None } else { role(Role::Time, stated.is_none()) };
         let input = input.filter(|_| wants_input);
@@ -127,10 +127,10 @@ impl Layout {
     }
 }
 
-/// The columns that a map names, with the roles that it gives them.
+/// Returns the columns that `map` names, with their roles.
 ///
 /// # Errors
-/// When one is not there, or has another unit.
+/// If a column is not in the file, or its unit has another dimension.
 pub(crate) fn mapped(file: &File<'_>, map: &ColumnMap) -> Result<Vec<(Role, Choice)>, RecordError> {
     let headings = file.heads.iter().map(|h| Heading::parse(&h.name, h.unit.as_deref())).collect();
     Search { wants_input: true, file, headings }.mapped(map)
@@ -140,11 +140,11 @@ fn per_second(canonical: &str) -> f64 {
     TimeUnit::of_column(canonical).unwrap_or(TimeUnit::Second).per_second()
 }
 
-/// What keeps a file's columns from being used, and the roles that are open.
+/// The problems of the columns of a file, and the roles without a column.
 #[derive(Default)]
 struct Problems {
     list: Vec<String>,
-    /// Roles with the column that they may be in.
+    /// Roles without a column, each with the most likely column.
     open: Vec<(Role, Option<usize>)>,
 }
 
@@ -156,7 +156,7 @@ impl Problems {
 }
 
 struct Search<'a> {
-    /// Whether the record is one of a drive, not a reference.
+    /// Whether the record needs an input; false for a reference.
     wants_input: bool,
     file: &'a File<'a>,
     headings: Vec<Heading>,
@@ -171,7 +171,7 @@ impl Search<'_> {
         0..self.file.heads.len()
     }
 
-    /// The column that a map names: by its whole name, by the last part of it, or by its number.
+    /// Finds the columns that `map` names: by the whole name, by its last part, or by number.
     fn mapped(&self, map: &ColumnMap) -> Result<Vec<(Role, Choice)>, RecordError> {
         let of = |entry: &Entry| {
             let by = |is: &dyn Fn(&str) -> bool| {
@@ -186,8 +186,8 @@ impl Search<'_> {
                 .or_else(|| self.part_of_table(&entry.column))
                 .ok_or_else(|| self.not_there(entry))?;
             let unit = self.headings[column].unit;
-            // A clock's unit is often named wrongly, and an odd rate shows it: of times the map's unit counts.
-            // A factor is that of the file's values, whatever their unit; −1 is a sign alone.
+            // The stated unit of a time column is often wrong, so the unit of the map applies.
+            // A factor applies to the values in the file and replaces their unit; −1 only inverts the sign.
             let scaled = entry.factor.is_some_and(|factor| factor != -1.0);
             let unit = match (Unit::of_canonical(&entry.canonical), unit.filter(|_| !scaled)) {
                 (Some(own), Some(unit)) if entry.role != Role::Time && unit != own => {
@@ -203,7 +203,7 @@ impl Search<'_> {
         map.entries.iter().map(of).collect()
     }
 
-    /// The column that `table[2]` names in a table whose columns have names.
+    /// Finds the column `table[2]` of a table with named columns.
     fn part_of_table(&self, name: &str) -> Option<usize> {
         let (table, number) = name.strip_suffix(']')?.rsplit_once('[')?;
         let number = number.parse::<usize>().ok()?.checked_sub(1)?;
@@ -212,12 +212,12 @@ impl Search<'_> {
         self.columns().filter(own).nth(number)
     }
 
-    /// The column with `role`, or a problem if there has to be one.
+    /// Finds the column with `role`. If it is required and not found, adds a problem.
     fn find(&self, role: Role, required: bool, taken: &[usize], problems: &mut Problems) -> Option<Choice> {
         let free = || self.columns().filter(|at| !taken.contains(at));
         let plain = |column: usize| {
             let canonical = leaf(self.name(column)).to_owned();
-            // A row of units or an attribute may say otherwise than the name does.
+            // A row of units or an attribute overrides the unit in the name.
             let own = Unit::of_canonical(&canonical);
             let stated = self.file.heads[column].unit.as_deref().and_then(Unit::parse);
             let unit = stated.filter(|unit| own.is_some_and(|own| own != *unit && own.dimension == unit.dimension));
@@ -228,7 +228,7 @@ impl Search<'_> {
         // Names of the record format.
         let is_own = |at: &usize| {
             let name = leaf(self.name(*at));
-            // An input of another kind counts only where nothing is in volts, and no time or temperature is one.
+            // `<quantity>_in_<unit>` is an input only if no column is in volts, and never with a unit of time or temperature.
             let other = role == Role::Input && name != "voltage_v";
             let odd = || {
                 name.rsplit_once("_in_")
@@ -239,7 +239,7 @@ impl Search<'_> {
         };
         let mut own = free().filter(is_own);
         match (own.next(), own.next()) {
-            // A voltage is the input wherever there is one; other inputs count only in its absence.
+            // A voltage takes precedence over other inputs.
             (Some(_), Some(_)) if role == Role::Input && voltage().count() == 1 => return voltage().next().map(plain),
             (Some(first), Some(second)) => {
                 let hint = match (role, leaf(self.name(second))) {
@@ -261,8 +261,12 @@ impl Search<'_> {
         let chosen = match *measured.as_slice() {
             [] => None,
             [only] if required && role != Role::Segment && self.contradicts(role, only) => {
-                let what =
-                    format!("{} is hardly {}: it reads like {}", self.quoted(only), role.words(), contrary(role));
+                let what = format!(
+                    "{} is probably not {}: its name suggests {}",
+                    self.quoted(only),
+                    role.words(),
+                    contrary(role)
+                );
                 problems.add(role, Some(only), what);
                 return None;
             }
@@ -272,7 +276,7 @@ impl Search<'_> {
                 _ if !required => None,
                 _ => {
                     let names =
-                        several.iter().map(|at| self.quoted(*at)).take(MOST_LISTED).collect::<Vec<_>>().join(", ");
+                        several.iter().map(|at| self.quoted(*at)).take(MAX_LISTED).collect::<Vec<_>>().join(", ");
                     problems.add(role, Some(several[0]), format!("{names} each could be {}", role.words()));
                     return None;
                 }
@@ -293,9 +297,9 @@ impl Search<'_> {
                 }
             });
         }
-        // Words without a unit: of the heading, else of the path before it.
+        // Words without a unit: of the heading, otherwise of the path before it.
         let without = |at: &usize| self.headings[*at].unit.is_none();
-        // A letter is hardly a word: a column "X" of row numbers is no position.
+        // A single letter is weak evidence: a column "X" that counts the rows is not a position.
         let letter = |at: &usize| leaf(self.name(*at)).chars().count() == 1;
         let without = |at: &usize| without(at) && !(letter(at) && self.is_counter(role, *at));
         let worded = |at: &usize| without(at) && self.headings[*at].suggests(words_of(role));
@@ -315,12 +319,13 @@ impl Search<'_> {
                 problems.add(
                     role,
                     None,
-                    format!("{} would be {}, but it holds text: {}", quoted(name), role.words(), quoted(example)),
+                    format!("{} may be {}, but it holds text: {}", quoted(name), role.words(), quoted(example)),
                 );
             }
             _ if required => {
-                let which = if self.is_without_names() { "no column has a name, and none" } else { "no heading" };
-                let what = format!("{which} states a unit of {}, as {} does", role.words(), role.accepted());
+                let which = if self.is_without_names() { "the columns have no names, and none" } else { "no heading" };
+                let what =
+                    format!("{which} states a unit of {} (expected for example {})", role.words(), role.accepted());
                 problems.add(role, None, what);
             }
             _ => {}
@@ -328,23 +333,23 @@ impl Search<'_> {
         None
     }
 
-    /// Whether a column numbers the rows, where `role` is a quantity.
+    /// Returns whether a column counts the rows and `role` is not the time.
     fn is_counter(&self, role: Role, column: usize) -> bool {
         role != Role::Time && self.file.counters.contains(&column)
     }
 
-    /// Whether all columns go by their numbers.
+    /// Returns whether all column names are numbers.
     fn is_without_names(&self) -> bool {
         (0..self.headings.len()).all(|at| self.name(at).bytes().all(|byte| byte.is_ascii_digit()))
     }
 
-    /// Whether a column goes by no unit, neither a known one nor another.
+    /// Returns whether a column has no unit, neither a known nor an unknown one.
     fn is_unstated(&self, column: usize) -> bool {
         self.headings[column].unit.is_none() && self.headings[column].unknown.is_none()
     }
 
-    /// Whether a word of a column's whole name, its path included, is one of `role`'s, and its own name is not that of another role, as
-    /// in `voltage.Time`.
+    /// Returns whether the name of a column, including its path, has a word of `role`, and its last part has no word of another role
+    /// (as in `voltage.Time`).
     fn path_suggests(&self, role: Role, column: usize) -> bool {
         const OTHERS: [Role; 5] = [Role::Time, Role::Input, Role::Output, Role::Temperature, Role::Load];
         let own = |other: &Role| self.headings[column].suggests(words_of(*other));
@@ -352,7 +357,7 @@ impl Search<'_> {
         !is_another && words(self.name(column)).iter().any(|word| words_of(role).contains(&word.as_str()))
     }
 
-    /// A column of text whose heading states a unit of `role`.
+    /// Finds a column of text whose heading states a unit of `role`.
     fn text_of(&self, role: Role) -> Option<(&str, &str)> {
         let fits = |name: &str| {
             Role::of_column(name) == Some(role) || Heading::parse(name, None).unit.is_some_and(|unit| has(role, unit))
@@ -360,7 +365,7 @@ impl Search<'_> {
         self.file.texts.iter().find(|(name, _)| fits(name)).map(|(name, example)| (name.as_str(), example.as_str()))
     }
 
-    /// Whether a column's unit is one of `role`, which `required` says it needs.
+    /// Returns whether the unit of a column fits `role`. If the role is not `required`, its words must fit too.
     fn could_be(&self, role: Role, column: usize, required: bool) -> bool {
         let heading = &self.headings[column];
         let Some(unit) = heading.unit else {
@@ -375,29 +380,27 @@ impl Search<'_> {
             }
     }
 
-    /// Whether words say that a column is something else than `role`.
+    /// Returns whether the words of a column contradict `role`.
     fn contradicts(&self, role: Role, column: usize) -> bool {
         let heading = &self.headings[column];
         match role {
-            Role::Input => {
-                heading.suggests(NEVER_DRIVEN) && !heading.suggests(&["drive", "input", "voltage", "command"])
-            }
-            // In a reference the wanted position is what is asked for.
-            Role::Output => self.wants_input && heading.suggests(NEVER_MEASURED),
+            Role::Input => heading.suggests(NOT_INPUT) && !heading.suggests(&["drive", "input", "voltage", "command"]),
+            // In a reference the output column is the target.
+            Role::Output => self.wants_input && heading.suggests(NOT_OUTPUT),
             _ => false,
         }
     }
 
-    /// Those of several columns that words prefer.
+    /// Returns those of several columns that the words of their headings prefer.
     fn preferred(&self, role: Role, several: &[usize]) -> Vec<usize> {
         let with = |words: &[&str], is: bool| {
             several.iter().copied().filter(|at| self.headings[*at].suggests(words) == is).collect::<Vec<_>>()
         };
         let by_word = with(words_of(role), true);
         match role {
-            // What was measured, not what was wanted.
+            // The measured output, not the reference.
             Role::Output => {
-                let measured = with(WANTED, false);
+                let measured = with(COMMANDED, false);
                 let by_word: Vec<usize> = by_word.into_iter().filter(|at| measured.contains(at)).collect();
                 if measured.len() != 1 && by_word.len() == 1 {
                     return by_word;
@@ -415,7 +418,7 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a column that may be absent goes by a unit of its role's that is not known.
+    /// Returns whether the column of an optional role ends in a unit that is not supported.
     fn states_unknown_unit(&self, role: Role, column: usize) -> bool {
         let heading = &self.headings[column];
         match role {
@@ -426,7 +429,7 @@ impl Search<'_> {
         }
     }
 
-    /// What is said of a column that is read by its heading, or in another unit.
+    /// Returns the note of a column that is identified by its heading or has another unit.
     fn reading(&self, choice: &Choice) -> Option<String> {
         let name = self.name(choice.column);
         let own_name = leaf(name) == choice.canonical;
@@ -440,15 +443,15 @@ impl Search<'_> {
         Some(format!("{} is read as {}{converted}", quoted(name), choice.canonical))
     }
 
-    /// A column's name, with the unit that the file states beside it.
+    /// Returns the name of a column in quotation marks, with the unit that the file states outside the name.
     fn quoted(&self, column: usize) -> String {
         let unit = self.file.heads[column].unit.as_deref().map_or(String::new(), |unit| format!(" in {unit}"));
         format!("{}{unit}", quoted(self.name(column)))
     }
 
     fn listed(&self) -> String {
-        let names: Vec<String> = self.columns().take(MOST_LISTED).map(|at| self.quoted(at)).collect();
-        let more = self.file.heads.len().saturating_sub(MOST_LISTED);
+        let names: Vec<String> = self.columns().take(MAX_LISTED).map(|at| self.quoted(at)).collect();
+        let more = self.file.heads.len().saturating_sub(MAX_LISTED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("{}{more}", names.join(", "))
     }
@@ -456,10 +459,10 @@ impl Search<'_> {
     fn not_there(&self, entry: &Entry) -> RecordError {
         let same = |at: &usize| self.name(*at) == entry.column || leaf(self.name(*at)) == entry.column;
         let numbers: Vec<String> =
-            self.columns().filter(same).take(MOST_LISTED).map(|at| (at + 1).to_string()).collect();
+            self.columns().filter(same).take(MAX_LISTED).map(|at| (at + 1).to_string()).collect();
         if let [first, _, ..] = numbers.as_slice() {
             let problems = format!("{} is the name of the columns {}", quoted(&entry.column), numbers.join(", "));
-            let advice = format!("give the number, as --map {}={first}", entry.canonical);
+            let advice = format!("give the number of the column, for example --map {}={first}", entry.canonical);
             return RecordError::Columns {
                 file: self.place(),
                 problems,
@@ -489,14 +492,14 @@ impl Search<'_> {
 
     fn other_dimension(&self, entry: &Entry, unit: Unit) -> RecordError {
         let what = format!(
-            "--map {}={}: the column is in {}, which {} is not",
+            "--map {}={}: the column is in {}, which is not a unit of {}",
             entry.canonical, entry.column, unit.symbol, entry.canonical
         );
         RecordError::Columns {
             file: self.place(),
             problems: what,
             advice: format!(
-                "map another column, or give its scale: --map '{}=GAIN*{}', GAIN per {}",
+                "map another column, or type --map '{}=GAIN*{}' with the scale GAIN per {}",
                 entry.canonical,
                 entry.column.replace('\'', r"'\''"),
                 unit.symbol
@@ -510,35 +513,35 @@ impl Search<'_> {
         self.file.header.map_or_else(|| self.file.name.to_owned(), |place| format!("{}, {place}", self.file.name))
     }
 
-    /// What is missing where the file has fewer columns than the roles that are open.
+    /// Returns what is missing if the file has fewer free columns than roles without a column.
     fn too_few(&self, open: &[(Role, Option<usize>)], taken: &[usize]) -> Option<String> {
         let count = self.file.heads.len();
         let free = count.saturating_sub(taken.len());
-        // A rate stands for a column of time.
+        // --rate can replace a time column.
         let needed = open.iter().filter(|(role, _)| *role != Role::Time).count();
         if free >= needed {
             return None;
         }
         let columns = if count == 1 { "1 column".to_owned() } else { format!("{count} columns") };
         let words: Vec<&str> = open.iter().map(|(role, _)| role.word()).collect();
-        let time = if words.contains(&Role::Time.word()) { " (--rate HZ replaces a column of time)" } else { "" };
+        let time = if words.contains(&Role::Time.word()) { " (--rate HZ replaces a time column)" } else { "" };
         let alone = if free == 1 && taken.is_empty() {
             let example = argument(Role::Output.example(), None, self.name(0));
-            format!("; for a reference, which is an output alone: --map {example} --rate HZ")
+            format!("; for a reference (an output only) type --map {example} --rate HZ")
         } else {
             String::new()
         };
-        Some(format!("the file has {columns}; a record needs also: {}{time}{alone}", words.join(", ")))
+        Some(format!("the file has {columns}; a record also needs: {}{time}{alone}", words.join(", ")))
     }
 
-    /// All problems in one message, with a map that is complete.
+    /// Makes one message of all problems, with complete `--map` options.
     fn refuse(&self, problems: Problems, map: &ColumnMap, taken: &[usize]) -> RecordError {
-        // A column with a unit would have been found.
+        // A column with a unit would have been found already.
         let is_free = |at: &usize| {
             self.is_unstated(*at) && !taken.contains(at) && !problems.open.iter().any(|(_, guess)| *guess == Some(*at))
         };
         let mut free: Vec<usize> = self.columns().filter(is_free).collect();
-        // Of columns that say nothing of themselves, one whose path does, else the next.
+        // Prefer a column whose path has a word of the role, otherwise the next free column.
         let mut next = |role: Role| {
             let fits = |at: &usize| !self.is_counter(role, *at);
             let place = free.iter().position(|at| fits(at) && self.path_suggests(role, *at));
@@ -547,7 +550,7 @@ impl Search<'_> {
         };
         let mut open: Vec<(Role, Option<usize>)> = problems.open.clone();
         open.sort_by_key(|(role, _)| *role != Role::Time);
-        // A sensor often comes as a voltage, whose scale only its owner knows.
+        // A sensor signal is often recorded as a voltage with an unknown scale.
         let driven: Vec<usize> = open
             .iter()
             .filter_map(|(role, guess)| guess.filter(|_| *role == Role::Input))
@@ -558,7 +561,7 @@ impl Search<'_> {
         let sensor = sensor.filter(|_| open.iter().any(|(role, guess)| *role == Role::Output && guess.is_none()));
         let mut list = problems.list;
         list.extend(
-            sensor.map(|at| format!("{} may be the sensor: put its µm per V in place of GAIN", self.quoted(at))),
+            sensor.map(|at| format!("{} may be the sensor: replace GAIN by its scale in µm/V", self.quoted(at))),
         );
         let arguments = open.iter().map(|(role, guess)| {
             if let (Role::Output, None, Some(at)) = (role, guess, sensor) {
@@ -568,7 +571,7 @@ impl Search<'_> {
             let column = guess.filter(known).or_else(|| next(*role));
             let canonical =
                 column.and_then(|at| self.headings[at].unit).map_or(role.example(), |unit| unit.canonical(*role));
-            // A unit of another dimension is no unit of the role.
+            // The unit may have a dimension that does not fit the role.
             let canonical = if Role::of_column(canonical) == Some(*role) { canonical } else { role.example() };
             format!(
                 "--map {}",
@@ -581,13 +584,13 @@ impl Search<'_> {
             return RecordError::Columns {
                 file: self.place(),
                 problems: format!("{}; {short}", list.join("; ")),
-                advice: format!("columns found: {}; put all columns side by side into one file", self.listed()),
+                advice: format!("columns found: {}; put all columns into one file", self.listed()),
                 options: String::new(),
                 columns: self.file.heads.len() + self.file.texts.len(),
             };
         }
         let no_time = open.iter().any(|(role, guess)| *role == Role::Time && guess.is_none());
-        let rate = if no_time { "; for a file without times give the rate with --rate" } else { "" };
+        let rate = if no_time { "; if the file has no times, give the sample rate with --rate HZ" } else { "" };
         RecordError::Columns {
             file: self.place(),
             problems: list.join("; "),
@@ -598,7 +601,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether values in a unit can have a role.
+/// Returns whether values in `unit` can have `role`.
 fn has(role: Role, unit: Unit) -> bool {
     match role {
         Role::Segment => false,
@@ -610,16 +613,16 @@ fn has(role: Role, unit: Unit) -> bool {
     }
 }
 
-/// A name in quotation marks, not too long.
+/// Returns a name in quotation marks, shortened.
 fn quoted(name: &str) -> String {
-    let short: String = name.chars().take(MOST_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let more = if name.chars().nth(MOST_CHARACTERS).is_some() { "…" } else { "" };
+    let short: String = name.chars().take(MAX_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let more = if name.chars().nth(MAX_CHARACTERS).is_some() { "…" } else { "" };
     format!("\"{short}{more}\"")
 }
 
-/// A map as a shell takes it.
+/// Returns the right side of a `--map` option, quoted for a shell.
 fn argument(canonical: &str, factor: Option<f64>, column: &str) -> String {
-    let short: String = column.chars().take(4 * MOST_CHARACTERS).collect();
+    let short: String = column.chars().take(4 * MAX_CHARACTERS).collect();
     let column = short.as_str();
     let factor = match factor {
         Some(-1.0) => "-".to_owned(),
@@ -672,8 +675,8 @@ const OUTPUT: &[&str] = &[
 ];
 const TEMPERATURE: &[&str] = &["temperature", "temp", "temperatur"];
 const LOAD: &[&str] = &["load", "preload", "external"];
-/// Words of a position that was asked for.
-const WANTED: &[&str] = &[
+/// Words of a commanded position.
+const COMMANDED: &[&str] = &[
     "target",
     "commanded",
     "command",
@@ -687,7 +690,7 @@ const WANTED: &[&str] = &[
     "cmd",
     "ref",
 ];
-/// Words of a voltage that was measured.
+/// Words of a measured voltage.
 const SENSOR: &[&str] = &[
     "sensor",
     "monitor",
@@ -703,17 +706,17 @@ const SENSOR: &[&str] = &[
     "capacitive",
     "strain",
 ];
-/// Units of columns that may be absent, which are no units of them here.
+/// Units of temperature or load that are not supported.
 const UNKNOWN_UNITS: &[&str] = &["kg", "g", "lbf"];
 
-/// Words of a voltage that no amplifier puts out.
-const NEVER_DRIVEN: &[&str] = &["sensor", "gauge", "strain", "capacitive", "lvdt", "interferometer"];
-/// Words of a position that nobody measured.
-const NEVER_MEASURED: &[&str] = &["target", "commanded", "setpoint", "desired", "wanted", "soll"];
+/// Words of a voltage that is a sensor signal, not the input.
+const NOT_INPUT: &[&str] = &["sensor", "gauge", "strain", "capacitive", "lvdt", "interferometer"];
+/// Words of a position that is a reference, not a measured output.
+const NOT_OUTPUT: &[&str] = &["target", "commanded", "setpoint", "desired", "wanted", "soll"];
 
-/// What a column is that cannot have `role`.
+/// Returns what a column is instead, if its words contradict `role`.
 fn contrary(role: Role) -> &'static str {
-    if role == Role::Input { "a sensor" } else { "what was wanted, not what was measured" }
+    if role == Role::Input { "a sensor signal" } else { "a reference, not a measured output" }
 }
 
 fn words_of(role: Role) -> &'static [&'static str] {
@@ -728,7 +731,7 @@ fn words_of(role: Role) -> &'static [&'static str] {
 }
 
 impl Unit {
-    /// The unit of a column of the record format.
+    /// Returns the unit of a column name of the record format.
     pub(crate) fn of_canonical(name: &str) -> Option<Self> {
         let is_own = matches!(Role::of_column(name)?, Role::Time | Role::Output | Role::Temperature | Role::Load)
             || name == "voltage_v";
@@ -738,7 +741,7 @@ impl Unit {
         }
     }
 
-    /// The column of the record format in which values of this unit are kept in `role`: without a conversion where the format has the unit.
+    /// Returns the column name of the record format for values of this unit with `role`. It has the same unit if the format supports it.
     fn canonical(self, role: Role) -> &'static str {
         match (role, self.dimension) {
             (Role::Time, _) => match self.symbol {
@@ -782,7 +785,7 @@ mod tests {
     }
 
     #[test]
-    fn headings_with_units_are_enough() {
+    fn columns_are_found_by_headings_with_units() {
         let found = train(&["Time (ms)", "Voltage [mV]", "Position, nm", "T (K)"]).unwrap();
         assert_eq!(found.time, Clock::Column { column: 0, per_second: 1e3 });
         assert_eq!(of(&found.input), (1, "voltage_v", Some("mV")));
@@ -792,7 +795,7 @@ mod tests {
     }
 
     #[test]
-    fn words_decide_between_columns_of_one_unit() {
+    fn words_decide_between_columns_with_the_same_unit() {
         let found = train(&["Time (s)", "Monitor (V)", "Drive (V)", "Target position (µm)", "Position (µm)"]).unwrap();
         assert_eq!(of(&found.input), (2, "voltage_v", None));
         assert_eq!(of(&found.output).0, 4);
@@ -802,7 +805,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_that_is_not_stated_is_asked_for_all_at_once() {
+    fn one_message_asks_for_all_units_that_are_not_stated() {
         let message = train(&["t", "V", "x"]).unwrap_err();
         assert!(message.contains("--map time_s=t --map voltage_v=V --map displacement_um=x"), "{message}");
         let message = train(&["1", "2", "3"]).unwrap_err();
@@ -814,7 +817,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_says_what_its_channels_are() {
+    fn the_words_of_a_path_suggest_the_role() {
         let message = train(&["voltage.Time", "voltage.Data", "displacement.Data"]).unwrap_err();
         let map = "--map time_s=voltage.Time --map voltage_v=voltage.Data --map displacement_um=displacement.Data";
         assert!(message.contains(map), "{message}");
@@ -833,7 +836,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_are_bounded() {
+    fn messages_have_a_limited_length() {
         let names: Vec<String> = (0..100_000).map(|k| format!("channel{k}{}", "x".repeat(100))).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let message = train(&names).unwrap_err();

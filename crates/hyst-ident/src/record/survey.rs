@@ -1,4 +1,4 @@
-//! What a file holds, for somebody who looks at it: format, channels, and the record in them.
+//! Survey of a file: its format, its columns and the record in them (`hystctl info`).
 
 use std::path::Path;
 
@@ -17,51 +17,51 @@ use crate::samples::range;
 /// A column of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Its name, as `--map` takes it.
+    /// The name for `--map`.
     pub name: String,
-    /// Its unit, where heading or file state one that is known.
+    /// The unit, if the heading or the file states a known unit.
     pub unit: Option<&'static str>,
-    /// Rows.
+    /// The number of rows.
     pub rows: usize,
-    /// Rows without a value.
+    /// The number of rows without a value.
     pub missing: usize,
-    /// Smallest and largest value, in its unit.
+    /// Minimum and maximum, in `unit`.
     pub range: Option<(f64, f64)>,
-    /// Smallest difference between two values, in its unit; 0 where all are one.
+    /// Smallest difference between two values, in `unit`; 0 if all values are equal.
     pub step: f64,
-    /// What the record takes it for: `segment`, `time`, `input`, `output`, `temperature` or `load`.
+    /// The role in the record: `segment`, `time`, `input`, `output`, `temperature` or `load`.
     pub role: Option<&'static str>,
-    /// The unit that `--map` gives it, where the file states none or `--map` scales its values.
+    /// The unit that `--map` assigns, if the file states none or `--map` scales the values.
     pub mapped_unit: Option<&'static str>,
-    /// How many of that unit one of the file's numbers is, if `--map` says so.
+    /// The factor of `--map` from values in the file to `mapped_unit`, if given.
     pub scale: Option<f64>,
-    /// Whether its unit is stated elsewhere in the file than in its name.
+    /// Whether the file states the unit outside the name, for example in a row of units.
     pub unit_outside_name: bool,
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Debug)]
 pub struct Survey {
-    /// The format, as `table of text, ';' between columns`.
+    /// The format, such as `table of text, ';' between columns`.
     pub format: String,
-    /// Its columns, in their order.
+    /// The columns of numbers, in the order of the file.
     pub channels: Vec<Channel>,
-    /// Columns that hold text, with a cell of each.
+    /// The columns of text, each with an example of a cell.
     pub texts: Vec<(String, String)>,
-    /// Where the times of the record come from, or would, as `the column "t"` or `the sample interval in the file`.
+    /// The source of the times, such as `the column "t"` or `the sample interval in the file`.
     pub times: Option<String>,
-    /// The record, or why it is none yet.
+    /// The record, or the reason why the file does not make one.
     pub record: Result<Record, RecordError>,
 }
 
-/// Columns that are looked at; a file with more is listed in part.
+/// The maximum number of columns in a survey. Further columns are not listed.
 pub const MAX_CHANNELS: usize = 200;
 
 impl Survey {
-    /// Looks at the file at `path`.
+    /// Surveys the file at `path`.
     ///
     /// # Errors
-    /// When it cannot be read or has no columns.
+    /// If the file cannot be read or has no columns.
     pub fn read(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
         let path = path.as_ref();
         let file = path.display().to_string();
@@ -72,10 +72,10 @@ impl Survey {
         Self::parse(&file, &bytes, how)
     }
 
-    /// As [`read`](Self::read), of the bytes of a file.
+    /// Surveys the bytes of a file.
     ///
     /// # Errors
-    /// As those of [`read`](Self::read).
+    /// Those of [`read`](Self::read).
     pub fn parse(name: &str, bytes: &[u8], how: &Reading) -> Result<Self, RecordError> {
         if is_run_log(bytes) {
             let log = RunLog::parse(name, bytes)?;
@@ -90,7 +90,7 @@ impl Survey {
         Ok(Self { record: survey.record.map(|record| record.kept_as(bytes)), ..survey })
     }
 
-    /// Looks at the columns of a file.
+    /// Surveys the columns of a file.
     fn of(name: &str, contents: &dyn Contents, how: &Reading) -> Result<Self, RecordError> {
         let mut channels = channels(contents)?;
         let read = |need| with_layout(name, contents, how, need);
@@ -101,7 +101,7 @@ impl Survey {
             }
             Err(error) => {
                 mark_mapped(&mut channels, name, contents, &how.map);
-                // A rate or a clock that was named stands for it.
+                // A rate overrides the sample interval in the file.
                 let open = matches!(error, RecordError::Columns { .. }) && how.rate.is_none();
                 let even = open && contents.heads().iter().any(|head| matches!(head.axis, source::Axis::Even { .. }));
                 (Err(error), even.then(|| "the sample interval in the file".to_owned()))
@@ -111,7 +111,7 @@ impl Survey {
     }
 }
 
-/// Notes which channels a record is read from.
+/// Sets the roles of the channels that a record is read from.
 fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
     let mut note =
         |column, role, canonical: &str, factor| mark_one(channels, contents, (column, role), canonical, factor);
@@ -135,7 +135,7 @@ fn mark(channels: &mut [Channel], contents: &dyn Contents, layout: &Layout) {
     }
 }
 
-/// The same for what a map says of columns that are no record yet. A map that is wrong is said so by the error.
+/// Sets the roles of the channels that `map` names, if the file does not make a record. Errors of the map are reported elsewhere.
 fn mark_mapped(channels: &mut [Channel], name: &str, contents: &dyn Contents, map: &ColumnMap) {
     let file =
         File { name, header: contents.header(), heads: contents.heads(), texts: contents.texts(), counters: &[] };
@@ -144,7 +144,7 @@ fn mark_mapped(channels: &mut [Channel], name: &str, contents: &dyn Contents, ma
     }
 }
 
-/// Notes the role of a channel, and the unit of its values that a map states.
+/// Sets the role of a channel and the unit that a map assigns.
 fn mark_one(
     channels: &mut [Channel],
     contents: &dyn Contents,
@@ -164,7 +164,7 @@ fn has_unit(head: &source::Head) -> bool {
     Heading::parse(&head.name, head.unit.as_deref()).unit.is_some()
 }
 
-/// Where times come from.
+/// Returns the source of the times.
 fn times(contents: &dyn Contents, how: &Reading, layout: &Layout) -> String {
     match layout.time {
         Clock::Column { column, .. } => {
@@ -175,8 +175,10 @@ fn times(contents: &dyn Contents, how: &Reading, layout: &Layout) -> String {
     }
 }
 
-/// A record with what a file has: input and output, or one of them if there is nothing else. If it is none, the reason is why it has
-/// not both.
+/// Reads a record with input and output, or with one of them if the file has no further columns.
+///
+/// # Errors
+/// Those of a record with input and output.
 fn any<T>(
     rated: bool,
     read: impl Fn(Need) -> Result<T, RecordError>,
@@ -184,7 +186,7 @@ fn any<T>(
 ) -> Result<T, RecordError> {
     read(Need::InputAndOutput).or_else(|error| match error {
         RecordError::Columns { columns, .. } => {
-            // A record at a stated rate may have no column of times.
+            // A record with a given rate may have no time column.
             let whole = |read: &T| {
                 let own = record(read).columns();
                 own == columns || rated && own == columns + 1
@@ -196,16 +198,16 @@ fn any<T>(
 }
 
 impl Record {
-    /// How many columns of a file have a role.
+    /// Returns the number of columns with a role.
     fn columns(&self) -> usize {
         let channels = [self.input.is_some(), self.output.is_some(), self.temperature.is_some(), self.load.is_some()];
         1 + usize::from(self.labelled) + channels.into_iter().filter(|there| *there).count()
     }
 
-    /// Reads what a file has: input and output, or one of them.
+    /// Reads a record with input and output, or with one of them if the file has no further columns.
     ///
     /// # Errors
-    /// As those of [`read`](Self::read).
+    /// Those of [`read`](Self::read).
     pub fn read_any(path: impl AsRef<Path>, how: &Reading) -> Result<Self, RecordError> {
         any(how.rate.is_some(), |need| Self::read(path.as_ref(), how.clone(), need), |record| record)
     }

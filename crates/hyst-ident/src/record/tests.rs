@@ -11,7 +11,7 @@ fn read_mapped(text: &str, map: &[&str], need: Need) -> Result<Record, RecordErr
     Record::parse("run.csv", text.as_bytes(), &ColumnMap::parse(map).unwrap(), need)
 }
 
-/// The message with which `text` is refused has to contain all of `parts`.
+/// Asserts that `text` is refused with a message that contains all of `parts`.
 #[track_caller]
 fn refused(text: &str, need: Need, parts: &[&str]) {
     refused_mapped(text, &[], need, parts);
@@ -63,25 +63,25 @@ fn sha256_is_that_of_the_files_bytes() {
 }
 
 #[test]
-fn what_is_needed_decides_what_has_to_be_there() {
+fn the_required_columns_depend_on_the_need() {
     let drive = "time_s,voltage_v\n0,0\n1,1\n";
     assert_eq!(read(drive, Need::Input).unwrap().output(), None);
     refused(
         drive,
         Need::InputAndOutput,
-        &["line 1", "the output", "displacement_um|displacement_nm", "needs also: output"],
+        &["line 1", "the output", "displacement_um|displacement_nm", "also needs: output"],
     );
     let reference = "time_s,force_n\n0,0\n1,1\n";
     let record = read(reference, Need::Output).unwrap();
     assert!(record.input().is_empty());
     assert_eq!(record.output_unit(), Some(OutputUnit::Newton));
     refused(reference, Need::Input, &["line 1", "the input", "voltage_v", "columns found: \"time_s\", \"force_n\""]);
-    // An earlier drive in the file is carried through unread, whatever its unit.
+    // A drive in the file is copied without being read, with any unit.
     assert!(read("time_s,force_n,voltage_mv\n0,0,x\n1,1,x\n", Need::Output).is_ok());
 }
 
 #[test]
-fn time_comes_in_three_units() {
+fn time_may_be_in_three_units() {
     for (text, period) in [
         ("time_ms,voltage_v\n1.5,0\n3.0,1\n4.5,1\n", 0.0015),
         ("time_us,voltage_v\n0,0\n20,1\n40,1\n", 2e-5),
@@ -94,7 +94,7 @@ fn time_comes_in_three_units() {
 }
 
 #[test]
-fn jitter_of_rounding_is_not_passed_on() {
+fn rounding_jitter_of_times_is_removed() {
     let mut text = String::from("time_s,force_in_n,displacement_mm\n");
     for k in 0..3000 {
         text += &format!("{:.6},{k},0\n", f64::from(k) / 750.0);
@@ -108,7 +108,7 @@ fn jitter_of_rounding_is_not_passed_on() {
 }
 
 #[test]
-fn byte_order_mark_line_ends_quotes_and_blanks_are_taken() {
+fn byte_order_mark_line_ends_quotes_and_blanks_are_accepted() {
     for text in [
         "\u{feff}time_s,voltage_v\n0,0\n1,2.5\n",
         "time_s,voltage_v\r\n0,0\r\n1,2.5\r\n",
@@ -123,7 +123,7 @@ fn byte_order_mark_line_ends_quotes_and_blanks_are_taken() {
 }
 
 #[test]
-fn further_columns_are_carried_through() {
+fn further_columns_are_copied_unchanged() {
     let text = "note,time_s,voltage_v,predicted_um,gain\n\"a, b\",0.00,0.10,9,x\n,0.50,1.0e0,9,\n";
     let record = read(text, Need::Input).unwrap();
     let mut out = Vec::new();
@@ -158,7 +158,7 @@ fn a_column_can_be_mapped() {
         Need::Input,
         &["line 1", "--map voltage_v=Uin", "columns found: \"t\", \"Vin\""],
     );
-    // Messages about values name the file's column.
+    // Messages about values use the column name of the file.
     refused_mapped("t,Vin\n0,1\n1,x\n", &["time_s=t", "voltage_v=Vin"], Need::Input, &["line 3", "\"Vin\"", "\"x\""]);
     refused_mapped("t,Vin\n0,1\n0,2\n", &["time_s=t", "voltage_v=Vin"], Need::Input, &["line 3", "\"t\"", "increase"]);
 }
@@ -190,13 +190,13 @@ fn two_candidates_for_a_role_are_refused() {
     assert_eq!(record.output_unit(), Some(OutputUnit::Newton));
     refused("time_s,time_ms,voltage_v\n0,0,0\n", Need::Input, &["\"time_s\"", "\"time_ms\""]);
     refused("time_s,force_in_n,current_in_a\n0,0,0\n", Need::Input, &["\"force_in_n\"", "\"current_in_a\""]);
-    // A voltage is the input wherever there is one.
+    // A voltage takes precedence over other inputs.
     let record = read("time_s,force_in_n,voltage_v\n0,5,6\n1,5,6\n", Need::Input).unwrap();
     assert_eq!((record.input_column(), record.input()), ("voltage_v", &[6.0, 6.0][..]));
 }
 
 #[test]
-fn other_units_are_converted_and_said() {
+fn other_units_are_converted_and_noted() {
     let record = read("Time (ms),Drive [mV],Position_m\n0,0,0\n1,1500,2.5e-6\n", Need::InputAndOutput).unwrap();
     assert_eq!((record.time(), record.input()), (&[0.0, 0.001][..], &[0.0, 1.5][..]));
     assert_eq!((record.output_unit(), record.output()), (Some(OutputUnit::Micrometre), Some(&[0.0, 2.5][..])));
@@ -207,7 +207,7 @@ fn other_units_are_converted_and_said() {
 }
 
 #[test]
-fn units_that_are_not_stated_or_not_known_are_asked_for() {
+fn units_that_are_not_stated_or_not_known_are_refused() {
     refused("time,voltage_v\n0,0\n1,1\n", Need::Input, &["\"time\"", "unit is not stated", "--map time_s=time"]);
     for output in ["displacement", "position [counts]", "sensor"] {
         refused(
@@ -216,9 +216,9 @@ fn units_that_are_not_stated_or_not_known_are_asked_for() {
             &[&format!("\"{output}\""), "--map", "displacement_um="],
         );
     }
-    // A column that may be absent must not be overlooked for its unit either…
+    // An optional column with an unknown unit is refused, …
     refused("time_s,voltage_v,load_kg\n0,0,0\n1,1,1\n", Need::Input, &["\"load_kg\"", "load_n"]);
-    // …but one that only shares a word with it is carried through.
+    // … but a column that only shares a word with it is copied unchanged.
     assert!(read("time_s,voltage_v,load_cell_v,temperature_sensor_id\n0,0,0,x\n1,1,0,x\n", Need::Input).is_ok());
 }
 
@@ -236,7 +236,7 @@ fn damaged_headers_are_refused() {
 }
 
 #[test]
-fn damaged_rows_are_refused_where_they_are() {
+fn damaged_rows_are_refused_with_their_line() {
     let with = |row: &str| format!("segment,time_s,voltage_v\r\n0,0.0,1\r\n\r\n{row}\r\n0,0.2,1\r\n");
     refused(&with("0,0.1"), Need::Input, &["line 4", "2 fields", "3 columns", "\"voltage_v\""]);
     refused(&with("0,0.1,1,1"), Need::Input, &["line 4", "4 fields"]);
@@ -249,7 +249,7 @@ fn damaged_rows_are_refused_where_they_are() {
 }
 
 #[test]
-fn bytes_of_no_known_format_are_refused() {
+fn bytes_of_unknown_format_are_refused() {
     let refused = |bytes: &[u8], parts: &[&str]| {
         let error = Record::parse("run.csv", bytes, &ColumnMap::default(), Need::Input).unwrap_err().to_string();
         assert!(parts.iter().all(|part| error.contains(part)), "{error}");
@@ -269,7 +269,7 @@ fn a_lost_row_is_interpolated_and_not_fitted() {
     let record = read(&rows(&times), Need::InputAndOutput).unwrap();
     assert_eq!((record.rows(), record.segments().len(), record.missing()[12]), (60, 1, true));
     assert!((record.input()[12] - 0.012).abs() < 1e-12);
-    // Across segments time has to increase.
+    // Time must increase across segments.
     refused(
         "segment,time_s,voltage_v\n0,0.0,0\n0,0.1,0\n1,0.0,0\n1,0.1,0\n",
         Need::Input,
@@ -286,7 +286,7 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
-fn records_are_joined_and_segments_keep_their_files() {
+fn joined_records_keep_the_file_of_each_segment() {
     let one = read(TRAIN, Need::InputAndOutput).unwrap();
     let two = Record::parse("two.csv", TRAIN.as_bytes(), &ColumnMap::default(), Need::InputAndOutput).unwrap();
     let joined = Record::join(vec![one, two]).unwrap();
@@ -302,7 +302,7 @@ fn records_are_joined_and_segments_keep_their_files() {
 }
 
 #[test]
-fn unlike_records_are_not_joined() {
+fn records_with_different_columns_are_not_joined() {
     let base = "time_s,voltage_v,displacement_um\n0.0,0,0\n0.1,0,0\n";
     for (other, part) in [
         ("time_s,force_in_n,displacement_um\n0.0,0,0\n0.1,0,0\n", "the input column is \"force_in_n\""),
@@ -321,7 +321,7 @@ fn unlike_records_are_not_joined() {
 }
 
 #[test]
-fn a_row_alone_has_no_sample_period() {
+fn a_single_row_has_no_sample_period() {
     refused("time_s,voltage_v\n0,0\n", Need::Input, &["line 2", "\"time_s\"", "two rows"]);
 }
 
@@ -347,7 +347,7 @@ fn segments_and_files_keep_their_own_sample_periods() {
 
 #[test]
 fn a_short_file_joins_a_long_one_of_the_same_rate() {
-    // Two rows leave 749.6 to 750.8 Hz; the longer file knows better.
+    // Two rows allow rates from 749.6 to 750.8 Hz; the longer file is more accurate.
     let text = |rows: u32| {
         (0..rows).fold(String::from("time_s,voltage_v\n"), |text, k| text + &format!("{:.6},0\n", f64::from(k) / 750.0))
     };
@@ -382,7 +382,7 @@ fn columns_in_memory_are_checked() {
 }
 
 #[test]
-fn columns_that_somebody_needs_are_named() {
+fn a_missing_column_is_named_with_the_reason() {
     let record = read("time_s,voltage_v\n0,0\n1,1\n", Need::Input).unwrap();
     let message = record.need_temperature("the model has a temperature stage").unwrap_err().to_string();
     assert!(message.contains("run.csv") && message.contains("\"temperature_degc\""), "{message}");
@@ -421,7 +421,7 @@ fn writing_and_reading_again_is_exact() {
 }
 
 #[test]
-fn times_are_written_with_as_few_decimals_as_do() {
+fn times_are_written_with_the_fewest_sufficient_decimals() {
     for (h, second) in
         [(0.001, "0.001"), (1.0 / 750.0, "0.001333"), (0.000_25, "0.00025"), (1.0 / 44_100.0, "0.00002268")]
     {
@@ -499,7 +499,7 @@ proptest! {
 }
 
 #[test]
-fn columns_of_a_text_in_another_encoding_are_carried_through() {
+fn columns_of_a_text_in_another_encoding_are_copied_unchanged() {
     let text = "time_s,voltage_v,displacement_um,gain_x\n0,0,0,7\n1,1,1,8\n2,2,2,9\n";
     let orders: [fn(u16) -> [u8; 2]; 2] = [u16::to_le_bytes, u16::to_be_bytes];
     for order in orders {

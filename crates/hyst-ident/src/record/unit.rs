@@ -1,17 +1,19 @@
-//! The units that an output may have, and the columns named after them.
+//! Units of output and time columns, and their column names.
 
 use serde::{Deserialize, Serialize};
 
-/// What the actuator's output is.
+/// The quantity of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// A position or its change.
+    /// A position or a displacement.
     Displacement,
-    /// A force, as of a clamped actuator.
+    /// A force, for example of a clamped actuator.
     Force,
 }
 
-/// The unit of an output column. Values keep the unit of their file: nothing is converted on reading.
+/// The unit of an output column.
+///
+/// Values are not converted on reading if their unit is one of these. Other units of length are converted to µm, of force to N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum OutputUnit {
     /// `displacement_um` \[µm\]
@@ -32,7 +34,7 @@ impl OutputUnit {
     /// Every unit, in the order in which messages list their columns.
     pub const ALL: [Self; 4] = [Self::Micrometre, Self::Nanometre, Self::Millimetre, Self::Newton];
 
-    /// The name of a record's column in this unit, as `displacement_um`.
+    /// Returns the column name for this unit, such as `displacement_um`.
     pub fn column(self) -> &'static str {
         match self {
             Self::Micrometre => "displacement_um",
@@ -42,7 +44,7 @@ impl OutputUnit {
         }
     }
 
-    /// The ending of column names in this unit: `um`, `nm`, `mm` or `n`.
+    /// Returns the suffix of column names in this unit: `um`, `nm`, `mm` or `n`.
     pub fn suffix(self) -> &'static str {
         match self {
             Self::Micrometre => "um",
@@ -52,7 +54,7 @@ impl OutputUnit {
         }
     }
 
-    /// The unit as a person reads it: `µm`, `nm`, `mm` or `N`.
+    /// Returns the symbol of the unit: `µm`, `nm`, `mm` or `N`.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Micrometre => "µm",
@@ -62,12 +64,12 @@ impl OutputUnit {
         }
     }
 
-    /// The column in which a model's answer is written, as `predicted_um`.
+    /// Returns the column name for the predicted output, such as `predicted_um`.
     pub fn predicted_column(self) -> String {
         format!("predicted_{}", self.suffix())
     }
 
-    /// What is measured in this unit.
+    /// Returns the quantity that this unit measures.
     pub fn quantity(self) -> Quantity {
         match self {
             Self::Newton => Quantity::Force,
@@ -75,19 +77,19 @@ impl OutputUnit {
         }
     }
 
-    /// The unit of the column `column`, or `None` when that is no output column's name.
+    /// Returns the unit of the output column `column`, or `None` if `column` is not an output column name.
     pub fn of_column(column: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.column() == column)
     }
 
-    /// The unit with the ending `suffix`, or `None`.
+    /// Returns the unit with the suffix `suffix`, or `None`.
     pub fn of_suffix(suffix: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.suffix() == suffix)
     }
 
-    /// The factor that turns values in this unit into values in `other`, or `None` between displacement and force.
+    /// Returns the factor from this unit to `other`, or `None` between displacement and force.
     pub fn factor_to(self, other: Self) -> Option<f64> {
-        // Nanometres in one unit: whole numbers, so that a factor of one is exact.
+        // Nanometres per unit. Whole numbers keep a factor of one exact.
         let size = |unit| match unit {
             Self::Micrometre => 1e3,
             Self::Millimetre => 1e6,
@@ -116,7 +118,7 @@ impl TimeUnit {
         }
     }
 
-    /// How many of this unit make a second. Dividing by it rounds once; multiplying by its inverse would round twice.
+    /// Returns the number of this unit per second. Division by it rounds once; multiplication by its inverse would round twice.
     pub(crate) fn per_second(self) -> f64 {
         match self {
             Self::Second => 1.0,
@@ -135,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_and_suffixes_lead_back_to_their_unit() {
+    fn units_are_found_by_column_and_suffix() {
         for unit in OutputUnit::ALL {
             assert_eq!(OutputUnit::of_column(unit.column()), Some(unit));
             assert_eq!(OutputUnit::of_suffix(unit.suffix()), Some(unit));

@@ -13,38 +13,38 @@ use super::{OutputUnit, Record, Text};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The writer refused.
+    /// Writing failed.
     #[error("the record cannot be written: {0}")]
     Io(#[from] std::io::Error),
-    /// A column to add has another length than the record.
-    #[error("column \"{column}\" has {found} values, but the record has {expected} rows")]
+    /// An extra column has another length than the record.
+    #[error("column \"{column}\" has {found} values, but the record has {expected} rows; give one value per row")]
     Lengths {
         /// The column.
         column: String,
         /// Its length.
         found: usize,
-        /// The record's rows.
+        /// The number of rows of the record.
         expected: usize,
     },
-    /// A value to write is NaN or infinite, which no reader of the format would take.
-    #[error("column \"{column}\", row {row}: {value} is not a finite number and is not written")]
+    /// A value to write is NaN or infinite, which the record format does not allow.
+    #[error("column \"{column}\", row {row}: {value} is not a finite number; nothing is written; correct the value")]
     NotFinite {
         /// The column.
         column: String,
-        /// The row; the first is 0.
+        /// The row, counted from 0.
         row: usize,
         /// The value.
         value: f64,
     },
-    /// The record was joined from several files, whose clocks need not go on from one to the next.
-    #[error("{name}: records joined from several files are not written as one; write each by itself")]
+    /// The record was joined from several files, whose times may overlap.
+    #[error("{name}: a record joined from several files cannot be written to one file; write each record separately")]
     Joined {
         /// The files.
         name: String,
     },
 }
 
-/// A column to write after a record's own. It replaces a column of the same name.
+/// A column to write after the columns of a record. It replaces a column with the same name.
 #[derive(Clone, Copy, Debug)]
 pub struct Extra<'a> {
     name: &'a str,
@@ -58,17 +58,17 @@ enum Cells<'a> {
 }
 
 impl<'a> Extra<'a> {
-    /// Numbers, written with as many digits as it takes to read the same values again.
+    /// Makes a column of numbers, written with enough digits to read the same values again.
     pub fn numbers(name: &'a str, values: &'a [f64]) -> Self {
         Self { name, cells: Cells::Numbers(values, None) }
     }
 
-    /// Numbers, rounded to `decimals` digits after the point.
+    /// Makes a column of numbers, rounded to `decimals` digits after the point.
     pub fn rounded(name: &'a str, values: &'a [f64], decimals: usize) -> Self {
         Self { name, cells: Cells::Numbers(values, Some(decimals)) }
     }
 
-    /// Flags, written as 1 and 0.
+    /// Makes a column of flags, written as 1 and 0.
     pub fn flags(name: &'a str, values: &'a [bool]) -> Self {
         Self { name, cells: Cells::Flags(values) }
     }
@@ -102,11 +102,13 @@ impl<'a> Extra<'a> {
 }
 
 impl Record {
-    /// Writes the columns that play a role, in the record format: times in seconds with the decimals that keep them
-    /// even to the last printed digit, other values with as many digits as it takes to read the same values again. A missing output is an empty cell.
+    /// Writes the columns with a role in the record format.
+    ///
+    /// Times are in seconds, with enough decimals to be even to the last printed digit. Other values have enough digits to read the same
+    /// values again. A missing output is an empty cell.
     ///
     /// # Errors
-    /// When `out` refuses, or the record was joined.
+    /// If writing to `out` fails, or the record was joined.
     pub fn write_csv(&self, mut out: impl Write) -> Result<(), WriteError> {
         if self.sources.len() != 1 {
             return Err(WriteError::Joined { name: self.name() });
@@ -147,15 +149,16 @@ impl Record {
         Ok(())
     }
 
-    /// Writes the file's own columns, digit for digit and with those that play no role, and `extra` after them. A
-    /// record made in memory is written as by [`write_csv`](Self::write_csv).
+    /// Writes all columns of the file unchanged, including those without a role, and `extra` after them.
+    ///
+    /// A record made in memory is written as by [`write_csv`](Self::write_csv).
     ///
     /// # Errors
-    /// When `out` refuses, an extra column has another length than the record or values that are not finite, or the
+    /// If writing to `out` fails, an extra column has another length than the record or a value that is not finite, or the
     /// record was joined.
     pub fn write_with(&self, out: impl Write, extra: &[Extra<'_>]) -> Result<(), WriteError> {
         extra.iter().try_for_each(|column| column.check(self.rows()))?;
-        // As many rows, and a header.
+        // The text is copied only if it has the rows of the record and a header.
         let whole = |text: &&[u8]| rows_of(text).byte_records().count() == self.rows() + 1;
         let text = match self.text.as_ref().map(Text::as_bytes).filter(whole) {
             Some(text) => Cow::Borrowed(text),
@@ -194,35 +197,36 @@ impl Record {
         Ok(())
     }
 
-    /// Whether the output of a row is missing, and its value made up.
+    /// Returns whether the output of a row is missing, so that its value is interpolated.
     pub(super) fn is_missing(&self, row: usize) -> bool {
         self.missing.get(row).copied().unwrap_or(false)
     }
 
-    /// The fewest decimals with which the printed times lead back to this record's grid, but enough to show a
-    /// thousandth of a period where the period itself is not a short number.
+    /// Returns the fewest decimals with which the printed times give the periods of this record again.
+    ///
+    /// If the period has many decimals, a thousandth of a period is resolved at least.
     fn time_decimals(&self) -> usize {
-        const MOST: usize = 17;
+        const MAX_DECIMALS: usize = 17;
         let periods = self.sample_periods();
-        let fine = |h: f64| (3.0 - h.log10()).ceil().clamp(3.0, MOST as f64) as usize;
+        let fine = |h: f64| (3.0 - h.log10()).ceil().clamp(3.0, MAX_DECIMALS as f64) as usize;
         let starts = self.segments.iter().map(|rows| decimals_of(self.time[rows.start]));
         let steps = periods.iter().map(|h| decimals_of(*h).min(fine(*h)));
-        let least = starts.chain(steps).max().unwrap_or(0).clamp(3, MOST);
+        let least = starts.chain(steps).max().unwrap_or(0).clamp(3, MAX_DECIMALS);
         let mut near = None;
-        for decimals in least..=MOST {
+        for decimals in least..=MAX_DECIMALS {
             let Some(found) = self.periods_printed_with(decimals) else { continue };
             if found == periods {
                 return decimals;
             }
-            // A period that is no short number at all comes back to its last bits only.
+            // A period with many decimals is reproduced to 1e-12 only.
             if near.is_none() && found.iter().zip(&periods).all(|(found, h)| (found - h).abs() <= 1e-12 * h) {
                 near = Some(decimals);
             }
         }
-        near.unwrap_or(MOST)
+        near.unwrap_or(MAX_DECIMALS)
     }
 
-    /// The period of each segment that a reader of the times would find.
+    /// Returns the period of each segment that reading the times with `decimals` would give.
     fn periods_printed_with(&self, decimals: usize) -> Option<Vec<f64>> {
         let mut printed = Printed::default();
         let mut text = String::new();
@@ -239,12 +243,12 @@ impl Record {
     }
 }
 
-/// The decimals of the shortest text that reads as `t` again.
+/// Returns the number of decimals of the shortest text that parses to `t`.
 fn decimals_of(t: f64) -> usize {
     t.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len())
 }
 
-/// A reader of all rows, the header among them, that leaves their lengths to us.
+/// Returns a reader of all rows, including the header, that accepts rows of any length.
 fn rows_of(text: &[u8]) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text)
 }

@@ -181,7 +181,7 @@ def _shown(text: str) -> str:
 def _say(line: str) -> None:
     """What the command line prints to stderr."""
     # What is said of a file that vanishes.
-    if _VANISHES.search(line) and ("was there already" in line or "is kept in" in line):
+    if _VANISHES.search(line) and ("existed and was renamed to" in line or "saved in" in line):
         return
     level, frame = 1, sys._getframe()
     # The caller's own line.

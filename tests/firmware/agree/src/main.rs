@@ -1,15 +1,15 @@
-//! Runs every case on the machine and prints what it computed and what it cost.
+//! Runs all cases on the machine and prints outputs and costs.
 //!
-//! Two lines a case and precision,
+//! It prints two lines per case and precision:
 //!
 //! ```text
 //! case pi_10 f32 hash=0123456789abcdef steps=999 instructions=162837 worst=163 stack=56 build_stack=588 …
 //! bits pi_10 f32 00000000 3dcccccd …
 //! ```
 //!
-//! `instructions` is the sum over the steps, each a call, `worst` the most that one call took, both beyond a call that
-//! does nothing; `stack` what a step used of it, the call included (16 to 32), `build_stack` what building and resetting
-//! did, `coefficients` and `state` their sizes \[all bytes\]. Ends with `done`.
+//! `instructions` is the sum over all steps, `worst` the maximum of one step, both minus an empty call. `stack` is the stack of a step,
+//! including the call (16 to 32), `build_stack` that of building and resetting; `coefficients` and `state` are their sizes. All sizes
+//! are in bytes. The last line is `done`.
 #![no_std]
 #![no_main]
 
@@ -28,16 +28,16 @@ use measure::{Counter, stack};
 #[entry]
 fn main() -> ! {
     let Some(counter) = Counter::start() else { panic!("SysTick is taken") };
-    assert!(counter.is_true(), "a loop of known length is miscounted; QEMU needs -icount shift=6");
+    assert!(counter.is_true(), "the instruction count is wrong; start QEMU with -icount shift=6");
     each(&mut Bench { counter });
     hprintln!("done");
     end(debug::EXIT_SUCCESS)
 }
 
-/// Steps of a case: the first sample is the one at rest.
+/// Number of steps of a case; the first sample is a reset.
 const STEPS: u64 = SAMPLES as u64 - 1;
 
-/// Bytes of stack that are watched while a case is built and reset, and in each step.
+/// Measured depth of the stack during build and reset, and during a step (bytes).
 const DEEP: usize = 64 * 1024;
 const SHALLOW: usize = 4 * 1024;
 
@@ -46,8 +46,9 @@ struct Bench {
 }
 
 impl Bench {
-    /// Ticks of one step as a call: what an interrupt routine pays. Through a pointer, so that the call is the same for
-    /// every stage, whatever it makes of its arguments.
+    /// Returns the ticks of one step as a call, as in an interrupt routine.
+    ///
+    /// The call goes through a pointer, so that it is the same for all stages.
     #[inline(never)]
     fn step<T: Precision, S: Stage<T>>(
         &self,
@@ -107,7 +108,7 @@ impl Visit for Bench {
             worst = worst.max(ticks);
         }
 
-        // Once more as a block; whatever the first run has left behind, a reset makes it as new.
+        // Repeat as a block. A reset must remove all effects of the first run.
         again[0] = model.reset(&mut state, &env[0], u[0]);
         model.block(&mut state, &env[1..], &u[1..], &mut again[1..]);
         assert!(same(&y, &again), "{}: a block after a reset differs from steps", C::NAME);
@@ -117,7 +118,11 @@ impl Visit for Bench {
             step_stack = stack(SHALLOW, || *y = step(&model, &mut state, env, *u)).max(step_stack);
         }
         assert!(same(&y, &again), "{}: a second run after a reset differs", C::NAME);
-        assert!(build_stack.max(reset_stack) < DEEP && step_stack < SHALLOW, "{}: deeper than is watched", C::NAME);
+        assert!(
+            build_stack.max(reset_stack) < DEEP && step_stack < SHALLOW,
+            "{}: the stack is deeper than the measured depth",
+            C::NAME
+        );
 
         hprintln!(
             "case {} {} hash={:016x} steps={} instructions={} worst={} stack={} build_stack={} coefficients={} state={}",
@@ -146,7 +151,7 @@ fn same<T: Precision>(a: &[T], b: &[T]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.bits() == b.bits())
 }
 
-/// A line that goes out at once: every write to the host stops the machine.
+/// A line that is sent in one write, because every write to the host stops the machine.
 struct Line {
     text: [u8; 64 + 17 * SAMPLES],
     len: usize,

@@ -1,8 +1,8 @@
-//! The core on bare metal and nothing else: no start-up code, no semihosting.
+//! The core on bare metal, without start-up code and semihosting.
 //!
-//! Three functions for each case and precision, under the names `build.CASE.f32`, `reset.CASE.f32` and `step.CASE.f32`.
-//! Linked alone, with all that it does not reach thrown away, each shows what it costs and what it can run into. The panic
-//! handler calls a function that does not exist: **what can panic does not link**.
+//! There are three functions for each case and precision: `build.CASE.f32`, `reset.CASE.f32` and `step.CASE.f32`. Each one is linked
+//! alone, without unreachable code, to measure its size. The panic handler calls a function that does not exist, so **a function
+//! that can panic does not link**.
 #![no_std]
 
 use core::panic::PanicInfo;
@@ -15,7 +15,7 @@ unsafe extern "C" {
 
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
-    // SAFETY: there is no such function.
+    // SAFETY: the function does not exist, so this code never links.
     unsafe { this_can_panic() }
 }
 
@@ -30,7 +30,7 @@ macro_rules! export {
         const _: () = {
             type Model = <list::$name as Case>::Model<$t>;
 
-            // SAFETY (of all three names): nothing else is called like this.
+            // SAFETY (of all three names): no other symbol has this name.
             #[unsafe(export_name = concat!("build.", stringify!($name), ".", stringify!($t)))]
             fn build(slot: &mut Option<Model>) {
                 *slot = list::$name::build::<$t>().ok();

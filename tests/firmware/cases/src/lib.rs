@@ -1,7 +1,7 @@
-//! Every model of the core over the same samples: on the host and in firmware, in `f32` and `f64`.
+//! All models of the core on the same samples: on the host and in firmware, in `f32` and `f64`.
 //!
-//! What a [`Case`] computes is arithmetic alone (no clock, no file, no random device), so two machines that disagree in
-//! one bit of one sample disagree in how they compute. [`run`] gives the bits, [`Fingerprint`] their fingerprint.
+//! A [`Case`] is pure arithmetic, without clock, file or random device. So a difference in one bit between two machines is a
+//! difference in their arithmetic. [`run`] computes the outputs, [`Fingerprint`] a hash of their bits.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -26,29 +26,29 @@ pub trait Case {
     /// Builds the coefficients.
     ///
     /// # Errors
-    /// Never, if the case is a sound one: the tests build all of them.
+    /// If the parameters are invalid. The tests build all cases.
     fn build<T: Real>() -> Result<Self::Model<T>, Error>;
 }
 
 /// The history of case `C` in precision `T`.
 pub type State<C, T> = <<C as Case>::Model<T> as Stage<T>>::State;
 
-/// What is done with every case in every precision.
+/// A visitor of all cases in all precisions.
 pub trait Visit {
     /// Called once for each case and precision, always in the same order.
     fn visit<C: Case, T: Precision>(&mut self);
 }
 
-/// Visits every case, in `f32` and then in `f64`.
+/// Visits all cases, each in `f32` and then in `f64`.
 pub fn each(visitor: &mut impl Visit) {
     list::each(visitor);
 }
 
-/// A number type with a name and bits.
+/// A number type with a name and access to its bits.
 pub trait Precision: Real {
     /// `f32` or `f64`.
     const NAME: &'static str;
-    /// The bits of the number, in the low end for `f32`.
+    /// Returns the bits of the number; the lower 32 bits for `f32`.
     fn bits(self) -> u64;
 }
 
@@ -66,7 +66,7 @@ impl Precision for f64 {
     }
 }
 
-/// 64-bit FNV-1a over the bits of numbers, low byte first.
+/// 64-bit FNV-1a hash of the bits of numbers, low byte first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fingerprint(pub u64);
 
@@ -77,14 +77,14 @@ impl Default for Fingerprint {
 }
 
 impl Fingerprint {
-    /// Takes in one more number.
+    /// Adds a number.
     pub fn add<T: Precision>(&mut self, x: T) {
         for byte in x.bits().to_le_bytes().iter().take(size_of::<T>()) {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
 
-    /// The fingerprint of a run.
+    /// Returns the fingerprint of a run.
     pub fn of<T: Precision>(numbers: &[T]) -> Self {
         let mut hash = Self::default();
         numbers.iter().for_each(|x| hash.add(*x));
@@ -92,7 +92,9 @@ impl Fingerprint {
     }
 }
 
-/// Input and surroundings of case `C`: the same samples for all cases, scaled to the range of the input.
+/// Computes input and environment of case `C`.
+///
+/// The samples are the same for all cases, scaled to the range of the input.
 pub fn inputs<C: Case, T: Real>(u: &mut [T; SAMPLES], env: &mut [Env<T>; SAMPLES]) {
     let [low, high] = C::INPUT;
     for ((u, env), s) in u.iter_mut().zip(env).zip(samples()) {
@@ -101,10 +103,10 @@ pub fn inputs<C: Case, T: Real>(u: &mut [T; SAMPLES], env: &mut [Env<T>; SAMPLES
     }
 }
 
-/// All outputs of case `C`: at rest at the first sample, then step by step.
+/// Computes all outputs of case `C`: a reset at the first sample, then one step per sample.
 ///
 /// # Errors
-/// As [`Case::build`].
+/// The errors of [`Case::build`].
 pub fn run<C: Case, T: Real>() -> Result<[T; SAMPLES], Error> {
     let (mut u, mut env, mut y) = ([T::ZERO; SAMPLES], [Env::default(); SAMPLES], [T::ZERO; SAMPLES]);
     inputs::<C, T>(&mut u, &mut env);
@@ -120,7 +122,7 @@ pub fn run<C: Case, T: Real>() -> Result<[T; SAMPLES], Error> {
     Ok(y)
 }
 
-/// A value that the optimiser must not look into: parameters come from outside, on a device as here.
+/// Hides a value from the optimiser, because on a device parameters also come from outside.
 pub fn given<X>(value: X) -> X {
     black_box(value)
 }

@@ -1,10 +1,14 @@
-//! The list of all cases: to add a model is to add a line here, and a constant to `models.rs` for its parameters.
+//! The list of all cases.
+//!
+//! To add a model, add a line here and a constant with its parameters to `models.rs`.
 
 use crate::models::*;
 use crate::{Case, PERIOD, Visit, given};
 use hyst_core::*;
 
-/// Calls `$with!` with every case: name, coefficients in precision `T`, range of the input, how they are built.
+/// Calls `$with!` with all cases.
+///
+/// A case is a name, a type of coefficients in precision `T`, a range of the input, and an expression that builds the coefficients.
 #[macro_export]
 macro_rules! all_cases {
     ($with:ident) => {
@@ -73,7 +77,7 @@ macro_rules! define {
     ($($name:ident: $model:ty, $low:literal..$high:literal => $build:expr;)*) => {
         $(
             #[doc = concat!("The case `", stringify!($name), "`.")]
-            #[allow(non_camel_case_types, reason = "a case is called as its line is")]
+            #[allow(non_camel_case_types, reason = "a case has the name of its line")]
             #[derive(Debug)]
             pub enum $name {}
 

@@ -1,4 +1,4 @@
-//! Parameters of the cases, and what turns them into coefficients where that is more than one call.
+//! Parameters of the cases, and functions that build coefficients in more than one call.
 
 use crate::{PERIOD, given};
 use core::array::from_fn;
@@ -12,7 +12,7 @@ pub(crate) const MODE: ResonanceParams = ResonanceParams { hz: 90.0, damping: 0.
 pub(crate) const WARMTH: TemperatureParams =
     TemperatureParams { per_kelvin: 0.005, reference_degc: 22.0, expansion: 0.02, seconds: 3.0 };
 pub(crate) const BOUC_WEN: BoucWenParams = BoucWenParams { k0: 0.15, alpha: -0.05, beta: 0.06, gamma: 0.02, n: 1.0 };
-/// Xie et al., tanh at 50 Hz but for γ, which is small enough here to bend.
+/// Xie et al., tanh at 50 Hz, with a smaller γ so that the curve bends in this range.
 pub(crate) const XIE: ActivationParams = ActivationParams { k0: 0.1447, alpha: -9e-5, beta: 0.4017, gamma: 0.05 };
 pub(crate) const LFDM: LfdmParams = LfdmParams::PRINTED;
 pub(crate) const IFM: IfmParams = IfmParams::PRINTED;
@@ -60,12 +60,12 @@ const PI_10: PiParams<[f64; 10]> = PiParams {
     weights: [0.01; 10],
 };
 
-/// λ = 2 ms.
+/// Builds a viscous operator with λ = 2 ms.
 pub(crate) fn viscous<T: Real>() -> Result<ViscousPi<T, 10>, Error> {
     given(ViscousPiParams { pi: PI_10, seconds: 2e-3, volt_seconds: 0.0 }).build(&PERIOD)
 }
 
-/// J = 5 mV s.
+/// Builds a root-viscous operator with J = 5 mV s.
 pub(crate) fn root_viscous<T: Real>() -> Result<ViscousPi<T, 10>, Error> {
     given(ViscousPiParams { pi: PI_10, seconds: 0.0, volt_seconds: 5e-3 }).build(&PERIOD)
 }
@@ -101,7 +101,7 @@ pub(crate) fn dpm<T: Real>() -> Result<Dpm<T, 25, 8, 9>, Error> {
     Dpm::new(everett::<T, 25>()?, mirror, given(20.0), &PERIOD)
 }
 
-/// A stage at a constant temperature.
+/// A stage at the constant temperature 23 °C.
 #[derive(Clone, Debug)]
 pub struct Steady<S>(pub(crate) S);
 
@@ -118,7 +118,7 @@ impl<T: Real, S: Stage<T>> Stage<T> for Steady<S> {
     }
 }
 
-/// A PID that holds a first-order plant at the reference: the drive of a closed loop, as a stage.
+/// A closed loop of a PID and a first-order plant, as a stage from reference to drive.
 #[derive(Clone, Debug)]
 pub struct Loop<T>(Pid<T>);
 
@@ -142,7 +142,7 @@ impl<T: Real> Stage<T> for Loop<T> {
     }
 }
 
-/// A force observer that takes the drive for the free model and the load for the measured displacement.
+/// A force observer as a stage; its measured displacement is the sample's load.
 #[derive(Clone, Debug)]
 pub struct Observer<T>(ForceObserver<T, Pi<T, 10>>);
 
@@ -163,7 +163,7 @@ impl<T: Real> Stage<T> for Observer<T> {
     }
 }
 
-/// Limits as a stage: the drive that may follow the last one.
+/// Voltage and slew limits as a stage.
 #[derive(Clone, Debug)]
 pub struct Limiter<T>(Limits<T>);
 

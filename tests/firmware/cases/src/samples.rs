@@ -1,19 +1,19 @@
-//! The samples: integer arithmetic up to one exact division, so every machine makes the same bits.
+//! The samples: integer arithmetic and one exact division, so that all machines compute the same bits.
 
 use hyst_core::Sampling;
 
-/// Number of samples, the one at rest included.
+/// Number of samples, including the one at rest.
 pub const SAMPLES: usize = 1000;
 
 /// The sample period.
 pub const PERIOD: Sampling = Sampling { period: 1e-3 };
 
-/// Drive and surroundings at one sample.
+/// Drive and environment at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Time \[s\].
     pub time: f64,
-    /// Where the drive is in the range of the input: 0 to 1.
+    /// Drive as a share of the input range, 0 to 1.
     pub drive: f64,
     /// Temperature \[°C\], 20 to 26.
     pub temperature: f64,
@@ -24,13 +24,15 @@ pub struct Sample {
 /// 1 in the fixed-point numbers below.
 const UNIT: i64 = 1 << 20;
 
-/// The samples: a slow triangle whose swing shrinks (nested loops), two parabolic near-sines of other periods (minor
-/// loops), a little noise (reversals at nearly every sample), and a stretch in which the input stands still.
+/// Returns the samples.
+///
+/// The drive is the sum of a slow triangle with decreasing amplitude (nested loops), two approximate sines with other periods (minor
+/// loops) and some noise (reversals at nearly every sample). In one part it is constant.
 pub fn samples() -> impl Iterator<Item = Sample> {
     let mut seed: u32 = 1;
     let mut held = 0;
     (0..SAMPLES as i64).map(move |k| {
-        // Numerical Recipes' generator; the high bits are the good ones.
+        // Generator of Numerical Recipes; its high bits are better.
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let noise = i64::from(seed >> 12);
         let slow = UNIT - (UNIT - triangle(k, 410)) * (1400 - k) / 1400;
@@ -51,13 +53,13 @@ fn fraction(x: i64) -> f64 {
     x as f64 / UNIT as f64
 }
 
-/// 0 at k = 0, 1 at half a period, and back.
+/// Returns a triangle: 0 at k = 0, 1 at half a period.
 fn triangle(k: i64, period: i64) -> i64 {
     let phase = k.rem_euclid(period) * 2 * UNIT / period;
     if phase < UNIT { phase } else { 2 * UNIT - phase }
 }
 
-/// Two parabolas that look like a sine, −1 to 1.
+/// Returns an approximate sine of two parabolas, −1 to 1.
 fn sine(k: i64, period: i64) -> i64 {
     let phase = k.rem_euclid(period) * 2 * UNIT / period - UNIT;
     -(4 * phase * (UNIT - phase.abs())) / UNIT
@@ -68,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_drive_fills_its_range_and_turns_often() {
+    fn the_drive_covers_its_range_with_many_reversals() {
         let (mut low, mut high, mut turns, mut still) = (1.0f64, 0.0f64, 0, 0);
         let (mut last, mut rise) = (0.0, 0.0);
         for s in samples() {

@@ -1,50 +1,51 @@
-//! The core computes the same bits on a Cortex-M4F as here, within a bounded stack.
+//! The core computes the same bits on a Cortex-M4F as on the host, within a bounded stack.
 //!
-//! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU and then this, with the path of what it printed in
-//! `HYST_FIRMWARE`.
+//! `cargo xtask firmware` runs `tests/firmware/agree` in QEMU, and then this test. `HYST_FIRMWARE` is the path of the firmware's
+//! output.
 
 use hyst_cases::{Case, Fingerprint, Precision, Visit, each, run};
 use std::collections::BTreeMap;
 use std::{env, fs};
 
-/// Bytes of stack that one step may use, the call included.
+/// Maximum stack of one step, call included (bytes).
 const STEP_STACK: usize = 2048;
 
-/// Bytes of stack that building coefficients and resetting may use: several copies of the largest coefficients, since a
-/// `Result` is returned by value.
+/// Maximum stack of building coefficients and resetting (bytes).
+///
+/// It holds several copies of the largest coefficients, because a `Result` is returned by value.
 const BUILD_STACK: usize = 32 * 1024;
 
-/// How far a run in `f32` may be from the same in `f64`, of the span of the outputs.
-const FOLLOWS: f64 = 1e-4;
+/// Maximum difference between runs in `f32` and `f64`, as a share of the span of the outputs.
+const PRECISION_TOLERANCE: f64 = 1e-4;
 
-/// All outputs of all cases, computed here.
+/// All outputs of all cases, computed on the host.
 #[derive(Default)]
-struct Here(Vec<(&'static str, &'static str, Vec<u64>, Vec<f64>)>);
+struct Host(Vec<(&'static str, &'static str, Vec<u64>, Vec<f64>)>);
 
-impl Visit for Here {
+impl Visit for Host {
     fn visit<C: Case, T: Precision>(&mut self) {
         let y = run::<C, T>().unwrap_or_else(|error| panic!("{}: {error}", C::NAME));
         self.0.push((C::NAME, T::NAME, y.iter().map(|y| y.bits()).collect(), y.iter().map(|y| y.to_f64()).collect()));
     }
 }
 
-/// What the firmware printed: for each case and precision its figures and the bits of its outputs.
+/// Output of the firmware: figures and bits of the outputs for each case and precision.
 #[derive(Default)]
-struct There {
+struct Firmware {
     figures: BTreeMap<(String, String), BTreeMap<String, String>>,
     bits: BTreeMap<(String, String), Vec<u64>>,
 }
 
-impl There {
-    /// `None`, with a message that says so, where the firmware was not run.
+impl Firmware {
+    /// Reads the output; prints a message and returns `None` if the firmware was not run.
     fn read() -> Option<Self> {
         let Some(path) = env::var_os("HYST_FIRMWARE") else {
-            println!("skipped: the firmware was not run; `cargo xtask firmware` does");
+            println!("skipped: the firmware was not run; `cargo xtask firmware` runs it");
             return None;
         };
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        assert_eq!(text.lines().last(), Some("done"), "the firmware did not come to its end");
-        let mut there = Self::default();
+        assert_eq!(text.lines().last(), Some("done"), "the firmware did not finish");
+        let mut firmware = Self::default();
         for line in text.lines() {
             let mut words = line.split(' ');
             let kind = words.next();
@@ -52,50 +53,50 @@ impl There {
             match kind {
                 Some("case") => {
                     let pairs = words.filter_map(|word| word.split_once('='));
-                    there.figures.insert(key, pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).collect());
+                    firmware.figures.insert(key, pairs.map(|(k, v)| (k.to_owned(), v.to_owned())).collect());
                 }
                 Some("bits") => {
                     let bits = words.map(|word| u64::from_str_radix(word, 16).expect("hexadecimal digits"));
-                    there.bits.insert(key, bits.collect());
+                    firmware.bits.insert(key, bits.collect());
                 }
                 _ => {}
             }
         }
-        Some(there)
+        Some(firmware)
     }
 }
 
-/// The number that has these bits.
+/// Returns the number with these bits.
 fn value(precision: &str, bits: u64) -> f64 {
     if precision == "f32" { f32::from_bits(bits as u32).into() } else { f64::from_bits(bits) }
 }
 
 #[test]
-fn every_case_moves_and_single_precision_follows_double_precision() {
-    let mut here = Here::default();
-    each(&mut here);
-    assert!(here.0.len() >= 2);
-    for pair in here.0.chunks(2) {
+fn outputs_vary_and_single_precision_agrees_with_double_precision() {
+    let mut host = Host::default();
+    each(&mut host);
+    assert!(host.0.len() >= 2);
+    for pair in host.0.chunks(2) {
         let [(name, "f32", _, single), (_, "f64", _, double)] = pair else { panic!("cases come as f32 and f64") };
         let (low, high) = double.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
         assert!(single.iter().chain(double).all(|y| y.is_finite()) && high > low, "{name}: {low} to {high}");
         let worst = single.iter().zip(double).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(
-            worst <= FOLLOWS * (high - low),
-            "{name}: f32 is {worst} away from f64, which goes from {low} to {high}"
+            worst <= PRECISION_TOLERANCE * (high - low),
+            "{name}: f32 differs from f64 by {worst}; the outputs are {low} to {high}"
         );
     }
 }
 
 #[test]
 fn firmware_and_host_agree_bit_for_bit() {
-    let Some(there) = There::read() else { return };
-    let mut here = Here::default();
-    each(&mut here);
+    let Some(firmware) = Firmware::read() else { return };
+    let mut host = Host::default();
+    each(&mut host);
     let mut differ = Vec::new();
-    for (name, precision, ours, _) in &here.0 {
+    for (name, precision, ours, _) in &host.0 {
         let key = ((*name).to_owned(), (*precision).to_owned());
-        let Some(theirs) = there.bits.get(&key) else {
+        let Some(theirs) = firmware.bits.get(&key) else {
             differ.push(format!("{name} {precision} was not run"));
             continue;
         };
@@ -104,29 +105,29 @@ fn firmware_and_host_agree_bit_for_bit() {
         if let Some((k, (a, b))) = pairs().next() {
             let (count, is, was) = (pairs().count(), value(precision, *a), value(precision, *b));
             differ.push(format!(
-                "{name} {precision}: {count} samples differ, first {k}: {a:x} ({is:e}) here, {b:x} ({was:e}) there"
+                "{name} {precision}: {count} samples differ, first {k}: {a:x} ({is:e}) on the host, {b:x} ({was:e}) in firmware"
             ));
         }
-        // The fingerprint that the firmware took of its own numbers: nothing was lost on the way here.
+        // The firmware's own fingerprint detects bits that were lost in the transfer.
         let hash = match *precision {
             "f32" => Fingerprint::of(&theirs.iter().map(|b| f32::from_bits(*b as u32)).collect::<Vec<_>>()),
             _ => Fingerprint::of(&theirs.iter().map(|b| f64::from_bits(*b)).collect::<Vec<_>>()),
         };
         assert_eq!(
-            there.figures[&key]["hash"],
+            firmware.figures[&key]["hash"],
             format!("{:016x}", hash.0),
-            "{name} {precision}: bits were lost on the way"
+            "{name} {precision}: bits were lost in the transfer"
         );
     }
     assert!(differ.is_empty(), "host and firmware differ:\n{}", differ.join("\n"));
-    assert_eq!(there.bits.len(), here.0.len(), "the firmware was built from another list of cases");
-    println!("{} runs of 1000 samples agree in every bit", here.0.len());
+    assert_eq!(firmware.bits.len(), host.0.len(), "the firmware was built from another list of cases");
+    println!("{} runs of 1000 samples agree in every bit", host.0.len());
 }
 
 #[test]
 fn the_stack_is_bounded() {
-    let Some(there) = There::read() else { return };
-    for ((name, precision), figures) in &there.figures {
+    let Some(firmware) = Firmware::read() else { return };
+    for ((name, precision), figures) in &firmware.figures {
         let figure = |key: &str| figures[key].parse::<usize>().expect("a number");
         assert!(figure("stack") <= STEP_STACK, "{name} {precision}: a step uses {} bytes of stack", figure("stack"));
         let build = figure("build_stack");

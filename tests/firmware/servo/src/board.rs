@@ -1,4 +1,4 @@
-//! What belongs to this board: a serial line and a clock. Another board changes this file, and the memory map.
+//! Board support: serial line and clock. For another board, change this file and the memory map.
 
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
@@ -13,7 +13,7 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 /// Core clock of the mps2-an386 \[Hz\].
 const CLOCK_HZ: f32 = 25_000_000.0;
 
-/// Periods of the clock that have passed.
+/// Number of clock periods since the start.
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 
 #[exception]
@@ -21,14 +21,14 @@ fn SysTick() {
     PERIODS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The clock.
+/// The sample clock.
 pub struct Clock {
     systick: SYST,
     seen: u32,
 }
 
 impl Clock {
-    /// Starts it. Only once: `None` from then on.
+    /// Starts the clock; returns `None` on a second call.
     pub fn start(rate_hz: f32) -> Option<Self> {
         let mut systick = Peripherals::take()?.SYST;
         systick.set_clock_source(SystClkSource::Core);
@@ -39,13 +39,13 @@ impl Clock {
         Some(clock)
     }
 
-    /// Another period, from now on. The counter has 24 bits: the slowest rate is 1.5 Hz.
+    /// Sets the rate from now on. The slowest rate is 1.5 Hz, because the counter has 24 bits.
     pub fn set(&mut self, rate_hz: f32) {
         self.systick.set_reload((CLOCK_HZ / rate_hz) as u32 - 1);
         self.systick.clear_current();
     }
 
-    /// Periods that have passed since it was asked last.
+    /// Returns the number of periods since the last call.
     pub fn passed(&mut self) -> u32 {
         let now = PERIODS.load(Ordering::Relaxed);
         let passed = now.wrapping_sub(self.seen);
@@ -54,7 +54,7 @@ impl Clock {
     }
 }
 
-/// The first serial line of the CMSDK (Arm DDI 0479).
+/// The first UART of the CMSDK (Arm DDI 0479).
 pub struct Uart(());
 
 const UART: usize = 0x4000_4000;
@@ -66,7 +66,7 @@ const SEND_FULL: u32 = 1;
 const RECEIVED: u32 = 2;
 
 fn read(register: usize) -> u32 {
-    // SAFETY: a register of the UART, which this board has there; only `Uart`, of which there is one, reads and writes it.
+    // SAFETY: this board has a UART register at this address. Only `Uart`, which exists once, reads and writes it.
     unsafe { read_volatile(register as *const u32) }
 }
 
@@ -76,11 +76,11 @@ fn write(register: usize, value: u32) {
 }
 
 impl Uart {
-    /// 926 kbit/s, both ways.
+    /// Opens the UART at 926 kbit/s, for both directions.
     pub fn open() -> Self {
         write(DIVIDER, 27);
         write(CONTROL, 0b11);
-        // What stood there before is nobody's.
+        // Discard a byte from before.
         read(DATA);
         Self(())
     }

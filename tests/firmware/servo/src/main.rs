@@ -1,7 +1,7 @@
-//! Reference firmware: an actuator that follows references, at the end of a serial line.
+//! Reference firmware: an actuator that follows references, with a host on a serial line.
 //!
-//! The clock and the line are this board's (`board.rs`), the actuator is a simulated one (`hyst-onboard`); everything else is the same source
-//! as on the host. On a real board `OnBoard` is replaced by the converters.
+//! Clock and line belong to this board (`board.rs`), and the actuator is simulated (`hyst-onboard`). Everything else is the same source
+//! as on the host. On a real board, replace `OnBoard` with the converters.
 #![no_std]
 #![no_main]
 
@@ -20,19 +20,19 @@ use hyst_onboard::{OnBoard, RATE_HZ, REST_V, servo};
 fn main() -> ! {
     let mut line = Uart::open();
     let (mut servo, mut actuator) = (servo(), OnBoard::default());
-    // Whatever stood there before a reset: the device takes it for granted that it begins at rest.
+    // Set the rest voltage, which the device assumes at the start. A reset may leave another output.
     actuator.put_out(REST_V);
     let mut rate_hz = RATE_HZ;
     let Some(mut clock) = Clock::start(rate_hz) else { panic!("SysTick is taken") };
     let mut server = SerialServer::new();
     loop {
-        // Periods for which it comes too late are lost: made up for at once, they would be a jump of the output.
+        // Missed periods are counted but not repeated: several drives at once would be a step of the output.
         if let Some(late) = clock.passed().checked_sub(1) {
             servo.missed(late);
             servo.tick(&mut actuator);
         }
         let Ok(()) = server.poll(&mut servo, &mut line);
-        // Slew, patience and watchdog count periods of the run's rate, of which this board has one; another may leave the host a choice.
+        // Slew limit, tolerances and watchdog count periods of the run's rate. This board has one rate; others may have several.
         if servo.rate_hz() != rate_hz {
             rate_hz = servo.rate_hz();
             clock.set(rate_hz);
@@ -40,8 +40,10 @@ fn main() -> ! {
     }
 }
 
-/// Ends the emulation. A board puts its output to rest first, by the shortest way that does not need what has just failed, and has a hardware watchdog
-/// that does it where even this is not reached.
+/// Ends the emulation.
+///
+/// A real board sets its output to rest here, without the parts that have just failed. A hardware watchdog must do the same if this
+/// function is not reached.
 fn end(status: debug::ExitStatus) -> ! {
     debug::exit(status);
     loop {

@@ -1,4 +1,4 @@
-//! Which experiment comes next, and why.
+//! Choice of the next experiment.
 
 use hyst_hw::{Daq, RecordOptions};
 use hyst_ident::diagnose::Findings;
@@ -14,11 +14,11 @@ use crate::{host, recording};
 /// A drive that was played.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Experiment {
-    /// What it is.
+    /// Name of the drive.
     pub(super) drive: &'static str,
-    /// How long it took, rests included \[s\].
+    /// Duration, rests included \[s\].
     pub(super) seconds: f64,
-    /// What it was chosen for, where experiments are chosen.
+    /// Purpose, if experiments are chosen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) why: Option<String>,
 }
@@ -27,10 +27,10 @@ pub(super) struct Experiment {
 pub(super) struct Plan {
     limits: Limits,
     seed: u64,
-    /// Chooses experiments; `None` for the usual ones.
+    /// Chooses experiments; `None` for identification drives.
     planner: Option<Planner>,
     spent: f64,
-    /// What comes next, if it was chosen.
+    /// Next experiment, if it was chosen.
     next: Option<Box<experiment::Experiment>>,
 }
 
@@ -43,19 +43,19 @@ impl Plan {
         Self { limits, seed: args.seed, planner, spent: 0.0, next: None }
     }
 
-    /// Time of all experiments so far \[s\].
+    /// Returns the time of all experiments so far \[s\].
     pub(super) fn spent(&self) -> f64 {
         self.spent
     }
 
-    /// Lets no later drive be steeper \[V/s\], and begins anew.
+    /// Limits the slope of all later drives \[V/s\] and starts again.
     pub(super) fn stay_below(&mut self, v_per_s: f64) {
         self.limits.slew_v_per_s = Some(v_per_s);
         self.planner.iter_mut().for_each(|planner| planner.stay_below(v_per_s));
         self.next = None;
     }
 
-    /// Plays the next experiment.
+    /// Plays the next experiment; returns it with its record.
     pub(super) fn play(&mut self, daq: &mut impl Daq, turn: u32) -> CommandResult<(Experiment, Record)> {
         let (drive, name, why) = match (self.next.take(), &mut self.planner) {
             (Some(next), _) => (next.drive, next.name, Some(next.why)),
@@ -79,7 +79,8 @@ impl Plan {
         Ok((Experiment { drive: name, seconds, why }, record))
     }
 
-    /// Looks at what is open, and chooses the next experiment; the second part states why there is none.
+    /// Chooses the next experiment.
+    /// Returns the undecided questions, and the reason if there is no next experiment.
     pub(super) fn next(
         &mut self,
         findings: &Findings,

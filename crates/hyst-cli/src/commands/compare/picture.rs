@@ -1,4 +1,4 @@
-//! One picture of a comparison: how large the errors of all models are, and what each of them leaves.
+//! Picture of a comparison: errors and residuals of all models.
 
 use hyst_ident::compare::{Compared, Comparison, SortedBy};
 use hyst_ident::record::Record;
@@ -12,7 +12,7 @@ use crate::text;
 const TRAIN: RGBColor = RGBColor(30, 110, 190);
 const TEST: RGBColor = RGBColor(200, 80, 40);
 
-/// The picture; the residuals are those of `record`.
+/// Draws the picture; the residuals are those of `record`.
 pub(super) fn draw(
     format: Format,
     comparison: &Comparison,
@@ -24,7 +24,7 @@ pub(super) fn draw(
     format.draw(size, |root| panels(root, comparison, record, predicted))
 }
 
-/// Columns and rows of residual panels.
+/// Returns the numbers of columns and rows of the panels of residuals.
 fn panels_of(models: &[Compared]) -> (usize, usize) {
     let columns = (models.len() as f64).sqrt().ceil() as usize;
     (columns, models.len().div_ceil(columns.max(1)))
@@ -41,17 +41,18 @@ fn panels(root: &Area<'_>, comparison: &Comparison, record: &Record, predicted: 
     let (left, right) = root.split_horizontally(520);
     errors(&left, models, unit)?;
     let input = models.first().map_or("", |m| &m.fit.model.input.unit);
-    let caption = format!("measured − model [{unit}] against the input [{input}], all on one scale");
+    let caption = format!("measured − model [{unit}] over input [{input}], all on one scale");
     let right = right.titled(&caption, ("sans-serif", 16))?;
     let settling = if tested { &comparison.test_settling } else { &comparison.train_settling };
     let measured = record.output().unwrap_or_default();
-    // In a piece for each segment, without the rows that do not count.
+    // One piece for each segment, without start-up rows.
     let residual = |model: &Compared| -> Vec<Vec<(f64, f64)>> {
         let row = |k: usize| (!settling[k]).then(|| (record.input()[k], measured[k] - predicted(model)[k]));
         record.segments().iter().map(|rows| rows.clone().filter_map(row).collect()).collect()
     };
     let residuals: Vec<_> = models.iter().map(residual).collect();
-    // A model that is far off would flatten all others: the scale is that of the median model, and the far ones leave it.
+    // The scale follows the model with the median error; larger residuals are clipped, so that one bad model does not
+    // flatten all others.
     let mut most: Vec<f64> = residuals
         .iter()
         .map(|pieces| pieces.iter().flatten().fold(0.0, |most: f64, (_, r)| most.max(r.abs())))
@@ -70,12 +71,12 @@ fn panels(root: &Area<'_>, comparison: &Comparison, record: &Record, predicted: 
     Ok(())
 }
 
-/// Dots of RMSE on a logarithmic axis, the best on top.
+/// Draws the RMSE of all models on a logarithmic axis, the best one on top.
 fn errors(area: &Area<'_>, models: &[Compared], unit: &str) -> Drawn {
     let of = |m: &Compared| [Some((m.train, TRAIN)), m.test.map(|test| (test, TEST))];
     let all = || models.iter().flat_map(of).flatten().map(|(figures, _)| figures.errors.rmse).filter(|x| *x > 0.0);
     let (low, high) = all().fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
-    // A model without error has no place on the axis; if none has one, any axis does.
+    // An RMSE of zero is not on the axis; without any other RMSE the axis is arbitrary.
     let (low, high) = if low.is_finite() { (low / 2.0, high * 1.6) } else { (0.1, 1.0) };
     let count = models.len() as f64;
     let mut chart = ChartBuilder::on(area)
@@ -122,7 +123,7 @@ fn errors(area: &Area<'_>, models: &[Compared], unit: &str) -> Drawn {
     Ok(())
 }
 
-/// Text that ends at its point.
+/// Alignment of text that ends at its point.
 fn text_right() -> plotters::style::text_anchor::Pos {
     use plotters::style::text_anchor::{HPos, Pos, VPos};
     Pos::new(HPos::Right, VPos::Center)

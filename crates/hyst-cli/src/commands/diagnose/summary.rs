@@ -1,4 +1,4 @@
-//! Findings as a person reads them.
+//! Findings as text for the terminal.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use hyst_ident::diagnose::{Finding, Findings, FoundErrors};
 use crate::report::{next::Advice, words};
 use crate::text::{percent, short, symbol, table};
 
-/// Verdict, errors before and after, each effect, what is left, and what to do next.
+/// Returns verdict, errors before and after, effects, remainder and next steps.
 pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
     let unit = symbol(&findings.unit);
     let mut text = format!("{}\n\n{}", words::verdict(findings), errors(findings, unit));
@@ -19,7 +19,8 @@ pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
     if words::worse_on_test(findings) {
         let _ = writeln!(
             text,
-            "WARNING: on the test record the error grew; do not use the extended model. The training record may not show\nenough to tell effects apart: record the drive of `hystctl excite identification`."
+            "WARNING: on the test record the extended model has a larger error; do not use it. The training record may not be\n\
+             sufficient to distinguish effects: record the drive of `hystctl excite identification`."
         );
     }
     for effect in &findings.effects {
@@ -40,7 +41,7 @@ pub(super) fn of(findings: &Findings, next: &[Advice]) -> String {
     }
     let limits = words::limits(findings);
     if !limits.is_empty() {
-        let _ = writeln!(text, "\nnot named; this record would have shown it from this size on:");
+        let _ = writeln!(text, "\nnot named; limits of detection (smallest size that this record would have shown):");
         let rows: Vec<Vec<String>> =
             limits.into_iter().map(|(name, size, of)| vec![format!("  {name}"), size, of]).collect();
         text.push_str(&table(&rows));
@@ -89,7 +90,11 @@ fn finding(effect: &Finding, unit: &str) -> String {
     }
     for tie in effect.alternatives.iter().filter(|other| other.indistinguishable) {
         let rmse = short(tie.cv_rmse);
-        let _ = writeln!(text, "  this record cannot tell it from {} (cross-validated RMSE {rmse} {unit})", tie.name);
+        let _ = writeln!(
+            text,
+            "  this record cannot distinguish it from {} (cross-validated RMSE {rmse} {unit})",
+            tie.name
+        );
     }
     let others: Vec<String> = effect
         .alternatives
@@ -98,7 +103,7 @@ fn finding(effect: &Finding, unit: &str) -> String {
         .map(|other| format!("{} {} {unit}", other.name, short(other.cv_rmse)))
         .collect();
     if !others.is_empty() {
-        let _ = writeln!(text, "  tried in its place: {}", others.join(", "));
+        let _ = writeln!(text, "  alternatives (cross-validated RMSE): {}", others.join(", "));
     }
     text
 }

@@ -1,4 +1,4 @@
-//! `excite separate`: the drive that tells two effects apart.
+//! `excite separate`: makes the drive that separates two effects best.
 
 use hyst_ident::excite::{Limits, SeparateOptions, Separation, Tried, Verdict, separate};
 use serde::Serialize;
@@ -10,7 +10,7 @@ use crate::output::{self, Report};
 use crate::progress::Progress;
 use crate::text;
 
-/// What is said about a separation.
+/// Report of a separation.
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     output: String,
@@ -19,7 +19,7 @@ struct Summary<'a> {
     verdict: Verdict,
     reason: &'a str,
     rows: usize,
-    /// Steepest slope \[V/s\].
+    /// Maximum slope \[V/s\].
     steepest_v_per_s: f64,
     segments: &'a [&'static str],
     tried: &'a [Tried],
@@ -56,21 +56,22 @@ pub(super) fn run(args: &SeparateArgs) -> CommandResult {
     report.print(&summary.text(&found), &summary)
 }
 
-/// Drives that are listed.
-const LISTED: usize = 6;
+/// Maximum number of drives in the printed table.
+const MAX_LISTED: usize = 6;
 
 impl Summary<'_> {
     fn text(&self, found: &Separation) -> String {
         let head = [
-            "left, as multiples of the noise",
-            &format!("of {} by {}", self.first, self.second),
-            &format!("of {} by {}", self.second, self.first),
+            "residual / noise",
+            &format!("{} fitted by {}", self.first, self.second),
+            &format!("{} fitted by {}", self.second, self.first),
         ];
         let row = |t: &Tried| vec![t.drive.to_owned(), text::short(t.first_left), text::short(t.second_left)];
-        let rows: Vec<Vec<String>> =
-            std::iter::once(head.map(str::to_owned).to_vec()).chain(found.tried.iter().take(LISTED).map(row)).collect();
+        let rows: Vec<Vec<String>> = std::iter::once(head.map(str::to_owned).to_vec())
+            .chain(found.tried.iter().take(MAX_LISTED).map(row))
+            .collect();
         format!(
-            "{}\n\n{}\n{}: {}, steepest slope {} V/s, {}: {}",
+            "{}\n\n{}\n{}: {}, maximum slope {} V/s, {}: {}",
             self.reason,
             text::table(&rows),
             self.output,

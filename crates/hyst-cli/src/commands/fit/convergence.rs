@@ -1,4 +1,4 @@
-//! How the searches of a fit went: a table of every generation, and a picture of it.
+//! Convergence of the searches of a fit: a table of all generations, and a picture.
 
 use std::io::{self, Write};
 
@@ -16,13 +16,13 @@ const BEST: RGBColor = RGBColor(200, 80, 40);
 const OTHERS: RGBColor = RGBColor(150, 170, 190);
 const POLISHED: RGBColor = RGBColor(30, 110, 190);
 
-/// Writes what `--trace` and `--picture` ask for.
+/// Writes the table of `--trace` and the picture of `--picture`.
 pub(super) fn write(args: &FitArgs, trials: &Trials, polished: Option<f64>, unit: &str) -> CommandResult {
     if let Some(target) = &args.trace {
         target.write(|out| table(out, trials))?;
     }
     if let Some(target) = &args.picture {
-        let title = format!("{}, {}: how the search went", args.model, text::count(trials.found.len(), "trial"));
+        let title = format!("{}, {}: convergence of the search", args.model, text::count(trials.found.len(), "trial"));
         let lines = trials.variables.len().div_ceil(columns(trials));
         let size = (1400, 460 + 260 * u32::try_from(lines).unwrap_or(1));
         let picture = Format::of(target)?.draw(size, |root| panels(root, &title, trials, polished, unit))?;
@@ -31,19 +31,19 @@ pub(super) fn write(args: &FitArgs, trials: &Trials, polished: Option<f64>, unit
     Ok(())
 }
 
-/// Refuses to show a search where there was none; before anything is written.
+/// Refuses `--trace` and `--picture` for a fit without a search; called before anything is written.
 pub(super) fn check(args: &FitArgs, fit: &Fit) -> CommandResult {
-    let asked = [("--trace", args.trace.is_some()), ("--picture", args.picture.is_some())];
-    match asked.iter().find(|(_, asked)| *asked) {
+    let given = [("--trace", args.trace.is_some()), ("--picture", args.picture.is_some())];
+    match given.iter().find(|(_, given)| *given) {
         Some((option, _)) if fit.trials.is_none() => Err(CommandError::bad_input(format!(
-            "{option} shows a search, and {} was fitted without one ({}); leave it out or choose a model with something to search",
+            "{option} shows a search, but {} was fitted without one ({}); leave {option} out or give a model that is searched",
             args.model, fit.how
         ))),
         _ => Ok(()),
     }
 }
 
-/// Every generation of every trial: its lowest cost so far and where that is.
+/// Writes all generations of all trials: lowest cost so far, and its variables.
 fn table(out: &mut dyn Write, trials: &Trials) -> io::Result<()> {
     write!(out, "trial,generation,evaluations,cost")?;
     for variable in &trials.variables {
@@ -62,7 +62,7 @@ fn table(out: &mut dyn Write, trials: &Trials) -> io::Result<()> {
     Ok(())
 }
 
-/// Variables side by side.
+/// Returns the number of columns of the panels of variables.
 fn columns(trials: &Trials) -> usize {
     trials.variables.len().clamp(1, 4)
 }
@@ -77,10 +77,10 @@ fn panels(root: &Area<'_>, title: &str, trials: &Trials, polished: Option<f64>, 
     let by_evaluations = |row: &TraceRow| (row.evaluations as f64, row.cost);
     let mut costs = Chart::new("lowest cost so far", "evaluations", &format!("RMS [{unit}]")).logarithmic();
     every_trial(&mut costs, trials, &by_evaluations);
-    if let Some(left) = polished {
+    if let Some(cost) = polished {
         let last = trials.found.iter().map(|f| f.evaluations).max().unwrap_or(0) as f64;
-        let name = format!("after Levenberg-Marquardt: {} {unit}", text::short(left));
-        costs.curve(&name, POLISHED, &[vec![(0.0, left), (last, left)]]);
+        let name = format!("after Levenberg-Marquardt: {} {unit}", text::short(cost));
+        costs.curve(&name, POLISHED, &[vec![(0.0, cost), (last, cost)]]);
     }
     costs.draw(&left)?;
     if let (true, Some(spread)) = (several, trials.costs()) {
@@ -96,7 +96,7 @@ fn panels(root: &Area<'_>, title: &str, trials: &Trials, polished: Option<f64>, 
     Ok(())
 }
 
-/// A line for each trial, the best one in front.
+/// Adds a line for each trial; the best one is drawn last.
 fn every_trial(chart: &mut Chart, trials: &Trials, point: &dyn Fn(&TraceRow) -> (f64, f64)) {
     let line = |found: &Found| -> Vec<(f64, f64)> { found.trace.iter().map(point).collect() };
     let Some(best) = trials.best() else { return };
@@ -107,12 +107,12 @@ fn every_trial(chart: &mut Chart, trials: &Trials, point: &dyn Fn(&TraceRow) -> 
     chart.curve(if others.is_empty() { "the trial" } else { "best trial" }, BEST, &[line(best)]);
 }
 
-/// Quartiles and extremes of the costs at the end, and each of them as a point.
+/// Draws quartiles and extremes of the final costs, and each final cost as a point.
 fn box_plot(area: &Area<'_>, found: &[Found], spread: &Spread, unit: &str) -> Drawn {
     let Spread { lowest, lower_quartile, median, upper_quartile, highest } = *spread;
     let room = 0.08 * (highest - lowest).max(1e-3 * highest.abs()).max(f64::MIN_POSITIVE);
     let mut chart = ChartBuilder::on(area)
-        .caption("costs at the end", ("sans-serif", 18))
+        .caption("final costs", ("sans-serif", 18))
         .margin(8)
         .x_label_area_size(38)
         .y_label_area_size(90)

@@ -1,14 +1,14 @@
-//! What is said of a measured Everett surface and of a mirror function.
+//! Reports about a measured Everett surface and a mirror function.
 
 use hyst_ident::everett::{Breach, BreachRule, ClassicalPart, DpmReport, FodReport, PeakShape};
 use hyst_ident::model::Model;
 
 use crate::text;
 
-/// Rows of a table that a person reads; `--json` has all of them.
-const SHOWN: usize = 20;
+/// Maximum number of rows of a printed table; `--json` has all rows.
+const MAX_ROWS: usize = 20;
 
-/// Notes for stderr: what is wrong with a surface and what was done about it, what a mirror function does not know.
+/// Returns notes about violations of a surface, and about undetermined nodes of a mirror function.
 pub(super) fn notes(surface: Option<&FodReport>, dynamics: Option<&DpmReport>, model: &Model) -> Vec<String> {
     let (unit, input) = (text::symbol(&model.output.unit), model.input.unit.as_str());
     let classical = dynamics.and_then(|d| match &d.classical {
@@ -22,7 +22,9 @@ pub(super) fn notes(surface: Option<&FodReport>, dynamics: Option<&DpmReport>, m
         }
         notes.extend(report.moved.map(|m| {
             format!(
-                "note: the measured surface falls somewhere, so the nearest valid one was taken: {} moved by more than their standard error, the farthest by {} {unit} ({} standard errors), all of them by {} {unit} RMS; --as-measured refuses that",
+                "note: the measured surface is not monotone; the nearest monotone surface was taken. {} changed by more \
+                 than their standard error, by {} {unit} at most ({} standard errors) and {} {unit} RMS; --as-measured \
+                 refuses such a surface",
                 text::count(m.nodes, "node"),
                 text::short(m.largest),
                 text::short(m.largest_sigmas),
@@ -34,7 +36,7 @@ pub(super) fn notes(surface: Option<&FodReport>, dynamics: Option<&DpmReport>, m
         let mut rows = vec![vec![format!("rate [{input}/s]"), format!("change [{input}]")]];
         rows.extend(report.untouched.iter().map(|n| vec![text::short(n.rate), text::short(n.change)]));
         notes.push(format!(
-            "note: no row comes near {} of the mirror function; there it follows their neighbours:\n{}",
+            "note: no row is near {} of the mirror function; the values there follow from neighbouring nodes:\n{}",
             text::count(report.untouched.len(), "node"),
             text::table(&rows)
         ));
@@ -45,7 +47,7 @@ pub(super) fn notes(surface: Option<&FodReport>, dynamics: Option<&DpmReport>, m
 fn breaches(all: &[Breach], unit: &str, input: &str) -> String {
     let head = ["rule", &format!("alpha [{input}]"), &format!("beta [{input}]"), &format!("by [{unit}]"), "sigmas"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    rows.extend(all.iter().take(SHOWN).map(|b| {
+    rows.extend(all.iter().take(MAX_ROWS).map(|b| {
         let rule = match b.rule {
             BreachRule::Positive => "is negative",
             BreachRule::RisesWithAlpha => "falls with alpha",
@@ -53,16 +55,18 @@ fn breaches(all: &[Breach], unit: &str, input: &str) -> String {
         };
         vec![rule.to_owned(), text::short(b.alpha), text::short(b.beta), text::short(b.by), text::short(b.sigmas)]
     }));
-    let more = all.len().saturating_sub(SHOWN);
+    let more = all.len().saturating_sub(MAX_ROWS);
     let rest = if more > 0 { format!("and {more} more, which --json lists\n") } else { String::new() };
     format!(
-        "warning: in {} the measured surface is no Everett surface, by more than 3 standard errors:\n{}{rest}a structure that rings does this: drive half-sine peaks of several durations, with rest between them",
+        "warning: in {} the measured surface violates the conditions of an Everett surface by more than 3 standard \
+         errors:\n{}{rest}a ringing structure causes this: record half-sine peaks of several durations with rests \
+         between them (hystctl excite forc --seconds 1,2,4)",
         text::count(all.len(), "cell"),
         text::table(&rows)
     )
 }
 
-/// The measured surface in two lines.
+/// Describes the measured surface in two lines.
 pub(super) fn measured(s: &FodReport, unit: &str) -> String {
     let family = |f: &hyst_ident::everett::Family| {
         let shape = match f.shape {
@@ -74,13 +78,14 @@ pub(super) fn measured(s: &FodReport, unit: &str) -> String {
     };
     let families: Vec<String> = s.families.iter().map(family).collect();
     let scatter =
-        s.scatter.map_or_else(String::new, |x| format!(", durations differ by {} {unit} RMS", text::short(x)));
-    let passed = match s.passed_over {
+        s.scatter.map_or_else(String::new, |x| format!(", difference between durations {} {unit} RMS", text::short(x)));
+    let ignored = match s.passed_over {
         0 => String::new(),
-        n => format!("; {} passed over", text::count(n, "other excursion")),
+        n => format!("; {} ignored", text::count(n, "other excursion")),
     };
     format!(
-        "Everett surface of {} cells a side from first-order descent curves: {}{passed}\nnoise {} {unit}, standard error of a node up to {} {unit}{scatter}, {} violated",
+        "Everett surface of {} cells per side from first-order descent curves: {}{ignored}\nnoise {} {unit}, standard error \
+         of a node up to {} {unit}{scatter}, conditions violated in {}",
         s.cells,
         text::listed(&families),
         text::short(s.noise),
@@ -89,18 +94,19 @@ pub(super) fn measured(s: &FodReport, unit: &str) -> String {
     )
 }
 
-/// The mirror function in a few lines.
+/// Describes the mirror function in a few lines.
 pub(super) fn dynamics(d: &DpmReport, unit: &str, input: &str) -> String {
     let classical = match &d.classical {
         ClassicalPart::Fod(report) => measured(report, unit),
         ClassicalPart::LeastSquares => "classical part by least squares".to_owned(),
     };
     let bound = if d.bound == 0 { String::new() } else { format!(", {} at a bound", text::count(d.bound, "node")) };
-    let left_out = d
-        .rmse_left_out
-        .map_or_else(String::new, |e| format!(", {} {unit} each with what the others say", text::short(e)));
+    let left_out =
+        d.rmse_left_out.map_or_else(String::new, |e| format!(", {} {unit} cross-validated by segment", text::short(e)));
     format!(
-        "{classical}\n{} of about {} {input}/s, up to {} {input}/s in the others\nmirror function from {} to {}{bound}, steps fade over {} {input}\nRMSE of the faster segments {} {unit} without the mirror function, {} {unit} with it{left_out}",
+        "{classical}\n{} of about {} {input}/s, up to {} {input}/s in the other segments\nmirror function from {} to \
+         {}{bound}, steps fade over {} {input}\nRMSE of the faster segments {} {unit} without the mirror function, {} \
+         {unit} with it{left_out}",
         text::count(d.slow_segments, "slow segment"),
         text::short(d.rates[0]),
         text::short(d.rates[1]),

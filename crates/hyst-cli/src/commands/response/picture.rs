@@ -14,12 +14,12 @@ const MEASURED: RGBColor = RGBColor(30, 110, 190);
 const MODEL: RGBColor = RGBColor(200, 80, 40);
 const FAINT: RGBColor = RGBColor(150, 150, 150);
 
-/// The picture.
+/// Draws the picture.
 pub(super) fn draw(format: Format, found: &Structure, unit: &str, title: &str) -> CommandResult<Vec<u8>> {
     format.draw((1100, 1000), |root| panels(root, &Shown::new(found), unit, title))
 }
 
-/// What is shown, up to the end of the band: above it is noise.
+/// Data of the picture, up to the end of the band; above the band there is only noise.
 struct Shown<'a> {
     hz: Range<f64>,
     lines: Vec<&'a ResponseLine>,
@@ -59,7 +59,7 @@ fn panels(root: &Area<'_>, shown: &Shown<'_>, unit: &str, title: &str) -> Drawn 
     Ok(())
 }
 
-/// Axes with a grid that all panels have in common.
+/// Creates axes with the grid of all panels.
 macro_rules! axes {
     ($area:expr, $hz:expr, $y:expr, $x_room:expr) => {{
         let mut builder = ChartBuilder::on($area);
@@ -88,7 +88,7 @@ macro_rules! mesh {
 fn gain(area: &Area<'_>, shown: &Shown<'_>, unit: &str) -> Drawn {
     let values = shown.lines.iter().map(|l| l.gain).chain(shown.model.iter().map(|m| m.1)).filter(|g| *g > 0.0);
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), g| (low.min(g), high.max(g)));
-    // Room above for the names of the modes.
+    // Room at the top for the names of the modes.
     let (low, high) = (low.max(1e-6 * high) / 1.6, high * 4.0);
     let mut chart = axes!(area, shown.hz, (low..high).log_scale(), 24);
     mesh!(chart, format!("gain [{unit}]"), 10, &|y: &f64| tick(*y), "");
@@ -112,13 +112,13 @@ fn gain(area: &Area<'_>, shown: &Shown<'_>, unit: &str) -> Drawn {
         .draw_series([PathElement::new(model, MODEL.stroke_width(1))])?
         .label(format!("ARMAX of order {}", shown.order))
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], MODEL.stroke_width(1)));
-    // Modes that stand out, at changing heights so that neighbours do not cover each other.
+    // Names of the large modes, at alternating heights so that neighbours do not overlap.
     let tallest = shown.modes.iter().fold(0.0_f64, |most, m| most.max(m.peak));
     let named = shown.modes.iter().filter(|m| m.peak > 0.02 * tallest && m.damping < 0.3);
     for (k, mode) in named.enumerate() {
         let name = format!("{} Hz, damping {}", text::short(mode.hz), text::percent(100.0 * mode.damping));
         let height = high / f64::powi(1.3, 1 + (k % 3) as i32);
-        // On the side of the line that has more room.
+        // The name is on the side of the line with more room.
         let left = mode.hz > (shown.hz.start * shown.hz.end).sqrt();
         let (at, side) = if left { (mode.hz / 1.01, HPos::Right) } else { (mode.hz * 1.01, HPos::Left) };
         let style = ("sans-serif", 13).into_font().color(&BLACK.mix(0.75)).pos(Pos::new(side, VPos::Center));
@@ -141,7 +141,7 @@ fn phase(area: &Area<'_>, shown: &Shown<'_>) -> Drawn {
     let measured: Vec<(f64, f64)> = shown.lines.iter().map(|l| (l.hz, l.phase.to_degrees() / 90.0)).collect();
     let model: Vec<(f64, f64)> = shown.model.iter().map(|m| (m.0, m.2)).collect();
     for (line, style) in [(measured, MEASURED.mix(0.5).stroke_width(4)), (model, MODEL.stroke_width(1))] {
-        // A line that passes ±180° goes on at the other side.
+        // A line that crosses ±180° continues on the other side.
         for piece in line.chunk_by(|a, b| (a.1 - b.1).abs() < 2.0) {
             chart.draw_series([PathElement::new(piece.to_vec(), style)])?;
         }
@@ -157,7 +157,7 @@ fn coherence(area: &Area<'_>, shown: &Shown<'_>) -> Drawn {
     Ok(())
 }
 
-/// A number on an axis: as short as it is exact.
+/// Formats a number on an axis as short as possible.
 fn tick(x: f64) -> String {
     let usual = x == 0.0 || (1e-3..1e5).contains(&x.abs());
     if usual { format!("{}", (x * 1e6).round() / 1e6) } else { format!("{x:.0e}") }

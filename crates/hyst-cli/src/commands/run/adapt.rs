@@ -1,4 +1,4 @@
-//! `--adapt`: the inverse aims at what the measured output, against the predicted one, asks for.
+//! `--adapt`: corrects the target of the inverse by the residual of the model.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -17,17 +17,19 @@ use crate::exit::{CommandError, CommandResult};
 use crate::output::{self, Target};
 use crate::text;
 
-/// Plays between predicted and measured output, and all numbers: gain, weights, zero.
+/// Number of play operators between predicted and measured output.
+/// The adapted numbers are their weights, the gain and the zero.
 const PLAYS: usize = 4;
 const NUMBERS: usize = PLAYS + 2;
 
-/// Least and greatest residual of a model that an update is weighed by, as a share of its output's range: a fit to a record of its own knows less than it says.
-const SIGMA: (f64, f64) = (1e-3, 0.05);
-/// A change is logged from this share on, of the gain or of the output's range.
-const LOGGED: f64 = 0.005;
+/// Bounds of the residual that weights an update, as a share of the output range.
+/// The residual of a fit underestimates the error on other records, and a model without one has the upper bound.
+const SIGMA_BOUNDS: (f64, f64) = (1e-3, 0.05);
+/// Minimum change that is logged, as a share of the gain or of the output range.
+const MIN_LOGGED_CHANGE: f64 = 0.005;
 const DAY_S: f64 = 86_400.0;
 
-/// What is adapted, by the computation of the drive and by the model beside the device.
+/// The adaptation, shared by the computation of the drive and the parallel model.
 #[derive(Clone, Debug)]
 pub(in crate::commands) struct Adapting(Rc<RefCell<Inner>>);
 
@@ -36,38 +38,38 @@ struct Inner {
     how: Adaptation<f64, PLAYS, NUMBERS>,
     state: Adapted<f64, PLAYS, NUMBERS>,
     span: f64,
-    /// Whether the estimate was updated since the change was looked at.
+    /// Whether the estimate was updated since the last call of `new_change`.
     updated: bool,
     logged: Change,
-    /// What an earlier run knew.
+    /// Adaptation of an earlier run.
     kept: Option<Kept>,
     model_sha256: String,
 }
 
-/// How the actuator differs from its model.
+/// Difference between the actuator and its model.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub(super) struct Change {
-    /// Of a stroke over the whole range \[%\].
+    /// Change of the gain of a stroke over the whole range \[%\].
     pub(super) gain_percent: f64,
-    /// How much wider the loop of such a stroke is, in its middle \[output unit\].
+    /// Change of the loop width of such a stroke, in the middle of the range \[output unit\].
     pub(super) loop_width: f64,
-    /// \[output unit\]
+    /// Change of the zero \[output unit\].
     pub(super) zero: f64,
-    /// Updates of the estimate.
+    /// Number of updates of the estimate.
     pub(super) updates: u32,
-    /// Since the first run of the kept adaptation \[s\]; none of a run on its own.
+    /// Time since the first run of a saved adaptation \[s\]; `None` without one.
     pub(super) over_s: Option<f64>,
 }
 
-/// A file of what was learned.
+/// File of an adaptation.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Kept {
-    /// Of the model's file.
+    /// SHA-256 of the model file.
     model_sha256: String,
-    /// When the first run began, in seconds since 1970.
+    /// Start of the first run \[s since 1970\].
     since_unix_s: f64,
-    /// Gain, weights of the plays, zero over the output's range.
+    /// Gain, weights of the play operators, and zero over the output range.
     numbers: Vec<f64>,
 }
 
@@ -76,16 +78,18 @@ fn now_unix_s() -> f64 {
 }
 
 impl Adapting {
-    /// For a model; from what `file` keeps, if it is there.
+    /// Creates the adaptation of a model; continues from `file` if it exists.
     pub(super) fn new(model: &Model, json: &str, file: Option<&Path>) -> CommandResult<Self> {
         if model.between_samples != BetweenSamples::Linear {
             return Err(CommandError::bad_input(
-                "--adapt needs a model that can be run as the drive comes; this one has to know all of it (band-limited)",
+                "--adapt needs a model that runs sample by sample, but a model with a band-limited drive between samples needs \
+                 the whole drive; fit one with --between-samples linear",
             ));
         }
         let range = (model.output.low, model.output.high);
         let span = range.1 - range.0;
-        let sigma = model.rmse.map_or(SIGMA.1, |rmse| (rmse / span).clamp(SIGMA.0, SIGMA.1));
+        let (least, greatest) = SIGMA_BOUNDS;
+        let sigma = model.rmse.map_or(greatest, |rmse| (rmse / span).clamp(least, greatest));
         let options = AdaptationOptions { sigma, ..AdaptationOptions::default() };
         let how = Adaptation::new(range, &options).map_err(CommandError::bad_input)?;
         let model_sha256 = format!("{:x}", Sha256::digest(json));
@@ -105,7 +109,7 @@ impl Adapting {
         }))))
     }
 
-    /// Where the inverse has to aim to reach `reference`; whether a segment begins with it.
+    /// Returns the target of the inverse for `reference`; `begins` marks the first row of a segment.
     pub(super) fn aim(&self, begins: bool, reference: f64) -> f64 {
         let Inner { how, state, .. } = &mut *self.0.borrow_mut();
         if begins {
@@ -114,26 +118,26 @@ impl Adapting {
         how.aim(state, reference)
     }
 
-    /// The device was at rest, and so is the model.
+    /// Starts a segment: the model is at rest, like the device.
     pub(super) fn begin_segment(&self) {
         let Inner { how, state, .. } = &mut *self.0.borrow_mut();
         how.see_anew(state);
     }
 
-    /// Takes the zero that the sensor has before a reference begins \[output unit\].
+    /// Sets the sensor zero before a reference \[output unit\].
     pub(super) fn zero(&self, zero: f64) {
         let Inner { how, state, .. } = &mut *self.0.borrow_mut();
         how.set_zero(state, zero);
     }
 
-    /// Takes a sample, and gives the output that was expected.
+    /// Takes a sample; returns the predicted output of the adapted model.
     pub(super) fn take(&self, predicted: f64, measured: f64, trusted: bool) -> f64 {
         let Inner { how, state, updated, .. } = &mut *self.0.borrow_mut();
         *updated |= how.learn(state, predicted, measured, trusted);
         how.expected(state, predicted).unwrap_or(predicted)
     }
 
-    /// How the actuator differs from its model by now.
+    /// Returns the present difference between the actuator and its model.
     pub(super) fn change(&self) -> Change {
         let Inner { how, state, span, kept, .. } = &*self.0.borrow();
         Change {
@@ -145,21 +149,21 @@ impl Adapting {
         }
     }
 
-    /// The same, if it is another one than was given last.
-    pub(super) fn news(&self) -> Option<Change> {
+    /// Returns the difference if it has changed by more than [`MIN_LOGGED_CHANGE`] since the last one.
+    pub(super) fn new_change(&self) -> Option<Change> {
         if !std::mem::take(&mut self.0.borrow_mut().updated) {
             return None;
         }
         let now = self.change();
         let Inner { logged, span, .. } = &mut *self.0.borrow_mut();
-        let moved = (now.gain_percent - logged.gain_percent).abs() > 100.0 * LOGGED
-            || (now.loop_width - logged.loop_width).abs() > LOGGED * *span
-            || (now.zero - logged.zero).abs() > LOGGED * *span;
+        let moved = (now.gain_percent - logged.gain_percent).abs() > 100.0 * MIN_LOGGED_CHANGE
+            || (now.loop_width - logged.loop_width).abs() > MIN_LOGGED_CHANGE * *span
+            || (now.zero - logged.zero).abs() > MIN_LOGGED_CHANGE * *span;
         moved.then(|| *logged = now)?;
         Some(now)
     }
 
-    /// Keeps what was learned for the next run.
+    /// Saves the adaptation for the next run.
     pub(super) fn keep(&self, file: &Path) -> CommandResult {
         let Inner { state, kept, model_sha256, .. } = &*self.0.borrow();
         let kept = Kept {
@@ -177,17 +181,15 @@ impl Kept {
         let name = file.display();
         let text = fs::read_to_string(file).map_err(|error| CommandError::bad_input(format!("{name}: {error}")))?;
         let kept: Self = serde_json::from_str(&text).map_err(|error| {
-            CommandError::bad_input(format!("{name}: {error}; give a file that --adapt wrote, or a new name"))
+            CommandError::bad_input(format!("{name}: {error}; give a file that --adapt wrote or a new name"))
         })?;
         let finite = kept.numbers.iter().chain([&kept.since_unix_s]).all(|x| x.is_finite());
         if kept.numbers.len() != NUMBERS || !finite {
-            let message = format!("{name}: numbers has to hold {NUMBERS} finite numbers; give a new name");
+            let message = format!("{name}: the field numbers needs {NUMBERS} finite numbers; give a new name");
             return Err(CommandError::bad_input(message));
         }
         if kept.model_sha256 != model_sha256 {
-            let message = format!(
-                "{name}: this was learned beside another model; give that model, or a new name for what this one lacks"
-            );
+            let message = format!("{name}: this adaptation belongs to another model; give that model or a new name");
             return Err(CommandError::bad_input(message));
         }
         Ok(kept)
@@ -195,7 +197,7 @@ impl Kept {
 }
 
 impl Change {
-    /// In words.
+    /// Returns the difference as a sentence.
     pub(super) fn text(&self, unit: &str) -> String {
         let over = match self.over_s {
             Some(over) if over >= DAY_S => format!(" in {:.0} days", over / DAY_S),
@@ -203,14 +205,14 @@ impl Change {
             _ => String::new(),
         };
         format!(
-            "gain {:+.2} %{over}, loop wider by {} {unit}, zero {:+.3e} {unit}, against the model",
+            "gain {:+.2} %{over}, loop wider by {} {unit}, zero {:+.3e} {unit}, relative to the model",
             self.gain_percent,
             text::short(self.loop_width),
             self.zero
         )
     }
 
-    /// As a log has it.
+    /// Returns metadata of a log.
     pub(super) fn entries(&self) -> BTreeMap<String, String> {
         BTreeMap::from([
             ("gain_percent".to_owned(), self.gain_percent.to_string()),

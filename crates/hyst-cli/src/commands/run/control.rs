@@ -1,4 +1,4 @@
-//! A PID on the host: around a feedforward, or alone.
+//! A PID on this computer, with or without a feedforward.
 
 use hyst_core::{Build, Pid, PidParams, PidState, Sampling};
 use hyst_hw::Revision;
@@ -11,27 +11,29 @@ use crate::exit::{CommandError, CommandResult};
 pub(super) struct ClosedLoop {
     pid: Pid<f64>,
     state: PidState<f64>,
-    /// Whether what was planned is fed forward; else it only says where the actuator is held before the reference begins.
+    /// Whether the planned drive is fed forward.
+    /// If not, only its first value is used, which is held before the reference.
     feedforward: bool,
     /// Wanted output of each segment.
     wanted: Vec<Vec<f64>>,
-    /// Most that the drive may change from one sample to the next \[V\].
+    /// Maximum change of the drive from one sample to the next \[V\].
     step_v: f64,
     last_v: f64,
-    /// Samples in which a limit held the drive.
+    /// Number of samples in which the drive is at a limit.
     limited: usize,
-    /// Whether, and for how long, that has kept the output away.
-    held: Lasting,
-    /// Samples after which that is too long, and whether it has been.
+    /// Duration of the present saturation: drive at a limit and tracking error above `tolerance`.
+    saturation: Lasting,
+    /// Maximum duration of a saturation \[samples\], and whether one was longer.
     patience: f32,
     too_long: bool,
-    /// A limit that leaves less than this is of no account \[output unit\].
+    /// Tracking error below which a drive at a limit is not a saturation \[output unit\].
     tolerance: f64,
     samples: usize,
 }
 
 impl ClosedLoop {
-    /// Around what is planned for `wanted`, at a sample period \[s\]; errors up to `tolerance` \[output unit\] are no sign of a drive that is held.
+    /// Creates the loop for references `wanted` with a sample period \[s\].
+    /// `tolerance` is the tracking error below which a drive at a limit is not a saturation \[output unit\].
     pub(super) fn new(
         params: &PidParams,
         feedforward: bool,
@@ -51,7 +53,7 @@ impl ClosedLoop {
             step_v,
             last_v: 0.0,
             limited: 0,
-            held: Lasting::default(),
+            saturation: Lasting::default(),
             patience: PATIENCE_S / period as f32,
             too_long: false,
             tolerance,
@@ -59,7 +61,7 @@ impl ClosedLoop {
         })
     }
 
-    /// Replaces what was planned for the next rows by what the loop makes of the newest measurement.
+    /// Replaces the planned drive of the next rows by the output of the controller.
     pub(super) fn revise(&mut self, revision: &mut Revision<'_>) {
         let measured = revision.latest.map_or(f64::NAN, |sample| sample.output);
         let Some(wanted) = self.wanted.get(revision.segment) else { return };
@@ -70,27 +72,28 @@ impl ClosedLoop {
                 self.pid.take_over(&mut self.state, planned, measured, forward);
                 self.last_v = planned;
             }
-            // What was measured last belongs to the row before: a feedforward that is right leaves no error to that row's reference.
-            let of = if self.feedforward { row.saturating_sub(1) } else { row };
-            let reference = wanted.get(of).copied().unwrap_or(measured);
+            // The latest measurement belongs to the previous row. With feedforward it is compared with the reference of that row,
+            // so that an exact feedforward has no error.
+            let reference_row = if self.feedforward { row.saturating_sub(1) } else { row };
+            let reference = wanted.get(reference_row).copied().unwrap_or(measured);
             let asked = self.pid.step(&mut self.state, reference, measured, forward);
             *volts = asked.clamp(self.last_v - self.step_v, self.last_v + self.step_v);
             self.pid.applied(&mut self.state, *volts);
             let limited = self.state.limited() || *volts != asked;
             self.limited += usize::from(limited);
             let away = self.state.limited() && (reference - measured).abs() > self.tolerance;
-            self.too_long |= self.held.step(away, self.patience);
+            self.too_long |= self.saturation.step(away, self.patience);
             self.samples += 1;
             self.last_v = *volts;
         }
     }
 
-    /// Whether a limit has held the drive, and the output away from its reference, for too long.
+    /// Whether a saturation (drive at a limit, output away from its reference) has lasted too long.
     pub(super) fn limited_too_long(&self) -> bool {
         self.too_long
     }
 
-    /// Share of the samples in which a limit held the drive \[%\].
+    /// Returns the share of the samples in which the drive is at a limit \[%\].
     pub(super) fn limited_percent(&self) -> f64 {
         100.0 * self.limited as f64 / self.samples.max(1) as f64
     }

@@ -1,25 +1,26 @@
-//! Periods in which a device had nothing to put out: it holds its last value then, and nothing is measured.
+//! Gaps: sample periods for which a device received no value.
+//! It holds its last value then and does not measure.
 
 use hyst_hw::Sample;
 use serde::Serialize;
 
 use crate::recording::missing;
 
-/// Where the line or this computer was too slow for the rate.
+/// Gaps of a run, in which the line or this computer was too slow for the sample rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(in crate::commands) struct Gaps {
-    /// How often.
+    /// Number of gaps.
     pub(in crate::commands) times: usize,
-    /// Periods altogether.
+    /// Sum of the missing periods.
     periods: usize,
 }
 
-/// Looks for gaps between samples.
+/// Finds gaps between samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GapFinder {
     rate_hz: f64,
     gaps: Gaps,
-    /// Segment and sample before.
+    /// Segment and sample before the next one.
     last: Option<(usize, Sample)>,
 }
 
@@ -28,7 +29,7 @@ impl GapFinder {
         Self { rate_hz, gaps: Gaps::default(), last: None }
     }
 
-    /// Takes the next sample; gives the periods that are missing before it, if some are.
+    /// Takes the next sample; returns the number of periods that are missing before it, if there are any.
     pub(super) fn take(&mut self, segment: usize, sample: &Sample) -> Option<usize> {
         let (_, before) = self.last.replace((segment, *sample)).filter(|(last, _)| *last == segment)?;
         let periods = missing(&before, sample, self.rate_hz);
@@ -43,12 +44,14 @@ impl GapFinder {
 }
 
 impl Gaps {
-    /// What happened, if it did.
+    /// Returns a sentence about the gaps, if there are any.
     pub(in crate::commands) fn text(&self) -> Option<String> {
         let Self { times, periods } = *self;
         (times > 0).then(|| {
             format!(
-                "the line was too slow for this rate: {times} times the device had nothing to put out and held its last value, for {periods} periods altogether; after each the record begins another segment, which a fit would take to begin at rest: take a lower rate or a quicker line before you fit this"
+                "the line was too slow for this sample rate: the device received no value {times} times and held the last one, for \
+                 {periods} periods in total. After each gap the record has a new segment, and a fit would assume that it \
+                 starts at rest. Record again with a lower sample rate or a faster line before you fit it"
             )
         })
     }
@@ -60,13 +63,13 @@ mod tests {
     use crate::recording::tests::at;
 
     #[test]
-    fn only_what_is_missing_within_a_segment_counts() {
+    fn gaps_within_segments_are_counted() {
         let mut finder = GapFinder::new(100.0);
-        let mut told = Vec::new();
+        let mut missing = Vec::new();
         for (segment, period) in [(0, 1), (0, 2), (0, 5), (0, 6), (0, 8), (1, 20), (1, 21)] {
-            told.extend(finder.take(segment, &at(period)));
+            missing.extend(finder.take(segment, &at(period)));
         }
-        assert_eq!(told, [2, 1]);
+        assert_eq!(missing, [2, 1]);
         assert_eq!(finder.gaps(), Gaps { times: 2, periods: 3 });
         assert!(finder.gaps().text().unwrap().contains("for 3 periods"));
         assert_eq!(Gaps::default().text(), None);

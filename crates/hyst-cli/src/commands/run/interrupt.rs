@@ -1,6 +1,6 @@
-//! Ctrl-C while a device is driven: the first one brings it to rest, the second one leaves at once.
+//! Ctrl-C during a run: the first one ramps the device to rest, the second one ends the program.
 //!
-//! One program has one handler; it looks after the run that goes on, of which a command may have several, one after the other.
+//! A program has one handler. It acts on the current run; a command may have several runs in turn.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,16 +12,16 @@ use crate::exit::Exit;
 use crate::host;
 use crate::output::say;
 
-/// A run, as the handler knows it.
+/// State of a run for the handler.
 #[derive(Debug, Default)]
 pub(super) struct Interrupt {
-    /// Whether the run is to end.
+    /// Whether the run must end.
     pub(super) stop: Arc<AtomicBool>,
-    /// Whether the device is at rest again.
+    /// Whether the device is at rest after the run.
     pub(super) over: AtomicBool,
-    /// Whether anything is in the log.
+    /// Whether the log has samples.
     pub(super) logged: AtomicBool,
-    /// Where it is, and whether a record is written at the end.
+    /// Path of the log, and whether a record is written after the run.
     pub(super) log: Option<PathBuf>,
     pub(super) recorded: bool,
     warned: AtomicBool,
@@ -29,33 +29,33 @@ pub(super) struct Interrupt {
 
 static CURRENT: Mutex<Option<Arc<Interrupt>>> = Mutex::new(None);
 static HANDLER: Once = Once::new();
-/// Set once Ctrl-C was pressed.
-static ASKED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// Whether Ctrl-C was pressed.
+static PRESSED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// Whether Ctrl-C was pressed since the program began.
-pub(in crate::commands) fn asked() -> bool {
-    ASKED.load(Ordering::Relaxed)
+/// Returns whether Ctrl-C was pressed since the start of the program.
+pub(in crate::commands) fn pressed() -> bool {
+    PRESSED.load(Ordering::Relaxed)
 }
 
-/// What ends a computation after a run: the host, or Ctrl-C.
+/// Returns the flag that ends a computation after a run: that of the host, or Ctrl-C.
 pub(in crate::commands) fn stopping() -> Stop {
-    Stop::from(host::stop().unwrap_or_else(|| Arc::clone(&ASKED)))
+    Stop::from(host::stop().unwrap_or_else(|| Arc::clone(&PRESSED)))
 }
 
 impl Interrupt {
-    /// Looks after this run from now on.
+    /// Makes this run the current one of the handler.
     pub(super) fn watch(self: &Arc<Self>) {
         *CURRENT.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(self));
         HANDLER.call_once(|| {
             let press = || {
-                ASKED.store(true, Ordering::Relaxed);
+                PRESSED.store(true, Ordering::Relaxed);
                 let current = CURRENT.lock().unwrap_or_else(PoisonError::into_inner).clone();
                 if let Some(current) = current {
                     current.press();
                 }
             };
             if let Err(error) = ctrlc::set_handler(press) {
-                say(&format!("note: Ctrl-C will not ramp the device to rest: {error}"));
+                say(&format!("warning: Ctrl-C will not ramp the device to rest: {error}; use hystctl stop instead"));
             }
         });
     }
@@ -66,16 +66,16 @@ impl Interrupt {
 
     fn press(&self) {
         if self.over.load(Ordering::Relaxed) {
-            // What was measured is being written: an impatient stop of the run is no wish to lose it.
+            // The measured data are being written: the first Ctrl-C in this phase does not end the program.
             if self.warned.swap(true, Ordering::Relaxed) {
-                say("error: left at once; what had not been written yet is lost");
+                say("error: ended at once; measured data that were not yet written are lost");
                 std::process::exit(i32::from(Exit::DeviceLost as u8));
             }
-            say("note: stopping; what was measured is kept. Press Ctrl-C again to leave at once");
+            say("note: stopping; the measured data are being written. Press Ctrl-C again to end at once");
         } else if self.stop.swap(true, Ordering::Relaxed) {
-            // Who asks twice does not want to wait for a device that does not answer.
+            // The second Ctrl-C does not wait for a device that does not answer.
             say(&format!(
-                "error: left before the device was at rest; its watchdog brings it there, look whether it does (hystctl status){}",
+                "error: ended before the device was at rest; its watchdog ramps it to rest, check that with hystctl status{}",
                 self.kept()
             ));
             std::process::exit(i32::from(Exit::DeviceLost as u8));
@@ -85,10 +85,10 @@ impl Interrupt {
     fn kept(&self) -> String {
         match self.log.as_ref().filter(|_| self.logged.load(Ordering::Relaxed)) {
             Some(path) => {
-                format!("; what was measured, but for the last half second, can be read in {}", path.display())
+                format!("; the measured data, except for the last 0.5 s, are in {}", path.display())
             }
             None if self.recorded => {
-                "; what was measured is lost: give --log, too, which is written as it comes".to_owned()
+                "; the measured data are lost; give --log as well, which is written during the run".to_owned()
             }
             None => String::new(),
         }

@@ -1,4 +1,4 @@
-//! What a run plays: a drive as it stands, or the one that makes the output follow a reference.
+//! The job of a run: a drive that is played unchanged, or a reference to follow with a model.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -13,9 +13,9 @@ use hyst_ident::model::Model;
 use hyst_ident::record::{Need, Record};
 
 use super::adapt::Adapting;
-use super::beside::{Beside, Force};
 use super::control::ClosedLoop;
 use super::live::Live;
+use super::parallel::{Force, ParallelModel};
 use super::shape::Shape;
 use crate::cli::{Control, PidGains, RecordArgs, RunArgs, VoltageLimits};
 use crate::commands::compensate::{Compensation, options};
@@ -23,33 +23,33 @@ use crate::exit::{CommandError, CommandResult};
 use crate::output::say;
 use crate::{input, recording, text};
 
-/// Everything that has to be known before a device moves.
+/// Everything that is needed before a device moves.
 #[derive(Debug)]
 pub(in crate::commands) struct Job {
     /// Voltages of each segment \[V\].
     pub(in crate::commands) segments: Vec<Vec<f64>>,
-    /// How they are played.
+    /// How the segments are played.
     pub(in crate::commands) options: RecordOptions,
-    /// What is followed, unless a drive is played as it stands.
+    /// Reference and model; `None` for a drive that is played unchanged.
     pub(in crate::commands) followed: Option<Followed>,
-    /// Wanted output at each of the voltages, where there is one.
+    /// Wanted output at each voltage; `None` for a drive.
     pub(in crate::commands) wanted: Vec<Option<f64>>,
-    /// What the device is to follow references with: then the voltages above are references.
+    /// Controller on the device; with it `segments` holds references \[output unit\].
     pub(super) handed_over: Option<HandedOver>,
-    /// Symbol of the output's unit.
+    /// Symbol of the output unit.
     pub(super) symbol: &'static str,
-    /// Whether a record of it is written.
+    /// Whether a record is written.
     pub(super) recorded: bool,
-    /// The option that keeps what is measured as it comes.
+    /// Name of the option for a log, for messages.
     pub(in crate::commands) log_option: &'static str,
-    /// Where viewers are served, if they are.
+    /// Address for viewers.
     pub(super) live: Option<SocketAddr>,
-    /// Whether a bar is to be shown instead of a picture.
+    /// Whether a progress bar is shown instead of a plot.
     pub(super) plain: bool,
-    /// Highest temperature \[°C\] and greatest tracking error \[output unit\] of the run.
+    /// Maximum temperature \[°C\] and maximum tracking error \[output unit\] of the run.
     pub(super) hottest_degc: Option<f64>,
     pub(super) greatest_error: Option<f64>,
-    /// Temperature where none is measured \[°C\], and stiffness with which a force is estimated \[N/output unit\].
+    /// Temperature if none is measured \[°C\], and stiffness for a force estimate \[N/output unit\].
     degc: Option<f64>,
     stiffness: Option<f64>,
 }
@@ -57,24 +57,24 @@ pub(in crate::commands) struct Job {
 /// A controller that runs on the device.
 #[derive(Debug)]
 pub(super) struct HandedOver {
-    /// As the device reads it.
+    /// The controller in the format of the device.
     pub(super) recipe: Vec<u8>,
-    /// Lowest and highest reference \[output unit\].
+    /// Minimum and maximum reference \[output unit\].
     pub(super) range: (f64, f64),
-    /// Rows by which the output is later than the references.
+    /// Delay of the output relative to the references \[rows\].
     pub(super) late: usize,
     gains: PidParams,
     why: String,
     slew_v_per_s: f64,
-    /// The drive that the model's inverse has in mind, where there is one: the loop stays near it.
+    /// Drive of the model's inverse, if it could be computed; the drive of the loop is close to it.
     plan: Option<Drive>,
 }
 
 impl HandedOver {
-    /// Share of the rows in which the drive stood at a limit and the output away from what was wanted \[%\].
+    /// Returns the share of the rows with the drive at a limit and a tracking error \[%\].
     fn limited_percent(&self, recording: &Recording, followed: &Followed) -> f64 {
         let PidParams { low, high, .. } = self.gains;
-        // The device's numbers are f32.
+        // The device computes with f32.
         let (near, step) = (1e-5 * (high - low), 0.999 * self.slew_v_per_s / recording.rate_hz);
         let tolerance = SATURATION_TOLERANCE * (followed.model.output.high - followed.model.output.low);
         let wanted = followed.wanted();
@@ -92,73 +92,75 @@ impl HandedOver {
     }
 }
 
-/// A reference, and the model that computes its drive.
+/// A reference and the model that computes its drive.
 #[derive(Debug)]
 pub(in crate::commands) struct Followed {
     pub(in crate::commands) model: Model,
-    /// The text of the model's file.
+    /// Text of the model file.
     pub(in crate::commands) json: String,
     pub(in crate::commands) reference: Record,
-    /// Limits and surroundings of its drive.
+    /// Limits and temperature of the drive.
     pub(in crate::commands) options: CompensateOptions,
-    /// What makes the drive.
+    /// Controller that computes the drive.
     pub(super) control: Control,
-    /// The drive as planned by the model's inverse, where that takes part.
+    /// Drive planned by the model's inverse; `None` without an inverse.
     pub(super) drive: Option<Drive>,
-    /// The drive as it is corrected on the way, where the model needs a temperature that the device measures, or is adapted.
+    /// Drive that is corrected during the run, for a measured temperature or an adapted model.
     pub(in crate::commands) live: Option<Live>,
-    /// What keeps up with the actuator, where that was asked for.
+    /// The adaptation of `--adapt`.
     pub(super) adapting: Option<Adapting>,
-    /// The PID, where one takes part.
+    /// PID on this computer.
     pub(super) closed: Option<Closed>,
-    /// How long the device is held at the first value of a segment \[s\].
+    /// Hold time at the first value of a segment \[s\].
     held_s: f64,
 }
 
-/// A PID, and why it has these gains.
+/// A PID with its gains and their reason.
 #[derive(Debug)]
 pub(super) struct Closed {
     pub(super) running: ClosedLoop,
     pub(super) gains: PidParams,
-    /// Of gains from the model \[Hz\].
+    /// Crossover frequency of gains from the model \[Hz\].
     pub(super) crossover_hz: Option<f64>,
-    /// In words.
+    /// Reason for the gains.
     pub(super) why: String,
 }
 
 impl Job {
-    /// The model that runs beside the device, where there is one.
-    pub(super) fn beside(&self) -> CommandResult<Option<Beside>> {
+    /// Creates the model that runs in parallel with the device; `None` without a reference.
+    pub(super) fn parallel_model(&self) -> CommandResult<Option<ParallelModel>> {
         let Some(followed) = &self.followed else { return Ok(None) };
         let on_device = self.handed_over.is_some();
         let force = self.stiffness.map(|stiffness| if on_device { Force::OnDevice } else { Force::Here(stiffness) });
-        let beside = Beside::new(&followed.model, self.options.rate_hz, self.degc, force, followed.adapting.clone())?;
-        if beside.is_none() && self.stiffness.is_some() && !on_device {
+        let model =
+            ParallelModel::new(&followed.model, self.options.rate_hz, self.degc, force, followed.adapting.clone())?;
+        if model.is_none() && self.stiffness.is_some() && !on_device {
             return Err(CommandError::bad_input(
-                "--kout needs a model that can be run as the drive comes; this one has to know all of it (band-limited): estimate the force afterwards, with hystctl force",
+                "--kout needs a model that runs sample by sample, but a model with a band-limited drive between samples needs \
+                 the whole drive; estimate the force after the run with hystctl force",
             ));
         }
-        Ok(beside)
+        Ok(model)
     }
 
-    /// How steep the device has to go \[V/s\].
+    /// Returns the slope that the device must allow \[V/s\].
     pub(in crate::commands) fn steepest(&self) -> f64 {
         if let Some(HandedOver { slew_v_per_s, .. }) = self.handed_over {
             return slew_v_per_s;
         }
         let steep = |volts: &[f64]| steepest_step(volts) * self.options.rate_hz;
         let steepest = self.segments.iter().map(|volts| steep(volts)).fold(0.0, f64::max);
-        STEEPER * steepest.max(self.options.slew_v_per_s)
+        SLEW_MARGIN * steepest.max(self.options.slew_v_per_s)
     }
 
-    /// What the model foresees to go wrong, if that is much.
-    pub(in crate::commands) fn foreseen(&self) -> Option<String> {
+    /// Returns a sentence about the predicted tracking error of the planned drive, if it is large.
+    pub(in crate::commands) fn predicted_error(&self) -> Option<String> {
         let followed = self.followed.as_ref()?;
         let plan = self.handed_over.as_ref().and_then(|handed| handed.plan.as_ref());
-        followed.foreseen(followed.drive.as_ref().or(plan)?)
+        followed.predicted_error(followed.drive.as_ref().or(plan)?)
     }
 
-    /// Takes the rows away in which the output had not come to a reference's beginning yet, and the forces of these rows.
+    /// Removes the rows (and forces) before the output has reached the start of a reference.
     pub(super) fn align(&self, recording: &mut Recording, forces: &mut [Vec<f64>]) {
         let Some(HandedOver { late, .. }) = self.handed_over else { return };
         for segment in &mut recording.segments {
@@ -169,44 +171,45 @@ impl Job {
         }
     }
 
-    /// The PID that took part: its gains, where they come from, bandwidth \[Hz\] and share of limited samples \[%\].
-    pub(super) fn pid(&self, recording: &Recording) -> Option<Told<'_>> {
+    /// Returns the PID of the run; `None` without one.
+    pub(super) fn pid(&self, recording: &Recording) -> Option<PidReport<'_>> {
         if let (Some(handed), Some(followed)) = (&self.handed_over, &self.followed) {
             let limited_percent = Some(handed.limited_percent(recording, followed));
-            return Some(Told { gains: &handed.gains, why: &handed.why, crossover_hz: None, limited_percent });
+            return Some(PidReport { gains: &handed.gains, why: &handed.why, crossover_hz: None, limited_percent });
         }
         let Closed { running, gains, crossover_hz, why } = self.followed.as_ref()?.closed.as_ref()?;
         let limited_percent = Some(running.limited_percent());
-        Some(Told { gains, why, crossover_hz: *crossover_hz, limited_percent })
+        Some(PidReport { gains, why, crossover_hz: *crossover_hz, limited_percent })
     }
 }
 
-/// A PID that took part.
+/// Gains and result of a PID.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Told<'a> {
+pub(super) struct PidReport<'a> {
     pub(super) gains: &'a PidParams,
+    /// Reason for the gains.
     pub(super) why: &'a str,
-    /// \[Hz\]
+    /// Crossover frequency of gains from the model \[Hz\].
     pub(super) crossover_hz: Option<f64>,
-    /// \[%\]
+    /// Share of the samples with the drive at a limit \[%\].
     pub(super) limited_percent: Option<f64>,
 }
 
 impl Followed {
-    /// Wanted output, over all segments.
+    /// Returns the wanted output of all segments.
     pub(super) fn wanted(&self) -> &[f64] {
         self.reference.output().unwrap_or_default()
     }
 
-    /// What the model foresees to go wrong with the drive as planned, if that is much, and why.
-    fn foreseen(&self, drive: &Drive) -> Option<String> {
+    /// Returns a sentence about the predicted tracking error of a drive and its causes, if it is large.
+    fn predicted_error(&self, drive: &Drive) -> Option<String> {
         let Drive { bandwidth_hz, voltage_limited, slew_limited, missed, .. } = drive;
         let wanted = self.wanted();
         let count = wanted.len().max(1) as f64;
         let mean = wanted.iter().sum::<f64>() / count;
         let spread = (wanted.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count).sqrt();
         let (low, high) = (self.model.output.low, self.model.output.high);
-        if missed.settled_rmse <= (FORESEEN * spread).max(FORESEEN_OF_RANGE * (high - low)) {
+        if missed.settled_rmse <= (MIN_ERROR_SHARE * spread).max(MIN_ERROR_SHARE_OF_RANGE * (high - low)) {
             return None;
         }
         let mut why = Vec::new();
@@ -216,49 +219,52 @@ impl Followed {
             }
         }
         if let (Some(hz), true) = (bandwidth_hz, why.is_empty()) {
-            why.push(format!("nothing above {} Hz is inverted", text::short(*hz)));
+            why.push(format!("dynamics are inverted only up to {} Hz", text::short(*hz)));
         }
         let unit = text::symbol(&self.model.output.unit);
         let (missed, why) = (text::short(missed.settled_rmse), why.join(", "));
         let why = if why.is_empty() { String::new() } else { format!(" ({why})") };
-        Some(format!("with the drive as planned the model itself misses the reference by {missed} {unit} RMS{why}"))
+        Some(format!("for the planned drive the model predicts a tracking error of {missed} {unit} RMS{why}"))
     }
 
-    /// Wanted output at each row of a recording, whose segments may end before their time.
+    /// Returns the wanted output at each row of a recording, whose segments may have ended early.
     pub(super) fn wanted_at(&self, recording: &Recording) -> Vec<f64> {
         let wanted = self.wanted();
         let rows = self.reference.segments().iter().zip(&recording.segments);
         rows.flat_map(|(rows, segment)| wanted[rows.clone()].iter().take(segment.samples.len())).copied().collect()
     }
 
-    /// Whether the drive was corrected on the way and depends on a temperature.
+    /// Whether the drive is corrected during the run and depends on the temperature.
     pub(super) fn needs_temperature(&self) -> bool {
         self.live.is_some() && self.model.effects.temperature.is_some()
     }
 
-    /// What there is to say about the drive that was played.
+    /// Returns the report of the drive that was played.
     pub(super) fn compensation(&self) -> Option<Compensation> {
         let drive = self.live.as_ref().map(Live::drive).or(self.drive.as_ref())?;
-        let mut said = Compensation::new(&self.model, &self.reference, drive);
-        said.held_s = Some(self.held_s);
-        Some(said)
+        let mut compensation = Compensation::new(&self.model, &self.reference, drive);
+        compensation.held_s = Some(self.held_s);
+        Some(compensation)
     }
 }
 
-/// What a planned drive may miss without a word: as a share of the reference's deviation from its mean, and of the model's travel.
-const FORESEEN: f64 = 0.05;
-const FORESEEN_OF_RANGE: f64 = 1e-3;
-/// How long a device is held at the first value of a reference, if nothing is said \[s\]: the model takes it as settled there.
-const USUAL_SETTLE_S: f64 = 2.0;
-/// By how much steeper than the planned drive, which may be corrected on the way, the device may go.
-const STEEPER: f64 = 1.5;
-/// As [`STEEPER`], where a loop on the device corrects it.
-const LOOP_STEEPER: f64 = 4.0;
-/// How much of a drive is sent at once where it is corrected by what is measured \[s\].
+/// Minimum predicted tracking error that is reported.
+/// As a share of the standard deviation of the reference, and of the output range of the model.
+const MIN_ERROR_SHARE: f64 = 0.05;
+const MIN_ERROR_SHARE_OF_RANGE: f64 = 1e-3;
+/// Default hold time at the first value of a reference \[s\].
+/// The model assumes that the actuator has settled there.
+const DEFAULT_SETTLE_S: f64 = 2.0;
+/// Maximum slope of the device over the slope of the planned drive.
+/// The margin is for corrections during the run.
+const SLEW_MARGIN: f64 = 1.5;
+/// As [`SLEW_MARGIN`], for a loop on the device.
+const LOOP_SLEW_MARGIN: f64 = 4.0;
+/// Length of the blocks in which a drive is sent that is corrected during the run \[s\].
 const LIVE_BLOCK_S: f64 = 0.05;
 
 impl Job {
-    /// Reads the files that `args` names and computes the drive for a device that can do `device`.
+    /// Reads the files of `args` and computes the drive for a device with these capabilities.
     pub(in crate::commands) fn read(args: &RunArgs, device: &Capabilities) -> CommandResult<Self> {
         let limits = limits(args, device)?;
         thermometer(args.hottest, device)?;
@@ -279,12 +285,14 @@ impl Job {
         let (model, json) = input::model(model)?;
         let (driven, measured) = (&model.input.column, &model.output.column);
         if driven != "voltage_v" {
-            let message = format!("the model's input is {driven}, but the device is driven by a voltage");
+            let message = format!(
+                "the model's input is {driven}, but the device is driven by voltage_v; fit a model to records of that column"
+            );
             return Err(CommandError::bad_input(message));
         }
         if measured != device.output.column() {
             let message = format!(
-                "the model's output is {measured}, but the device measures {}: fit a model to records of that column",
+                "the model's output is {measured}, but the device measures {}; fit a model to records of that column",
                 device.output.column()
             );
             return Err(CommandError::bad_input(message));
@@ -295,10 +303,10 @@ impl Job {
                 let rate_hz = args.map.rate.unwrap_or(usual);
                 shape.record(reference, recording::unit(device.output), rate_hz)?
             }
-            // At another rate than its own a reference would move the actuator faster or slower than its file says.
+            // With another rate the actuator would move faster or slower than the reference file says.
             None if args.map.rate.is_some() => {
                 return Err(CommandError::bad_input(
-                    "--rate is for a reference as sine:LOW,HIGH,HZ,SECONDS; a file needs times of its own",
+                    "--rate needs a reference such as sine:LOW,HIGH,HZ,SECONDS; a reference file is played at its own times",
                 ));
             }
             None => input::record(reference, &args.map, Need::Output)?,
@@ -312,7 +320,7 @@ impl Job {
             ));
         }
         let mut options = options(&args.limits);
-        // Not given, the limits are the model's, as far as the device goes along.
+        // Default limits: the range of the model within the range of the device.
         options.voltage = Some(match args.limits.limit {
             Some(limit) => (limit.low, limit.high),
             None => (limits.low.max(model.input.low), limits.high.min(model.input.high)),
@@ -320,8 +328,8 @@ impl Job {
         options.slew = options.slew.min(device.max_slew_v_per_s);
         options.temperature = input::temperature(args.temperature, &model, &reference);
         let mut play = play_options(args, device, &reference);
-        play.settle_s = args.settle.unwrap_or(USUAL_SETTLE_S);
-        // A temperature that is measured is followed; the plan starts from the given one, or the one that the gain is stated for.
+        play.settle_s = args.settle.unwrap_or(DEFAULT_SETTLE_S);
+        // The drive follows a measured temperature; the plan uses the given one or the reference temperature of the model.
         let measured = model.effects.temperature.filter(|_| device.temperature && args.control.inverts());
         if let Some(gain) = measured {
             options.temperature = options.temperature.or(Some(gain.reference_degc));
@@ -330,7 +338,7 @@ impl Job {
             Some(file) if args.control == Control::Feedforward => Some(Adapting::new(&model, &json, file.as_deref())?),
             Some(_) => {
                 return Err(CommandError::bad_input(
-                    "--adapt corrects what the inverse aims at, and a PID would take its part: give --control feedforward",
+                    "--adapt corrects the inverse of the model and works only with --control feedforward; give that",
                 ));
             }
             None => None,
@@ -341,7 +349,7 @@ impl Job {
         let (low, high) = options.voltage.unwrap_or((limits.low, limits.high));
         if args.control.closes() && device.queued {
             let degc = options.temperature;
-            // Where the inverse alone would be refused, the loop may find its way or end with a fault that says why.
+            // A reference that the inverse refuses may still work with the loop, or ends with a fault that has the reason.
             let plan = compensate(&model, &reference, &options).ok();
             let job = Self::hand_over(args, device, model, json, reference, (options, (low, high), plan), play)?;
             return Ok(Self { degc, ..job });
@@ -381,7 +389,8 @@ impl Job {
         Ok(Self { degc: options.temperature, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
 
-    /// For a device that closes the loop itself: what it measures comes too late for one that is closed here.
+    /// Creates the job of a device that closes the loop itself.
+    /// Its measurements arrive too late for a loop on this computer.
     fn hand_over(
         args: &RunArgs,
         device: &Capabilities,
@@ -393,16 +402,18 @@ impl Job {
     ) -> CommandResult<Self> {
         if args.control != Control::PidFeedforward {
             return Err(CommandError::bad_input(
-                "what this device measures comes too late for a loop that is closed on this computer, and its own loop is around a model's inverse: give --control pid+feedforward",
+                "the measurements of this device arrive too late for a loop on this computer, and the loop on the device needs \
+                 the inverse of the model; give --control pid+feedforward",
             ));
         }
         if model.needs_temperature() && !device.temperature {
             return Err(CommandError::bad_input(
-                "the model's gain follows a temperature that this device does not measure: give --control feedforward with --temperature, or a model without that effect",
+                "the model's gain depends on a temperature that this device does not measure; give --control feedforward with \
+                 --temperature, or a model without this effect",
             ));
         }
         let period = 1.0 / play.rate_hz;
-        // The loop begins and ends where the device rests, also where the model's record does not reach that far.
+        // The loop starts and ends at the rest voltage, which may be outside the range of the model.
         let rest_v = device.voltage.rest_v;
         let limits = (limits.0.min(rest_v), limits.1.max(rest_v));
         let Chosen { gains, why, .. } = Chosen::new(args, &model, limits, period)?;
@@ -411,19 +422,20 @@ impl Job {
         let recipe = [recipe_head(Some(&gains), force.as_ref()).as_slice(), &block].concat();
         let late = lateness(&recipe, period as f32).ok_or_else(|| {
             CommandError::bad_input(
-                "the device has no inverse of this model at this rate: it takes models of kind pi with what an inverse needs room for; fit one with --model pi, or use --control feedforward",
+                "the device cannot invert this model at this sample rate: it inverts pi models of limited size; fit a model with \
+                 --model pi, or give --control feedforward",
             )
         })?;
         let rows = split(&reference, reference.output().unwrap_or_default());
         let range =
             rows.iter().flatten().fold((model.output.low, model.output.high), |(l, h), y| (l.min(*y), h.max(*y)));
-        // From one end to the other in a second.
+        // The ramps cover the range in one second.
         play.slew_v_per_s = (range.1 - range.0).max(f64::MIN_POSITIVE);
         let held = |rows: &Vec<f64>| [&rows[..], &vec![rows.last().copied().unwrap_or_default(); late]].concat();
         let segments = rows.iter().map(held).collect();
-        let told =
+        let delayed =
             |rows: &Vec<f64>| std::iter::repeat_n(None, late).chain(rows.iter().copied().map(Some)).collect::<Vec<_>>();
-        let wanted = rows.iter().flat_map(told).collect();
+        let wanted = rows.iter().flat_map(delayed).collect();
         let followed = Followed {
             model,
             json,
@@ -436,14 +448,14 @@ impl Job {
             closed: None,
             held_s: play.settle_s,
         };
-        // On the way to the reference the drive goes over its range in about a second.
+        // During the ramp to the reference the drive covers its range in about one second.
         let planned = plan.as_ref().map_or(f64::INFINITY, |plan| {
             let rows = followed.reference.segments().iter();
             rows.map(|rows| steepest_step(&plan.voltage[rows.clone()])).fold(0.0, f64::max) / period
         });
         let least = (limits.1 - limits.0).max(RecordOptions::at(play.rate_hz).slew_v_per_s);
-        let usual = (LOOP_STEEPER * planned.max(least)).min(device.max_slew_v_per_s);
-        let slew_v_per_s = args.limits.slew.unwrap_or(usual);
+        let default = (LOOP_SLEW_MARGIN * planned.max(least)).min(device.max_slew_v_per_s);
+        let slew_v_per_s = args.limits.slew.unwrap_or(default);
         let handed_over = Some(HandedOver { recipe, range, late, gains, why, slew_v_per_s, plan });
         Ok(Self { handed_over, ..Self::new(args, device, segments, play, wanted, Some(followed)) })
     }
@@ -474,7 +486,7 @@ impl Job {
         }
     }
 
-    /// At rest for so many samples, without a drive and without a model.
+    /// Creates a job that records a device at rest, without a drive and without a model.
     pub(in crate::commands) fn at_rest(device: &Capabilities, rows: usize, rate_hz: f64, args: &RecordArgs) -> Self {
         Self {
             segments: vec![vec![device.voltage.rest_v; rows]],
@@ -497,40 +509,45 @@ impl Job {
     fn play(args: &RunArgs, device: &Capabilities, path: &Path, limits: VoltageLimits) -> CommandResult<Self> {
         if args.limits.bandwidth.is_some() {
             return Err(CommandError::bad_input(
-                "--bandwidth needs --model and --reference: a drive is played as it stands",
+                "--bandwidth needs --model and --reference; a drive is played unchanged",
             ));
         }
         if args.temperature.degc.is_some() {
             return Err(CommandError::bad_input(
-                "--temperature needs --model and --reference: a drive is played as it stands",
+                "--temperature needs --model and --reference; a drive is played unchanged",
             ));
         }
         if args.map.rate.is_some() {
             return Err(CommandError::bad_input(
-                "--rate is for a reference: a drive is played at the times of its file",
+                "--rate needs a reference such as sine:LOW,HIGH,HZ,SECONDS; a drive is played at its own times",
             ));
         }
         let drive = input::record(path, &args.map, Need::Input)?;
         let (file, column) = (path.display(), drive.input_column());
         if column != "voltage_v" {
             let message = format!(
-                "{file}: the input is {column}, but the device is driven by voltage_v; use --map if only its name differs"
+                "{file}: the input is {column}, but the device is driven by voltage_v; use --map if only the name differs"
             );
             return Err(CommandError::bad_input(message));
         }
         let (time, volts) = (drive.time(), drive.input());
         if let Some(row) = volts.iter().position(|u| !(limits.low..=limits.high).contains(u)) {
             let (t, u, VoltageLimits { low, high }) = (time[row], volts[row], limits);
-            let message = format!("{file}: at {t} s the drive is {u} V, outside {low} to {high} V; nothing was played");
+            let message = format!(
+                "{file}: at {t} s the drive is {u} V, outside {low} to {high} V; nothing was played; make a drive within \
+                 these limits"
+            );
             return Err(CommandError::bad_input(message));
         }
         let slew = args.limits.slew.unwrap_or(device.max_slew_v_per_s);
-        // A drive that was limited to this slew has been printed and read since.
+        // Tolerance for a drive that was limited to this slew and rounded in its file.
         let step = slew * drive.need_one_sample_period("a drive that a device plays")? * (1.0 + 1e-6);
         let steep = |row: &usize| (volts[row + 1] - volts[*row]).abs() > step;
         if let Some(row) = drive.segments().iter().find_map(|s| (s.start..s.end - 1).find(steep)) {
-            let message =
-                format!("{file}: after {} s the drive is steeper than {slew} V/s; nothing was played", time[row]);
+            let message = format!(
+                "{file}: after {} s the drive is steeper than {slew} V/s; nothing was played; make a slower drive",
+                time[row]
+            );
             return Err(CommandError::bad_input(message));
         }
         let wanted = vec![None; volts.len()];
@@ -540,15 +557,16 @@ impl Job {
     }
 }
 
-/// From how many times the model's own integral gain on a given one leaves no margin.
-const TOO_MUCH: f64 = 2.0;
+/// Maximum ratio of a given integral gain and that from the model.
+/// Above it the loop has no stability margin.
+const MAX_GAIN_RATIO: f64 = 2.0;
 
-/// Largest step between neighbours \[V\].
+/// Returns the largest step between successive voltages \[V\].
 fn steepest_step(volts: &[f64]) -> f64 {
     volts.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
 }
 
-/// Gains, as given or from the model.
+/// Gains of a PID, given or from the model.
 struct Chosen {
     gains: PidParams,
     crossover_hz: Option<f64>,
@@ -560,19 +578,20 @@ impl Chosen {
         let own = loop_gains(model, period, limits).map_err(CommandError::bad_input)?;
         let (gains, why) = match args.pid {
             Some(PidGains { proportional, integral, derivative }) => {
-                // Where nothing is integrated, nothing winds up.
+                // Without an integral there is no windup.
                 let back = if integral == 0.0 { 1.0 } else { (proportional / integral).abs().max(10.0 * period) };
                 let given = PidParams { proportional, integral, derivative, anti_windup_seconds: back, ..own.pid };
                 let ratio = integral / own.pid.integral;
                 let turned = |gain: f64| gain * own.pid.integral < 0.0;
                 if turned(integral) || (integral == 0.0 && turned(proportional)) {
                     return Err(CommandError::bad_input(
-                        "--pid: the gain has the wrong sign for this model: the loop would drive the output away from its reference",
+                        "--pid: the gain has the wrong sign for this model, and the output would move away from its reference; \
+                         change the sign",
                     ));
                 }
-                if ratio > TOO_MUCH {
+                if ratio > MAX_GAIN_RATIO {
                     say(&format!(
-                        "note: an integral gain of {} is {} times what the model allows with a margin of two: the loop may oscillate",
+                        "note: the integral gain {} is {} times the gain with a stability margin of two; the loop may oscillate",
                         text::short(integral),
                         text::short(ratio)
                     ));
@@ -581,10 +600,10 @@ impl Chosen {
             }
             None => {
                 let why = match own.mode_hz {
-                    Some(hz) => format!("the model's mode at {} Hz allows no more", text::short(hz)),
-                    None => "sample period and dead time allow no more".to_owned(),
+                    Some(hz) => format!("limited by the model's mode at {} Hz", text::short(hz)),
+                    None => "limited by sample period and dead time".to_owned(),
                 };
-                (own.pid, format!("bandwidth {} Hz: {why}", text::short(own.crossover_hz)))
+                (own.pid, format!("bandwidth {} Hz, {why}", text::short(own.crossover_hz)))
             }
         };
         Ok(Self { gains, crossover_hz: args.pid.is_none().then_some(own.crossover_hz), why })
@@ -606,14 +625,15 @@ impl Closed {
     }
 }
 
-/// A drive along the straight line through the ends of what the model was fitted to, within the limits.
+/// Returns the drive of a constant gain: a straight line through the ends of the model's range.
+/// The drive is clamped to the limits.
 fn straight(model: &Model, reference: &Record, low: f64, high: f64) -> CommandResult<Vec<f64>> {
     let wanted = match reference.output_unit() {
         Some(unit) if unit.column() == model.output.column => reference.output().unwrap_or_default(),
         _ => {
             let (column, file) = (&model.output.column, reference.name());
             return Err(CommandError::bad_input(format!(
-                "{file}: column {column} is missing; the reference says what the output is to do"
+                "{file}: column {column} is missing; the reference needs the output column of the model"
             )));
         }
     };
@@ -621,11 +641,11 @@ fn straight(model: &Model, reference: &Record, low: f64, high: f64) -> CommandRe
     Ok(wanted.iter().map(|y| (model.input.low + (y - at_low) / gain).clamp(low, high)).collect())
 }
 
-/// A limit on a temperature that nobody measures would guard nothing.
+/// Refuses a limit on the temperature for a device that does not measure it.
 pub(in crate::commands) fn thermometer(hottest_degc: Option<f64>, device: &Capabilities) -> CommandResult {
     if hottest_degc.is_some() && !device.temperature {
         let message = format!(
-            "--hottest: {} measures no temperature; run without that limit, and watch it otherwise",
+            "--hottest: {} does not measure a temperature; leave --hottest out and monitor the temperature another way",
             device.device
         );
         return Err(CommandError::bad_input(message));
@@ -633,20 +653,20 @@ pub(in crate::commands) fn thermometer(hottest_degc: Option<f64>, device: &Capab
     Ok(())
 }
 
-/// The voltages that may be applied: what the device can do, and no more than what the command line allows.
+/// Returns the limits of the drive: those of the command line, or of the device.
 fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits> {
     let (low, high, rest) = (device.voltage.min_v, device.voltage.max_v, device.voltage.rest_v);
     match args.limits.limit {
         None => Ok(VoltageLimits { low, high }),
         Some(limit) if device.queued && !(limit.low..=limit.high).contains(&rest) => {
             Err(CommandError::bad_input(format!(
-                "--limit {},{} leaves out the {rest} V at which the device rests; give limits around that",
+                "--limit {},{} excludes {rest} V, at which the device rests; give limits that include it",
                 limit.low, limit.high
             )))
         }
         Some(limit) if limit.low >= low && limit.high <= high => Ok(limit),
         Some(limit) => Err(CommandError::bad_input(format!(
-            "--limit {},{} goes beyond the device, which can do {low} to {high} V; give limits within that",
+            "--limit {},{} exceeds the range of the device, {low} to {high} V; give limits within it",
             limit.low, limit.high
         ))),
     }
@@ -655,7 +675,7 @@ fn limits(args: &RunArgs, device: &Capabilities) -> CommandResult<VoltageLimits>
 fn play_options(args: &RunArgs, device: &Capabilities, record: &Record) -> RecordOptions {
     let rate_hz = 1.0 / record.sample_period();
     let whole = rate_hz.round();
-    // 1 / 0.00001 is not 100000 to the last bit.
+    // 1 / 0.00001 is not exactly 100000.
     let rate_hz = if (rate_hz - whole).abs() < 1e-9 * rate_hz { whole } else { rate_hz };
     let mut options = RecordOptions::at(rate_hz);
     options.rest_s = args.rest;

@@ -1,4 +1,4 @@
-//! A drive that is corrected while it is played, by the temperature that is measured and by what is learned of the actuator.
+//! A drive that is corrected during the run for the measured temperature and by the adaptation.
 
 use hyst_hw::Revision;
 use hyst_ident::compensate::{CompensateError, CompensateOptions, Drive, Follower};
@@ -7,7 +7,7 @@ use hyst_ident::record::Record;
 
 use super::adapt::Adapting;
 
-/// The drive of a model whose gain depends on a temperature that is only known while the device runs, or that is adapted.
+/// The drive of a model whose gain depends on the measured temperature, or of an adapted model.
 #[derive(Debug)]
 pub(in crate::commands) struct Live {
     follower: Follower,
@@ -16,8 +16,8 @@ pub(in crate::commands) struct Live {
 }
 
 impl Live {
-    /// A drive for `reference` from its first row on, of an actuator that is held at the first voltages of `plan`; it goes from there
-    /// to what is asked for then at `slew` \[V/s\].
+    /// Creates the drive of `reference` for an actuator that is held at the first voltages of `plan`.
+    /// The drive moves from there to the corrected voltage with `slew` \[V/s\].
     pub(super) fn new(
         model: &Model,
         reference: &Record,
@@ -33,7 +33,7 @@ impl Live {
         Ok(Self { follower, drive, adapting })
     }
 
-    /// Replaces what was planned for the next rows by what the newest temperature asks for.
+    /// Replaces the planned drive of the next rows by the drive for the latest temperature.
     pub(super) fn revise(&mut self, revision: &mut Revision<'_>) {
         let temperature = revision.latest.and_then(|sample| sample.temperature_degc);
         for volts in revision.drive_v.iter_mut() {
@@ -49,7 +49,7 @@ impl Live {
         }
     }
 
-    /// The drive as it was played so far.
+    /// Returns the drive that was played so far.
     pub(super) fn drive(&self) -> &Drive {
         &self.drive
     }

@@ -1,4 +1,4 @@
-//! Playing a job on a device while log, progress and Ctrl-C are looked after.
+//! Plays a job on a device, with log, view and Ctrl-C.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use hyst_hw::wire::Fault;
 use hyst_hw::{Cause, Daq, Failure, Recording, Revision, record_with};
 
-use super::beside::Watched;
 use super::gaps::{GapFinder, Gaps};
 use super::guard::Guard;
 use super::interrupt::{self, Interrupt};
 use super::job::Job;
-use super::lookout::Lookout;
+use super::monitor::Monitor;
+use super::parallel::Watched;
 use super::view::View;
 use crate::exit::{Classified, CommandError, CommandResult, Exit};
 use crate::host;
@@ -20,29 +20,29 @@ use crate::log::{LogError, RunLog, RunStream};
 use crate::output::say;
 use crate::text;
 
-/// A run that came to its end.
+/// Result of a run.
 pub(in crate::commands) struct Played {
     pub(in crate::commands) recording: Recording,
-    /// Estimated force at each row of each segment \[N\]; empty where none is estimated.
+    /// Estimated force at each row of each segment \[N\]; empty without an estimate.
     pub(super) forces: Vec<Vec<f64>>,
-    /// None where no model was watched.
+    /// `None` if no model was monitored.
     pub(super) watched: Option<Watched>,
     pub(in crate::commands) gaps: Gaps,
-    /// Why it ended before its time, if it did.
+    /// Error that ended the run early.
     pub(in crate::commands) error: Option<CommandError>,
 }
 
-/// Plays all segments; every sample goes to `log` as it comes in.
+/// Plays all segments; writes each sample to `log` when it arrives.
 pub(in crate::commands) fn play<D: Daq>(daq: &mut D, job: &mut Job, log: Option<&mut RunLog>) -> CommandResult<Played>
 where
     D::Error: Classified,
 {
-    let lent = host::stop();
+    let host_stop = host::stop();
     let path = log.as_ref().map(|log| log.path().to_owned());
-    let current = Interrupt::new(lent.clone().unwrap_or_default(), path, job.recorded);
+    let current = Interrupt::new(host_stop.clone().unwrap_or_default(), path, job.recorded);
     let stop = Arc::clone(&current.stop);
-    // A host looks after Ctrl-C itself.
-    if lent.is_none() {
+    // A host handles Ctrl-C itself.
+    if host_stop.is_none() {
         current.watch();
     }
     let shortest = job.segments.iter().map(Vec::len).min().unwrap_or(0) as f64 / job.options.rate_hz;
@@ -52,14 +52,14 @@ where
     if let Some(stream) = &stream {
         say(&format!("note: viewers (Foxglove, Lichtblick) connect to {}", stream.url()));
     }
-    let mut lookout = Lookout {
+    let mut monitor = Monitor {
         log,
         stream,
         log_error: None,
-        beside: job.beside()?,
+        model: job.parallel_model()?,
         guard,
         gaps: GapFinder::new(job.options.rate_hz),
-        view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain || lent.is_some()),
+        view: View::new(job.segments.iter().map(Vec::len).sum(), job.symbol, job.plain || host_stop.is_some()),
         wanted: &job.wanted,
         unit: job.symbol,
         fault: None,
@@ -67,8 +67,8 @@ where
         forces: Vec::new(),
         now_s: 0.0,
     };
-    // Of a command that plays more than once, Ctrl-C may have come in between.
-    if lookout.view.interrupted() || stop.load(Ordering::Relaxed) || (lent.is_none() && interrupt::asked()) {
+    // In a command that plays several times, Ctrl-C may have been pressed between two plays.
+    if monitor.view.interrupted() || stop.load(Ordering::Relaxed) || (host_stop.is_none() && interrupt::pressed()) {
         return Err(CommandError::failed("stopped on request before anything moved"));
     }
     let (mut live, mut closed) = match &mut job.followed {
@@ -84,34 +84,34 @@ where
         }
     };
     let played = record_with(daq, &job.segments, &job.options, revise, |news| {
-        let on = lookout.take(news);
-        let has_logged = lookout.log.as_ref().is_some_and(|log| log.samples() > 0);
+        let flow = monitor.take(news);
+        let has_logged = monitor.log.as_ref().is_some_and(|log| log.samples() > 0);
         current.logged.store(has_logged, Ordering::Relaxed);
         if saturated.load(Ordering::Relaxed) {
-            lookout.end(Fault::Saturation);
+            monitor.end(Fault::Saturation);
         }
-        let ended = lookout.fault.is_some() || lookout.view.interrupted() || stop.load(Ordering::Relaxed);
-        if ended { ControlFlow::Break(()) } else { on }
+        let ended = monitor.fault.is_some() || monitor.view.interrupted() || stop.load(Ordering::Relaxed);
+        if ended { ControlFlow::Break(()) } else { flow }
     });
     current.over.store(true, Ordering::Relaxed);
     match &played {
         Err(Failure { not_stopped: Some(error), driven, .. }) => {
-            let what = if *driven { "the device may still be driven" } else { "the device did not take the stop" };
-            lookout.note("fault", format!("{what}: {error}"));
+            let what = if *driven { "the device may still be driven" } else { "the device did not confirm the stop" };
+            monitor.note("fault", format!("{what}: {error}"));
         }
         Err(Failure { cause: Cause::Cancelled, driven, .. })
-            if lookout.fault.is_none() && lookout.log_error.is_none() =>
+            if monitor.fault.is_none() && monitor.log_error.is_none() =>
         {
-            let how = if *driven { "the device was brought to rest" } else { "the device was at rest all the time" };
-            lookout.event("cancelled", format!("stopped on request; {how}"));
+            let how = if *driven { "the device was ramped to rest" } else { "the device was always at rest" };
+            monitor.event("cancelled", format!("stopped on request; {how}"));
         }
-        Err(Failure { cause: Cause::Device(error), .. }) => lookout.note("fault", error.to_string()),
+        Err(Failure { cause: Cause::Device(error), .. }) => monitor.note("fault", error.to_string()),
         _ => {}
     }
-    let watched = lookout.watched();
-    let gaps = lookout.gaps.gaps();
-    let Lookout { log, log_error, fault, detail, forces, view, .. } = lookout;
-    // What is said from here on stands below the picture.
+    let watched = monitor.watched();
+    let gaps = monitor.gaps.gaps();
+    let Monitor { log, log_error, fault, detail, forces, view, .. } = monitor;
+    // Removes the view; later lines are printed in its place.
     drop(view);
     match played {
         Ok(recording) => Ok(Played { recording, forces, watched, gaps, error: None }),
@@ -129,35 +129,37 @@ where
     }
 }
 
-/// What to say about a run that did not come to its end, and about what was measured until then.
+/// Returns the error of a run that ended early, and prints notes about the measured data.
 fn failed<E: Classified>(
     failure: Failure<E>,
     partial: &Recording,
     log_error: Option<LogError>,
     fault: Option<(Fault, String)>,
-    (log, recorded, keeps): (Option<&RunLog>, bool, &str),
+    (log, recorded, log_option): (Option<&RunLog>, bool, &str),
 ) -> CommandError {
     let measured: usize = partial.segments.iter().map(|s| s.approach.len() + s.samples.len() + s.retreat.len()).sum();
     let many = text::count(measured, "sample");
     let cancelled = matches!(failure.cause, Cause::Cancelled) && failure.not_stopped.is_none();
     match (log, log_error) {
         (Some(_), Some(error)) if cancelled => {
-            say(&format!("note: the device was brought to rest; {many} had been measured"));
+            say(&format!("note: the device was ramped to rest after {many}"));
             return error.into();
         }
         (Some(_), Some(error)) => say(&format!("note: {error}")),
         _ if measured == 0 => {}
         (Some(log), None) => {
-            say(&format!("note: {many}, all that was measured, can be read in {}", log.path().display()));
+            say(&format!("note: all measured data ({many}) are in {}", log.path().display()));
         }
         (None, _) if recorded => {}
-        (None, _) => say(&format!("note: {many} that had been measured are lost; give {keeps} to keep them next time")),
+        (None, _) => {
+            say(&format!("note: the measured data ({many}) are lost; give {log_option} to save them next time"))
+        }
     }
     match fault {
         Some((fault, detail)) if cancelled => CommandError::new(
             Exit::DeviceLost,
             anyhow::anyhow!(
-                "the run was ended and the device brought to rest (fault {}): {fault}{detail}",
+                "the run was ended and the device ramped to rest (fault {}): {fault}{detail}",
                 fault.code()
             ),
         ),
@@ -193,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn exit_codes_tell_a_lost_device_from_a_refused_request() {
+    fn a_lost_device_and_a_refused_request_have_different_exit_codes() {
         let refused = PlantError::Rate { asked_hz: 1e9, min_hz: 1.0, max_hz: 2e4 };
         let lost = PlantError::SensorRange { time_s: 1.0, value_um: 99.0 };
         assert_eq!(code(Cause::Device(lost.clone())), Exit::DeviceLost);

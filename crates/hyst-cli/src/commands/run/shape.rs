@@ -1,4 +1,4 @@
-//! References without a file: sines, triangles, steps and what scanners ask for, between two outputs.
+//! References without a file: sines, triangles, steps and scan patterns between two outputs.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -9,16 +9,17 @@ use hyst_ident::record::{Columns, OutputUnit, Record};
 
 use crate::exit::{CommandError, CommandResult};
 
-/// Longest reference \[rows\].
-const MOST_ROWS: f64 = 1e8;
+/// Maximum length of a reference \[rows\].
+const MAX_ROWS: f64 = 1e8;
 
-/// A reference as its arguments say it. It begins at its lower end, but for spirals and the sines of Lissajous patterns, which begin in the middle.
+/// A reference as its argument describes it.
+/// It starts at its lower end; spirals and Lissajous sines start in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::commands) struct Shape {
     form: Form,
     low: f64,
     high: f64,
-    /// Frequency of a sine or triangle, or of passing all of the steps up and down \[Hz\].
+    /// Frequency of one period, for steps of all steps up and down \[Hz\].
     hz: f64,
     seconds: f64,
 }
@@ -28,10 +29,11 @@ enum Form {
     Sine,
     Triangle,
     Steps,
-    /// Lines with rounded turnings.
+    /// Lines with rounded turning points.
     Raster,
-    /// One axis of a spiral, from the middle to the rim, and the other one.
+    /// First axis of a spiral, from the middle outwards.
     Spiral,
+    /// Second axis of a spiral.
     SpiralY,
     /// One axis of a Lissajous pattern.
     Lissajous,
@@ -53,64 +55,67 @@ impl Form {
     }
 }
 
-/// Share of a raster's time that its turnings take.
-const TURNING: f64 = 0.2;
+/// Share of the time of a raster that is spent in turning points.
+const TURNING_SHARE: f64 = 0.2;
 
-/// Highest frequency, as a share of the rate: with fewer samples in a period a shape is another one.
-const FASTEST: f64 = 0.1;
+/// Maximum frequency as a share of the sample rate.
+/// With fewer samples per period the shape is distorted.
+const MAX_FREQUENCY_SHARE: f64 = 0.1;
 
-/// Steps from one end to the other.
+/// Number of steps from one end to the other.
 const STEPS: f64 = 5.0;
 
 impl FromStr for Shape {
-    /// What makes no sense.
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (form, numbers) = text.split_once(':').ok_or("there is no colon")?;
-        let form = Form::named(form).ok_or_else(|| format!("there is no form \"{form}\""))?;
+        let form = Form::named(form).ok_or_else(|| format!("\"{form}\" is not a form"))?;
         let cells: Vec<&str> = numbers.split(',').map(str::trim).collect();
         let &[low, high, hz, seconds] = &cells[..] else {
             let many = if numbers.is_empty() { 0 } else { cells.len() };
-            return Err(format!("four numbers have to follow, not {many}"));
+            return Err(format!("expected four numbers after the colon, not {many}"));
         };
         let number = |name: &str, cell: &str| {
             let x = cell.parse::<f64>().ok().filter(|x| x.is_finite());
-            x.ok_or_else(|| format!("{name} is \"{cell}\", no finite number"))
+            x.ok_or_else(|| format!("{name} is \"{cell}\", not a finite number"))
         };
         let positive = |name: &str, cell: &str| match number(name, cell)? {
             x if x > 0.0 => Ok(x),
-            x => Err(format!("{name} is {x}, and has to be above zero")),
+            x => Err(format!("{name} is {x}, but must be positive")),
         };
         let (low, high) = (number("LOW", low)?, number("HIGH", high)?);
         if low >= high {
-            return Err(format!("LOW is {low}, and has to be below HIGH, {high}"));
+            return Err(format!("LOW is {low}, but must be below HIGH, {high}"));
         }
         Ok(Self { form, low, high, hz: positive("HZ", hz)?, seconds: positive("SECONDS", seconds)? })
     }
 }
 
 impl Shape {
-    /// What `path` names, if it is a shape and no file.
+    /// Parses the shape that `path` names; `None` for a file.
     pub(in crate::commands) fn named(path: &Path) -> CommandResult<Option<Self>> {
         let Some(text) = path.to_str().filter(|_| !path.exists()) else { return Ok(None) };
         let Some((form, _)) = text.split_once(':') else { return Ok(None) };
         if Form::named(form).is_none() {
-            // Windows has drives of one letter.
+            // One letter is a drive of Windows.
             let word = form.len() > 1 && form.chars().all(|c| c.is_ascii_alphabetic() || c == '-');
             let names: Vec<&str> = Form::ALL.iter().map(|(name, _)| *name).collect();
             let message = format!(
-                "{text}: there is no such file, and no form \"{form}\": give one of {}, as sine:2,12,5,10",
+                "{text}: no such file, and \"{form}\" is not a form of a reference; give one of {}, for example \
+                 sine:2,12,5,10",
                 names.join(", ")
             );
             return if word { Err(CommandError::bad_input(message)) } else { Ok(None) };
         }
         text.parse().map(Some).map_err(|wrong: String| {
-            CommandError::bad_input(format!("{text}: {wrong}; give FORM:LOW,HIGH,HZ,SECONDS, as sine:2,12,5,10"))
+            CommandError::bad_input(format!(
+                "{text}: {wrong}; give FORM:LOW,HIGH,HZ,SECONDS, for example sine:2,12,5,10"
+            ))
         })
     }
 
-    /// Its value at a time \[s\].
+    /// Returns the value at a time \[s\].
     fn at(&self, t: f64) -> f64 {
         let phase = (t * self.hz).fract();
         let up = 1.0 - (2.0 * phase - 1.0).abs();
@@ -118,7 +123,7 @@ impl Shape {
             Form::Sine => 0.5 - 0.5 * (TAU * phase).cos(),
             Form::Triangle => up,
             Form::Steps => (STEPS * up).round() / STEPS,
-            Form::Raster => Raster::position(phase, TURNING),
+            Form::Raster => Raster::position(phase, TURNING_SHARE),
             Form::Spiral => Spiral::position(t / self.seconds, t * self.hz, 0.0),
             Form::SpiralY => Spiral::position(t / self.seconds, t * self.hz, 90.0),
             Form::Lissajous => 0.5 + 0.5 * (TAU * phase).sin(),
@@ -126,20 +131,24 @@ impl Shape {
         self.low + (self.high - self.low) * share
     }
 
-    /// As a record at `rate_hz`.
+    /// Returns the reference as a record at `rate_hz`.
     pub(in crate::commands) fn record(&self, path: &Path, unit: OutputUnit, rate_hz: f64) -> CommandResult<Record> {
         let rows = (self.seconds * rate_hz).round();
-        if !(2.0..=MOST_ROWS).contains(&rows) {
-            let message =
-                format!("{}: {} s at {rate_hz} Hz are {rows} rows; give another time", path.display(), self.seconds);
+        if !(2.0..=MAX_ROWS).contains(&rows) {
+            let message = format!(
+                "{}: {} s at {rate_hz} Hz are {rows} rows, expected 2 to {MAX_ROWS}; give another SECONDS",
+                path.display(),
+                self.seconds
+            );
             return Err(CommandError::bad_input(message));
         }
-        if self.hz > FASTEST * rate_hz {
+        if self.hz > MAX_FREQUENCY_SHARE * rate_hz {
             let message = format!(
-                "{}: {} Hz at {rate_hz} samples/s has fewer than {} samples a period; give a lower frequency, or, to run, a higher --rate where the device can",
+                "{}: {} Hz at {rate_hz} samples per second has fewer than {} samples per period; give a lower frequency or a \
+                 higher --rate",
                 path.display(),
                 self.hz,
-                1.0 / FASTEST
+                1.0 / MAX_FREQUENCY_SHARE
             );
             return Err(CommandError::bad_input(message));
         }
@@ -155,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shapes_begin_at_their_lower_end_and_reach_the_upper_one() {
+    fn shapes_start_at_their_lower_end_and_reach_the_upper_end() {
         for form in ["sine", "triangle", "steps", "raster"] {
             let path = format!("{form}:2,12,5,1");
             let shape = Shape::named(Path::new(&path)).unwrap().unwrap();
@@ -168,13 +177,13 @@ mod tests {
     }
 
     #[test]
-    fn what_scanners_ask_for_has_its_speed_and_its_radius() {
+    fn scan_patterns_have_their_speed_and_radius() {
         let of = |form: &str| {
             let path = format!("{form}:2,12,5,1");
             let shape = Shape::named(Path::new(&path)).unwrap().unwrap();
             shape.record(Path::new(&path), OutputUnit::Micrometre, 1000.0).unwrap().output().unwrap().to_vec()
         };
-        // 10 % of each line's time is a turning at either end; constant speed is 100 µm/s over 0.9 then.
+        // Each line spends 10 % of its time in the turning point at each end, so the constant speed is 100/0.9 µm/s.
         let raster = of("raster");
         let slopes: Vec<f64> = raster.windows(2).map(|w| 1e3 * (w[1] - w[0])).collect();
         assert!(slopes[10..90].iter().all(|v| (v - 100.0 / 0.9).abs() < 1e-6), "{slopes:?}");
@@ -189,17 +198,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_shape_is_told_and_files_are_left_alone() {
+    fn wrong_shapes_are_refused_and_files_are_not_shapes() {
         for (text, what) in [
-            ("sine:1,2,3", "follow, not 3;"),
-            ("sine:", "follow, not 0;"),
-            ("sine:0,1,1,1,", "follow, not 5;"),
-            ("sine:1,2,x,3", "HZ is \"x\", no finite number;"),
-            ("sine:0,1,1,inf", "SECONDS is \"inf\", no finite number;"),
-            ("steps:1,inf,2,3", "HIGH is \"inf\", no finite number;"),
-            ("steps:0,1,0,1", "HZ is 0, and has to be above zero;"),
-            ("sine:1,2,5,-1", "SECONDS is -1, and has to be above zero;"),
-            ("triangle:3,2,5,1", "LOW is 3, and has to be below HIGH, 2;"),
+            ("sine:1,2,3", "colon, not 3;"),
+            ("sine:", "colon, not 0;"),
+            ("sine:0,1,1,1,", "colon, not 5;"),
+            ("sine:1,2,x,3", "HZ is \"x\", not a finite number;"),
+            ("sine:0,1,1,inf", "SECONDS is \"inf\", not a finite number;"),
+            ("steps:1,inf,2,3", "HIGH is \"inf\", not a finite number;"),
+            ("steps:0,1,0,1", "HZ is 0, but must be positive;"),
+            ("sine:1,2,5,-1", "SECONDS is -1, but must be positive;"),
+            ("triangle:3,2,5,1", "LOW is 3, but must be below HIGH, 2;"),
         ] {
             let message = Shape::named(Path::new(text)).unwrap_err().text();
             assert!(message.contains(what) && message.contains("FORM:LOW,HIGH,HZ,SECONDS"), "{message}");

@@ -1,4 +1,4 @@
-//! What a person sees of a run while it goes on: a picture of the last seconds in the terminal, or a bar.
+//! View of a run in the terminal: a plot of the last seconds, or a progress bar.
 
 mod picture;
 mod seconds;
@@ -18,96 +18,98 @@ use ratatui::{Terminal, TerminalOptions, Viewport};
 use crate::progress::Progress;
 use seconds::Seconds;
 
-/// How often the picture is drawn anew.
-const EVERY: Duration = Duration::from_millis(100);
-/// Lines of the terminal that it takes.
+/// Interval between drawings of the plot.
+const DRAW_INTERVAL: Duration = Duration::from_millis(100);
+/// Height of the plot \[lines\].
 const LINES: u16 = 16;
-/// Columns and lines that a terminal has at least where there is a picture: on one of no size nothing can ever be written above it.
-const LEAST: Size = Size::new(20, 8);
+/// Minimum size of a terminal with a plot.
+/// ratatui cannot write above a plot in a terminal without a size.
+const MIN_SIZE: Size = Size::new(20, 8);
 
-/// One instant.
+/// Values at one time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct Values {
     pub(super) sample: Sample,
-    /// Wanted output.
+    /// Wanted output \[output unit\].
     pub(super) wanted: Option<f64>,
-    /// What the model expects.
+    /// Output that the model predicts \[output unit\].
     pub(super) predicted: Option<f64>,
-    /// \[N\]
+    /// Estimated force \[N\].
     pub(super) force: Option<f64>,
 }
 
-/// What is shown.
+/// The view of a run.
 pub(super) struct View {
     shown: Shown,
-    /// Whether Ctrl-C was typed while the terminal was asked where its cursor is: it is a key then, and no signal.
+    /// Whether Ctrl-C was typed during a query of the cursor position.
+    /// It is read as a key then and raises no signal.
     interrupted: bool,
 }
 
-/// What is shown where.
+/// Kind of view.
 enum Shown {
-    /// A bar, or nothing where stderr is no terminal.
+    /// A progress bar; nothing if stderr is not a terminal.
     Bar(Progress),
     Picture(Box<Picture>),
 }
 
-/// A picture in the terminal.
+/// A plot in the terminal.
 struct Picture {
     size: Option<Size>,
     terminal: Terminal<CrosstermBackend<Stderr>>,
     seconds: Seconds,
-    /// Symbol of the output's unit.
+    /// Symbol of the output unit.
     unit: &'static str,
     drawn: Option<Instant>,
-    /// What there was no room for.
-    untold: Vec<String>,
+    /// Lines that had no room above the plot; printed at the end.
+    pending: Vec<String>,
 }
 
-/// Whether a picture, and a line above it, has room.
-fn roomy(size: Size) -> bool {
-    size.width >= LEAST.width && size.height >= LEAST.height
+/// Whether a terminal has room for a plot and a line above it.
+fn has_room(size: Size) -> bool {
+    size.width >= MIN_SIZE.width && size.height >= MIN_SIZE.height
 }
 
 impl View {
-    /// Of a run of so many samples; `plain` asks for a bar.
+    /// Creates the view of a run with `total` samples; `plain` selects the progress bar.
     pub(super) fn new(total: usize, unit: &'static str, plain: bool) -> Self {
         let options = TerminalOptions { viewport: Viewport::Inline(LINES) };
-        // Where the cursor is, is asked on stdout and answered on stdin: neither may be anything else.
-        let asked = stdout().is_terminal() && stdin().is_terminal();
+        // The query of the cursor position goes to stdout and its answer comes on stdin, so both must be terminals.
+        let can_query = stdout().is_terminal() && stdin().is_terminal();
         let able = std::env::var_os("TERM").is_none_or(|name| name != "dumb");
-        let able = able && terminal::size().is_ok_and(|(width, height)| roomy(Size::new(width, height)));
-        let wanted = stderr().is_terminal() && asked && able && !plain;
-        // A terminal that does not say where its cursor is has no picture.
+        let able = able && terminal::size().is_ok_and(|(width, height)| has_room(Size::new(width, height)));
+        let wanted = stderr().is_terminal() && can_query && able && !plain;
+        // A terminal that does not answer the query has no plot.
         let terminal = wanted.then(|| Terminal::with_options(CrosstermBackend::new(stderr()), options).ok()).flatten();
         let shown = match terminal {
             Some(terminal) => {
                 let (seconds, size) = (Seconds::default(), terminal.size().ok());
-                Shown::Picture(Box::new(Picture { size, terminal, seconds, unit, drawn: None, untold: Vec::new() }))
+                Shown::Picture(Box::new(Picture { size, terminal, seconds, unit, drawn: None, pending: Vec::new() }))
             }
             None => Shown::Bar(Progress::steady("playing", total)),
         };
         Self { shown, interrupted: wanted && typed_interrupt() }
     }
 
-    /// Whether Ctrl-C was typed where it is no signal.
+    /// Whether Ctrl-C was typed as a key, without a signal.
     pub(super) fn interrupted(&self) -> bool {
         self.interrupted
     }
 
-    /// Takes a sample.
-    pub(super) fn add(&mut self, seen: Seen) {
+    /// Adds the values of a sample.
+    pub(super) fn add(&mut self, values: Values) {
         if let Shown::Picture(picture) = &mut self.shown {
-            picture.seconds.add(seen);
+            picture.seconds.add(values);
         }
     }
 
-    /// Shows how far the run is.
+    /// Shows the progress of the run.
     pub(super) fn show(&mut self, done: usize, total: usize) {
         match &mut self.shown {
             Shown::Bar(bar) => bar.at(done),
             Shown::Picture(picture) => {
                 picture.draw(done, total);
-                // Of another size, the terminal was asked anew.
+                // A change of size has queried the cursor position again.
                 let size = picture.terminal.size().ok();
                 if size != picture.size {
                     picture.size = size;
@@ -117,19 +119,19 @@ impl View {
         }
     }
 
-    /// Says something that has happened.
-    pub(super) fn tell(&mut self, text: &str) {
+    /// Prints a line above the view.
+    pub(super) fn print_above(&mut self, text: &str) {
         match &mut self.shown {
-            Shown::Bar(bar) => bar.tell(text),
+            Shown::Bar(bar) => bar.print_above(text),
             Shown::Picture(picture) => {
-                picture.tell(text);
+                picture.print_above(text);
                 self.interrupted |= typed_interrupt();
             }
         }
     }
 }
 
-/// Whether Ctrl-C is among the keys that were read along with the terminal's answer.
+/// Whether Ctrl-C is among the keys that were read with the answer to a query of the cursor position.
 fn typed_interrupt() -> bool {
     let mut interrupted = false;
     while event::poll(Duration::ZERO).unwrap_or(false) {
@@ -142,22 +144,22 @@ fn typed_interrupt() -> bool {
 
 impl Picture {
     fn draw(&mut self, done: usize, total: usize) {
-        if self.drawn.is_some_and(|drawn| drawn.elapsed() < EVERY) {
+        if self.drawn.is_some_and(|drawn| drawn.elapsed() < DRAW_INTERVAL) {
             return;
         }
         self.drawn = Some(Instant::now());
         let share = done as f64 / total.max(1) as f64;
-        // A picture that cannot be drawn is no reason to stop an actuator.
+        // A failure to draw must not stop the run.
         let _ = self.terminal.draw(|frame| picture::draw(frame, &self.seconds, self.unit, share));
     }
 
-    /// Above the picture, where it stays.
-    fn tell(&mut self, text: &str) {
-        // What is written above goes by the size that was known at the last drawing.
+    /// Prints a line above the plot.
+    fn print_above(&mut self, text: &str) {
+        // Without this the line would be written for the size of the last drawing.
         let _ = self.terminal.autoresize();
-        let Some(size) = self.terminal.size().ok().filter(|size| roomy(*size)) else {
-            // Made small meanwhile.
-            self.untold.push(text.to_owned());
+        let Some(size) = self.terminal.size().ok().filter(|size| has_room(*size)) else {
+            // The terminal has become too small.
+            self.pending.push(text.to_owned());
             return;
         };
         let height = (text.chars().count() as u16).div_ceil(size.width).max(1);
@@ -170,9 +172,9 @@ impl Drop for Picture {
     fn drop(&mut self) {
         let place = self.terminal.get_frame().area().as_position();
         let _ = self.terminal.clear();
-        // What is said next begins where the picture was.
+        // Later output starts where the plot was.
         let _ = self.terminal.set_cursor_position(place);
         let _ = self.terminal.show_cursor();
-        self.untold.iter().for_each(|text| crate::output::say(text));
+        self.pending.iter().for_each(|text| crate::output::say(text));
     }
 }

@@ -1,52 +1,53 @@
-//! What no diagnosis has on its list.
+//! Disturbances that are not effects.
 
 use serde::{Deserialize, Serialize};
 
-/// A section `[[disturbance]]`: something that happens to the actuator or its sensor and is none of the effects that a
-/// diagnosis can name. A load or a temperature that is not recorded is another.
+/// Section `[[disturbance]]`: a disturbance of the actuator or its sensor that is not an effect.
+///
+/// A diagnosis cannot name it. A load or a temperature that is not recorded is also such a disturbance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Disturbance {
-    /// The reading jumps once and stays.
+    /// A single step of the reading.
     Jump {
-        /// By how much (µm).
+        /// Size of the step (µm).
         um: f64,
-        /// When, on the lab's clock (s).
+        /// Time of the step on the lab clock (s).
         at_s: f64,
     },
-    /// The hysteresis' displacement is `1 + share` times as large from a moment on.
+    /// A step of the gain: from then on, the displacement of the hysteresis is multiplied by `1 + share`.
     GainStep {
-        /// Relative change.
+        /// Relative change of the gain.
         share: f64,
-        /// When, on the lab's clock (s).
+        /// Time of the step on the lab clock (s).
         at_s: f64,
     },
-    /// Bursts of Gaussian noise in the reading, one at a random moment of every `every_s`.
+    /// Bursts of Gaussian noise in the reading, one at a random time in each interval of `every_s`.
     Bursts {
         /// Standard deviation (µm).
         um: f64,
-        /// How long each lasts (s).
+        /// Duration of a burst (s).
         seconds: f64,
-        /// Time for one burst (s).
+        /// Interval that contains one burst (s).
         every_s: f64,
     },
-    /// The sensor's zero wanders like a random walk: a dozen sines whose amplitudes fall with their frequency.
+    /// A random walk of the sensor's zero: the sum of 12 sines, with amplitudes that fall with frequency.
     Wander {
-        /// Sum of the amplitudes: the zero stays within this (µm).
+        /// Sum of the amplitudes (µm); the zero stays within it.
         um: f64,
         /// Period of the slowest sine (s).
         period_s: f64,
     },
-    /// The mount slips to another place each time the drive rises past a voltage.
+    /// The mount slips to another position each time the drive rises above a voltage.
     Slip {
-        /// The mount stays within this distance of its first place (µm).
+        /// Largest distance of the mount from its first position (µm).
         um: f64,
-        /// The voltage (V).
+        /// Voltage at which the mount slips (V).
         at_v: f64,
     },
-    /// The amplifier's current is limited: what it puts out follows the drive no faster than this.
+    /// The amplifier's current is limited, which limits the slew rate of its output.
     SlewLimit {
-        /// Steepest slope (V/s).
+        /// Slew limit (V/s).
         v_per_s: f64,
     },
 }

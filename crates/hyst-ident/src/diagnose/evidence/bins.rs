@@ -1,6 +1,6 @@
-//! Means over stretches of another quantity.
+//! Means over bins of another quantity.
 
-/// Equal stretches of an axis.
+/// Equal bins of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bins {
     low: f64,
@@ -9,29 +9,29 @@ pub(super) struct Bins {
     log: bool,
 }
 
-/// Rows that a stretch needs to have a mean.
-const LEAST_ROWS: usize = 5;
+/// Minimum number of rows of a bin that has a mean.
+const MIN_ROWS: usize = 5;
 
 impl Bins {
-    /// `count` stretches over the finite values; none if they are all the same.
+    /// Returns `count` bins over the finite values; `None` if all values are equal.
     pub(super) fn over(values: impl Iterator<Item = f64>, count: usize) -> Option<Self> {
         let (low, high) = crate::samples::range(values.filter(|v| v.is_finite()));
         (low < high).then_some(Self { low, high, count, log: false })
     }
 
-    /// Stretches of equal ratio from `low` to `high`, both positive, `per_decade` to ten times.
+    /// Returns bins of equal ratio from `low` to `high` (both positive), `per_decade` in each decade.
     pub(super) fn of_ratio(low: f64, high: f64, per_decade: f64) -> Option<Self> {
         let usable = low > 0.0 && high > low && high.is_finite();
         let count = (per_decade * (high / low).log10()).ceil().max(1.0) as usize;
         usable.then(|| Self { low: low.ln(), high: high.ln(), count, log: true })
     }
 
-    /// How many there are.
+    /// Returns the number of bins.
     pub(super) fn count(&self) -> usize {
         self.count
     }
 
-    /// The stretch that `x` lies in.
+    /// Returns the bin that contains `x`.
     pub(super) fn index(&self, x: f64) -> Option<usize> {
         let x = if self.log { x.ln() } else { x };
         let inside = x >= self.low && x <= self.high;
@@ -39,13 +39,13 @@ impl Bins {
         inside.then(|| (at as usize).min(self.count - 1))
     }
 
-    /// Where stretch `i` begins.
+    /// Returns the start of bin `i`.
     pub(super) fn edge(&self, i: usize) -> f64 {
         let x = self.low + (self.high - self.low) * i as f64 / self.count as f64;
         if self.log { x.exp() } else { x }
     }
 
-    /// Mean of x and of y in every stretch that has enough pairs.
+    /// Returns the means of x and of y in every bin with enough pairs.
     pub(super) fn means(&self, pairs: impl Iterator<Item = (f64, f64)>) -> (Vec<f64>, Vec<f64>) {
         let mut sums = vec![(0.0, 0.0, 0_usize); self.count];
         for (x, y) in pairs {
@@ -53,11 +53,12 @@ impl Bins {
                 *sum = (sum.0 + x, sum.1 + y, sum.2 + 1);
             }
         }
-        let enough = sums.into_iter().filter(|s| s.2 >= LEAST_ROWS);
+        let enough = sums.into_iter().filter(|s| s.2 >= MIN_ROWS);
         enough.map(|(x, y, n)| (x / n as f64, y / n as f64)).unzip()
     }
 
-    /// Slope of y over m in every stretch of x in which m moves: `(x, m, y)` in, mean of x and slope out.
+    /// Returns the slope of y over m in every bin of x in which m varies: takes `(x, m, y)`, returns the means of x and
+    /// the slopes.
     pub(super) fn slopes(&self, rows: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
         let mut sums = vec![Line::default(); self.count];
         let mut whole = Line::default();
@@ -67,16 +68,16 @@ impl Bins {
                 whole.add(x, m, y);
             }
         }
-        let least = MOVES * whole.variance();
-        let enough = sums.into_iter().filter(|s| s.n >= 4.0 * LEAST_ROWS as f64 && s.variance() > least);
+        let least = MIN_VARIANCE_SHARE * whole.variance();
+        let enough = sums.into_iter().filter(|s| s.n >= 4.0 * MIN_ROWS as f64 && s.variance() > least);
         enough.map(|s| (s.x / s.n, s.slope())).unzip()
     }
 }
 
-/// Share of the motion's whole variance that a stretch needs to show a gain.
-const MOVES: f64 = 0.1;
+/// Minimum variance of m in a bin, as a share of its overall variance.
+const MIN_VARIANCE_SHARE: f64 = 0.1;
 
-/// Sums of a straight line.
+/// Sums of a least-squares line.
 #[derive(Clone, Copy, Default)]
 struct Line {
     n: f64,
@@ -111,13 +112,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_and_slopes_of_stretches() {
+    fn means_and_slopes_of_bins() {
         let x: Vec<f64> = (0..1000).map(|k| f64::from(k) / 999.0).collect();
         let bins = Bins::over(x.iter().copied(), 10).unwrap();
         let (at, mean) = bins.means(x.iter().map(|x| (*x, 3.0 * x + 1.0)));
         assert_eq!(at.len(), 10);
         assert!(at.iter().zip(&mean).all(|(x, y)| (3.0 * x + 1.0 - y).abs() < 1e-12));
-        // The gain grows with x, under an offset.
+        // A constant gain under an offset that changes with x.
         let motion = |k: usize| (0.37 * k as f64).sin();
         let (at, slope) = bins.slopes((0..1000).map(|k| (x[k], motion(k), 5.0 + x[k].floor() + 2.0 * motion(k))));
         assert_eq!(at.len(), 10);

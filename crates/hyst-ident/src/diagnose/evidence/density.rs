@@ -1,11 +1,11 @@
-//! How a signal's power lies over frequency.
+//! Power spectral density of a signal.
 
 use nalgebra::Complex;
 
 use crate::Samples;
 use crate::linear::{Hann, windows};
 
-/// Power over frequency, one-sided.
+/// One-sided power spectral density.
 pub(super) struct Density {
     /// Frequencies \[Hz\], evenly spaced.
     pub(super) hz: Vec<f64>,
@@ -13,18 +13,18 @@ pub(super) struct Density {
     pub(super) power: Vec<f64>,
 }
 
-/// Windows that are averaged where the record is long enough.
+/// Number of windows that are averaged if the record is long enough.
 const WINDOWS: usize = 24;
-/// Rows that a window has at least.
-const SHORTEST: usize = 32;
+/// Minimum number of rows of a window.
+const MIN_WINDOW_ROWS: usize = 32;
 
 impl Density {
-    /// Of a signal over the settled rows by Welch's method; windows such that about 24 fit into the record.
+    /// Returns the density of a signal over the settled rows by Welch's method, with about 24 windows in the record.
     pub(super) fn of(samples: &Samples, signal: &[f64]) -> Option<Self> {
         Self::with_windows(samples, signal, 2 * samples.len() / (WINDOWS + 1))
     }
 
-    /// With the finest lines that the longest segment gives.
+    /// Returns the density with the finest lines that the longest segment allows.
     pub(super) fn finest(samples: &Samples, signal: &[f64]) -> Option<Self> {
         Self::with_windows(samples, signal, usize::MAX)
     }
@@ -33,9 +33,9 @@ impl Density {
         let samples = samples.clone().of_one_period();
         let segments = super::settled_segments(&samples);
         let longest = segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
-        // Fast lengths, and never longer than a segment.
+        // An even length, never longer than a segment.
         let length = length.min(longest) / 2 * 2;
-        if length < SHORTEST {
+        if length < MIN_WINDOW_ROWS {
             return None;
         }
         let hann = Hann::new(length);
@@ -48,37 +48,37 @@ impl Density {
         for window in windows(&segments, length) {
             add(&hann.spectrum(&signal[window]), hann.energy());
         }
-        // Segments that are too short for a window count as they are.
-        for segment in segments.iter().filter(|s| (SHORTEST..length).contains(&s.len())) {
+        // A segment that is too short for a window is one short window.
+        for segment in segments.iter().filter(|s| (MIN_WINDOW_ROWS..length).contains(&s.len())) {
             let (spectrum, energy) = hann.short(&signal[segment.clone()]);
             add(&spectrum, energy);
         }
         let scale = 2.0 * samples.period / energy;
         let step = 1.0 / (length as f64 * samples.period);
-        // The window smears the removed mean over the first line, and the last stands for half a line.
+        // The window spreads the removed mean over the first line, and the last line is only half a line.
         let lines = 2..length / 2;
         let hz = lines.clone().map(|i| i as f64 * step).collect();
         Some(Self { hz, power: power[lines].iter().map(|p| p * scale).collect() })
     }
 
-    /// Distance of the lines \[Hz\].
+    /// Returns the spacing of the lines \[Hz\].
     pub(super) fn step(&self) -> f64 {
         self.hz.get(1).zip(self.hz.first()).map_or(0.0, |(b, a)| b - a)
     }
 
-    /// Roots of the densities \[unit/√Hz\].
+    /// Returns the square roots of the densities \[unit/√Hz\].
     pub(super) fn amplitudes(&self) -> Vec<f64> {
         self.power.iter().map(|p| p.sqrt()).collect()
     }
 
-    /// Power between two frequencies \[unit²\].
+    /// Returns the power between two frequencies \[unit²\].
     pub(super) fn between(&self, low: f64, high: f64) -> f64 {
         let inside = self.hz.iter().zip(&self.power).filter(|(hz, _)| **hz >= low && **hz < high);
         inside.map(|(_, p)| p).sum::<f64>() * self.step()
     }
 }
 
-/// Density of white noise of a standard deviation, sampled every `period` \[unit/√Hz\].
+/// Returns the density of white noise with standard deviation `sigma`, sampled every `period` \[unit/√Hz\].
 pub(super) fn white(sigma: f64, period: f64) -> f64 {
     sigma * (2.0 * period).sqrt()
 }

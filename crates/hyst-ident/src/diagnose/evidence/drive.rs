@@ -1,20 +1,20 @@
-//! What the drive does: rests after a motion, and whether it rises or falls.
+//! Features of the drive: holds, and rising and falling branches.
 
 use std::ops::Range;
 
 use crate::Samples;
 use crate::noise::noise_floor;
 
-/// A rest after a motion.
+/// A hold after a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Hold {
     /// Its rows.
     pub(super) rows: Range<usize>,
-    /// Where the rest before it ended: the motion lies in between.
+    /// End of the hold before it: the motion is in between.
     pub(super) before: usize,
 }
 
-/// Whether the drive rises, falls or rests.
+/// Whether the drive rises, falls or is at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Branch {
     Rising,
@@ -22,18 +22,18 @@ pub(super) enum Branch {
     AtRest,
 }
 
-/// A drive rests where it stays within this share of its span (or within its own noise) …
-const STILL: f64 = 5e-4;
-/// … for this share of the longest segment, and for so many rows: a slow turning point is no rest.
-const LEAST_SHARE: f64 = 0.025;
-const LEAST_ROWS: usize = 20;
+/// The drive is at rest while it stays within this share of its span (or within its own noise) …
+const MAX_REST_CHANGE: f64 = 5e-4;
+/// … for this share of the longest segment and for this many rows: a slow turning point is no rest.
+const MIN_REST_SHARE: f64 = 0.025;
+const MIN_REST_ROWS: usize = 20;
 
-/// Stretches in which the drive rests, those at the beginning of a segment among them.
+/// Returns the rests of the drive, including those at the start of a segment.
 fn rests(samples: &Samples) -> Vec<Range<usize>> {
     let (low, high) = samples.input_range();
-    let room = (STILL * (high - low)).max(4.0 * noise_floor(&samples.input, &samples.segments));
+    let room = (MAX_REST_CHANGE * (high - low)).max(4.0 * noise_floor(&samples.input, &samples.segments));
     let longest = samples.segments.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
-    let least = ((LEAST_SHARE * longest as f64) as usize).max(LEAST_ROWS);
+    let least = ((MIN_REST_SHARE * longest as f64) as usize).max(MIN_REST_ROWS);
     let mut found = Vec::new();
     for segment in &samples.segments {
         let mut start = segment.start;
@@ -44,7 +44,7 @@ fn rests(samples: &Samples) -> Vec<Range<usize>> {
                 found.push(start..start + length);
                 start += length;
             } else {
-                // Whole steps while it moves fast; in a slow motion every row would be looked at again and again.
+                // Large steps: in a slow motion every row would otherwise be examined many times.
                 start += (length / 8).max(1);
             }
         }
@@ -52,7 +52,7 @@ fn rests(samples: &Samples) -> Vec<Range<usize>> {
     found
 }
 
-/// Rests that follow a motion.
+/// Returns the rests that follow a motion.
 pub(super) fn holds(samples: &Samples) -> Vec<Hold> {
     let rests = rests(samples);
     let mut found = Vec::new();
@@ -68,7 +68,7 @@ pub(super) fn holds(samples: &Samples) -> Vec<Hold> {
     found
 }
 
-/// Rate of the drive at every row \[input unit/s\], over four sample periods.
+/// Returns the rate of the drive at every row \[input unit/s\], over four sample periods.
 pub(super) fn rates(samples: &Samples) -> Vec<f64> {
     let mut rates = vec![0.0; samples.len()];
     for (i, s) in samples.segments.iter().enumerate() {
@@ -81,7 +81,7 @@ pub(super) fn rates(samples: &Samples) -> Vec<f64> {
     rates
 }
 
-/// The branch that every row lies on.
+/// Returns the branch of every row.
 pub(super) fn branches(samples: &Samples) -> Vec<Branch> {
     let mut branches: Vec<Branch> = rates(samples)
         .into_iter()
@@ -97,7 +97,7 @@ pub(super) fn branches(samples: &Samples) -> Vec<Branch> {
     branches
 }
 
-/// A clock that goes on from file to file, where each of them has its own \[s\].
+/// Returns a clock that continues from file to file, if each file has its own clock \[s\].
 pub(super) fn clock(samples: &Samples) -> Vec<f64> {
     let (mut shift, mut last) = (0.0, f64::NEG_INFINITY);
     let mut clock = Vec::with_capacity(samples.len());
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holds_are_found_and_turning_points_are_none() {
+    fn holds_are_found_and_turning_points_are_not_holds() {
         // Rest, ramp, hold, ramp down, hold; then a slow cosine without any rest.
         let level = |k: usize| match k {
             0..100 => 0.0,

@@ -1,4 +1,4 @@
-//! What shows over frequency: dead time and lag, modes, tones.
+//! Evidence over frequency: dead time and lag, modes, tones.
 
 use std::f64::consts::TAU;
 
@@ -12,30 +12,31 @@ use super::{Axis, NAMED, Picture, Role, Scene, View, WITH, WITHOUT};
 use crate::linear::{ResponseLine, WelchOptions, response};
 use crate::model::{Effect, Model};
 
-/// Lines of a response are shown where their phase is known this well \[rad\].
-const KNOWN: f64 = 0.05;
-/// … and where the output predicted without the effect has this share of its strongest line's power: between lines there is what windows leak.
-const EXCITED: f64 = 1e-5;
-/// Points for each decade of frequency.
+/// Maximum standard error of the phase of a shown line of the response \[rad\].
+const MAX_PHASE_ERROR: f64 = 0.05;
+/// Minimum power of a shown line of the output predicted without the effect, relative to its strongest line: between
+/// the lines there is only leakage.
+const MIN_RELATIVE_POWER: f64 = 1e-5;
+/// Points per decade of frequency.
 const PER_DECADE: f64 = 16.0;
 
-/// Gain and phase of the measured output against the predicted one, over frequency (H₁).
+/// Returns pictures of the gain and phase of the measured over the predicted output, over frequency (H₁).
 pub(super) fn response_pictures(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
     let (phase_says, gain_says) = match effect {
         Effect::Delay => {
-            ("A dead time turns the phase in proportion to frequency.", "A dead time leaves the gain at 1.")
+            ("A dead time shifts the phase in proportion to frequency.", "A dead time does not change the gain.")
         }
         Effect::Lag => (
-            "A first-order lag turns the phase towards −90°, by 45° at its corner.",
-            "A first-order lag lets the gain fall beyond its corner, to 0.71 there.",
+            "A first-order lag shifts the phase towards −90°, by −45° at its corner frequency.",
+            "A first-order lag lowers the gain to 0.71 at its corner frequency, and more above it.",
         ),
         Effect::Resonance => (
-            "A mode turns the phase at its frequency, as far as the drive reaches.",
-            "A mode lets the gain rise towards its frequency, as far as the drive reaches.",
+            "A mode shifts the phase near its frequency, within the band of the drive.",
+            "A mode raises the gain near its frequency, within the band of the drive.",
         ),
         _ => (
-            "Plays that drag turn the phase the more, the faster the drive.",
-            "Plays that drag lower the gain the more, the faster the drive.",
+            "Rate-dependent play operators shift the phase more at a higher rate of the drive.",
+            "Rate-dependent play operators lower the gain more at a higher rate of the drive.",
         ),
     };
     let hz = || Axis::new("frequency", "Hz").log();
@@ -60,7 +61,7 @@ pub(super) fn response_pictures(effect: Effect, model: &Model, scene: &Scene<'_>
     vec![phase, gain]
 }
 
-/// The response that was found, where it is that of a linear filter.
+/// Returns the frequency response of the named effect, if it is a linear filter.
 fn named(effect: Effect, model: &Model, hz: &[f64], period: f64) -> Option<Vec<Complex<f64>>> {
     let one = Complex::new(1.0, 0.0);
     let of: Box<dyn Fn(f64) -> Complex<f64>> = match effect {
@@ -82,27 +83,27 @@ fn named(effect: Effect, model: &Model, hz: &[f64], period: f64) -> Option<Vec<C
         }
         _ => return None,
     };
-    // What lies beyond half of the sample rate the record does not show.
+    // The record does not show frequencies above half its sample rate.
     Some(hz.iter().map(|hz| of(TAU * hz.min(0.5 / period))).collect())
 }
 
-/// Lines of the response that the drive excites and that are known well.
+/// Returns the lines of the response that the drive excites and whose phase is known well.
 fn lines(scene: &Scene<'_>, view: &View) -> Vec<ResponseLine> {
     let mut samples = scene.samples.clone().of_one_period();
     samples.segments = super::settled_segments(&samples);
     samples.input.clone_from(&view.predicted);
-    // A record that is too short for it has no such picture.
+    // A record that is too short for a response has no such picture.
     let found = response(&samples, &WelchOptions::default()).map(|r| r.lines).unwrap_or_default();
     let Some(density) = Density::of(&scene.samples, &scene.without.predicted) else { return Vec::new() };
     let most = density.power.iter().copied().fold(0.0, f64::max);
     let excited = |hz: f64| {
         let near = density.hz.partition_point(|line| *line < hz - 0.5 * density.step());
-        density.power.get(near).is_some_and(|power| *power > EXCITED * most)
+        density.power.get(near).is_some_and(|power| *power > MIN_RELATIVE_POWER * most)
     };
-    found.into_iter().filter(|l| l.phase_std_error < KNOWN && excited(l.hz)).collect()
+    found.into_iter().filter(|l| l.phase_std_error < MAX_PHASE_ERROR && excited(l.hz)).collect()
 }
 
-/// Means over stretches of frequency, each line weighted by what is known of it.
+/// Returns means over bins of frequency, each line weighted by its certainty.
 fn averaged(lines: &[ResponseLine], f: &dyn Fn(&ResponseLine) -> f64) -> (Vec<f64>, Vec<f64>) {
     let ends = lines.first().zip(lines.last()).and_then(|(a, b)| Bins::of_ratio(a.hz, b.hz, PER_DECADE));
     let Some(bins) = ends else { return Default::default() };
@@ -116,7 +117,7 @@ fn averaged(lines: &[ResponseLine], f: &dyn Fn(&ResponseLine) -> f64) -> (Vec<f6
     sums.into_iter().filter(|s| s.0 > 0.0).map(|(w, hz, y)| (hz / w, y / w)).unzip()
 }
 
-/// A picture of the residual's spectrum: what the curves are of, and the density of each.
+/// Returns a picture of the residual's spectrum from the densities of two curves.
 pub(super) fn spectrum(
     scene: &Scene<'_>,
     effect: Option<Effect>,
@@ -139,10 +140,10 @@ pub(super) fn spectrum(
     picture
 }
 
-/// Spectrum of the residual with the modes marked.
+/// Returns the spectrum of the residual with the modes marked.
 pub(super) fn modes(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Picture {
-    let caption = "Without it the residual is large where the mode rings by itself (marked) and where the drive forces it nearby; with it \
-        both fall towards the noise.";
+    let caption = "Without it the residual is large at the natural frequency of the mode (marked) and at nearby frequencies of the drive; with it \
+        both fall towards the noise floor.";
     let of = |view: &View| Density::of(&scene.samples, &view.residual);
     let curves = [(Role::Without, WITHOUT, of(&scene.without)), (Role::With, WITH, of(&scene.with))];
     let mut picture = spectrum(scene, Some(Effect::Resonance), caption, curves);
@@ -152,24 +153,25 @@ pub(super) fn modes(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Picture {
     picture
 }
 
-/// Rests that ring-down is averaged over, cycles that are shown at most, and at which amplitude it is over.
-const RINGS: usize = 8;
-const CYCLES: f64 = 25.0;
-const OVER: f64 = 0.02;
-/// Noise floors that the expected ringing must have: what a record does not excite, it cannot show.
-const EXPECTED: f64 = 3.0;
+/// Maximum number of holds in the average, maximum number of cycles, and relative amplitude at which the ring-down
+/// ends.
+const MAX_HOLDS: usize = 8;
+const MAX_CYCLES: f64 = 25.0;
+const FINAL_AMPLITUDE: f64 = 0.02;
+/// Minimum expected ringing in noise floors: a record cannot show a mode that it does not excite.
+const MIN_EXPECTED_RINGING: f64 = 3.0;
 
-/// What is left in rests after which the mode should ring most, averaged in step with it.
+/// Returns the residual after the holds with the largest expected ringing, aligned and averaged.
 pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Picture> {
     let (hz, damping) = *modes.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let period = scene.samples.usual_period();
-    let decay = -OVER.ln() / (TAU * hz * damping.max(1e-3));
-    let rows = (decay.min(CYCLES / hz) / period).ceil() as usize;
+    let decay = -FINAL_AMPLITUDE.ln() / (TAU * hz * damping.max(1e-3));
+    let rows = (decay.min(MAX_CYCLES / hz) / period).ceil() as usize;
     if rows < 8 {
         return None;
     }
     let window = |h: &Hold| h.rows.start..h.rows.start + rows;
-    // What the mode adds to the output, less its mean.
+    // The mode's contribution to the output, minus its mean.
     let expected =
         |h: &Hold| centred(window(h).map(|k| scene.with.predicted[k] - scene.without.predicted[k]).collect());
     let energy = |ring: &[f64]| ring.iter().map(|y| y * y).sum::<f64>() / rows as f64;
@@ -180,9 +182,9 @@ pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Pictu
     let mut rests: Vec<(Hold, Vec<f64>)> =
         holds(&scene.samples).into_iter().filter(long).map(|h| (h.clone(), expected(&h))).collect();
     rests.sort_by(|a, b| energy(&b.1).total_cmp(&energy(&a.1)));
-    rests.truncate(RINGS);
+    rests.truncate(MAX_HOLDS);
     let strongest = rests.first()?.1.clone();
-    // Their size and sign beside the strongest: rings of opposite steps must not cancel.
+    // Weights with the size and sign relative to the strongest, so that rings of opposite steps do not cancel.
     let weights: Vec<f64> = rests
         .iter()
         .map(|(_, ring)| {
@@ -190,13 +192,13 @@ pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Pictu
         })
         .collect();
     let whole: f64 = weights.iter().map(|w| w * w).sum();
-    if energy(&strongest).sqrt() * whole.sqrt() < EXPECTED * scene.noise {
+    if energy(&strongest).sqrt() * whole.sqrt() < MIN_EXPECTED_RINGING * scene.noise {
         return None;
     }
     let (x, y) = (Axis::new("time since the drive stopped", "ms"), scene.residual_axis());
     let caption = format!(
-        "Average over the {} rests of the drive in which the mode should ring most, each in step with it. Without it the residual rings \
-         at {hz:.1} Hz and dies away as the mode does, with it little of that is left.",
+        "Average over the {} holds of the drive with the largest expected ringing, aligned in phase. Without it the residual rings \
+         at {hz:.1} Hz and decays like the mode; with it the residual is small.",
         rests.len()
     );
     let mut picture = Picture::new(Some(Effect::Resonance), "Ring-down after a stop", x, y, caption);
@@ -211,16 +213,17 @@ pub(super) fn ring_down(scene: &Scene<'_>, modes: &[(f64, f64)]) -> Option<Pictu
     Some(picture)
 }
 
-/// The same less its mean.
+/// Returns the values minus their mean.
 fn centred(mut values: Vec<f64>) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter_mut().for_each(|v| *v -= mean);
     values
 }
 
-/// Spectrum of the residual with a tone marked, as fine as the record allows.
+/// Returns the spectrum of the residual with a tone marked, at the finest resolution of the record.
 pub(super) fn tone(scene: &Scene<'_>, hz: f64) -> Picture {
-    let caption = "A tone in the sensor is a line as narrow as the record can show. Without it the line is there, with it it is gone.";
+    let caption = "A tone in the sensor is a line of the smallest width that the record resolves. Without it the line is visible, \
+        with it the line disappears.";
     let of = |view: &View| Density::finest(&scene.samples, &view.residual);
     let curves = [(Role::Without, WITHOUT, of(&scene.without)), (Role::With, WITH, of(&scene.with))];
     let mut picture = spectrum(scene, Some(Effect::Interference), caption, curves);
@@ -228,13 +231,13 @@ pub(super) fn tone(scene: &Scene<'_>, hz: f64) -> Picture {
     picture
 }
 
-/// Points over a period.
+/// Number of points over a period.
 const PHASES: usize = 48;
 
-/// The residual over the tone's phase, averaged over the whole record.
+/// Returns the residual over the tone's phase, averaged over the whole record.
 pub(super) fn folded(scene: &Scene<'_>, tone: &InterferenceParams) -> Option<Picture> {
-    let caption = "All periods of the tone on the lab's clock laid over each other and averaged: what does not keep its time over the whole \
-        record vanishes. Without it a sine is left, with it nothing is.";
+    let caption = "All periods of the tone, aligned on the lab clock and averaged. Errors without a constant phase over the whole record average \
+        out. Without it a sine remains, with it nothing remains.";
     let (x, y) = (Axis::new("phase of the tone", "°"), scene.residual_axis());
     let mut picture = Picture::new(Some(Effect::Interference), "Folded on the tone", x, y, caption);
     let phase = |k: usize| 360.0 * (tone.hz * scene.samples.time[k]).rem_euclid(1.0);

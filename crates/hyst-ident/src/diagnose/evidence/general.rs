@@ -1,4 +1,4 @@
-//! The whole model before and after: loops, residuals over time, spectra.
+//! Pictures of the whole model before and after: loops, residuals over time, spectra.
 
 use super::density::Density;
 use super::drive::clock;
@@ -8,11 +8,11 @@ use crate::Samples;
 use crate::record::Record;
 use crate::simulate::Simulation;
 
-/// Names of the model as it was given, and of the extended one.
+/// Names of the curves of the given and of the extended model.
 const BEFORE: &str = "before";
 const AFTER: &str = "after";
 
-/// All of them; `scene` has the model as it was given as the one without.
+/// Returns all pictures of the whole model; `scene.without` is the given model.
 pub(super) fn pictures(m: &Material<'_>, scene: &Scene<'_>) -> Vec<Picture> {
     let mut pictures = Vec::new();
     let changed = m.before.predicted != m.after.predicted;
@@ -25,8 +25,7 @@ pub(super) fn pictures(m: &Material<'_>, scene: &Scene<'_>) -> Vec<Picture> {
     if let Some((record, (before, after))) = m.test.zip(m.tests) {
         pictures.push(over_time(record, before, after, "test record", changed, scene));
     }
-    let caption =
-        "What stands above the noise floor is not noise. Narrow peaks are modes or tones, a rise to the left is slow.";
+    let caption = "Power above the noise floor is not noise. Narrow peaks are modes or tones; a rise to the left is a slow error.";
     let of = |view: &View| Density::of(&scene.samples, &view.residual);
     let before = of(&scene.without).filter(|_| changed);
     let mut picture = spectrum(
@@ -41,15 +40,15 @@ pub(super) fn pictures(m: &Material<'_>, scene: &Scene<'_>) -> Vec<Picture> {
     pictures
 }
 
-/// Where nothing was added there is one model.
+/// Returns the name of a curve; without an extension there is only one model.
 fn name(name: &'static str, changed: bool) -> &'static str {
     if changed { name } else { "the model" }
 }
 
-/// Rows of a loop that are shown at most, so that one can follow it.
-const MOST_ROWS: usize = 8000;
+/// Maximum number of rows of a loop, so that it stays readable.
+const MAX_LOOP_ROWS: usize = 8000;
 
-/// The segment with the widest motion over the drive, and the residual there.
+/// Returns the segment with the largest motion over the drive, and its residual.
 fn loops(
     record: &Record,
     before: &Simulation,
@@ -65,9 +64,9 @@ fn loops(
     };
     let segments = super::settled_segments(&samples);
     let widest = segments.iter().map(&width).fold(0.0, f64::max);
-    // The first of those that are as wide, but for noise.
+    // The first of the segments with equal motion, up to noise.
     let Some(rows) = segments.iter().find(|s| width(s) >= 0.95 * widest && !s.is_empty()) else { return Vec::new() };
-    let rows = rows.start..rows.end.min(rows.start + MOST_ROWS);
+    let rows = rows.start..rows.end.min(rows.start + MAX_LOOP_ROWS);
     let changed = m.before.predicted != m.after.predicted;
     let which = if m.test.is_some() { "test record" } else { "training record" };
     let seconds = (samples.time[rows.start], samples.time[rows.end - 1]);
@@ -78,7 +77,7 @@ fn loops(
     let caption = format!("Measured and predicted output over the drive ({part}).");
     let mut whole = Picture::new(None, "Loops", drive(), Axis::new("output", scene.unit), caption);
     whole.path(Role::Measured, "measured", u, &samples.output[rows.clone()]);
-    let caption = format!("What the models miss of the same loops ({part}).");
+    let caption = format!("Residual over the same loops ({part}).");
     let mut left = Picture::new(None, "Residual over the drive", drive(), scene.residual_axis(), caption);
     for (role, name, simulation) in [(Role::Without, BEFORE, before), (Role::With, name(AFTER, changed), after)]
         .into_iter()
@@ -92,7 +91,7 @@ fn loops(
     vec![whole, left]
 }
 
-/// The residual of a record over lab time.
+/// Returns the residual of a record over lab time.
 fn over_time(
     record: &Record,
     before: &Simulation,
@@ -103,7 +102,8 @@ fn over_time(
 ) -> Picture {
     let samples = Samples::from_record(record);
     let clock = clock(&samples);
-    let caption = "Measured less predicted at every row (of many the lowest and the highest), start-up rows left out.";
+    let caption =
+        "Measured − predicted at every row, without start-up rows. Long records: minimum and maximum per pixel.";
     let title = format!("Residual over time, {which}");
     let mut picture = Picture::new(None, &title, Axis::new("lab time", "s"), scene.residual_axis(), caption);
     for (role, name, simulation) in [(Role::Without, BEFORE, before), (Role::With, name(AFTER, changed), after)]
@@ -116,7 +116,7 @@ fn over_time(
                 x.push(clock[k]);
                 y.push(samples.output[k] - simulation.predicted[k]);
             }
-            // The line is interrupted where the record is.
+            // Interrupt the line at the gap.
             x.push(clock[s.end - 1] + 0.5 * samples.period_of(i));
             y.push(f64::NAN);
         }

@@ -1,4 +1,4 @@
-//! Where what is left lives: in time, over the drive, on which branch, at which frequencies.
+//! Breakdown of the remainder by time, drive, branch and frequency.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,15 +10,15 @@ use super::drive::{Branch, branches, clock};
 /// One part of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Part {
-    /// Its name, as `12.0 to 18.1 s`.
+    /// Name, for example `12.0 to 18.1 s`.
     pub name: String,
-    /// Root mean square of the residual in it; of a band of frequencies, of what lies in the band \[output unit\].
+    /// RMS of the remainder in it; for a band of frequencies, RMS of its power in the band \[output unit\].
     pub rms: f64,
-    /// Its share of the whole record's Σ residual².
+    /// Share of the whole record's Σ residual².
     pub share: f64,
 }
 
-/// The residual of the extended model on the training record, by one quantity.
+/// Breakdown of the remainder on the training record by one quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Breakdown {
     /// The quantity: `time`, `drive`, `branch` or `frequency`.
@@ -27,19 +27,19 @@ pub struct Breakdown {
     pub parts: Vec<Part>,
 }
 
-/// Segments that are looked at one by one; a record of more, or of one, is cut into even parts.
+/// Numbers of segments that are examined one by one; a record with fewer or more is divided into equal parts.
 const SEGMENTS: std::ops::RangeInclusive<usize> = 2..=12;
-/// Even parts of time, and bands of the drive.
+/// Number of equal parts of the time, and of bands of the drive.
 const PARTS: usize = 8;
-/// Bands of frequency in each decade.
+/// Frequency bands per decade.
 const PER_DECADE: f64 = 2.0;
 
-/// By time, drive, branch and frequency.
+/// Returns the breakdowns by time, drive, branch and frequency.
 pub(super) fn breakdowns(scene: &Scene<'_>) -> Vec<Breakdown> {
     [by_time(scene), by_drive(scene), by_branch(scene), by_frequency(scene)].into_iter().flatten().collect()
 }
 
-/// A breakdown from the part of every row.
+/// Returns a breakdown, given the part of every row.
 fn by_part(scene: &Scene<'_>, by: &str, names: Vec<String>, part: impl Fn(usize) -> Option<usize>) -> Breakdown {
     let mut sums = vec![(0.0, 0_usize); names.len()];
     for k in scene.rows() {
@@ -90,19 +90,21 @@ fn by_branch(scene: &Scene<'_>) -> Option<Breakdown> {
     Some(by_part(scene, "branch", names, |k| BRANCHES.iter().position(|b| b.0 == branches[k])))
 }
 
-/// Bands of half a decade. What lies below the slowest line of the spectrum, the mean included, counts for the lowest band.
+/// Returns the breakdown into bands of half a decade. Power below the slowest line of the spectrum, including the mean,
+/// counts for the lowest band.
 fn by_frequency(scene: &Scene<'_>) -> Option<Breakdown> {
     let density = Density::finest(&scene.samples, &scene.with.residual)?;
     let (n, squares) = scene.rows().fold((0.0, 0.0), |(n, s), k| (n + 1.0, s + scene.with.residual[k].powi(2)));
     let variance: f64 = squares / f64::max(n, 1.0);
     let (first, last) = (*density.hz.first()?, *density.hz.last()? + density.step());
-    // Edges at 1 and 3 of each decade, so that they are the same whatever the record.
+    // Edges at 1 and 3 of each decade, so that they are the same for all records.
     let edge = |i: i32| if i % 2 == 0 { 10f64.powi(i / 2) } else { 3.0 * 10f64.powi((i - 1).div_euclid(2)) };
     let lowest = (PER_DECADE * first.log10()).floor() as i32;
     let mut edges: Vec<f64> = (lowest..).map(edge).skip_while(|e| *e <= first).take_while(|e| *e < last).collect();
     edges.push(last);
     let mut powers: Vec<f64> = edges.windows(2).map(|w| density.between(w[0], w[1])).collect();
-    // The spectrum weighs the middle of its windows: over a record that is not the same everywhere it need not sum up to the variance.
+    // The spectrum weights the middle of its windows. For a residual that varies over the record, its sum differs from
+    // the variance.
     let sum = powers.iter().sum::<f64>();
     powers.iter_mut().for_each(|p| *p *= f64::min(1.0, variance / sum.max(f64::MIN_POSITIVE)));
     let rest = (variance - sum).max(0.0);
@@ -114,15 +116,16 @@ fn by_frequency(scene: &Scene<'_>) -> Option<Breakdown> {
     Some(Breakdown { by: "frequency".into(), parts })
 }
 
-/// A part stands out from this multiple of the whole record's root mean square on, a band of frequencies from this share on.
-const STANDS_OUT: f64 = 1.3;
-const MOST_OF_IT: f64 = 0.5;
+/// Minimum RMS of a part that is reported, relative to the RMS of the whole record, and minimum share of a frequency
+/// band.
+const MIN_RMS_RATIO: f64 = 1.3;
+const MIN_BAND_SHARE: f64 = 0.5;
 
-/// The breakdowns in sentences; nothing where what is left is noise.
+/// Returns the breakdowns in sentences; none if the remainder is noise.
 pub(super) fn places(scene: &Scene<'_>, breakdowns: &[Breakdown]) -> Vec<String> {
     let (n, squares) = scene.rows().fold((0.0, 0.0), |(n, s), k| (n + 1.0, s + scene.with.residual[k].powi(2)));
     let whole = (squares / f64::max(n, 1.0)).sqrt();
-    if whole <= STANDS_OUT * scene.noise {
+    if whole <= MIN_RMS_RATIO * scene.noise {
         return Vec::new();
     }
     let unit = scene.unit;
@@ -131,11 +134,11 @@ pub(super) fn places(scene: &Scene<'_>, breakdowns: &[Breakdown]) -> Vec<String>
         let Some(most) = parts.iter().max_by(|a, b| a.rms.total_cmp(&b.rms)) else { continue };
         let against = format!("{} {unit} RMS against {} {unit} over the whole record", figure(most.rms), figure(whole));
         match by.as_str() {
-            "frequency" if most.share >= MOST_OF_IT => {
-                places.push(format!("{:.0} % of its power lies {}", 100.0 * most.share, between(&most.name)));
+            "frequency" if most.share >= MIN_BAND_SHARE => {
+                places.push(format!("{:.0} % of its power is {}", 100.0 * most.share, between(&most.name)));
             }
             "frequency" => {}
-            _ if most.rms < STANDS_OUT * whole => {}
+            _ if most.rms < MIN_RMS_RATIO * whole => {}
             "time" => places.push(format!("it is largest in {}: {against}", most.name)),
             "branch" if most.name == "at rest" => {
                 places.push(format!("it is largest where the drive rests: {against}"));
@@ -146,17 +149,18 @@ pub(super) fn places(scene: &Scene<'_>, breakdowns: &[Breakdown]) -> Vec<String>
     }
     places.extend(jump(scene));
     if places.is_empty() {
-        places.push("it is spread evenly over time, drive and branch, and over frequency".into());
+        places.push("it is spread evenly over time, drive, branch and frequency".into());
     }
     places
 }
 
-/// Means over time in which a jump is looked for, how much of them it must explain, and how much less a slope may leave.
+/// Number of means over time in which a jump is searched, minimum share of their variance that it explains, and maximum
+/// ratio of its squares to those of a slope.
 const MEANS: usize = 100;
-const EXPLAINS: f64 = 0.6;
-const LESS_THAN_A_SLOPE: f64 = 0.5;
+const MIN_JUMP_SHARE: f64 = 0.6;
+const MAX_RATIO_TO_SLOPE: f64 = 0.5;
 
-/// A jump of the residual's mean, where one explains what is slow in it better than a slope does.
+/// Returns a jump of the mean residual, if it explains the slow part better than a slope.
 fn jump(scene: &Scene<'_>) -> Option<String> {
     let clock = clock(&scene.samples);
     let bins = Bins::over(clock.iter().copied(), MEANS)?;
@@ -169,13 +173,13 @@ fn jump(scene: &Scene<'_>) -> Option<String> {
     let (ty, tt) =
         time.iter().zip(&mean).fold((0.0, 0.0), |s, (a, b)| (s.0 + (a - t) * (b - y), s.1 + (a - t).powi(2)));
     let (whole, sloping) = (spread(&mean), spread(&mean) - ty * ty / tt);
-    let sharp = left(at) < (1.0 - EXPLAINS) * whole && left(at) < LESS_THAN_A_SLOPE * sloping;
+    let sharp = left(at) < (1.0 - MIN_JUMP_SHARE) * whole && left(at) < MAX_RATIO_TO_SLOPE * sloping;
     let height = average(&mean[at..]) - average(&mean[..at]);
     let (seconds, sign) = (0.5 * (time[at - 1] + time[at]), if height > 0.0 { "+" } else { "" });
     sharp.then(|| format!("its mean jumps by {sign}{} {} at about {seconds:.1} s", figure(height), scene.unit))
 }
 
-/// `between 1 and 3 Hz` of `1 to 3 Hz`; others as they are.
+/// Changes `1 to 3 Hz` to `between 1 and 3 Hz`; other names stay unchanged.
 fn between(name: &str) -> String {
     match name.split_once(" to ") {
         Some((low, high)) => format!("between {low} and {high}"),
@@ -183,7 +187,7 @@ fn between(name: &str) -> String {
     }
 }
 
-/// Three significant digits, without zeros at the end of whole numbers.
+/// Returns three significant digits, without trailing zeros after the decimal point.
 fn figure(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
@@ -193,7 +197,7 @@ fn figure(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// An edge of bands: one significant digit and no more.
+/// Returns the edge of a band with one significant digit.
 fn round(hz: f64) -> String {
     let decimals = (-hz.log10().floor() as i32).max(0) as usize;
     format!("{hz:.decimals$}")

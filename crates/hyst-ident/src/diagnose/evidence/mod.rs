@@ -1,23 +1,23 @@
-//! Evidence that a person can check: for each named effect the trace that it leaves in the record where the model does not have
-//! it, beside what is left with it; the whole model before and after; and where what is left lives.
+//! Evidence to check by eye: the trace of each named effect in the residual of a model without it, compared with the
+//! residual with it; the whole model before and after; and the breakdown of the remainder.
 //!
-//! "Without" is the extended model less that one stage, everything else kept: nothing is fitted again, so what the picture shows is
-//! the stage's own part. Residuals are measured − predicted, over the rows that are no start-up transient.
+//! "Without" is the extended model minus that one stage. Nothing is refitted, so the picture shows the contribution of
+//! that stage alone. Residuals are measured − predicted, over the rows that are no start-up rows.
 
 mod bins;
 mod density;
 mod drive;
 mod frequency;
 mod general;
-mod left;
 mod map;
 mod picture;
+mod residual_parts;
 mod slow;
 
 use std::ops::Range;
 
-pub use left::{Breakdown, Part};
 pub use picture::{Axis, Curve, MOST_POINTS, Mark, Picture, Role, Style};
+pub use residual_parts::{Breakdown, Part};
 
 use crate::Samples;
 use crate::fit::FitError;
@@ -25,7 +25,7 @@ use crate::model::{Base, Effect, Model};
 use crate::record::{OutputUnit, Record};
 use crate::simulate::{Simulation, Zero, simulate};
 
-/// What evidence is taken from.
+/// Inputs of the evidence.
 pub(super) struct Material<'a> {
     pub(super) extended: &'a Model,
     pub(super) named: &'a [Effect],
@@ -38,14 +38,14 @@ pub(super) struct Material<'a> {
     pub(super) noise: f64,
 }
 
-/// What a person can check.
+/// The evidence.
 pub(super) struct Evidence {
     pub(super) pictures: Vec<Picture>,
     pub(super) breakdowns: Vec<Breakdown>,
     pub(super) places: Vec<String>,
 }
 
-/// Pictures of every named effect and of the whole, and where what is left lives.
+/// Collects the pictures of every named effect and of the whole model, and the breakdown of the remainder.
 pub(super) fn collect(m: &Material<'_>) -> Result<Evidence, FitError> {
     let unit = OutputUnit::of_suffix(&m.extended.output.unit).map_or(m.extended.output.unit.as_str(), |u| u.symbol());
     let mut samples = Samples::from_record(m.train);
@@ -60,27 +60,27 @@ pub(super) fn collect(m: &Material<'_>) -> Result<Evidence, FitError> {
     };
     let mut pictures = general::pictures(m, &scene);
     for effect in m.named {
-        scene.without = View::of(&scene.samples, &simulate(&lacking(m.extended, *effect), m.train, m.zero)?);
+        scene.without = View::of(&scene.samples, &simulate(&without_effect(m.extended, *effect), m.train, m.zero)?);
         pictures.extend(of_effect(*effect, m.extended, &scene).into_iter().filter(Picture::shows));
     }
-    let breakdowns = left::breakdowns(&scene);
-    let places = left::places(&scene, &breakdowns);
+    let breakdowns = residual_parts::breakdowns(&scene);
+    let places = residual_parts::places(&scene, &breakdowns);
     Ok(Evidence { pictures, breakdowns, places })
 }
 
-/// The training record, and what two models make of it.
+/// The training record with the predictions of two models.
 struct Scene<'a> {
     samples: Samples,
     without: View,
     with: View,
-    /// Output's unit as a person writes it.
+    /// Symbol of the output's unit.
     unit: &'a str,
     drive_unit: &'a str,
     /// Noise floor \[output unit\].
     noise: f64,
 }
 
-/// What one model makes of a record.
+/// Prediction of one model.
 struct View {
     predicted: Vec<f64>,
     /// Measured − predicted.
@@ -95,18 +95,18 @@ impl View {
 }
 
 impl Scene<'_> {
-    /// Rows that are no start-up transient.
+    /// Returns the rows that are no start-up rows.
     fn rows(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.samples.len()).filter(|k| !self.samples.settling[*k])
     }
 
-    /// An axis of the residual.
+    /// Returns an axis for the residual.
     fn residual_axis(&self) -> Axis {
         Axis::new("measured − predicted", self.unit)
     }
 }
 
-/// Segments less their start-up rows.
+/// Returns the segments without their start-up rows.
 fn settled_segments(samples: &Samples) -> Vec<Range<usize>> {
     let settled = |s: &Range<usize>| {
         let unsettled = samples.settling[s.clone()].iter().rposition(|settling| *settling).map_or(0, |last| last + 1);
@@ -115,8 +115,8 @@ fn settled_segments(samples: &Samples) -> Vec<Range<usize>> {
     samples.segments.iter().map(settled).collect()
 }
 
-/// The same model without one effect; without all modes where the effect is a resonance.
-fn lacking(model: &Model, effect: Effect) -> Model {
+/// Returns the model without one effect; without all modes if the effect is a resonance.
+fn without_effect(model: &Model, effect: Effect) -> Model {
     let mut less = model.clone();
     match (effect, &model.base) {
         (Effect::RateDependence, Base::ViscousPi(p)) => less.base = Base::Pi(p.pi.clone()),
@@ -126,7 +126,7 @@ fn lacking(model: &Model, effect: Effect) -> Model {
     less
 }
 
-/// The traces that an effect leaves.
+/// Returns the pictures of an effect.
 fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
     match effect {
         Effect::Delay | Effect::Lag => frequency::response_pictures(effect, model, scene),
@@ -160,11 +160,11 @@ fn of_effect(effect: Effect, model: &Model, scene: &Scene<'_>) -> Vec<Picture> {
     }
 }
 
-/// The name of what the extended model leaves, in every picture.
+/// Name of the extended model's curve in every picture.
 const WITH: &str = "with it";
-/// The name of what the same model leaves without the effect.
+/// Name of the curve of the same model without the effect.
 const WITHOUT: &str = "without it";
-/// The name of what the parameters that were found would leave.
+/// Name of the curve that follows from the named effect's parameters.
 const NAMED: &str = "as named";
 
 #[cfg(test)]

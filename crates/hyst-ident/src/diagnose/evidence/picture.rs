@@ -1,10 +1,10 @@
-//! Pictures as data: what whoever draws them needs to know, and no more.
+//! Pictures as data, independent of how they are drawn.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::model::Effect;
 
-/// Points of a curve that are kept at most: more than this no screen shows.
+/// Maximum number of points of a curve; a screen shows no more.
 pub const MOST_POINTS: usize = 2000;
 
 /// One axis.
@@ -12,7 +12,7 @@ pub const MOST_POINTS: usize = 2000;
 pub struct Axis {
     /// What is on it.
     pub label: String,
-    /// Its unit as a person writes it; empty for ratios.
+    /// Symbol of its unit; empty for ratios.
     pub unit: String,
     /// Whether it is logarithmic.
     pub log: bool,
@@ -28,17 +28,17 @@ pub enum Style {
     Points,
 }
 
-/// What a curve is of, so that the same thing looks the same in every picture.
+/// Role of a curve: the same role has the same style in every picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// The measurement.
     Measured,
-    /// The model as it was given, or the extended one without one effect.
+    /// The given model, or the extended one without one effect.
     Without,
     /// The extended model.
     With,
-    /// What curves are compared with, as the noise floor.
+    /// A reference for comparison, such as the noise floor.
     Reference,
 }
 
@@ -49,7 +49,7 @@ pub struct Curve {
     pub name: String,
     /// How it is drawn.
     pub style: Style,
-    /// What it is of.
+    /// Its role.
     pub role: Role,
     /// Values \[the x axis's unit\].
     pub x: Vec<f64>,
@@ -63,10 +63,10 @@ fn null_as_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D
     Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
 }
 
-/// A place on the x axis that has a name, as the frequency of a mode.
+/// A named position on the x axis, such as the frequency of a mode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
-    /// Where \[the x axis's unit\].
+    /// Position \[the x axis's unit\].
     pub at: f64,
     /// Its name.
     pub name: String,
@@ -75,19 +75,19 @@ pub struct Mark {
 /// One picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
-    /// The effect that it is evidence for; none if it is about the whole model.
+    /// Effect that the picture is evidence for; `None` for the whole model.
     pub effect: Option<Effect>,
     /// Title.
     pub title: String,
-    /// What one should see if the name is right.
+    /// What the picture shows if the name is right.
     pub caption: String,
-    /// Across.
+    /// Horizontal axis.
     pub x: Axis,
-    /// Up.
+    /// Vertical axis.
     pub y: Axis,
-    /// Curves, in the order in which they are drawn.
+    /// Curves, in drawing order.
     pub curves: Vec<Curve>,
-    /// Places worth a line across the picture.
+    /// Positions with a vertical line.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
 }
@@ -107,7 +107,7 @@ impl Picture {
         Self { effect, title: title.into(), caption: caption.into(), x, y, curves: Vec::new(), marks: Vec::new() }
     }
 
-    /// Adds a function of x, thinned so that no peak is lost. What a logarithmic axis cannot show is left out.
+    /// Adds a function of x, thinned without losing peaks. Values that a logarithmic axis cannot show are dropped.
     pub(super) fn line(&mut self, role: Role, name: &str, x: &[f64], y: &[f64]) {
         let shown = |(x, y): &(f64, f64)| !(self.x.log && *x <= 0.0 || self.y.log && *y <= 0.0);
         let points: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).filter(shown).collect();
@@ -115,37 +115,37 @@ impl Picture {
         self.curves.push(Curve { name: name.into(), style: Style::Line, role, x, y });
     }
 
-    /// Adds single points, of which there are few.
+    /// Adds single points.
     pub(super) fn points(&mut self, role: Role, name: &str, (x, y): (Vec<f64>, Vec<f64>)) {
         self.curves.push(Curve { name: name.into(), style: Style::Points, role, x, y });
     }
 
-    /// Adds a path, as a loop is: evenly thinned, in the order in which it was passed.
+    /// Adds a path such as a loop: evenly thinned, in the order of the rows.
     pub(super) fn path(&mut self, role: Role, name: &str, x: &[f64], y: &[f64]) {
         let step = x.len().div_ceil(MOST_POINTS).max(1);
         let (x, y) = (x.iter().copied().step_by(step).collect(), y.iter().copied().step_by(step).collect());
         self.curves.push(Curve { name: name.into(), style: Style::Line, role, x, y });
     }
 
-    /// Names a place on the x axis.
+    /// Names a position on the x axis.
     pub(super) fn mark(&mut self, at: f64, name: String) {
         self.marks.push(Mark { at, name });
     }
 
-    /// Whether there is anything to see: every curve has two points.
+    /// Returns whether the picture has content: every curve has at least two points.
     pub(super) fn shows(&self) -> bool {
         !self.curves.is_empty() && self.curves.iter().all(|c| c.x.len() > 1)
     }
 }
 
-/// Keeps the lowest and the highest point of each stretch of the axis, and all interruptions.
+/// Keeps the minimum and the maximum of each bin of the axis, and all interruptions.
 fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
     if points.len() <= MOST_POINTS {
         return points.to_vec();
     }
     let place = |x: f64| if log { x.ln() } else { x };
     let (first, last) = (place(points[0].0), place(points[points.len() - 1].0));
-    // Two points a stretch, and some room for interruptions.
+    // Two points per bin, and some margin for interruptions.
     let stretches = 0.45 * MOST_POINTS as f64;
     let stretch = |p: &(f64, f64)| (((place(p.0) - first) / (last - first) * stretches) as usize, p.1.is_nan());
     let mut kept = Vec::new();
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_peak_is_lost_and_gaps_stay() {
+    fn thinning_keeps_peaks_and_gaps() {
         let mut points: Vec<(f64, f64)> = (1..=50_000).map(|k| (f64::from(k), (0.01 * f64::from(k)).sin())).collect();
         points[31_234].1 = 7.0;
         points[12_345].1 = -5.0;
@@ -182,11 +182,11 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_survives_its_file() {
+    fn a_picture_is_read_back_as_written() {
         let (x, y) = (Axis::new("time", "s"), Axis::new("residual", "µm").log());
         let mut picture = Picture::new(Some(Effect::Creep), "t", x, y, "c");
         picture.line(Role::With, "a", &[1.0, 2.0, 3.0], &[1.0, f64::NAN, 0.0]);
-        assert_eq!(picture.curves[0].x, [1.0, 2.0], "zero has no place on a logarithmic axis");
+        assert_eq!(picture.curves[0].x, [1.0, 2.0], "zero is not shown on a logarithmic axis");
         let read: Picture = serde_json::from_str(&serde_json::to_string(&picture).unwrap()).unwrap();
         assert!(read.curves[0].y[1].is_nan());
         assert_eq!(format!("{read:?}"), format!("{picture:?}"));

@@ -1,4 +1,4 @@
-//! Evidence on records whose truth is known: a model's own prediction, with one more effect and noise.
+//! Evidence on records with a known truth: the prediction of a model with one more effect and noise.
 
 use crate::stop::Stop;
 use hyst_core::{
@@ -44,7 +44,7 @@ pub(super) fn samples_of(period: f64, segments: &[Vec<f64>]) -> Samples {
     samples
 }
 
-/// White noise of deviation 1.
+/// White noise with standard deviation 1.
 pub(super) fn noise(seed: u64) -> impl Iterator<Item = f64> {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     std::iter::repeat_with(move || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0)
@@ -56,7 +56,7 @@ fn pi() -> PiParams<Vec<f64>> {
     PiParams { gain: 0.15, thresholds: vec![5.0, 15.0, 30.0], weights: vec![0.02, 0.015, 0.01] }
 }
 
-/// An actuator with this base and these effects.
+/// Returns a model with this base and these effects.
 fn actuator(base: Base, effects: Effects) -> Model {
     let channel =
         |column: &str, unit: &str| Channel { column: column.into(), unit: unit.into(), low: 0.0, high: 120.0 };
@@ -78,7 +78,7 @@ fn actuator(base: Base, effects: Effects) -> Model {
     }
 }
 
-/// Evidence for one effect on what the model itself gives for the identification drive.
+/// Collects the evidence for one effect on the model's own prediction for the identification drive.
 fn evidence(model: &Model, effect: Effect) -> Evidence {
     let limits = Limits { rate_hz: 1000.0, lo_v: 0.0, hi_v: 120.0, slew_v_per_s: None };
     let drive = Identification::at_rate(1000.0, 3).drive(&limits).unwrap();
@@ -100,7 +100,7 @@ fn evidence(model: &Model, effect: Effect) -> Evidence {
     let clean = simulate(model, &blank, Zero::None).unwrap().predicted;
     let train =
         Record::from_samples(columns(clean.iter().zip(noise(7)).map(|(y, e)| y + NOISE * e).collect())).unwrap();
-    let before = simulate(&lacking(model, effect), &train, Zero::None).unwrap();
+    let before = simulate(&without_effect(model, effect), &train, Zero::None).unwrap();
     let after = simulate(model, &train, Zero::None).unwrap();
     let material = Material {
         extended: model,
@@ -116,7 +116,7 @@ fn evidence(model: &Model, effect: Effect) -> Evidence {
     collect(&material).unwrap()
 }
 
-/// The picture of this title among those of the effect, as its curves (x, y), the one without the effect first.
+/// Returns the curves (x, y) of the effect's picture with this title, the one without the effect first.
 fn curves(evidence: &Evidence, effect: Effect, title: &str) -> Vec<Vec<(f64, f64)>> {
     let found = evidence.pictures.iter().find(|p| p.effect == Some(effect) && p.title == title);
     let picture = found.unwrap_or_else(|| panic!("no {title:?} among {:?}", titles(evidence)));
@@ -128,7 +128,7 @@ fn titles(evidence: &Evidence) -> Vec<&str> {
     evidence.pictures.iter().map(|p| p.title.as_str()).collect()
 }
 
-/// Slope of y over x by least squares.
+/// Returns the least-squares slope of y over x.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0 / n, s.1 + p.1 / n));
@@ -140,19 +140,19 @@ fn close(found: f64, expected: f64, share: f64) {
     assert!((found - expected).abs() <= share * expected.abs(), "{found}, expected {expected}");
 }
 
-/// Every point lies within `room` of zero.
+/// Asserts that every point is within `room` of zero.
 fn level(points: &[(f64, f64)], room: f64) {
     assert!(!points.is_empty() && points.iter().all(|p| p.1.abs() < room), "{points:?}");
 }
 
-/// Points of a curve lie within `room` of those of another at the same places.
+/// Asserts that the points of a curve are within `room` of those of another at the same positions.
 fn along(points: &[(f64, f64)], other: &[(f64, f64)], room: f64) {
     assert_eq!(points.len(), other.len());
     assert!(points.iter().zip(other).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < room), "{points:?} {other:?}");
 }
 
 #[test]
-fn a_delay_turns_the_phase_and_leaves_the_gain() {
+fn a_delay_shifts_the_phase_and_not_the_gain() {
     let effects = Effects { delay: Some(DelayParams { seconds: 0.004 }), ..Effects::default() };
     let found = evidence(&actuator(Base::Pi(pi()), effects), Effect::Delay);
     let phase = curves(&found, Effect::Delay, "Phase over frequency");
@@ -166,7 +166,7 @@ fn a_delay_turns_the_phase_and_leaves_the_gain() {
 }
 
 #[test]
-fn a_lag_lets_the_gain_fall() {
+fn a_lag_lowers_the_gain() {
     let effects = Effects { lag: Some(LagParams { seconds: 0.008 }), ..Effects::default() };
     let found = evidence(&actuator(Base::Pi(pi()), effects), Effect::Lag);
     let at_corner = |points: &[(f64, f64)]| {
@@ -182,7 +182,7 @@ fn a_lag_lets_the_gain_fall() {
 }
 
 #[test]
-fn loops_that_widen_with_the_rate_trail_more_at_higher_rates() {
+fn rate_dependent_loops_lag_more_at_higher_rates() {
     let base = Base::ViscousPi(ViscousPiParams { pi: pi(), seconds: 0.002, volt_seconds: 0.0 });
     let found = evidence(&actuator(base, Effects::default()), Effect::RateDependence);
     let trailing = curves(&found, Effect::RateDependence, "Width of loops over rate");
@@ -203,12 +203,12 @@ fn gain_follows_temperature() {
 }
 
 #[test]
-fn creep_goes_on_in_the_direction_of_the_step() {
+fn creep_continues_in_the_direction_of_the_step() {
     let creep = Some(CreepParams { seconds: vec![0.3, 3.0], shares: vec![0.03, 0.04] });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { creep, ..Effects::default() }), Effect::Creep);
     let after = curves(&found, Effect::Creep, "After the drive has stopped");
     let (seconds, percent) = *after[0].last().unwrap();
-    // Less what came during the ramp, more what was left of the steps before it.
+    // Minus the creep during the ramp, plus the remaining creep of earlier steps.
     let expected = 100.0 * (0.03 + 0.04 * (1.0 - (-seconds / 3.0f64).exp()));
     assert!(seconds > 1.5 && percent > 0.7 * expected && percent < 1.5 * expected, "{seconds} {percent} {expected}");
     assert!(after[0].windows(2).filter(|w| w[1].1 > w[0].1).count() > after[0].len() * 4 / 5, "{:?}", after[0]);
@@ -233,7 +233,7 @@ fn a_mode_peaks_and_rings() {
         Effect::Resonance,
     );
     let spectrum = curves(&found, Effect::Resonance, "Spectrum of the residual");
-    // The drive ends at 50 Hz: beyond it the mode rings by itself.
+    // The drive ends at 50 Hz: above it only the free oscillation of the mode remains.
     let peak = |curve: &[(f64, f64)]| {
         let beyond = curve.iter().copied().filter(|p| p.0 > 53.0 && p.0 < 120.0);
         beyond.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
@@ -255,7 +255,7 @@ fn a_mode_peaks_and_rings() {
 }
 
 #[test]
-fn a_stop_holds_the_measurement() {
+fn a_saturation_limit_stops_the_measured_output() {
     let saturation = Some(SaturationParams { low: -100.0, high: 18.0, knee: 0.01 });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { saturation, ..Effects::default() }), Effect::Saturation);
     let motion = curves(&found, Effect::Saturation, "Where the motion stops");
@@ -306,7 +306,7 @@ fn drift_and_tone_show_on_the_clock() {
 }
 
 #[test]
-fn pictures_of_the_whole_and_where_it_lives() {
+fn pictures_and_breakdowns_of_the_whole_model() {
     let drift = Some(DriftParams { per_second: 0.01, ..DriftParams::default() });
     let found = evidence(&actuator(Base::Pi(pi()), Effects { drift, ..Effects::default() }), Effect::Drift);
     let general: Vec<&str> = found.pictures.iter().filter(|p| p.effect.is_none()).map(|p| p.title.as_str()).collect();
@@ -320,7 +320,7 @@ fn pictures_of_the_whole_and_where_it_lives() {
             "Spectrum of the residual, training record"
         ]
     );
-    // Noise lives everywhere, and no sentence says otherwise.
+    // Noise is everywhere, so there is no sentence about its location.
     assert_eq!(found.places, Vec::<String>::new());
     for breakdown in &found.breakdowns {
         let whole: f64 = breakdown.parts.iter().map(|p| p.share).sum();
@@ -331,7 +331,7 @@ fn pictures_of_the_whole_and_where_it_lives() {
 }
 
 #[test]
-fn what_is_left_is_found_where_it_is() {
+fn the_remainder_is_located_in_time_and_frequency() {
     let mut samples = samples_of(1e-3, &[vec![0.0; 4000], (0..4000).map(|k| (0.003 * f64::from(k)).sin()).collect()]);
     samples.output = samples.time.iter().zip(noise(2)).map(|(t, e)| 0.01 * e + 0.1 * (60.0 * t).sin()).collect();
     let flat = Simulation {
@@ -344,7 +344,7 @@ fn what_is_left_is_found_where_it_is() {
         creep_away: Vec::new(),
         in_mid_cycle: Vec::new(),
     };
-    // The first segment, at rest, is noise alone.
+    // The first segment, at rest, contains only noise.
     samples.output[..4000].iter_mut().for_each(|y| *y *= 0.05);
     let mut scene = Scene {
         with: View::of(&samples, &flat),
@@ -354,18 +354,18 @@ fn what_is_left_is_found_where_it_is() {
         drive_unit: "V",
         noise: 0.01,
     };
-    let places = left::places(&scene, &left::breakdowns(&scene));
+    let places = residual_parts::places(&scene, &residual_parts::breakdowns(&scene));
     assert!(places[0].starts_with("it is largest in segment 2, 5.0 to 9.0 s: 0.07"), "{places:?}");
-    assert!(places.iter().any(|p| p.ends_with("% of its power lies between 3 and 10 Hz")), "{places:?}");
+    assert!(places.iter().any(|p| p.ends_with("% of its power is between 3 and 10 Hz")), "{places:?}");
     assert!(!places.iter().any(|p| p.contains("rests") || p.contains("jumps")), "{places:?}");
 
-    // A jump of the zero is told as such, a slope is not.
-    let mut told = |zero: &dyn Fn(f64) -> f64| {
+    // A jump of the zero is reported, a slope is not.
+    let mut places_of = |zero: &dyn Fn(f64) -> f64| {
         scene.with.residual = scene.samples.time.iter().zip(noise(3)).map(|(t, e)| 0.01 * e + zero(*t)).collect();
-        left::places(&scene, &left::breakdowns(&scene))
+        residual_parts::places(&scene, &residual_parts::breakdowns(&scene))
     };
-    let jumps = told(&|t| if t < 6.0 { 0.1 } else { -0.2 });
+    let jumps = places_of(&|t| if t < 6.0 { 0.1 } else { -0.2 });
     assert!(jumps.iter().any(|p| p.starts_with("its mean jumps by -0.29") && p.ends_with("6.0 s")), "{jumps:?}");
-    let slopes = told(&|t| 0.05 * t);
+    let slopes = places_of(&|t| 0.05 * t);
     assert!(!slopes.iter().any(|p| p.contains("jumps")), "{slopes:?}");
 }

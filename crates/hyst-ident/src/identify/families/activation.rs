@@ -1,4 +1,4 @@
-//! Activation-function models: `z = k₀ u + α u̇ + β f(γ u)` is linear in all but γ.
+//! Activation-function models: `z = k₀ u + α u̇ + β f(γ u)` is linear in all parameters but γ.
 
 use hyst_core::{ActivationKind, ActivationParams, Error, Kind};
 use nalgebra::DMatrix;
@@ -21,7 +21,8 @@ impl<'a> ActivationFamily<'a> {
 }
 
 impl Family for ActivationFamily<'_> {
-    /// From an activation that is a straight line over the record's range to one that switches within a millionth of it.
+    /// From an activation that is a straight line over the record's range to one that switches within a millionth of
+    /// it.
     fn variables(&self) -> Vec<Variable> {
         let u = largest_input(self.samples);
         vec![Variable::log("gamma", "1/u", 0.01 / u, 1e6 / u)]

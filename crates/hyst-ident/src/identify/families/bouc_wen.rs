@@ -1,4 +1,4 @@
-//! Bouc-Wen: with g = α w the memory w depends on β |α|ⁿ⁻¹, γ/β and n alone, and the output is linear in k₀ and α.
+//! Bouc-Wen. With g = α w, the memory w depends only on β |α|ⁿ⁻¹, γ/β and n, and the output is linear in k₀ and α.
 
 use hyst_core::{BoucWen, BoucWenParams, Build, Error};
 use nalgebra::DMatrix;
@@ -20,14 +20,14 @@ impl<'a> BoucWenFamily<'a> {
         Self { samples, n }
     }
 
-    /// β |α|ⁿ⁻¹, the ratio γ sgn(α) / β, n.
+    /// Returns β |α|ⁿ⁻¹, the ratio γ sgn(α) / β, and n.
     fn shape(&self, values: &[f64]) -> (f64, f64, f64) {
         (values[0], values[1], self.n.unwrap_or_else(|| values[2]))
     }
 }
 
 impl Family for BoucWenFamily<'_> {
-    /// The memory saturates somewhere between a thousandth and a thousand times the record's range.
+    /// The memory saturates between a thousandth and a thousand times the record's range.
     fn variables(&self) -> Vec<Variable> {
         let u = largest_input(self.samples);
         let mut list = vec![
@@ -58,7 +58,7 @@ impl Family for BoucWenFamily<'_> {
         Base::BoucWen(BoucWenParams { k0, alpha, beta, gamma: ratio * beta * alpha.signum(), n })
     }
 
-    /// γ is a part of β.
+    /// The scale of γ is β.
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         match (base, name) {
             (Base::BoucWen(p), "beta" | "gamma") => Some(p.beta),

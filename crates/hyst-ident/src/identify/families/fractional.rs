@@ -1,4 +1,4 @@
-//! The fractional models: linear in the gains, not in c, the orders and the delay.
+//! Fractional models: linear in the gains, nonlinear in c, the orders and the delay.
 
 use hyst_core::{Build, Error, Exponentials, GlOrder, Ifm, IfmParams, Lfdm, LfdmParams, Sampling};
 use nalgebra::DMatrix;
@@ -10,7 +10,7 @@ use crate::model::Base;
 use crate::model::capacity::DELAY;
 use crate::optimize::Variable;
 
-/// Memory of a trial: all of it, to 1e-6 of the output's span.
+/// Memory of a trial: full memory, accurate to 1e-6 of the output's span.
 type Memory = Exponentials<f64, 24>;
 
 pub(super) struct LfdmFamily<'a> {
@@ -23,7 +23,7 @@ impl<'a> LfdmFamily<'a> {
     }
 }
 
-/// c and the orders: the paper's bounds, c on a logarithmic scale.
+/// Returns c and the orders with the paper's bounds, c on a logarithmic scale.
 fn orders() -> Vec<Variable> {
     vec![
         Variable::log("c", "s^beta", 1e-3, 10.0),
@@ -66,7 +66,7 @@ impl<'a> IfmFamily<'a> {
 }
 
 impl Family for IfmFamily<'_> {
-    /// Delays from a tenth of a sample to a tenth of the record, at most what a delay of the host holds.
+    /// Delays from a tenth of a sample to a tenth of the record, within the capacity of the host's delay stage.
     fn variables(&self) -> Vec<Variable> {
         let h = self.samples.period;
         let longest = (0.1 * self.samples.longest_segment()).min(h * (DELAY as f64 - 4.0)).min(0.1);

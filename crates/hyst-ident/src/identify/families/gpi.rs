@@ -1,4 +1,4 @@
-//! The generalised Prandtl-Ishlinskii model with linear envelopes: linear in its weights, not in the envelopes.
+//! The generalised Prandtl-Ishlinskii model with linear envelopes: linear in its weights, nonlinear in the envelopes.
 
 use hyst_core::{Build, Curve, Error, Gpi, GpiParams};
 use nalgebra::DMatrix;
@@ -11,7 +11,8 @@ use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
 
-/// The left side is `γ = u − g/2`, which sets the unit of γ; the right one `γ = s u + g/2`. Thresholds are even over the range.
+/// The left envelope `γ = u − g/2` sets the unit of γ; the right one is `γ = s u + g/2`. Thresholds are even over the
+/// range.
 pub(super) struct GpiFamily<'a> {
     samples: &'a Samples,
     thresholds: Vec<f64>,
@@ -21,7 +22,7 @@ impl<'a> GpiFamily<'a> {
     pub(super) fn new(samples: &'a Samples, plays: usize) -> Self {
         let (low, high) = samples.input_range();
         let plays = plays.min(PLAYS);
-        // A play as wide as half the range never slides twice.
+        // A play operator as wide as half the range slides only once.
         let top = 0.5 * (high - low).max(0.2 * largest_input(samples));
         let thresholds = (1..=plays).map(|i| top * i as f64 / (plays + 1) as f64).collect();
         Self { samples, thresholds }

@@ -8,7 +8,7 @@ use crate::Samples;
 use crate::fit;
 use crate::identify::choice::{self, Bank, CANDIDATES};
 use crate::identify::family::{run, run_into};
-use crate::identify::{Beside, Family, Linear};
+use crate::identify::{Family, Linear, OtherParameter};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
@@ -17,23 +17,24 @@ fn gains(count: usize) -> Vec<Linear> {
     (0..count).map(|i| Linear::not_negative(&format!("gains[{i}]"))).collect()
 }
 
-/// A bank whose widths are where the record calls for elements.
+/// A bank with widths chosen by the record.
 pub(super) struct SlipFamily<'a> {
     samples: &'a Samples,
     widths: Vec<f64>,
-    /// Whether the record chose them.
+    /// Whether the record chose the widths.
     chosen: bool,
     reading: SlipReading,
 }
 
 impl<'a> SlipFamily<'a> {
-    /// At most so many elements. Where the record chooses none, their widths are even over the range of the input.
+    /// Builds a bank with at most this many elements. If the record chooses none, the widths are even over the input
+    /// range.
     pub(super) fn new(samples: &'a Samples, elements: usize, reading: SlipReading) -> Self {
         let elements = elements.clamp(1, PLAYS);
         let element = |width: &f64| {
             let mut y = vec![0.0; samples.len()];
             let params = MaxwellSlipParams { reading, widths: [*width], gains: [1.0] };
-            // An element of no width gives nothing.
+            // An element of width zero has no output.
             let _ = run(samples, |_| Build::<MaxwellSlip<f64, 1>>::build(&params, &()), &mut y);
             y
         };
@@ -47,8 +48,8 @@ impl<'a> SlipFamily<'a> {
     }
 }
 
-/// Even widths over the range of the input. The first backlash is as good as none, and carries what has no hysteresis; springs begin
-/// with a width of their own.
+/// Returns even widths over the input range. The first backlash has nearly no width and represents the part without
+/// hysteresis; the first spring has a full width.
 fn even(samples: &Samples, count: usize, reading: SlipReading) -> Vec<f64> {
     let (low, high) = samples.input_range();
     let first = if reading == SlipReading::Backlash { 1e-3 } else { 1.0 };
@@ -80,11 +81,11 @@ impl Family for SlipFamily<'_> {
         })
     }
 
-    fn beside(&self, name: &str) -> Beside {
-        if self.chosen && name.starts_with("widths") { Beside::Chosen } else { Beside::Nothing }
+    fn other_parameter(&self, name: &str) -> OtherParameter {
+        if self.chosen && name.starts_with("widths") { OtherParameter::Chosen } else { OtherParameter::Given }
     }
 
-    /// Gains are parts of one curve, widths have their places along it.
+    /// Gains are parts of one curve; the scale of widths is their spacing.
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         let (low, high) = self.samples.input_range();
         match base {
@@ -95,9 +96,9 @@ impl Family for SlipFamily<'_> {
     }
 }
 
-/// The electromechanical model: the first width d₁ (the others are its multiples, as printed) and the course of ψ over
-/// temperature are searched, the gains solved for. C, R, m, k, b and ψ at the reference are those of the printed tube: from
-/// displacement only the products ψ R gᵢ can be known, and they are what comes out.
+/// The electromechanical model. The first width d₁ (the others are its multiples, as published) and the temperature
+/// dependence of ψ are searched, the gains are solved for. C, R, m, k, b and ψ at the reference temperature are those
+/// of the published tube: a displacement record determines only the products ψ R gᵢ.
 pub(super) struct TdEmFamily<'a> {
     samples: &'a Samples,
     elements: usize,
@@ -123,7 +124,7 @@ impl<'a> TdEmFamily<'a> {
         let [c0, c1, c2] = printed.coupling;
         let t0 = self.reference_degc;
         let psi = c0 + t0 * (c1 + t0 * c2);
-        // ψ(T) = ψ(T₀) (1 + p (T − T₀) + q (T − T₀)²), in powers of T.
+        // ψ(T) = ψ(T₀) (1 + p (T − T₀) + q (T − T₀)²), as a polynomial in T.
         let (p, q) = (values.get(1).copied().unwrap_or(0.0), values.get(2).copied().unwrap_or(0.0));
         let coupling = [psi * (1.0 - p * t0 + q * t0 * t0), psi * (p - 2.0 * q * t0), psi * q];
         TdEmParams {
@@ -173,15 +174,15 @@ impl Family for TdEmFamily<'_> {
         Base::TdEm(self.params(values, linear.to_vec()))
     }
 
-    /// The products ψ R gᵢ are known, neither ψ nor a gain alone.
-    fn beside(&self, name: &str) -> Beside {
-        if name == "coupling[0]" { Beside::Convention } else { Beside::Nothing }
+    /// The products ψ R gᵢ are known, but neither ψ nor a gain alone.
+    fn other_parameter(&self, name: &str) -> OtherParameter {
+        if name == "coupling[0]" { OtherParameter::Convention } else { OtherParameter::Given }
     }
 
     fn given(&self) -> Option<String> {
         let degc = self.reference_degc;
         Some(format!(
-            "capacitance, resistance, mass, stiffness, damping and the coupling at {degc:.1} °C are those of the printed tube"
+            "capacitance, resistance, mass, stiffness, damping and the coupling at {degc:.1} °C are those of the published tube"
         ))
     }
 

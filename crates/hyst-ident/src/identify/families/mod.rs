@@ -1,6 +1,7 @@
-//! How each model is identified: which of its parameters are searched, within which bounds, and which are solved for.
+//! Families: which parameters of each model are searched, within which bounds, and which are solved for.
 //!
-//! Bounds come from the record: its ranges of input and temperature, its sample period and length. No family looks at the output.
+//! Bounds come from the record: its ranges of input and temperature, its sample period and length. No family uses the
+//! output.
 
 mod activation;
 mod bouc_wen;
@@ -18,16 +19,17 @@ use hyst_core::{Kind, SlipReading};
 use super::Family;
 use crate::{BetweenSamples, Samples};
 
-/// Forms of models that have more than one.
+/// Forms of models that have several.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Form {
     /// Exponent n of a Bouc-Wen model; `None` searches it.
     pub bouc_wen_n: Option<f64>,
-    /// Plays of `gpi` and `td-pi`, elements of `td-em`, most elements of `maxwell-slip`.
+    /// Number of play operators of `gpi` and `td-pi` and of elements of `td-em`, maximum number of elements of
+    /// `maxwell-slip`.
     pub elements: Option<usize>,
-    /// What an element of `maxwell-slip` is.
+    /// Kind of the elements of `maxwell-slip`.
     pub slip: SlipReading,
-    /// How the drive of `bouc-wen-oscillator` goes on between samples; `None` tries both ways and keeps the one that leaves less.
+    /// Interpolation of the drive of `bouc-wen-oscillator` between samples; `None` tries both and uses the better one.
     pub between_samples: Option<BetweenSamples>,
 }
 
@@ -38,13 +40,14 @@ impl Default for Form {
 }
 
 impl Form {
-    /// Names of forms: those of `bouc-wen` after the first authors of their papers, those of an element of `maxwell-slip`.
+    /// Names of the forms: those of `bouc-wen` after the first authors of their papers, and the elements of
+    /// `maxwell-slip`.
     pub const NAMES: [&str; 4] = ["zhu", "xie", "backlash", "elasto-slip"];
 }
 
-/// No form has this name.
+/// An unknown name of a form.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no form; there are {names}", names = Form::NAMES.join(", "))]
+#[error("unknown form {0:?}; expected one of {names}", names = Form::NAMES.join(", "))]
 pub struct UnknownForm(String);
 
 impl FromStr for Form {
@@ -60,8 +63,8 @@ impl FromStr for Form {
     }
 }
 
-/// How a kind of model is identified by search; `None` if it is not. `largest` is the largest |input| of the whole record, of which
-/// `samples` may be a part: variables that are relative to it mean the same over both.
+/// Returns the family of a kind of model; `None` if it is not identified by search. `largest` is the largest |input| of
+/// the whole record, of which `samples` may be a part, so that relative variables mean the same for both.
 pub(crate) fn family_of<'a>(
     kind: Kind,
     samples: &'a Samples,
@@ -88,7 +91,7 @@ pub(crate) fn family_of<'a>(
     })
 }
 
-/// Largest |input| of a record, at least a hair.
+/// Returns the largest |input| of a record, greater than zero.
 pub(crate) fn largest_input(samples: &Samples) -> f64 {
     let (low, high) = samples.input_range();
     low.abs().max(high.abs()).max(f64::MIN_POSITIVE)

@@ -1,4 +1,4 @@
-//! The Bouc-Wen oscillator: nothing in it is linear, its static response sets the scales.
+//! The Bouc-Wen oscillator: linear only in a scale of the output; its static response sets the scales.
 
 use hyst_core::{BoucWenOscillator, BoucWenOscillatorParams, Build, Error};
 use nalgebra::DMatrix;
@@ -10,9 +10,9 @@ use crate::model::Base;
 use crate::optimize::Variable;
 use crate::{BetweenSamples, Samples};
 
-/// With y = Y ỹ for any Y the equation keeps its form; Y is the one linear parameter, so that mass, damping and stiffness are
-/// searched relative to the stiffness at rest. Only the products of β with γ and δ leave a trace; β is chosen so that γ and δ are of
-/// the order of one where the hysteretic force is as large as the largest input.
+/// With y = Y ỹ the equation keeps its form for any Y. Y is the one linear parameter, so mass, damping and stiffness
+/// are searched relative to the static stiffness. The output depends only on the products of β with γ and δ; β is
+/// chosen so that γ and δ are of order one if the hysteretic force is as large as the largest input.
 pub(super) struct OscillatorFamily<'a> {
     samples: &'a Samples,
     drive: Drive<'a>,
@@ -26,14 +26,14 @@ impl<'a> OscillatorFamily<'a> {
         Self { samples, drive: Drive::new(samples, between, Passes::Once), between, size }
     }
 
-    /// From the frequency of small motions, the damping ratio, the share of the spring without memory, the two terms that bend the
-    /// other, and ν.
+    /// Builds the parameters from the frequency of small motions, the damping ratio, the share of the spring without
+    /// memory, the two bending terms of the other spring, and ν.
     fn params(&self, values: &[f64], y: f64) -> BoucWenOscillatorParams {
         let [hz, zeta, share, out, back, nu] = [0, 1, 2, 3, 4, 5].map(|i| values.get(i).copied().unwrap_or(1.0));
         let omega = std::f64::consts::TAU * hz;
         // In units in which k + α = 1.
         let (stiffness, alpha) = (share, 1.0 - share);
-        // dz/dy = α (1 − out |z/size|^ν) on the way out, α (1 + back |z/size|^ν) on the way back.
+        // dz/dy = α (1 − out |z/size|^ν) away from zero, α (1 + back |z/size|^ν) back to zero.
         let (gamma, delta) = (0.5 * (out + back), 0.5 * (out - back));
         BoucWenOscillatorParams {
             mass: 1.0 / (omega * omega) / y,

@@ -1,4 +1,4 @@
-//! Prandtl-Ishlinskii with thresholds that are searched: linear in the weights, not in where the plays stand.
+//! Prandtl-Ishlinskii with searched thresholds: linear in the weights, nonlinear in the thresholds.
 
 use hyst_core::{Error, PiParams};
 use nalgebra::DMatrix;
@@ -20,7 +20,7 @@ impl<'a> PiFamily<'a> {
         Self { samples, plays: plays.clamp(1, PLAYS) }
     }
 
-    /// The thresholds in rising order, none twice.
+    /// Returns the thresholds in increasing order, without duplicates.
     fn thresholds(values: &[f64]) -> Vec<f64> {
         let mut list = values.to_vec();
         list.sort_by(f64::total_cmp);
@@ -32,7 +32,7 @@ impl<'a> PiFamily<'a> {
 }
 
 impl Family for PiFamily<'_> {
-    /// Each anywhere from a thousandth of the range of the input to half of it.
+    /// Each threshold is between a thousandth and half of the input range.
     fn variables(&self) -> Vec<Variable> {
         let (low, high) = self.samples.input_range();
         let range = high - low;

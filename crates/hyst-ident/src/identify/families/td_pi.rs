@@ -1,4 +1,4 @@
-//! TD-PI: linear in ε alone. α is one: with the envelopes it sets a unit that leaves no trace.
+//! TD-PI: linear only in ε. α is one: a scale of α and the envelopes has no effect on the output.
 
 use hyst_core::{Build, Error, TdPi, TdPiParams};
 use nalgebra::DMatrix;
@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use super::largest_input;
 use crate::Samples;
 use crate::identify::family::run_into;
-use crate::identify::{Beside, Family, Linear};
+use crate::identify::{Family, Linear, OtherParameter};
 use crate::model::Base;
 use crate::model::capacity::PLAYS;
 use crate::optimize::Variable;
@@ -18,7 +18,7 @@ pub(super) struct TdPiFamily<'a> {
 }
 
 impl<'a> TdPiFamily<'a> {
-    /// T₀ is the lowest temperature of the record, rounded to a degree.
+    /// T₀ is the lowest temperature of the record, rounded to one degree.
     pub(super) fn new(samples: &'a Samples, plays: usize) -> Self {
         let lowest = samples.temperature.as_ref().map_or(23.0, |t| crate::samples::range(t.iter().copied()).0);
         Self { samples, plays: plays.min(PLAYS), reference_degc: lowest.round() }
@@ -42,7 +42,7 @@ impl<'a> TdPiFamily<'a> {
 }
 
 impl Family for TdPiFamily<'_> {
-    /// The envelopes carry the input's range over anything from one threshold to twice all of them.
+    /// The envelopes map the input range to between one threshold and twice all of them.
     fn variables(&self) -> Vec<Variable> {
         let (u, n) = (largest_input(self.samples), self.plays as f64);
         vec![
@@ -68,13 +68,13 @@ impl Family for TdPiFamily<'_> {
         Base::TdPi(self.params(values, linear[0]))
     }
 
-    fn beside(&self, name: &str) -> Beside {
-        if name == "alpha" { Beside::Convention } else { Beside::Nothing }
+    fn other_parameter(&self, name: &str) -> OtherParameter {
+        if name == "alpha" { OtherParameter::Convention } else { OtherParameter::Given }
     }
 
     fn scale(&self, base: &Base, name: &str) -> Option<f64> {
         match (base, name) {
-            // Offsets are lengths along γ, as α is; η is small without being vague.
+            // Offsets are lengths along γ, like α; η is small without being undetermined.
             (Base::TdPi(p), "a1" | "b1") => Some(p.alpha),
             (_, "eta") => Some(0.01),
             _ => None,

@@ -1,4 +1,4 @@
-//! What is whole in an MCAP file that may have been cut off or damaged.
+//! The intact records of an MCAP file that may be truncated or damaged.
 
 mod chunk;
 mod layout;
@@ -10,19 +10,19 @@ use mcap::records::{Record, op};
 
 use chunk::Unpacker;
 
-/// What an MCAP file begins with.
+/// The first bytes of an MCAP file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Kind and length in front of every record \[bytes\].
+/// Size of kind and length at the beginning of a record \[bytes\].
 const HEAD: usize = 9;
 
-/// The records of a log in their order, those inside of chunks among them.
+/// Iterates over the records of a log in order, including those inside chunks.
 ///
-/// A cut ends them; of a chunk that was cut its whole records are given. Of a chunk whose check sum is wrong nothing is given, and
-/// what comes after it is. One chunk is unpacked at a time, and its records are parsed one by one.
+/// A truncated log ends the iteration; complete records of its last chunk are returned. A chunk with a wrong checksum is skipped. One chunk
+/// is unpacked at a time, and its records are parsed one by one.
 #[derive(Debug)]
 pub struct LogRecords<'a> {
     rest: &'a [u8],
-    /// Contents of the chunk that is being read, and where its next record begins.
+    /// Contents of the current chunk, and the byte at which its next record begins.
     chunk: (Cow<'a, [u8]>, usize),
     unpacker: Unpacker,
     damaged: usize,
@@ -30,29 +30,29 @@ pub struct LogRecords<'a> {
 }
 
 impl<'a> LogRecords<'a> {
-    /// Of the bytes of a file; `None` if it is no MCAP file.
+    /// Makes the iterator from the bytes of a file; `None` if it is not an MCAP file.
     pub fn new(bytes: &'a [u8]) -> Option<Self> {
         let rest = bytes.strip_prefix(MAGIC)?;
         let unpacker = Unpacker::of_file(bytes.len());
         Some(Self { rest, chunk: (Cow::Borrowed(&[]), 0), unpacker, damaged: 0, problem: None })
     }
 
-    /// Records that were left out because they are damaged; a chunk counts as one.
+    /// Returns the number of damaged records that were skipped. A chunk counts as one.
     pub fn damaged(&self) -> usize {
         self.damaged
     }
 
-    /// What is wrong with the first record that was left out, as part of a sentence.
+    /// Returns the problem of the first skipped record, as part of a sentence.
     pub fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
     }
 
-    fn leave_out(&mut self, problem: String) {
+    fn skip_damaged(&mut self, problem: String) {
         self.damaged += 1;
         self.problem.get_or_insert(problem);
     }
 
-    /// The next record of the chunk that is being read.
+    /// Returns the next record of the current chunk.
     fn next_of_chunk(&mut self) -> Option<Result<Record<'a>, String>> {
         let (contents, at) = &mut self.chunk;
         let Some((kind, body, rest)) = split(&contents[*at..]) else {
@@ -62,7 +62,7 @@ impl<'a> LogRecords<'a> {
         let (from, end) = (*at + HEAD, *at + HEAD + body.len());
         *at = contents.len() - rest.len();
         Some(match contents {
-            // Borrowed from the file, and not only from this reader.
+            // Borrowed from the file, not from this iterator.
             Cow::Borrowed(contents) => {
                 let contents: &'a [u8] = contents;
                 parsed(kind, &contents[from..end])
@@ -72,7 +72,7 @@ impl<'a> LogRecords<'a> {
     }
 }
 
-/// Kind and body of the record that `bytes` begin with, and what follows it; `None` if it is not whole.
+/// Splits off the first record of `bytes`; returns its kind, its body and the rest, or `None` if it is not complete.
 fn split(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (head, rest) = bytes.split_at_checked(HEAD)?;
     let (kind, length) = head.split_first()?;
@@ -81,11 +81,11 @@ fn split(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((*kind, body, rest))
 }
 
-/// A record from its body.
+/// Parses the body of a record.
 fn parsed(kind: u8, body: &[u8]) -> Result<Record<'_>, String> {
-    // The parser takes the lengths inside on trust: it reserves memory for them, and stops the program at an attachment that is cut.
+    // The parser does not check lengths: it reserves memory for them, and it panics at a truncated attachment.
     if !layout::fits(kind, body) {
-        return Err(format!("a record of kind {kind} is shorter than it says"));
+        return Err(format!("a record of kind {kind} is shorter than its stated length"));
     }
     parse_record(kind, body).map_err(|error| format!("a record of kind {kind} is damaged ({error})"))
 }
@@ -103,7 +103,7 @@ impl<'a> Iterator for LogRecords<'a> {
                         self.rest = rest;
                         match self.unpacker.whole(body) {
                             Ok(contents) => self.chunk = (contents, 0),
-                            Err(problem) => self.leave_out(problem),
+                            Err(problem) => self.skip_damaged(problem),
                         }
                         continue;
                     }
@@ -111,13 +111,13 @@ impl<'a> Iterator for LogRecords<'a> {
                         self.rest = rest;
                         parsed(kind, body)
                     }
-                    // Cut off.
+                    // The file is truncated.
                     None => {
                         let last = std::mem::take(&mut self.rest);
                         if let Some(body) = last.get(HEAD..).filter(|_| last.first() == Some(&op::CHUNK)) {
                             match self.unpacker.cut(body) {
                                 Ok(contents) => self.chunk = (contents, 0),
-                                Err(problem) => self.leave_out(problem),
+                                Err(problem) => self.skip_damaged(problem),
                             }
                         }
                         continue;
@@ -126,7 +126,7 @@ impl<'a> Iterator for LogRecords<'a> {
             };
             match record {
                 Ok(record) => return Some(record),
-                Err(problem) => self.leave_out(problem),
+                Err(problem) => self.skip_damaged(problem),
             }
         }
     }

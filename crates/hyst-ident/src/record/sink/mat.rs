@@ -1,4 +1,4 @@
-//! MATLAB 5 files: `load` gives a column vector per column (MAT-File Format, MathWorks, chapter 1).
+//! MATLAB 5 files: `load` returns a column vector per column (MAT-File Format, MathWorks, chapter 1).
 
 use std::io::{self, Write};
 
@@ -41,7 +41,7 @@ pub(super) fn write(columns: &[Column<'_>], out: &mut impl Write) -> io::Result<
     Ok(())
 }
 
-/// A data element, padded to 8 bytes.
+/// Appends a data element, padded to 8 bytes.
 fn element(out: &mut Vec<u8>, kind: u32, data: &[u8]) {
     out.extend(kind.to_le_bytes());
     out.extend((data.len() as u32).to_le_bytes());
@@ -51,6 +51,6 @@ fn element(out: &mut Vec<u8>, kind: u32, data: &[u8]) {
 
 fn size(bytes: usize) -> io::Result<[u8; 4]> {
     let size = u32::try_from(bytes)
-        .map_err(|_| io::Error::other("a MATLAB 5 file holds less than 4 GB a variable; write .npy or .tdms"));
+        .map_err(|_| io::Error::other("a variable of a MATLAB 5 file must be smaller than 4 GB; write .npy or .tdms"));
     size.map(u32::to_le_bytes)
 }

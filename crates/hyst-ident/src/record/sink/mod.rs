@@ -1,4 +1,4 @@
-//! Writing records in the formats that other programs load.
+//! Writing of records in formats of other programs.
 
 mod mat;
 mod npy;
@@ -9,7 +9,7 @@ use std::io::Write;
 
 use super::{OutputUnit, Record, WriteError};
 
-/// A format that a record is written in.
+/// A file format for writing records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// The record format.
@@ -26,7 +26,7 @@ impl FileKind {
     /// Every format.
     pub const ALL: [Self; 4] = [Self::Csv, Self::Npy, Self::Mat, Self::Tdms];
 
-    /// The ending of its files, without the point.
+    /// Returns the file name extension without the point.
     pub fn ending(self) -> &'static str {
         match self {
             Self::Csv => "csv",
@@ -36,7 +36,7 @@ impl FileKind {
         }
     }
 
-    /// The format of files with this ending.
+    /// Returns the format of files with this extension.
     pub fn of_ending(ending: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.ending().eq_ignore_ascii_case(ending))
     }
@@ -45,17 +45,18 @@ impl FileKind {
 /// A column of a record.
 struct Column<'a> {
     name: &'a str,
-    /// The unit as people write it; empty for the segment.
+    /// The symbol of the unit; empty for the segment.
     unit: &'static str,
     values: Cow<'a, [f64]>,
 }
 
 impl Record {
-    /// Writes the columns that play a role in a format; a missing output is NaN. Values keep all their bits, but in CSV times are printed with the decimals that
-    /// keep them even.
+    /// Writes the columns with a role in a format.
+    ///
+    /// A missing output is NaN (in CSV an empty cell). Values are exact, except for times in CSV, which have enough decimals to be even.
     ///
     /// # Errors
-    /// When `out` refuses, or the record was joined.
+    /// If writing to `out` fails, or the record was joined.
     pub fn write_as(&self, kind: FileKind, mut out: impl Write) -> Result<(), WriteError> {
         if self.sources().len() != 1 {
             return Err(WriteError::Joined { name: self.name() });

@@ -1,10 +1,10 @@
-//! NumPy files: `numpy.load` gives a structured array (format version 1.0, NEP 1).
+//! NumPy files: `numpy.load` returns a structured array (format version 1.0, NEP 1).
 
 use std::io::{self, Write};
 
 use super::Column;
 
-/// The header is padded to a multiple of this.
+/// The size of the header is a multiple of this \[bytes\].
 const ALIGNMENT: usize = 64;
 
 pub(super) fn write(columns: &[Column<'_>], out: &mut impl Write) -> io::Result<()> {

@@ -33,7 +33,7 @@ pub(super) fn write(columns: &[Column<'_>], period: Option<f64>, out: &mut impl 
         text(&mut metadata, "unit_string");
         metadata.extend(TEXT.to_le_bytes());
         text(&mut metadata, column.unit);
-        // Rows with an interruption between them have no increment.
+        // A record with several segments has no common increment.
         let even = period.map(|period| [("wf_start_offset", start.unwrap_or(0.0)), ("wf_increment", period)]);
         for (name, value) in even.into_iter().flatten() {
             text(&mut metadata, name);

@@ -1,4 +1,4 @@
-//! Arrow IPC files, which are Feather files of version 2, and Arrow streams.
+//! Arrow IPC files (Feather version 2) and Arrow streams.
 
 mod buffers;
 mod columns;
@@ -13,13 +13,13 @@ use flatbuffer::{i64_at, u32_at};
 use schema::Schema;
 
 const FORMAT: &str = "Arrow";
-/// Stands for the file's name in lines to paste.
+/// The placeholder of the file name in lines to paste.
 const FILE: &str = "{FILE}";
 /// First and last bytes of a file.
 const MAGIC: &[u8] = b"ARROW1";
 /// First bytes of a Feather file of version 1, which is another format.
 const FEATHER_1: &[u8] = b"FEA1";
-/// What each message of a stream begins with.
+/// The first word of each message of a stream.
 const CONTINUES: u32 = u32::MAX;
 
 /// Kinds of messages.
@@ -27,7 +27,7 @@ const SCHEMA: u8 = 1;
 const DICTIONARY: u8 = 2;
 const BATCH: u8 = 3;
 
-/// What is wrong with a file, and what to do.
+/// An error message: what is wrong with a file, and what to do.
 #[derive(Debug, PartialEq)]
 struct Fault(String);
 
@@ -36,24 +36,24 @@ impl Fault {
         Self(what.into())
     }
 
-    /// What only a damaged file has.
+    /// Makes the message of a damaged file.
     fn damaged(what: impl std::fmt::Display) -> Self {
         Self(format!("{what}; the file is damaged: copy it again, or write it again with the program that made it"))
     }
 }
 
-/// Whether these are the bytes of an Arrow file or stream, or of a Feather file.
+/// Returns whether `bytes` are an Arrow file or stream, or a Feather file.
 pub(crate) fn is(bytes: &[u8]) -> bool {
-    // The first message of a stream is a schema; a damaged length is reported rather than taken for another format.
+    // The first message of a stream is a schema. A damaged length is accepted here and reported later.
     let stream = u32_at(bytes, 0) == Some(CONTINUES) && u32_at(bytes, 4).is_some_and(|length| length >= 16);
     let plausible = || Message::kind_of(&bytes[8..]) == Some(SCHEMA);
     bytes.starts_with(MAGIC) || bytes.starts_with(FEATHER_1) || stream && plausible()
 }
 
-/// The columns of an Arrow file or stream; `file` names it in messages.
+/// Reads the columns of an Arrow file or stream. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged, or has no column of numbers.
+/// If the file is damaged, or has no column of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let named =
         |Fault(what)| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what: what.replace(FILE, file) };
@@ -64,7 +64,7 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
     if bytes.starts_with(FEATHER_1) {
         let line = format!("pandas.read_feather(\"{FILE}\").to_feather(\"new.feather\")");
         return Err(Fault::new(format!(
-            "the file is Feather version 1, which is not read; in Python, {line} rewrites it as version 2"
+            "the file is Feather version 1, which is not supported; in Python, {line} rewrites it as version 2"
         )));
     }
     let is_file = bytes.starts_with(MAGIC);
@@ -80,7 +80,7 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
     Ok(table)
 }
 
-/// The units that a schema message states, by the columns' names; Parquet files of Arrow programs hold one.
+/// Returns the units of a schema message, by column name. Parquet files of Arrow programs contain one.
 pub(super) fn units_of_schema(message: &[u8]) -> Vec<(String, String)> {
     let Ok(Some(message)) = Message::read(message, 0) else { return Vec::new() };
     let schema =
@@ -89,7 +89,7 @@ pub(super) fn units_of_schema(message: &[u8]) -> Vec<(String, String)> {
     schema.map_or_else(Vec::new, |schema| schema.fields.into_iter().filter_map(stated).collect())
 }
 
-/// A message, and where the next one begins.
+/// A message, and the place of the next one.
 struct Message<'a> {
     kind: u8,
     header: Option<flatbuffer::Table<'a>>,
@@ -102,12 +102,12 @@ impl<'a> Message<'a> {
         Some(flatbuffer::Table::root(metadata)?.u8(1, 0))
     }
 
-    /// The message at `at`; `None` at the end mark.
+    /// Reads the message at byte `at`; `None` at the end mark.
     fn read(bytes: &'a [u8], at: usize) -> Result<Option<Self>, Fault> {
         let cut = || Fault::damaged(format!("the file ends in the middle of the message at byte {at}"));
         let too_long = |length: i64| {
             let left = bytes.len().saturating_sub(at);
-            Fault::damaged(format!("the message at byte {at} states {length} bytes, where the file has {left} more"))
+            Fault::damaged(format!("the message at byte {at} states {length} bytes, but the file has only {left} more"))
         };
         let mut start = at;
         let mut word = || {
@@ -115,7 +115,7 @@ impl<'a> Message<'a> {
             start = start.saturating_add(4);
             word.ok_or_else(cut)
         };
-        // Before version 0.15 there was a length alone.
+        // Before version 0.15 a message began with its length.
         let mut length = word()?;
         if length == CONTINUES {
             length = word()?;
@@ -145,7 +145,7 @@ fn of_file(bytes: &[u8]) -> Result<Columns, Fault> {
     let footer = flatbuffer::Table::root(&inner[start..end]).ok_or_else(damaged)?;
     let schema = Schema::parse(footer.table(1).ok_or_else(damaged)?, "open_file")?;
     let mut columns = Columns::new(schema, bytes.len())?;
-    // Batches that overlap could claim the same bytes a million times.
+    // Overlapping batches are refused, because they could use the same bytes a million times.
     let mut unread = bytes.len();
     for (kind, field) in [(DICTIONARY, 2), (BATCH, 3)] {
         for block in footer.vector(field, 24).unwrap_or_default().chunks_exact(24) {
@@ -158,7 +158,7 @@ fn of_file(bytes: &[u8]) -> Result<Columns, Fault> {
     Ok(columns)
 }
 
-/// Reads the messages of a stream in their order.
+/// Reads the messages of a stream in order.
 fn of_stream(bytes: &[u8], notes: &mut Vec<String>) -> Result<Columns, Fault> {
     let no_schema = || Fault::damaged("the first message is not a schema");
     let first = Message::read(bytes, 0)?.filter(|message| message.kind == SCHEMA).ok_or_else(no_schema)?;

@@ -1,28 +1,28 @@
-//! What Parquet and Arrow have in common: clocks, numbers that Rust has no type for, and what the file says of its columns.
+//! Common code of Parquet and Arrow: clocks, number types that Rust does not have, and metadata of columns.
 
 mod pandas;
 
 use super::{Axis, Table};
 
-/// Bytes that a compressed file may hold whatever its size.
+/// Size up to which a compressed file may always unpack \[bytes\].
 const ALWAYS_UNPACKED: usize = 64 << 20;
-/// How many times its size a file may hold beyond that; numbers rarely shrink to a tenth.
+/// Largest ratio of unpacked to packed size of larger files. Numbers rarely compress by more than a factor of 10.
 const MAX_EXPANSION: usize = 200;
-/// Names under which files state a sample rate \[Hz\].
+/// Keys of a sample rate \[Hz\].
 const RATES: [&str; 4] = ["fs", "sample_rate", "samplerate", "sampling_rate"];
-/// Names under which files state the time between two rows \[s\].
+/// Keys of a sample period \[s\].
 const PERIODS: [&str; 4] = ["dt", "ts", "sample_period", "sampleperiod"];
 
-/// Bytes that the columns of a file of `size` bytes may take.
+/// Returns the largest memory of the columns of a file of `size` bytes \[bytes\].
 ///
-/// A few bytes can state a billion equal values. Memory has to follow from the file, not from its claims.
+/// A few bytes can encode a billion equal values. The limit depends on the size of the file, not on the sizes stated in it.
 pub(super) fn unpacked_limit(size: usize) -> usize {
     ALWAYS_UNPACKED.max(size.saturating_mul(MAX_EXPANSION))
 }
 
 /// A clock of dates and times: seconds since the midnight (UTC) before its first value.
 ///
-/// Ticks since 1970 have up to 19 digits, of which a double holds 16. They are subtracted as integers.
+/// Ticks since 1970 have up to 19 digits, but a double has only 16. Ticks are therefore subtracted as integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Clock {
     ticks_per_second: i64,
@@ -35,17 +35,17 @@ impl Clock {
         Self { ticks_per_second, midnight: None }
     }
 
-    /// Seconds since midnight; the first call decides which midnight.
+    /// Returns the seconds since the midnight before the ticks of the first call.
     pub(super) fn seconds(&mut self, ticks: i64) -> f64 {
         let day = 86_400 * i128::from(self.ticks_per_second);
-        // 64 bits are too few for the difference of any two of them.
+        // The difference of two 64-bit integers may overflow 64 bits.
         let ticks = i128::from(ticks);
         let midnight = *self.midnight.get_or_insert_with(|| ticks.div_euclid(day) * day);
         (ticks - midnight) as f64 / self.ticks_per_second as f64
     }
 }
 
-/// The number in a half-precision float (IEEE 754 binary16).
+/// Converts a half-precision float (IEEE 754 binary16).
 pub(super) fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
     let magnitude = match exponent {
@@ -57,25 +57,25 @@ pub(super) fn half(bits: u16) -> f64 {
     if bits >> 15 == 1 { -magnitude } else { magnitude }
 }
 
-/// A decimal number: an integer with `scale` digits after the point.
+/// Converts a decimal number: an integer with `scale` digits after the decimal point.
 pub(super) fn decimal(integer: i128, scale: i32) -> f64 {
-    // A power of ten up to 22 is exact, so that a division rounds once; a product with 0.1 would round twice.
+    // Powers of ten up to 10^22 are exact, so a division rounds once. A product with 0.1 would round twice.
     if scale >= 0 { integer as f64 / 10_f64.powi(scale) } else { integer as f64 * 10_f64.powi(-scale) }
 }
 
-/// Whether a key of a column's metadata names its unit.
+/// Returns whether a metadata key of a column is its unit.
 pub(super) fn is_unit_key(key: &str) -> bool {
     key.eq_ignore_ascii_case("unit") || key.eq_ignore_ascii_case("units")
 }
 
-/// Applies what a file states of all its columns: the index of a pandas table, and a sample rate or period.
+/// Applies the metadata of a file to all columns: the index of a pandas table, and a sample rate or period.
 pub(super) fn apply_statements<'a>(table: &mut Table, statements: impl IntoIterator<Item = (&'a str, &'a str)>) {
     let mut axis = Axis::Unknown;
     for (key, value) in statements {
         let number = || value.trim().parse::<f64>().ok().filter(|number| number.is_normal() && *number > 0.0);
         let is_one_of = |names: &[&str]| names.iter().any(|name| key.eq_ignore_ascii_case(name));
         if key == "pandas" {
-            // An index has the time of each row; a rate has not.
+            // An index has the time of each row and takes precedence over a rate.
             if let Some(column) = pandas::index_of_times(table, value) {
                 axis = Axis::Column(column);
                 break;
@@ -104,7 +104,7 @@ mod tests {
         let start = 1_715_588_474_000_000_000;
         assert_eq!(clock.seconds(start), 30_074.0);
         assert_eq!(clock.seconds(start + 123_456_789), 30_074.123_456_789);
-        // 1969-12-31 23:59:59 belongs to the day before 1970.
+        // 1969-12-31 23:59:59 is on the day before 1970-01-01.
         assert_eq!(Clock::new(1).seconds(-1), 86_399.0);
         let mut clock = Clock::new(1_000_000_000);
         assert!(clock.seconds(i64::MIN).is_finite() && clock.seconds(i64::MAX) > 1e10);
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn half_precision_is_widened_exactly() {
+    fn half_precision_is_converted_exactly() {
         let cases =
             [(0x3c00, 1.0), (0xc000, -2.0), (0x7bff, 65_504.0), (0x0001, 2_f64.powi(-24)), (0x3555, 0.333_251_953_125)];
         for (bits, value) in cases {

@@ -1,4 +1,4 @@
-//! Numbers as binary formats store them.
+//! Conversion of numbers that are stored in binary formats.
 
 /// The type of a stored number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Bytes that one number takes.
+    /// Returns the size of one number \[bytes\].
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -28,7 +28,7 @@ impl Kind {
     }
 }
 
-/// How the numbers of an array are stored.
+/// The storage of the numbers of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Storage {
     pub(crate) kind: Kind,
@@ -36,12 +36,12 @@ pub(crate) struct Storage {
 }
 
 impl Storage {
-    /// Numbers whose bytes follow each other.
+    /// Returns contiguous numbers.
     pub(crate) fn all(self, bytes: &[u8]) -> Vec<f64> {
         self.column(bytes, 0, self.kind.size(), bytes.len() / self.kind.size())
     }
 
-    /// `rows` numbers, the first at the byte `first`, the next `step` bytes further. NaN where the bytes end before.
+    /// Returns `rows` numbers. The first is at byte `first`, each following one `step` bytes later. NaN after the end of the bytes.
     pub(crate) fn column(self, bytes: &[u8], first: usize, step: usize, rows: usize) -> Vec<f64> {
         match self.kind {
             Kind::I8 => self.each(bytes, first, step, rows, |b: [u8; 1]| f64::from(i8::from_le_bytes(b))),
@@ -78,7 +78,7 @@ impl Storage {
     }
 }
 
-/// IEEE 754 half precision, as a double holds it exactly.
+/// Converts an IEEE 754 half-precision number exactly.
 fn half(bits: u16) -> f64 {
     let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
     let magnitude = match exponent {
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_widened_exactly() {
+    fn numbers_are_converted_exactly() {
         let of = |kind, big_endian, bytes: &[u8]| Storage { kind, big_endian }.all(bytes);
         assert_eq!(of(Kind::F32, false, &0.1f32.to_le_bytes()), [f64::from(0.1f32)]);
         assert_eq!(of(Kind::I16, true, &[0xff, 0xfe, 0, 3]), [-2.0, 3.0]);
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_of_a_table_are_picked() {
+    fn columns_of_a_table_are_extracted() {
         let storage = Storage { kind: Kind::U8, big_endian: false };
         assert_eq!(storage.column(&[1, 2, 3, 4, 5, 6], 1, 2, 3), [2.0, 4.0, 6.0]);
         assert!(storage.column(&[1, 2], 1, 2, 2)[1].is_nan());

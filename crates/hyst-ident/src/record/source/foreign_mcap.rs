@@ -1,9 +1,10 @@
-//! MCAP logs that other programs wrote: JSON, ROS 2 and Protobuf messages.
+//! MCAP logs of other programs: JSON, ROS 2 and Protobuf messages.
 //!
-//! Every numeric field of a topic is a column `/topic.field`. Its times are those that the messages state in their header, or those at
-//! which they were logged, in a column `/topic@time`.
+//! Every numeric field of a topic is a column `/topic.field`. The column `/topic@time` has the time stamps in the headers of the messages, or
+//! else the log times.
 
 mod align;
+mod budget;
 mod cdr;
 mod clock;
 mod decoder;
@@ -11,7 +12,6 @@ mod json;
 mod json_units;
 mod log;
 mod protobuf;
-mod room;
 mod ros2;
 mod series;
 mod stated_unit;
@@ -26,21 +26,21 @@ use clock::Clock;
 use log::Log;
 use series::Series;
 
-/// What messages call the format.
+/// The name of the format in messages.
 const FORMAT: &str = "MCAP";
-/// Topics that are named in one note.
-const MOST_NAMED: usize = 8;
-/// Notes on one file.
-const MOST_NOTES: usize = 24;
-/// Fewest messages that make a column.
+/// Largest number of topics in one note.
+const MAX_NAMED: usize = 8;
+/// Largest number of notes on one file.
+const MAX_NOTES: usize = 24;
+/// Fewest messages of a topic.
 const MIN_ROWS: usize = 2;
 
-/// Whether these are the bytes of an MCAP file.
+/// Returns whether `bytes` begin as an MCAP file does.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     LogRecords::new(bytes).is_some()
 }
 
-/// Reads the numeric fields of all topics; `file` is for messages.
+/// Reads the numeric fields of all topics. `file` is the file name in messages.
 ///
 /// # Errors
 /// If no topic has two messages with numbers.
@@ -76,13 +76,13 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     if !left_out.is_empty() {
         notes.push(format!("left out: {}", listed(&left_out)));
     }
-    let more = notes.len().saturating_sub(MOST_NOTES);
-    notes.truncate(MOST_NOTES);
+    let more = notes.len().saturating_sub(MAX_NOTES);
+    notes.truncate(MAX_NOTES);
     notes.extend((more > 0).then(|| format!("and {more} more notes")));
     Ok(Table { notes, cut_off, ..table(topics, &encodings) })
 }
 
-/// Why there is no column, and what to do.
+/// Returns why there is no column, and what to do.
 fn why_nothing(is_empty: bool, left_out: &[String], notes: &[String]) -> String {
     let notes = if notes.is_empty() { String::new() } else { format!(" ({})", listed(notes)) };
     if is_empty {
@@ -90,25 +90,25 @@ fn why_nothing(is_empty: bool, left_out: &[String], notes: &[String]) -> String 
     }
     let topics = if left_out.is_empty() { String::new() } else { format!(": {}", listed(left_out)) };
     format!(
-        "no topic has two messages with numbers{topics}{notes}; read are JSON, ROS 2 (cdr with ros2msg) and Protobuf messages"
+        "no topic has two messages with numbers{topics}{notes}; supported are JSON, ROS 2 (cdr with ros2msg) and Protobuf messages"
     )
 }
 
-/// The first of many texts.
+/// Joins the first texts and counts the others.
 fn listed(texts: &[String]) -> String {
-    let more = texts.len().saturating_sub(MOST_NAMED);
-    let first = texts.iter().take(MOST_NAMED).map(|text| shortened(text)).collect::<Vec<_>>().join("; ");
+    let more = texts.len().saturating_sub(MAX_NAMED);
+    let first = texts.iter().take(MAX_NAMED).map(|text| shortened(text)).collect::<Vec<_>>().join("; ");
     if more == 0 { first } else { format!("{first}; and {more} more") }
 }
 
-/// At most so much of a text that stands in the file as a message can show.
+/// Shortens a text from the file for a message.
 fn shortened(text: &str) -> String {
-    /// Characters of a text that a message shows.
-    const MOST: usize = 200;
-    if text.chars().count() <= MOST { text.to_owned() } else { text.chars().take(MOST).chain(['…']).collect() }
+    /// Largest number of characters.
+    const MAX: usize = 200;
+    if text.chars().count() <= MAX { text.to_owned() } else { text.chars().take(MAX).chain(['…']).collect() }
 }
 
-/// The columns; topics with the same times share one column of them.
+/// Makes the table. Topics with the same times share one time column.
 fn table(topics: Vec<(Series, Clock)>, encodings: &str) -> Table {
     let mut table = Table::new(format!("MCAP log of {encodings} messages"));
     let zeros = clock::zeros(topics.iter().map(|(_, clock)| clock));

@@ -1,7 +1,6 @@
-//! Columns of a tree of arrays, on their way into a table.
+//! Common code of MATLAB and HDF5: conversion of a tree of arrays to a table.
 //!
-//! Files of MATLAB and HDF5 hold arrays in structs and groups. What is common to them is here: unique names, times shared by columns,
-//! the names of a matrix's columns, groups that are segments, and the limit on memory.
+//! It gives columns unique names, finds shared times and names of matrix columns, joins groups as segments, and limits the memory.
 
 mod lists;
 mod rates;
@@ -14,65 +13,65 @@ pub(crate) use lists::{TextList, of_matrix};
 pub(crate) use rates::{Rate, step_of};
 pub(crate) use segments::{Part, join, number_of};
 
-/// Bytes that a file may expand to whatever its size.
+/// Size up to which a file may always expand \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// How many times its size a file may expand to beyond that.
+/// Largest ratio of the expanded size to the size of larger files.
 const MAX_EXPANSION: u64 = 200;
 
-/// Bytes that may still be allocated for a file's arrays.
+/// The memory that the arrays of a file may still take \[bytes\].
 #[derive(Debug)]
-pub(crate) struct Room(u64);
+pub(crate) struct Budget(u64);
 
-impl Room {
-    /// What a file of this size justifies.
+impl Budget {
+    /// Returns the limit of a file of this size.
     pub(crate) fn of(file_bytes: usize) -> Self {
         Self(ALWAYS_UNPACKED.max(MAX_EXPANSION.saturating_mul(file_bytes as u64)))
     }
 
-    /// Bytes left.
-    pub(crate) fn left(&self) -> u64 {
+    /// Returns the remaining memory \[bytes\].
+    pub(crate) fn remaining(&self) -> u64 {
         self.0
     }
 
-    /// Takes `bytes`, or says that there are too many.
+    /// Reserves `bytes`. The error is the message if the limit is exceeded.
     pub(crate) fn take(&mut self, bytes: u64) -> Result<(), String> {
         self.0 = self.0.checked_sub(bytes).ok_or_else(Self::exceeded)?;
         Ok(())
     }
 
-    /// What is wrong with a file that needs more.
+    /// Returns the message for a file that exceeds the limit.
     pub(crate) fn exceeded() -> String {
         format!(
-            "expands to more than {MAX_EXPANSION} times the size of the file, as no measurement does; export the columns that are needed as CSV"
+            "expands to more than {MAX_EXPANSION} times the size of the file, which measured data do not; export only the needed columns, as CSV"
         )
     }
 }
 
-/// Where the times of a column's rows are.
+/// The times of the rows of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Clock {
     Unknown,
-    /// Even \[s\].
+    /// Even times \[s\].
     Even {
         start: f64,
         step: f64,
     },
-    /// In the column with this identity.
+    /// The column with this identity.
     Column(u64),
 }
 
-/// A column and all that the file says of it.
+/// A column and its metadata.
 #[derive(Clone, Debug)]
 pub(crate) struct Column {
-    /// Where it is: `/run/data[2]`, `rig.run.voltage`.
+    /// The place in the file: `/run/data[2]`, `rig.run.voltage`.
     pub(crate) path: String,
-    /// The array, struct or group that a label belongs to: `/run/data`.
+    /// The array, struct or group that the label belongs to: `/run/data`.
     pub(crate) owner: String,
-    /// What the file calls it, where that is more than its place.
+    /// The name that the file gives to the column, if it differs from the place.
     pub(crate) label: Option<String>,
     pub(crate) unit: Option<String>,
     pub(crate) clock: Clock,
-    /// By which others name it as their clock.
+    /// The identity with which other columns refer to this one as their clock.
     pub(crate) identity: Option<u64>,
     pub(crate) values: Vec<f64>,
 }
@@ -83,7 +82,7 @@ impl Column {
         Self { owner: path.clone(), path, label: None, unit: None, clock: Clock::Unknown, identity: None, values }
     }
 
-    /// The name where the label is not the only one of its kind.
+    /// Returns the name that is used if the label is not unique.
     fn long_name(&self) -> String {
         match &self.label {
             Some(label) if self.owner.is_empty() => label.clone(),
@@ -93,14 +92,14 @@ impl Column {
     }
 }
 
-/// A table of the columns, each with a name of its own.
+/// Makes a table of the columns, with unique names.
 ///
 /// # Errors
-/// When there is no column; what was left out is then listed.
+/// If there is no column. The message lists `notes`.
 pub(crate) fn table(format: &str, columns: Vec<Column>, notes: Vec<String>) -> Result<Table, String> {
     if columns.is_empty() {
         let reasons = if notes.is_empty() { String::new() } else { format!(": {}", notes.join("; ")) };
-        return Err(format!("holds no column of numbers{reasons}; save each signal as a vector of numbers"));
+        return Err(format!("no column of numbers was found{reasons}; save each signal as a vector of numbers"));
     }
     let names = names(&columns);
     let by_identity: HashMap<u64, usize> =
@@ -127,9 +126,9 @@ pub(crate) fn table(format: &str, columns: Vec<Column>, notes: Vec<String>) -> R
     Ok(table)
 }
 
-/// The label where no other column has it, the label behind its owner's path where that helps, else the path.
+/// Returns unique names: the label if it is unique, else the path of the owner and the label, else the path.
 fn names(columns: &[Column]) -> Vec<String> {
-    fn twice(names: &[String]) -> Vec<bool> {
+    fn repeated(names: &[String]) -> Vec<bool> {
         let mut count: HashMap<&str, usize> = HashMap::new();
         for name in names {
             *count.entry(name).or_default() += 1;
@@ -138,8 +137,8 @@ fn names(columns: &[Column]) -> Vec<String> {
     }
     let mut names: Vec<String> = columns.iter().map(|c| c.label.clone().unwrap_or_else(|| c.path.clone())).collect();
     for longer in [Column::long_name, |column: &Column| column.path.clone()] {
-        let twice = twice(&names);
-        for ((name, column), _) in names.iter_mut().zip(columns).zip(twice).filter(|(_, twice)| *twice) {
+        let repeated = repeated(&names);
+        for ((name, column), _) in names.iter_mut().zip(columns).zip(repeated).filter(|(_, repeated)| *repeated) {
             *name = longer(column);
         }
     }
@@ -155,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_are_names_where_they_are_unique() {
+    fn unique_labels_are_used_as_names() {
         let columns = [
             column("a[1]", "a", Some("time")),
             column("a[2]", "a", Some("x")),
@@ -180,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_columns_says_why() {
+    fn a_file_without_columns_is_refused_with_the_reason() {
         let message = table("F", vec![], vec!["x is complex".into()]).unwrap_err();
         assert!(message.contains("no column") && message.contains("x is complex"), "{message}");
     }

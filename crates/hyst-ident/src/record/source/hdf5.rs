@@ -1,4 +1,4 @@
-//! HDF5, and MATLAB's version 7.3, which is HDF5 behind a header of its own.
+//! HDF5, including MATLAB version 7.3, which is HDF5 after a MATLAB header.
 
 mod attributes;
 mod compound;
@@ -10,34 +10,34 @@ mod walk;
 use hdf5_reader::{Hdf5File, OpenOptions};
 
 use super::Table;
-use super::gather::{self, Room};
+use super::gather::{self, Budget};
 use super::mat::layout::Layout;
 use crate::record::error::RecordError;
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 const MATLAB: &[u8] = b"MATLAB 7.3 MAT-file";
-/// A file may begin behind a block of its user's: 512 bytes, or that doubled any number of times.
+/// Smallest user block before an HDF5 file \[bytes\]. Its size may be doubled several times.
 const FIRST_USER_BLOCK: usize = 512;
-const MOST_USER_BLOCKS: usize = 8;
+const MAX_USER_BLOCKS: usize = 8;
 
-/// Whether the content is HDF5.
+/// Returns whether `bytes` are an HDF5 file.
 pub(crate) fn is(bytes: &[u8]) -> bool {
-    let mut starts = std::iter::once(0).chain((0..MOST_USER_BLOCKS).map(|doubled| FIRST_USER_BLOCK << doubled));
+    let mut starts = std::iter::once(0).chain((0..MAX_USER_BLOCKS).map(|doubled| FIRST_USER_BLOCK << doubled));
     bytes.starts_with(MATLAB) || starts.any(|start| bytes.get(start..).is_some_and(|rest| rest.starts_with(SIGNATURE)))
 }
 
-/// Reads the columns of a file; `file` stands for it in messages.
+/// Reads the columns of a file. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged, or holds no column of numbers.
+/// If the file is damaged, or has no column of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let format = if bytes.starts_with(MATLAB) { "MATLAB 7.3" } else { "HDF5" };
     columns(format, bytes).map_err(|what| RecordError::Damaged { file: file.to_owned(), format, what })
 }
 
 fn columns(format: &str, bytes: &[u8]) -> Result<Table, String> {
-    let mut room = Room::of(bytes.len());
-    let most = usize::try_from(room.left()).unwrap_or(usize::MAX);
+    let mut budget = Budget::of(bytes.len());
+    let most = usize::try_from(budget.remaining()).unwrap_or(usize::MAX);
     let options = OpenOptions::default()
         .with_filter_registry(filters::registry(most))
         .with_max_chunk_bytes(most)
@@ -51,18 +51,18 @@ fn columns(format: &str, bytes: &[u8]) -> Result<Table, String> {
     let end = file.superblock().eof_address;
     if end > bytes.len() as u64 {
         return Err(format!(
-            "{end} bytes are announced and {} are there; the file is cut off: copy it again",
+            "the header states {end} bytes, but the file has {}; the file is cut off: copy it again",
             bytes.len()
         ));
     }
     let root = file.root_group().map_err(damaged)?;
     if format == "MATLAB 7.3" {
-        let variables = matlab::variables(&root, &mut room)?;
-        let mut layout = Layout::new(&mut room);
+        let variables = matlab::variables(&root, &mut budget)?;
+        let mut layout = Layout::new(&mut budget);
         let columns = layout.file(&variables)?;
         return gather::table(format, columns, layout.notes());
     }
-    let mut walk = walk::Walk::new(&mut room);
+    let mut walk = walk::Walk::new(&mut budget);
     let columns = walk.file(&root)?;
     gather::table(format, columns, walk.notes())
 }

@@ -1,7 +1,7 @@
 //! LVM, the text format of LabVIEW's "Write To Measurement File".
 //!
-//! A header for the file states separators and whether rows have times; a header for each segment states the channels' units, start
-//! times and sample periods.
+//! The header of the file states the separators and whether rows have times. The header of each segment states units, start times and sample
+//! periods of the channels.
 
 mod header;
 mod numbers;
@@ -16,18 +16,18 @@ use super::Table;
 use crate::record::error::RecordError;
 
 const FORMAT: &str = "LVM";
-/// The mark of UTF-8 that some editors put first.
+/// The byte-order mark of UTF-8, which some editors add.
 const MARK: &[u8] = b"\xEF\xBB\xBF";
 
-/// Whether a file is LVM.
+/// Returns whether `bytes` are an LVM file.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     bytes.strip_prefix(MARK).unwrap_or(bytes).starts_with(header::FILE.as_bytes())
 }
 
-/// Reads the channels of a file; `file` stands for it in messages.
+/// Reads the channels of a file. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged, or has no channel with values.
+/// If the file is damaged, or has no channel with values.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let text = text(bytes.strip_prefix(MARK).unwrap_or(bytes));
     rows::read(&text).and_then(table::table).map_err(|what| RecordError::Damaged {
@@ -37,7 +37,7 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     })
 }
 
-/// LabVIEW writes the code page of Windows, of which Latin-1 has all that units need.
+/// Decodes UTF-8 or else Latin-1. LabVIEW writes the code page of Windows, whose letters of units are the same in Latin-1.
 fn text(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),

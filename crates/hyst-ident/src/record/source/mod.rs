@@ -1,6 +1,6 @@
-//! What a file holds, before anybody says what its columns are for.
+//! Reading of file formats: columns and values, without roles.
 //!
-//! A format is told apart by its content, never by its name. Each format is one file here that implements [`Contents`].
+//! The format is detected from the content of a file, never from its name. Each format has one file here and implements [`Contents`].
 
 #[cfg(feature = "arrow")]
 mod arrow;
@@ -39,36 +39,36 @@ use std::io::Read;
 use super::error::{Place, RecordError};
 use super::grid::Printed;
 
-/// Formats that are read, as messages list them.
+/// The supported formats, for messages.
 pub(crate) const FORMATS: &str =
-    "tables of text as CSV, also compressed; MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files";
+    "text tables such as CSV, also compressed; MATLAB, HDF5, TDMS, LVM, NumPy, Parquet, Arrow, Excel and MCAP files";
 
-/// The note of a log without its end.
+/// The note of a truncated log.
 pub(crate) const CUT_OFF: &str = "the log was cut off: its end is missing";
 
-/// What the other columns of a file, or the file itself, say of the times of a column's rows.
+/// The times of the rows of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Axis {
-    /// Nothing.
+    /// The file does not state them.
     Unknown,
-    /// They are in this column.
+    /// The column with the times.
     Column(usize),
-    /// They are even \[s\].
+    /// Even times \[s\].
     Even { start: f64, step: f64 },
 }
 
 /// A column, without its values.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Head {
-    /// As `--map` names it: a heading, a path as `/group/name` or `matrix[2]`, or a number where a file has no names.
+    /// The name for `--map`: a heading, a path such as `/group/name` or `matrix[2]`, or a number if the file has no names.
     pub(crate) name: String,
-    /// The unit that the file states elsewhere than in the heading.
+    /// The unit, if the file states it outside the heading.
     pub(crate) unit: Option<String>,
-    /// Number of rows, where it is known before reading.
+    /// The number of rows, if it is known before reading.
     pub(crate) rows: Option<usize>,
-    /// Times of its rows.
+    /// The times of the rows.
     pub(crate) axis: Axis,
-    /// Where it is in the file, if its name does not say it, as `data[2]`; `--map` takes that too.
+    /// The place in the file, such as `data[2]`, if it differs from the name. `--map` accepts it too.
     pub(crate) path: Option<String>,
 }
 
@@ -82,89 +82,91 @@ impl Head {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted<'a> {
     pub(crate) columns: &'a [usize],
-    /// Which of them is the time.
+    /// The index of the time in `columns`.
     pub(crate) time: Option<usize>,
-    /// Which of them is the segment.
+    /// The index of the segment in `columns`.
     pub(crate) segment: Option<usize>,
 }
 
 impl<'a> Wanted<'a> {
-    /// These columns, whatever they are.
+    /// Requests columns without stating which is the time or the segment.
     pub(crate) fn all(columns: &'a [usize]) -> Self {
         Self { columns, time: None, segment: None }
     }
 }
 
-/// The values of a column; NaN stands for a cell without a number.
+/// The values of a column; NaN if a cell has no number.
 #[derive(Clone, Debug)]
 pub(crate) struct Values {
     pub(crate) numbers: Vec<f64>,
     pub(crate) printed: Printed,
 }
 
-/// A file's columns.
+/// The columns of a file.
 pub(crate) trait Contents {
-    /// The format in words, as `CSV, ';' between columns`.
+    /// Returns the format in words, such as `table of text, ';' between columns`.
     fn format(&self) -> String;
 
-    /// The columns.
+    /// Returns the columns.
     fn heads(&self) -> &[Head];
 
-    /// Values of the columns with these numbers, in their order. Only the first one, the time, says how finely it is printed.
+    /// Reads the requested columns, in the order of the request.
+    ///
+    /// Only the printed resolution of the first column, the time, is valid.
     ///
     /// # Errors
-    /// When a cell of them is no number, or the file ends early.
+    /// If a cell is not a number, or the file ends early.
     fn values(&self, wanted: Wanted<'_>) -> Result<Vec<Values>, RecordError>;
 
-    /// Rows of the file that are averaged into one.
+    /// Returns the number of rows of the file that are averaged into one.
     fn rows_per_row(&self) -> usize {
         1
     }
 
-    /// What reading the values has shown.
+    /// Returns notes that are known after the values were read.
     fn late_notes(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Columns of text, by name, with a cell of each.
+    /// Returns the columns of text: name and an example of a cell.
     fn texts(&self) -> &[(String, String)] {
         &[]
     }
 
-    /// Where a reader finds a row.
+    /// Returns the place of a row.
     fn place(&self, row: usize) -> Place {
         Place::Row(row)
     }
 
-    /// Where a reader finds the columns' names.
+    /// Returns the place of the column names.
     fn header(&self) -> Option<Place> {
         None
     }
 
-    /// The text of a table that is written as the record format is, so that its rows can be carried through as they stand.
+    /// Returns the text if the file is in the record format, so that its rows can be copied unchanged.
     fn plain_text(&self) -> Option<&str> {
         None
     }
 
-    /// What was done to read the file that its owner may want to know.
+    /// Returns one sentence per change that was made while reading.
     fn notes(&self) -> &[String] {
         &[]
     }
 
-    /// Whether the end of the file is missing.
+    /// Returns whether the end of the file is missing.
     fn cut_off(&self) -> bool {
         false
     }
 }
 
-/// A format of bytes: how its files are told apart, and how they are read as a whole.
+/// A binary format: the test for its files and the function that reads them.
 #[cfg(feature = "binary")]
 struct Binary {
     is: fn(&[u8]) -> bool,
     read: fn(&str, &[u8]) -> Result<Table, RecordError>,
 }
 
-/// The formats that are built in. Text comes after them: it is what nothing else is.
+/// The binary formats that are built in. A file of no binary format is read as text.
 #[cfg(feature = "binary")]
 const BINARY: &[Binary] = &[
     #[cfg(feature = "hdf5")]
@@ -188,10 +190,10 @@ const BINARY: &[Binary] = &[
     Binary { is: foreign_mcap::is, read: foreign_mcap::read },
 ];
 
-/// Opens the contents of a file; `name` stands for it in messages.
+/// Opens the contents of a file. `name` is the file name in messages.
 ///
 /// # Errors
-/// When the format is none that is read, or the file is damaged.
+/// If the format is not supported, or the file is damaged.
 pub(crate) fn open<'a>(name: &str, bytes: &'a [u8]) -> Result<Box<dyn Contents + 'a>, RecordError> {
     #[cfg(feature = "binary")]
     if let Some(binary) = BINARY.iter().find(|binary| (binary.is)(bytes)) {
@@ -200,15 +202,15 @@ pub(crate) fn open<'a>(name: &str, bytes: &'a [u8]) -> Result<Box<dyn Contents +
     Ok(Box::new(text::Text::open(name, bytes)?))
 }
 
-/// Bytes that a compressed file may hold whatever its size.
+/// Size up to which a compressed file may always unpack \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// How many times its size a compressed file may hold beyond that: numbers as text take a third to a tenth.
+/// Largest ratio of unpacked to packed size of larger files. Numbers as text compress by a factor of 3 to 10.
 const MAX_EXPANSION: u64 = 200;
 
-/// The bytes inside a file compressed by gzip or Zstandard; others as they are.
+/// Unpacks a file compressed by gzip or Zstandard; returns other files unchanged.
 ///
 /// # Errors
-/// When the file is damaged, or expands to far more than any table does.
+/// If the file is damaged, or unpacks to far more bytes than a table of numbers would.
 pub(crate) fn unpack<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, RecordError> {
     let damaged = |format, what: String| RecordError::Damaged { file: name.to_owned(), format, what };
     let (format, reader): (_, Box<dyn Read + 'a>) = if bytes.starts_with(b"\x1f\x8b") {
@@ -229,7 +231,8 @@ pub(crate) fn unpack<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, R
         return Err(damaged(
             format,
             format!(
-                "expands to more than {MAX_EXPANSION} times its size, as measured values do not; unpack it yourself if you trust it, and read the file inside"
+                "it unpacks to more than {MAX_EXPANSION} times its size, which tables of numbers do not; \
+                 if you trust it, unpack it with gzip -d or zstd -d and read the unpacked file"
             ),
         ));
     }

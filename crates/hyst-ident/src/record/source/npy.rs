@@ -1,6 +1,6 @@
-//! NumPy's arrays: NPY, and NPZ, which is an archive of them.
+//! NumPy arrays: NPY files, and NPZ archives of NPY files.
 //!
-//! Each vector of numbers is a column, each table has one for each of its columns, and so has each field of a structured array.
+//! A vector is one column. A table has one column per table column, and a structured array one column per field.
 
 mod archive;
 mod array;
@@ -16,34 +16,34 @@ use dtype::Kind;
 
 const FORMAT: &str = "NumPy";
 
-/// Whether a file is NPY or NPZ.
+/// Returns whether `bytes` are an NPY or NPZ file.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     bytes.starts_with(TAG) || archive::is(bytes)
 }
 
-/// Reads the arrays of a file; `file` stands for it in messages.
+/// Reads the arrays of a file. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged, or has no array of numbers.
+/// If the file is damaged, or has no array of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let table = if bytes.starts_with(TAG) { single(bytes) } else { archive::read(bytes) };
     let table = table.and_then(|table| if table.heads.is_empty() { Err(nothing(&table)) } else { Ok(table) });
     table.map_err(|what| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what })
 }
 
-/// The columns of a file with one array.
+/// Reads a file with one array.
 fn single(bytes: &[u8]) -> Result<Table, String> {
     let array = Array::parse(bytes).map_err(|what| format!("the array cannot be read: {what}"))?;
     let mut table = Table::new("NumPy .npy");
     let name = |field: &str, column: usize| {
-        // Columns without a name go by their numbers.
+        // Columns without a name are numbered.
         if field.is_empty() { (column + 1).to_string() } else { numbered(field, &array, column) }
     };
     add(&mut table, "", &array, name, |_| None);
     Ok(table)
 }
 
-/// A name with the number of the column, in a table that has several.
+/// Adds the number of the column to a name, if the array is a table.
 fn numbered(name: &str, array: &Array<'_>, column: usize) -> String {
     if matches!(array.shape, Shape::Table(..)) { format!("{name}[{}]", column + 1) } else { name.to_owned() }
 }
@@ -66,7 +66,7 @@ fn add(
         Shape::Other => {
             if array.fields.iter().any(|field| matches!(field.kind, Kind::Float | Kind::Signed | Kind::Unsigned)) {
                 table.notes.push(format!(
-                    "{own} is not read: its shape is {:?}, and columns of a record are as long as the array",
+                    "{own} is not read: its shape is {:?}, but a record needs one row per sample",
                     array.lengths
                 ));
             }
@@ -89,10 +89,10 @@ fn add(
     }
 }
 
-/// Why a file has no column.
+/// Returns why a file has no column, and what to do.
 fn nothing(table: &Table) -> String {
     let why = if table.notes.is_empty() { String::new() } else { format!(" ({})", table.notes.join("; ")) };
     format!(
-        "no array has columns of two or more numbers{why}; save a row for each sample, as numpy.column_stack([t, u, y]) has them"
+        "no array has columns of two or more numbers{why}; save one row per sample, for example numpy.column_stack([t, u, y])"
     )
 }

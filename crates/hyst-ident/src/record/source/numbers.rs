@@ -1,4 +1,4 @@
-//! Numbers as files print them, read in one pass.
+//! Parsing of printed numbers, dates and times in one pass.
 
 use crate::record::grid::Printed;
 
@@ -6,22 +6,22 @@ use crate::record::grid::Printed;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
     Number(f64),
-    /// A number with a sign between its thousands, as `1'250.5` or, with a decimal comma, `1.250,5`.
+    /// A number with a thousands separator: `1'250.5` or, with a decimal comma, `1.250,5`.
     Grouped(f64),
-    /// Nothing, or a word for it, as `NaN`.
+    /// An empty cell, or a word for a missing value such as `NaN`.
     Missing,
-    /// A date and time, as ISO 8601 writes it.
+    /// A date, a time of day, or both.
     Time(Moment),
     Other,
 }
 
-/// A date and time: seconds of it since 1970 have no room for a millionth beside them in one number.
+/// A date and time, in two numbers, because one double does not resolve seconds since 1970 to much better than a microsecond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
-    /// Whole seconds since 1970, or since midnight where there is no date.
+    /// Whole seconds since 1970, or since midnight if there is no date.
     whole: i64,
     fraction: f64,
-    /// Digits behind the point of the seconds.
+    /// Digits after the decimal point of the seconds.
     pub(super) decimals: i32,
     /// Whether it has a date.
     dated: bool,
@@ -30,18 +30,18 @@ pub(super) struct Moment {
 }
 
 impl Moment {
-    /// Seconds since `start`.
+    /// Returns the seconds since `start`.
     pub(super) fn since(self, start: i64) -> f64 {
         (self.whole - if self.dated { start } else { 0 }) as f64 + self.fraction
     }
 
-    /// The midnight before, in seconds since 1970.
+    /// Returns the midnight before, in seconds since 1970.
     pub(super) fn midnight(self) -> i64 {
         self.whole.div_euclid(86_400) * 86_400
     }
 }
 
-/// Powers of ten that a double holds exactly.
+/// Powers of ten that a double represents exactly.
 const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
@@ -51,18 +51,18 @@ const POWERS: [f64; 23] = [
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scanned {
     pub(super) value: f64,
-    /// Its digits and decimals.
+    /// The printed digits and decimals.
     pub(super) printed: Printed,
-    /// Bytes that it takes.
+    /// The number of bytes read.
     pub(super) bytes: usize,
 }
 
-/// The number that a cell without blanks around it prints, rounded to the nearest double.
+/// Parses a cell without surrounding blanks, rounded to the nearest double.
 pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
     scan(cell, decimal).filter(|scanned| scanned.bytes == cell.len()).map(|scanned| scanned.value)
 }
 
-/// The number that some bytes begin with, rounded to the nearest double.
+/// Parses the number at the beginning of `bytes`, rounded to the nearest double.
 pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
     let (negative, signs) = match bytes.first()? {
         b'-' => (true, 1),
@@ -83,7 +83,7 @@ pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
     let pointed = digits.get(before) == Some(&decimal);
     let at_point = before + usize::from(pointed);
     let mut at = if pointed { run(at_point) } else { before };
-    // Cells are shorter than any `i32`.
+    // The length of a cell fits an `i32`.
     let after = i32::try_from(at - at_point).ok()?;
     let zeros = digits[..at].iter().take_while(|byte| matches!(byte, b'0') || **byte == decimal);
     let zeros = zeros.filter(|byte| **byte == b'0').count();
@@ -101,7 +101,7 @@ pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
         exponent += written.parse::<i32>().ok().filter(|e| e.abs() < 10_000)?;
         at += 1 + written.len();
     }
-    // One rounding of two exact numbers (Clinger 1990).
+    // Both operands are exact, so the result is rounded once (Clinger 1990).
     let magnitude = if count <= 19 && mantissa <= 1 << 53 && exponent.unsigned_abs() <= 22 {
         let power = POWERS[exponent.unsigned_abs() as usize];
         if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power }
@@ -120,10 +120,10 @@ pub(super) fn scan(bytes: &[u8], decimal: u8) -> Option<Scanned> {
     Some(Scanned { value: if negative { -magnitude } else { magnitude }, printed, bytes: signs + at })
 }
 
-/// What a cell without blanks around it is.
+/// Classifies a cell without surrounding blanks.
 pub(super) fn cell(cell: &[u8], decimal: u8) -> Cell {
     if let Some(number) = number(cell, decimal) {
-        // What overflows is no measured value.
+        // A number that overflows is not a measured value.
         return if number.is_finite() { Cell::Number(number) } else { Cell::Missing };
     }
     if is_missing(cell) {
@@ -133,12 +133,12 @@ pub(super) fn cell(cell: &[u8], decimal: u8) -> Cell {
     grouped(text, decimal).map(Cell::Grouped).or_else(|| date_time(text).map(Cell::Time)).unwrap_or(Cell::Other)
 }
 
-/// The number of a text with a sign between its thousands: one sign throughout, groups of three digits, no leading zero.
+/// Parses a number with a thousands separator: the same separator throughout, groups of three digits, no leading zero.
 fn grouped(text: &str, decimal: u8) -> Option<f64> {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (whole, _) = unsigned.split_once(char::from(decimal)).unwrap_or((unsigned, ""));
     let between = whole.chars().find(|c| !c.is_ascii_digit())?;
-    // A comma or a point, whichever is not the decimal sign; an apostrophe; spaces that do not break a line.
+    // Comma or point (whichever is not the decimal sign), apostrophe, or no-break space.
     let known = ['.', ',', '\'', '\u{2019}', '\u{a0}', '\u{2009}', '\u{202f}'];
     let mut groups = whole.split(between);
     let first = groups.next()?;
@@ -150,7 +150,7 @@ fn grouped(text: &str, decimal: u8) -> Option<f64> {
     is_grouped.then(|| number(plain().as_bytes(), decimal)).flatten().filter(|number| number.is_finite())
 }
 
-/// Words that stand for no value in files of instruments and spreadsheets.
+/// Returns whether a cell is empty or a word for a missing value.
 fn is_missing(cell: &[u8]) -> bool {
     const WORDS: [&str; 23] = [
         "nan",
@@ -180,9 +180,9 @@ fn is_missing(cell: &[u8]) -> bool {
     cell.is_empty() || cell.len() <= 10 && WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
 }
 
-/// The moment of `2024-05-31T12:30:01.25`, with a blank for the T, a time zone, AM or PM, or the date left out.
+/// Parses `2024-05-31T12:30:01.25`, also with a blank instead of the T, a time zone, AM or PM, or without the date.
 fn date_time(text: &str) -> Option<Moment> {
-    // A clock of twelve hours: 12 AM is midnight, 12 PM noon.
+    // 12-hour clock: 12 AM is midnight, 12 PM is noon.
     if let Some((clock, half)) = text.rsplit_once(' ').filter(|(_, half)| half.len() == 2) {
         let afternoon = match half.to_ascii_uppercase().as_str() {
             "AM" => 0,
@@ -200,7 +200,7 @@ fn date_time(text: &str) -> Option<Moment> {
     date_time_of_day(text)
 }
 
-/// The same with 24 hours.
+/// Parses a date and time with a 24-hour clock.
 fn date_time_of_day(text: &str) -> Option<Moment> {
     let (days, clock) = match text.split_once(['T', ' ']) {
         Some((date, clock)) => (Some(days(date)?), clock.trim()),
@@ -213,7 +213,7 @@ fn date_time_of_day(text: &str) -> Option<Moment> {
     let mut parts = clock.split(':');
     let (hour, minute) = (whole(parts.next()?, 0..=24)?, whole(parts.next()?, 0..=59)?);
     let second = parts.next().unwrap_or("0");
-    // A decimal comma is as much ISO 8601 as a point is.
+    // ISO 8601 allows a decimal comma and a decimal point.
     let pointed = second.contains(['.', ',']);
     let (second, fraction) = second.split_once(['.', ',']).unwrap_or((second, "0"));
     let second = whole(second, 0..=60)?;
@@ -236,11 +236,13 @@ fn whole(text: &str, range: std::ops::RangeInclusive<i64>) -> Option<i64> {
     plain.then(|| text.parse().ok()).flatten().filter(|value| range.contains(value))
 }
 
-/// Days since 1970-01-01 of `2024-05-31`, `2024/05/31` or `31.05.2024` (Hinnant's algorithm, proleptic Gregorian calendar).
+/// Returns the days since 1970-01-01 of `2024-05-31`, `2024/05/31` or `31.05.2024`.
+///
+/// Hinnant's algorithm, proleptic Gregorian calendar.
 fn days(date: &str) -> Option<i64> {
     let mut parts = date.split(['-', '/', '.']);
     let (mut y, m, mut d) = (parts.next()?, parts.next()?, parts.next()?);
-    // 31.05.2024; with a slash it might as well be the month that comes first.
+    // 31.05.2024. With slashes the month could be first, so such dates are not accepted.
     if date.contains('.') && d.len() == 4 {
         std::mem::swap(&mut y, &mut d);
     }
@@ -256,7 +258,7 @@ fn days(date: &str) -> Option<i64> {
     Some(era * 146_097 + day_of_era - 719_468)
 }
 
-/// A clock time without its zone, and the zone's offset \[s\].
+/// Splits a time of day into the time without its zone and the offset of the zone \[s\].
 fn zone(clock: &str) -> Option<(&str, i64)> {
     if let Some(utc) = clock.strip_suffix(['Z', 'z']) {
         return Some((utc, 0));
@@ -271,12 +273,12 @@ fn zone(clock: &str) -> Option<(&str, i64)> {
     Some((&clock[..at], sign * (whole(hours, 0..=14)? * 3600 + whole(minutes, 0..=59)? * 60)))
 }
 
-/// Digits of a printed time, added to those of the rows before.
+/// Updates `printed` with the digits of a time.
 pub(super) fn take_digits(printed: &mut Printed, cell: &[u8], decimal: u8) {
     if decimal == b'.' {
         printed.take(cell);
     } else {
-        // A point is between thousands there.
+        // With a decimal comma the point is the thousands separator.
         let point = |byte: &u8| if *byte == decimal { b'.' } else { *byte };
         let text: Vec<u8> = cell.iter().filter(|byte| **byte != b'.').map(point).collect();
         printed.take(&text);
@@ -289,7 +291,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn numbers_are_those_that_the_standard_library_reads() {
+    fn numbers_equal_those_of_the_standard_library() {
         for text in [
             "0",
             "-0.5",
@@ -333,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn dates_are_seconds() {
+    fn dates_are_converted_to_seconds() {
         let date_time = |text| date_time(text).map(|moment| moment.since(0));
         assert_eq!(date_time("1970-01-02"), Some(86_400.0));
         assert_eq!(date_time("2024-02-29T12:00:00Z"), Some(1_709_208_000.0));
@@ -351,7 +353,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn printed_numbers_come_back(value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO, decimals in 0..9usize) {
+        fn printed_numbers_are_read_exactly(value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO, decimals in 0..9usize) {
             prop_assert_eq!(number(value.to_string().as_bytes(), b'.'), Some(value));
             prop_assert_eq!(number(format!("{value:e}").as_bytes(), b'.'), Some(value));
             let short = format!("{:.decimals$}", value % 1e6);
@@ -359,12 +361,12 @@ mod tests {
         }
 
         #[test]
-        fn any_clock_is_some_cell(text in "[0-9:+aµ.T -]{1,24}") {
+        fn no_time_of_day_panics(text in "[0-9:+aµ.T -]{1,24}") {
             let _ = cell(text.as_bytes(), b'.');
         }
 
         #[test]
-        fn any_bytes_are_some_cell(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
+        fn no_bytes_panic(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
             let _ = cell(&bytes, b'.');
         }
     }

@@ -1,7 +1,7 @@
-//! Parquet files: columns of numbers, also those inside structs.
+//! Parquet files: columns of numbers, including those inside structs.
 //!
-//! The crate `parquet` decodes. It trusts the sizes in a file more than a reader of foreign files may; [`pages::check`] looks at them first,
-//! and a panic that a damaged file still causes becomes an error.
+//! The crate `parquet` decodes the file. It does not check all sizes, so [`pages::check`] does this first. A panic caused by a damaged file is
+//! converted to an error.
 
 mod numbers;
 mod pages;
@@ -22,12 +22,12 @@ const FORMAT: &str = "Parquet";
 const MAGIC: &[u8] = b"PAR1";
 /// First and last bytes of a file whose footer is encrypted.
 const ENCRYPTED: &[u8] = b"PARE";
-/// Bytes behind the footer: its length and the magic number.
+/// Size of the length and the magic number after the footer \[bytes\].
 const TRAILER: usize = 8;
-/// The key under which Arrow programs store their schema.
+/// The key of the schema of Arrow programs.
 const ARROW_SCHEMA: &str = "ARROW:schema";
 
-/// What is wrong with a file, and what to do.
+/// An error message: what is wrong with a file, and what to do.
 #[derive(Debug, PartialEq)]
 struct Fault(String);
 
@@ -36,23 +36,23 @@ impl Fault {
         Self(what.into())
     }
 
-    /// What only a damaged file has.
+    /// Makes the message of a damaged file.
     fn damaged(what: impl std::fmt::Display) -> Self {
         Self(format!("{what}; the file is damaged: copy it again, or write it again with the program that made it"))
     }
 }
 
-/// Whether these are the bytes of a Parquet file.
+/// Returns whether `bytes` begin as a Parquet file does.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC) || bytes.starts_with(ENCRYPTED)
 }
 
-/// The columns of a Parquet file; `file` names it in messages.
+/// Reads the columns of a Parquet file. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged or encrypted, or has no column of numbers.
+/// If the file is damaged or encrypted, or has no column of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
-    // The decoder asserts some of what it expects of a file.
+    // The decoder panics at some damaged files.
     let table =
         std::panic::catch_unwind(|| table(bytes)).unwrap_or_else(|_| Err(Fault::damaged("the file cannot be decoded")));
     table.map_err(|Fault(what)| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what })
@@ -60,7 +60,7 @@ pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
 
 fn table(bytes: &[u8]) -> Result<Table, Fault> {
     if bytes.starts_with(ENCRYPTED) || bytes.ends_with(ENCRYPTED) {
-        return Err(Fault::new("the file is encrypted, which is not read; write it again without encryption"));
+        return Err(Fault::new("the file is encrypted, which is not supported; write it again without encryption"));
     }
     let inner = bytes.strip_suffix(MAGIC).filter(|inner| inner.len() >= MAGIC.len() + 4);
     let footer = inner.and_then(|inner| inner.last_chunk()).map(|length| u32::from_le_bytes(*length) as usize);
@@ -83,7 +83,7 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
             read.map_err(|error| Fault::damaged(format!("column \"{}\" cannot be read ({error})", head.name)))?;
         }
     }
-    // A single row is a setting, not a record.
+    // A column with a single row is a setting, not a measurement.
     for column in columns.into_iter().filter(|column| column.numbers.values.len() >= 2) {
         table.push(column.head, column.numbers.values);
     }
@@ -98,19 +98,19 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
 
 /// A column of numbers that is being read.
 struct Column {
-    /// Its number in the file.
+    /// The number of the column in the file.
     at: usize,
     head: Head,
     numbers: Numbers,
 }
 
-/// What a file states of itself.
+/// Returns the key-value metadata of a file.
 fn statements(metadata: &ParquetMetaData) -> impl Iterator<Item = (&str, &str)> {
     let pairs = metadata.file_metadata().key_value_metadata().map(Vec::as_slice).unwrap_or_default();
     pairs.iter().filter_map(|pair| Some((pair.key.as_str(), pair.value.as_deref()?)))
 }
 
-/// The columns that hold numbers, still empty.
+/// Returns the columns of numbers, without values yet.
 fn columns(metadata: &ParquetMetaData, notes: &mut Vec<String>) -> Vec<Column> {
     let message = statements(metadata).find(|(key, _)| *key == ARROW_SCHEMA).and_then(|(_, text)| base64(text));
     let units = message.map_or_else(Vec::new, |message| arrow::units_of_schema(&message));
@@ -130,7 +130,7 @@ fn columns(metadata: &ParquetMetaData, notes: &mut Vec<String>) -> Vec<Column> {
     columns
 }
 
-/// Lists are named once, and the first few of them.
+/// Returns a note on a column of lists, for the first few such columns.
 fn note_on_lists(descriptor: &ColumnDescriptor, notes: &[String]) -> Option<String> {
     const MAX_NOTES: usize = 3;
     let name = descriptor.path().parts().first()?;
@@ -139,7 +139,7 @@ fn note_on_lists(descriptor: &ColumnDescriptor, notes: &[String]) -> Option<Stri
     })
 }
 
-/// Decodes base64; `None` if the text is something else.
+/// Decodes base64; `None` if the text is not base64.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut count) = (0_u32, 0);

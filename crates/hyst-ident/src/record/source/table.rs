@@ -1,31 +1,31 @@
-//! Columns in memory, as most formats hold them.
+//! A table in memory, which most formats are read into.
 
 use super::{Contents, Head, Values, Wanted};
 use crate::record::error::RecordError;
 use crate::record::grid::Printed;
 
-/// Columns of a file that were read as a whole.
+/// The columns of a file that is read as a whole.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
-    /// The format in words, as `MATLAB 5`.
+    /// The format in words, such as `MATLAB 5`.
     pub(crate) format: String,
     /// The columns.
     pub(crate) heads: Vec<Head>,
-    /// Their values; NaN stands for a cell without a number.
+    /// The values of the columns; NaN if a cell has no number.
     pub(crate) values: Vec<Vec<f64>>,
-    /// What was done to read the file that its owner may want to know.
+    /// One sentence per change that was made while reading.
     pub(crate) notes: Vec<String>,
     /// Whether the end of the file is missing.
     pub(crate) cut_off: bool,
 }
 
 impl Table {
-    /// An empty one.
+    /// Makes an empty table.
     pub(crate) fn new(format: impl Into<String>) -> Self {
         Self { format: format.into(), ..Self::default() }
     }
 
-    /// Adds a column; its number.
+    /// Adds a column and returns its number.
     pub(crate) fn push(&mut self, head: Head, values: Vec<f64>) -> usize {
         self.heads.push(Head { rows: Some(values.len()), ..head });
         self.values.push(values);

@@ -1,6 +1,6 @@
 //! TDMS, the binary format of LabVIEW and other programs of National Instruments.
 //!
-//! Channels are columns, named `group/channel`. A waveform's properties state its times, and NI's scales are applied.
+//! Channels are columns with the names `group/channel`. The properties of a waveform state its times. NI scales are applied.
 
 mod bytes;
 mod data;
@@ -19,36 +19,37 @@ use objects::{Object, Values};
 use segments::Contents;
 
 const FORMAT: &str = "TDMS";
-/// Properties that state a unit: LabVIEW's own, then those that other programs write.
+/// Properties with a unit: first those of LabVIEW, then those of other programs.
 const UNIT_PROPERTIES: [&str; 6] = ["unit_string", "NI_UnitDescription", "Unit", "unit", "Units", "units"];
-/// Units of a waveform's axis that are seconds; some programs write the quantity.
+/// Units of a waveform axis that mean seconds. Some programs write the quantity instead.
 const SECONDS: [&str; 8] = ["", "s", "sec", "second", "seconds", "Seconds", "Time", "time"];
-/// Channels that a message names.
-const MOST_NAMED: usize = 6;
+/// Largest number of channels that a message names.
+const MAX_NAMED: usize = 6;
 
-/// Whether a file is TDMS, or the index of such a file.
+/// Returns whether `bytes` are a TDMS file, or the index of one.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     bytes.starts_with(b"TDSm") || bytes.starts_with(b"TDSh")
 }
 
-/// Reads the channels of a file; `file` stands for it in messages.
+/// Reads the channels of a file. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged, or has no channel of numbers.
+/// If the file is damaged, or has no channel of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
     let damaged = |what| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what };
     if bytes.starts_with(b"TDSh") {
         return Err(damaged(
-            "this is the index of a TDMS file, without values; give the file of the same name with .tdms".into(),
+            "this is the index of a TDMS file, without values; give the file with the same name that ends in .tdms"
+                .into(),
         ));
     }
     table(Contents::read(bytes).map_err(damaged)?).map_err(damaged)
 }
 
-/// Columns of time stamps by their group and number of rows.
+/// Columns of time stamps by group and number of rows.
 type Clocks = HashMap<(String, usize), usize>;
 
-/// A channel with its values, before it is a column.
+/// A channel with its values.
 struct Column {
     channel: Object,
     values: Vec<f64>,
@@ -65,7 +66,7 @@ fn table(mut contents: Contents) -> Result<Table, String> {
         }
         table.notes.insert(
             0,
-            format!("the file is cut off in its segment {segment}; the {rows} rows that are complete are read; if it should be longer, copy it again"),
+            format!("the file is cut off in its segment {segment}; the {rows} rows before are read; if the file should be longer, copy it again"),
         );
     }
     if columns.is_empty() {
@@ -79,7 +80,7 @@ fn table(mut contents: Contents) -> Result<Table, String> {
     let breaks = breaks(&columns, &mut table.notes);
     let is_clock = |(_, column): &(usize, &Column)| column.is_time;
     let place = |(at, column): (usize, &Column)| ((column.channel.group.clone(), column.values.len()), at);
-    // Of several clocks in a group the first counts.
+    // If a group has several columns of time stamps, the first applies.
     let clocks: Clocks = columns.iter().enumerate().rev().filter(is_clock).map(place).collect();
     let axes: Vec<Axis> = columns.iter().map(|column| axis(column, &clocks, earliest)).collect();
     for (column, axis) in columns.into_iter().zip(axes) {
@@ -95,7 +96,7 @@ fn table(mut contents: Contents) -> Result<Table, String> {
     Ok(table)
 }
 
-/// Channels of two or more numbers, with their scales applied.
+/// Returns the channels with two or more numbers, with their scales applied.
 fn columns(contents: &mut Contents, notes: &mut Vec<String>) -> Vec<Column> {
     let taken: Vec<Values> = contents.objects.iter_mut().map(|object| std::mem::take(&mut object.values)).collect();
     let (mut columns, mut unread) = (Vec::new(), Vec::new());
@@ -110,7 +111,7 @@ fn columns(contents: &mut Contents, notes: &mut Vec<String>) -> Vec<Column> {
         let values = match values {
             Values::Times(times) => Ok(since_midnight(&times)),
             values => {
-                // Scales of the group go before those of the file, which has no name.
+                // Scales of the group take precedence over those of the file, whose group name is empty.
                 let stated = [Some(object), above.get(object.group.as_str()).copied(), above.get("").copied()];
                 scale::apply(values, stated.into_iter().flatten())
             }
@@ -120,8 +121,8 @@ fn columns(contents: &mut Contents, notes: &mut Vec<String>) -> Vec<Column> {
             Err(what) => unread.push(format!("\"{}\" is not read: {what}", object.name())),
         }
     }
-    let more = unread.len().saturating_sub(MOST_NAMED);
-    unread.truncate(MOST_NAMED);
+    let more = unread.len().saturating_sub(MAX_NAMED);
+    unread.truncate(MAX_NAMED);
     notes.extend(unread);
     if more > 0 {
         notes.push(format!("{more} more channels are not read"));
@@ -129,7 +130,7 @@ fn columns(contents: &mut Contents, notes: &mut Vec<String>) -> Vec<Column> {
     columns
 }
 
-/// Seconds since the midnight (UTC) before the first of some time stamps.
+/// Returns the seconds since the midnight (UTC) before the first time stamp.
 fn since_midnight(times: &[i128]) -> Vec<f64> {
     let start = times.first().map_or(0, |first| midnight(*first));
     times.iter().map(|time| seconds(time.saturating_sub(start))).collect()
@@ -139,14 +140,15 @@ fn unit(channel: &Object) -> Option<String> {
     UNIT_PROPERTIES.iter().filter_map(|name| channel.text(name)).find(|unit| !unit.trim().is_empty()).map(str::to_owned)
 }
 
-/// The sample period \[s\] of a channel that is a waveform over time.
+/// Returns the sample period \[s\] of a channel that is a waveform over time.
 fn period(channel: &Object) -> Option<f64> {
     let is_time = channel.text("wf_xunit_string").is_none_or(|unit| SECONDS.contains(&unit.trim()));
     channel.number("wf_increment").filter(|step| is_time && step.is_finite() && *step > 0.0 && !channel.changes_period)
 }
 
-/// The times of a column: those of its waveform, or the time stamps of its group. Waveforms that start at different times keep
-/// their distance: 0 is the start of the earliest one.
+/// Returns the times of a column: those of its waveform, or the time stamps of its group.
+///
+/// Time 0 is the start of the earliest waveform. Waveforms that start later keep their delay.
 fn axis(column: &Column, clocks: &Clocks, earliest: Option<i128>) -> Axis {
     if let Some(step) = period(&column.channel) {
         let offset = column.channel.number("wf_start_offset").filter(|offset| offset.is_finite()).unwrap_or(0.0);
@@ -160,9 +162,9 @@ fn axis(column: &Column, clocks: &Clocks, earliest: Option<i128>) -> Axis {
     clocks.get(&(column.channel.group.clone(), column.values.len())).map_or(Axis::Unknown, |clock| Axis::Column(*clock))
 }
 
-/// Rows at which all waveforms start anew, as several runs in one file do; notes what cannot be a column.
+/// Returns the rows at which all waveforms restart (several runs in one file). Adds notes on channels whose times are not known.
 fn breaks(columns: &[Column], notes: &mut Vec<String>) -> Option<Vec<usize>> {
-    for column in columns.iter().filter(|column| column.channel.changes_period).take(MOST_NAMED) {
+    for column in columns.iter().filter(|column| column.channel.changes_period).take(MAX_NAMED) {
         notes.push(format!("\"{}\" changes its sample period; its times are not known", column.channel.name()));
     }
     let all: Vec<Vec<usize>> = columns.iter().map(|column| restarts(&column.channel, column.values.len())).collect();
@@ -173,19 +175,19 @@ fn breaks(columns: &[Column], notes: &mut Vec<String>) -> Option<Vec<usize>> {
     let is_free = columns.iter().all(|column| column.channel.channel.as_deref() != Some("segment"));
     let are_shared = same_rows && is_free && all.iter().all(|rows| rows == first);
     notes.push(if are_shared {
-        format!("\"{name}\" starts anew at row {row}; the column \"segment\" numbers its {parts} parts")
+        format!("\"{name}\" restarts at row {row}; the column \"segment\" numbers its {parts} parts")
     } else {
-        format!("\"{name}\" starts anew at row {row}, but is read as one piece; save each run in a file of its own")
+        format!("\"{name}\" restarts at row {row}, but is read as one segment; save each run in a separate file")
     });
     are_shared.then(|| first.clone())
 }
 
-/// Rows at which a channel's start time is not that of the row.
+/// Returns the rows at which the start time of a channel differs from the expected time.
 fn restarts(channel: &Object, rows: usize) -> Vec<usize> {
     let (Some(start), Some(step)) = (channel.time("wf_start_time"), period(channel)) else { return Vec::new() };
     let (mut start, mut first, mut found) = (start, 0, Vec::new());
     for (row, restart) in &channel.restarts {
-        // A segment that repeats the start of the whole waveform says nothing new.
+        // A segment that repeats the start time of the whole waveform is not a restart.
         let distance = seconds(restart.saturating_sub(start));
         let late = distance - (row - first) as f64 * step;
         if distance != 0.0 && late.abs() > step / 2.0 && *row < rows {

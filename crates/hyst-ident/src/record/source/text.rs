@@ -1,7 +1,7 @@
-//! Tables of text: CSV and its dialects, and what instruments export.
+//! Tables of text: CSV and its dialects, and text exports of instruments.
 //!
-//! The dialect (delimiter, decimal sign, where the numbers begin) is the one that makes most cells of the first rows numbers. Lines above
-//! the numbers are names, units and remarks.
+//! The dialect (delimiter, decimal sign, first row) is the one with the most numbers in the first rows. Lines above the numbers are names,
+//! units and remarks.
 
 mod dialect;
 mod encoding;
@@ -9,7 +9,7 @@ mod rows;
 mod stream;
 
 use std::borrow::Cow;
-use std::cell::Cell as Told;
+use std::cell::Cell as SharedCell;
 
 use super::numbers::number;
 use super::{Axis, Contents, Head, Values, Wanted};
@@ -18,7 +18,7 @@ pub(crate) use stream::LargeText;
 
 use dialect::{Delimiter, Dialect};
 
-/// A table of text, its rows unread.
+/// A table of text whose rows are not read yet.
 pub(crate) struct Text<'a> {
     file: String,
     text: Cow<'a, str>,
@@ -26,11 +26,12 @@ pub(crate) struct Text<'a> {
     heads: Vec<Head>,
     texts: Vec<(String, String)>,
     notes: Vec<String>,
-    /// Where lines below the rows begin.
+    /// The byte at which lines below the rows begin.
     end: usize,
-    /// Lines among the rows that repeat the header, and other lines that are no rows.
-    headings: Told<usize>,
-    others: Told<usize>,
+    /// Number of lines between the rows that repeat the header.
+    headings: SharedCell<usize>,
+    /// Number of other lines between the rows that are not rows.
+    others: SharedCell<usize>,
 }
 
 impl<'a> Text<'a> {
@@ -48,7 +49,7 @@ impl<'a> Text<'a> {
         let footer = dialect.footer(&text).map(|(at, line)| (at, rows::shortened(line)));
         if let Some((at, line)) = &footer {
             notes.push(format!(
-                "the file from line {} (\"{line}\") is not read: no row follows",
+                "lines from line {} (\"{line}\") to the end are not read: they are not rows of numbers",
                 rows::line_at(&text, *at)
             ));
         }
@@ -61,13 +62,13 @@ impl<'a> Text<'a> {
             texts,
             notes,
             end,
-            headings: Told::new(0),
-            others: Told::new(0),
+            headings: SharedCell::new(0),
+            others: SharedCell::new(0),
         })
     }
 }
 
-/// A text without a row of numbers.
+/// Returns the error of a text without a row of numbers.
 fn no_numbers(file: &str, text: &str) -> RecordError {
     let lines = text.lines().filter(|line| !line.trim().is_empty()).count();
     if lines <= 1 {
@@ -128,7 +129,7 @@ impl Contents for Text<'_> {
     }
 }
 
-/// The number in a remark such as `Sample Interval, 1.0e-3` or `# SAMPLE_TIME = 0.001`, taken as seconds between rows.
+/// Returns the sample period \[s\] of a remark such as `Sample Interval, 1.0e-3` or `# SAMPLE_TIME = 0.001`.
 fn period_of_remark(line: &str) -> Option<f64> {
     let lower = line.to_lowercase();
     let lower = lower.trim_start_matches(|c: char| !c.is_alphanumeric());
@@ -146,14 +147,14 @@ fn period_of_remark(line: &str) -> Option<f64> {
     let rate = ["sample rate", "sample_rate", "samplerate", "sampling rate", "sampling frequency"];
     let behind = |keys: &[&str]| {
         let key = keys.iter().find(|key| lower.starts_with(**key))?;
-        // The number comes next, or behind a unit in brackets: "rate of card 2: 5000" says something else.
+        // The number is next, or after a unit in brackets. "rate of card 2: 5000" is something else.
         let rest = lower[key.len()..].trim_start();
         let rest =
             rest.strip_prefix(['(', '[']).and_then(|rest| rest.split_once([')', ']'])).map_or(rest, |(_, rest)| rest);
         let rest = rest.trim_start_matches([' ', '\t', ':', '=', ',', ';', '"']);
         let end =
             rest.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | '-' | '+'))).unwrap_or(rest.len());
-        // "44,100" and "2,5" are other numbers than they begin with.
+        // Numbers with a comma such as "44,100" and "2,5" are ambiguous.
         if rest[end..].strip_prefix(',').is_some_and(|more| more.starts_with(|c: char| c.is_ascii_digit())) {
             return None;
         }
@@ -177,12 +178,12 @@ fn period_of_remark(line: &str) -> Option<f64> {
     }
 }
 
-/// The times of all rows that remarks above them state.
+/// Returns the times of the rows that a remark above them states.
 fn axis_of_remarks<'a>(mut lines: impl Iterator<Item = &'a str>) -> Axis {
     lines.find_map(period_of_remark).map_or(Axis::Unknown, |step| Axis::Even { start: 0.0, step })
 }
 
-/// Fields of a line.
+/// Returns the fields of a line.
 fn fields(line: &str, delimiter: Delimiter) -> Vec<&str> {
     match delimiter {
         Delimiter::Blanks => line.split_whitespace().collect(),
@@ -190,7 +191,7 @@ fn fields(line: &str, delimiter: Delimiter) -> Vec<&str> {
     }
 }
 
-/// Fields between delimiters, those in quotation marks whole.
+/// Returns the fields of a line. Delimiters within quotation marks do not separate fields.
 fn quoted_fields(line: &str, delimiter: u8) -> Vec<&str> {
     let delimiter = char::from(delimiter);
     if !line.contains('"') {
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn dialects_are_told_apart() {
+    fn dialects_are_detected() {
         let expected = vec![vec![0.0, 0.5], vec![1.5, -2.5], vec![3.0, 4.25]];
         for text in [
             "a,b,c\n0,1.5,3\n0.5,-2.5,4.25\n",
@@ -271,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn thousands_repeated_headers_and_footers_are_understood() {
+    fn thousands_repeated_headers_and_footers_are_handled() {
         let expected = vec![vec![0.0, 999.0, 1050.0], vec![0.5, -2.5, 12_004.25]];
         for text in [
             "a;b\n0;0,5\n999;-2,5\n1.050;12.004,25\n",
@@ -283,17 +284,17 @@ mod tests {
         ] {
             assert_eq!(table(text.as_bytes()).1, expected, "{text}");
         }
-        // Whole numbers alone: 999 and then 1.000 is no step back.
+        // Whole numbers only: 1.000 after 999 is one thousand.
         let whole: String = (997..1003)
             .map(|k| format!("{}\n", if k < 1000 { format!("{k};5") } else { format!("1.{:03};5", k - 1000) }))
             .collect();
         assert_eq!(table(format!("a;b\n{whole}").as_bytes()).1[0], [997.0, 998.0, 999.0, 1000.0, 1001.0, 1002.0]);
-        // A damaged last row is no footer.
+        // A damaged last row is not a footer.
         assert!(Text::open("x.csv", b"a,b\n0,1\n1,2\n2x,3\n").unwrap().values(Wanted::all(&[0])).is_err());
     }
 
     #[test]
-    fn what_is_no_number_is_missing_or_refused() {
+    fn cells_without_a_number_are_missing_or_refused() {
         let (_, values) = table(b"a,b\n0,NaN\n1,\n2,5\n3,inf\n");
         assert!(values[1][0].is_nan() && values[1][1].is_nan() && values[1][2] == 5.0 && values[1][3].is_nan());
         let text = Text::open("x.csv", b"a,b\n0,1\n1,2\n2,x y\n3,4\n").unwrap();

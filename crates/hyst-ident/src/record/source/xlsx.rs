@@ -1,7 +1,7 @@
 //! Excel workbooks (`.xlsx`).
 //!
-//! The crate `calamine` decodes the cells, one after the other. Its ready-made table of a sheet is not used: a single cell in the last row
-//! and column would make it reserve 400 GB.
+//! The crate `calamine` decodes the cells one by one. Its table of a whole sheet is not used, because a single cell in the last row and column
+//! would reserve 400 GB.
 
 mod archive;
 mod cells;
@@ -18,12 +18,12 @@ use cells::Sheet;
 use layout::Layout;
 
 const FORMAT: &str = "Excel";
-/// Cells of all sheets, and numbers of all columns.
+/// Largest number of cells of all sheets, and of numbers of all columns.
 const MAX_CELLS: usize = 20_000_000;
-/// Columns of numbers that a table has at least; a list of settings has one.
+/// Fewest columns of numbers of a table. A list of settings has one.
 const TABLE_COLUMNS: usize = 2;
 
-/// What is wrong with a file, and what to do.
+/// An error message: what is wrong with a file, and what to do.
 #[derive(Debug, PartialEq)]
 struct Fault(String);
 
@@ -32,7 +32,7 @@ impl Fault {
         Self(what.into())
     }
 
-    /// What only a damaged file has.
+    /// Makes the message of a damaged file.
     fn damaged(what: impl std::fmt::Display) -> Self {
         Self(format!(
             "{what}; the file is damaged: copy it again, or open it in a spreadsheet program and save it again"
@@ -41,23 +41,21 @@ impl Fault {
 
     fn too_large() -> Self {
         let million = MAX_CELLS / 1_000_000;
-        Self(format!(
-            "the workbook has more than {million} million cells; save the sheet with the record alone, as CSV"
-        ))
+        Self(format!("the workbook has more than {million} million cells; save only the sheet with the record, as CSV"))
     }
 }
 
-/// Whether these are the bytes of an Excel workbook, or of another workbook that can be saved as one.
+/// Returns whether `bytes` are an Excel workbook, or another workbook that can be saved as one.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     archive::kind(bytes).is_some()
 }
 
-/// The columns of all sheets of a workbook; `file` names it in messages.
+/// Reads the columns of all sheets of a workbook. `file` is the file name in messages.
 ///
 /// # Errors
-/// When the file is damaged or not `.xlsx`, or has no column of numbers.
+/// If the file is damaged or not `.xlsx`, or has no column of numbers.
 pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Table, RecordError> {
-    // The decoder computes with the positions of cells before it looks at them.
+    // The decoder may panic at invalid positions of cells.
     let table =
         std::panic::catch_unwind(|| table(bytes)).unwrap_or_else(|_| Err(Fault::damaged("a cell cannot be decoded")));
     table.map_err(|Fault(what)| RecordError::Damaged { file: file.to_owned(), format: FORMAT, what })
@@ -89,17 +87,17 @@ fn table(bytes: &[u8]) -> Result<Table, Fault> {
 struct Column {
     head: Head,
     values: Vec<f64>,
-    /// Cells with text, which count as empty.
+    /// Number of cells with text, which are read as empty.
     texts: usize,
 }
 
-/// One table of the columns of all sheets. The first sheet with a table has plain names.
+/// Makes one table of the columns of all sheets. In the first sheet with a table the names have no prefix.
 fn arrange(sheets: Vec<(String, Vec<Column>)>) -> Result<Table, Fault> {
     let plain = sheets.iter().position(|(_, columns)| columns.len() >= TABLE_COLUMNS);
     let plain = plain.or_else(|| sheets.iter().position(|(_, columns)| !columns.is_empty()));
     let Some(plain) = plain else {
         return Err(Fault::new(
-            "no sheet has a column of two or more numbers; a record has a row for each sample, with a column each for time, voltage and displacement",
+            "no sheet has a column of two or more numbers; a record has one row per sample, with one column each for time, voltage and displacement",
         ));
     };
     let mut table = Table::new("Excel workbook");
@@ -116,10 +114,13 @@ fn arrange(sheets: Vec<(String, Vec<Column>)>) -> Result<Table, Fault> {
         }
     }
     if !texts.is_empty() {
-        const SHOWN: usize = 3;
-        let more = if texts.len() > SHOWN { format!(" and {} more", texts.len() - SHOWN) } else { String::new() };
-        texts.truncate(SHOWN);
-        table.notes.push(format!("cells with text among numbers count as empty: column {}{more}", texts.join(", ")));
+        const MAX_SHOWN: usize = 3;
+        let more =
+            if texts.len() > MAX_SHOWN { format!(" and {} more", texts.len() - MAX_SHOWN) } else { String::new() };
+        texts.truncate(MAX_SHOWN);
+        table
+            .notes
+            .push(format!("cells with text between numbers are read as empty: column {}{more}", texts.join(", ")));
     }
     Ok(table)
 }

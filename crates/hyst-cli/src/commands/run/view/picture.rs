@@ -1,4 +1,4 @@
-//! The picture of a run: output and reference over the last seconds, and the newest numbers.
+//! Plot of a run: output and reference over the last seconds, and the latest values.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout};
@@ -7,17 +7,17 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Chart, Dataset, Gauge, GraphType};
 
-use super::Seen;
+use super::Values;
 use super::seconds::Seconds;
 use crate::text;
 
-/// Draws it; `share` of the run is over.
+/// Draws the plot; `share` is the share of the run that is finished.
 pub(super) fn draw(frame: &mut Frame<'_>, seconds: &Seconds, unit: &str, share: f64) {
     let [chart, numbers, gauge] =
         Layout::vertical([Constraint::Min(4), Constraint::Length(1), Constraint::Length(1)]).areas(frame.area());
-    let output = seconds.curve(|seen| Some(seen.sample.output));
-    let wanted = seconds.curve(|seen| seen.wanted);
-    let expected = seconds.curve(|seen| seen.predicted.filter(|_| seen.wanted.is_none()));
+    let output = seconds.curve(|values| Some(values.sample.output));
+    let wanted = seconds.curve(|values| values.wanted);
+    let predicted = seconds.curve(|values| values.predicted.filter(|_| values.wanted.is_none()));
     let ends = |low: f64, high: f64, y: &f64| (low.min(*y), high.max(*y));
     let (low, high) = [&output, &wanted]
         .into_iter()
@@ -33,8 +33,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, seconds: &Seconds, unit: &str, share: 
     if !wanted.is_empty() {
         lines.push(line("reference", &wanted, Color::Yellow));
     }
-    if !expected.is_empty() {
-        lines.push(line("model", &expected, Color::DarkGray));
+    if !predicted.is_empty() {
+        lines.push(line("model", &predicted, Color::DarkGray));
     }
     let axis = |low: f64, high: f64, title: String| {
         Axis::default()
@@ -49,14 +49,14 @@ pub(super) fn draw(frame: &mut Frame<'_>, seconds: &Seconds, unit: &str, share: 
         .y_axis(axis(low, high, unit.to_owned()));
     frame.render_widget(picture, chart);
     if let Some(now) = seconds.now() {
-        frame.render_widget(told(now, seconds.rmse(), unit), numbers);
+        frame.render_widget(latest(now, seconds.rmse(), unit), numbers);
     }
-    let left = format!("{:.0} %, Ctrl-C ramps to rest", 100.0 * share);
-    frame.render_widget(Gauge::default().ratio(share.clamp(0.0, 1.0)).label(left).gauge_style(Color::Blue), gauge);
+    let label = format!("{:.0} %, Ctrl-C ramps to rest", 100.0 * share);
+    frame.render_widget(Gauge::default().ratio(share.clamp(0.0, 1.0)).label(label).gauge_style(Color::Blue), gauge);
 }
 
-/// The newest numbers in a line.
-fn told(now: &Seen, rmse: Option<f64>, unit: &str) -> Line<'static> {
+/// Returns the latest values in a line.
+fn latest(now: &Values, rmse: Option<f64>, unit: &str) -> Line<'static> {
     let mut spans = Vec::new();
     let mut one = |name: &str, value: Option<f64>, unit: &str| {
         if let Some(value) = value {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_and_curves_of_a_run_are_shown() {
+    fn values_and_curves_of_a_run_are_shown() {
         let mut seconds = Seconds::default();
         for k in 0..20_000 {
             let t = f64::from(k) * 1e-3;
@@ -103,22 +103,22 @@ mod tests {
                 load_n: None,
                 force_n: None,
             };
-            seconds.add(Seen { sample, wanted: Some(wanted), predicted: None, force: Some(-1.5) });
+            seconds.add(Values { sample, wanted: Some(wanted), predicted: None, force: Some(-1.5) });
         }
         let (from, _) = seconds.window();
-        assert!((14.9..15.1).contains(&from) && seconds.curve(|seen| seen.wanted).len() <= 402);
+        assert!((14.9..15.1).contains(&from) && seconds.curve(|values| values.wanted).len() <= 402);
         let text = shown(&seconds);
         for part in ["measured", "reference", "RMSE 0.2500 µm", "drive 40.00 V", "force -1.500 N", "23.50 °C", "42 %"]
         {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
-        // Curves are drawn in braille.
+        // Curves are drawn with braille characters.
         assert!(text.chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count() > 50, "{text}");
         assert!(!text.contains("load"));
     }
 
     #[test]
-    fn nothing_and_no_numbers_are_shown_without_harm() {
+    fn an_empty_run_and_values_that_are_not_finite_are_drawn() {
         shown(&Seconds::default());
         let mut seconds = Seconds::default();
         let sample = Sample {
@@ -129,7 +129,7 @@ mod tests {
             load_n: None,
             force_n: None,
         };
-        seconds.add(Seen { sample, wanted: Some(1.0), predicted: None, force: None });
+        seconds.add(Values { sample, wanted: Some(1.0), predicted: None, force: None });
         shown(&seconds);
         assert_eq!(seconds.rmse(), None);
     }

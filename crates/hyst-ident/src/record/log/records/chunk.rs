@@ -1,29 +1,29 @@
-//! Contents of a chunk, unpacked within limits.
+//! Decompression of chunks with a limit on their size.
 
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Read};
 
 use super::split;
 
-/// Bytes that a chunk may unpack to whatever its size, and all chunks of a file together.
+/// Size up to which a chunk, and all chunks of a file together, may always unpack \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// How many times its size a chunk may unpack to beyond that: logs of numbers shrink to a third or a tenth.
+/// Largest ratio of unpacked to packed size of larger chunks. Logs of numbers compress by a factor of 3 to 10.
 const MAX_EXPANSION: u64 = 200;
-/// Largest window that a Zstandard frame may ask for, as a power of two: the largest that its tools use without being told to.
+/// Largest window of a Zstandard frame, as a power of two. It is the default limit of the zstd tools.
 const MAX_WINDOW_LOG: u32 = 27;
 
-/// Unpacks chunks, and knows how much they may unpack to.
+/// Unpacks chunks up to a total size.
 #[derive(Debug)]
 pub(super) struct Unpacker {
-    /// Bytes that all further chunks of the file may unpack to.
-    room: u64,
+    /// Remaining size for all further chunks of the file \[bytes\].
+    budget: u64,
 }
 
-/// What stands in front of a chunk's contents.
+/// The header of a chunk.
 struct Header<'a> {
     /// Size of the contents \[bytes\].
     size: u64,
-    /// Check sum of the contents; 0 if there is none.
+    /// Checksum of the contents; 0 if there is none.
     sum: u32,
     compression: &'a [u8],
     /// Size of the packed contents \[bytes\].
@@ -31,7 +31,7 @@ struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// The packed contents out of what follows the header; `None` if they are not whole.
+    /// Returns the packed contents from the bytes after the header; `None` if they are not complete.
     fn packed_of<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
         rest.get(..usize::try_from(self.packed).ok()?)
     }
@@ -39,28 +39,28 @@ impl Header<'_> {
 
 impl Unpacker {
     pub(super) fn of_file(length: usize) -> Self {
-        Self { room: limit(length) }
+        Self { budget: limit(length) }
     }
 
-    /// The contents of a chunk that is there as a whole, which are whole records.
+    /// Unpacks a complete chunk and checks that it consists of complete records.
     ///
     /// # Errors
-    /// If the chunk is damaged, or unpacks to too much.
+    /// If the chunk is damaged or unpacks to too many bytes.
     pub(super) fn whole<'a>(&mut self, body: &'a [u8]) -> Result<Cow<'a, [u8]>, String> {
         let (header, packed) = header(body).ok_or("a chunk is shorter than its header")?;
-        let packed = header.packed_of(packed).ok_or("a chunk is shorter than it says")?;
+        let packed = header.packed_of(packed).ok_or("a chunk is shorter than its stated length")?;
         let (contents, fault) = self.unpack(&header, packed)?;
         if let Some(error) = fault {
             return Err(format!("a chunk cannot be unpacked ({error})"));
         }
-        // Of contents that are not packed, their check sum says enough.
+        // Contents that are not compressed are checked by their checksum.
         if contents.len() as u64 != header.size && !header.compression.is_empty() {
-            return Err(format!("a chunk has {} bytes, and says that it has {}", contents.len(), header.size));
+            return Err(format!("a chunk has {} bytes, but its header states {}", contents.len(), header.size));
         }
         let mut sum = flate2::Crc::new();
         sum.update(&contents);
         if header.sum != 0 && sum.sum() != header.sum {
-            return Err("the check sum of a chunk is wrong".to_owned());
+            return Err("the checksum of a chunk is wrong".to_owned());
         }
         let mut rest: &[u8] = &contents;
         while !rest.is_empty() {
@@ -69,13 +69,13 @@ impl Unpacker {
         Ok(contents)
     }
 
-    /// What there is of a chunk that is longer than the rest of the file: the file was cut off, or the chunk's length is damaged.
+    /// Unpacks the available part of a chunk that is longer than the rest of the file (truncated file or damaged length).
     ///
     /// # Errors
-    /// If more is wrong than that the end is missing.
+    /// If the chunk has another fault than a missing end.
     pub(super) fn cut<'a>(&mut self, body: &'a [u8]) -> Result<Cow<'a, [u8]>, String> {
         let Some((header, packed)) = header(body) else { return Ok(Cow::Borrowed(&[])) };
-        // All that was packed is there, so that the check sum counts.
+        // The packed contents are complete, so the checksum applies.
         if header.packed_of(packed).is_some() {
             return self.whole(body);
         }
@@ -87,15 +87,15 @@ impl Unpacker {
         }
     }
 
-    /// The contents as far as they can be unpacked, and why not further.
+    /// Returns the contents up to the first error, and that error.
     fn unpack<'a>(&mut self, header: &Header<'_>, packed: &'a [u8]) -> Result<(Cow<'a, [u8]>, Option<Error>), String> {
         if header.compression.is_empty() {
             return Ok((Cow::Borrowed(packed), None));
         }
-        let largest = limit(packed.len()).min(self.room);
+        let largest = limit(packed.len()).min(self.budget);
         if header.size > largest {
             return Err(format!(
-                "a chunk of {} bytes says that it unpacks to {} bytes, and no more than {largest} are unpacked",
+                "a chunk of {} bytes states an unpacked size of {} bytes; the limit is {largest} bytes",
                 packed.len(),
                 header.size
             ));
@@ -110,26 +110,26 @@ impl Unpacker {
             b"lz4" => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
             other => {
                 let name: String = String::from_utf8_lossy(other).chars().take(16).collect();
-                return Err(format!("a chunk is compressed by {name:?}, and only zstd and lz4 are unpacked"));
+                return Err(format!("a chunk is compressed by {name:?}; only zstd and lz4 are supported"));
             }
         };
-        // Reserved is what the packed bytes justify; beyond that the contents grow as they come.
+        // Memory is reserved in proportion to the packed bytes, not by the stated size, which may be wrong.
         let likely = header.size.min(MAX_EXPANSION.saturating_mul(packed.len() as u64));
         let mut contents = Vec::with_capacity(usize::try_from(likely).unwrap_or(0));
         let ended = reader.take(header.size).read_to_end(&mut contents);
-        self.room = self.room.saturating_sub(contents.len() as u64);
+        self.budget = self.budget.saturating_sub(contents.len() as u64);
         Ok((Cow::Owned(contents), ended.err()))
     }
 }
 
-/// Bytes that so many packed ones may unpack to.
+/// Returns the largest unpacked size of `packed` bytes.
 fn limit(packed: usize) -> u64 {
     ALWAYS_UNPACKED.max(MAX_EXPANSION.saturating_mul(packed as u64))
 }
 
-/// The header of a chunk, and what follows it.
+/// Parses the header of a chunk and returns it with the bytes after it.
 fn header(body: &[u8]) -> Option<(Header<'_>, &[u8])> {
-    // The first and the last time.
+    // Start time and end time.
     let (_, rest) = body.split_first_chunk::<16>()?;
     let (size, rest) = rest.split_first_chunk()?;
     let (sum, rest) = rest.split_first_chunk()?;

@@ -1,27 +1,27 @@
-//! Whether the lengths inside of a record fit into it.
+//! Check of the lengths inside a record.
 
 use mcap::records::op;
 
 /// A part of a record.
 enum Part {
-    /// So many bytes.
+    /// A fixed number of bytes.
     Bytes(usize),
-    /// A length of four bytes, and as many bytes.
+    /// A length of four bytes, followed by that many bytes.
     Text,
-    /// A length of four bytes, and pairs of texts in as many bytes.
+    /// A length of four bytes, followed by pairs of texts in that many bytes.
     Pairs,
-    /// A length of four bytes, and pairs of numbers in as many bytes.
+    /// A length of four bytes, followed by pairs of numbers in that many bytes.
     Offsets,
-    /// A length of eight bytes, and as many bytes.
+    /// A length of eight bytes, followed by that many bytes.
     Data,
 }
 
 use Part::{Bytes, Data, Offsets, Pairs, Text};
 
-/// A channel's number and an offset \[bytes\].
+/// Size of a channel number and an offset \[bytes\].
 const OFFSET: usize = 10;
 
-/// The parts of a record of a kind, as far as lengths are among them.
+/// Returns the parts of a record of `kind` up to the last part with a length.
 fn parts(kind: u8) -> &'static [Part] {
     match kind {
         op::HEADER => &[Text, Text],
@@ -38,17 +38,17 @@ fn parts(kind: u8) -> &'static [Part] {
     }
 }
 
-/// Whether no length inside of the record reaches beyond its end.
+/// Returns whether every length inside the record is within the record.
 pub(super) fn fits(kind: u8, body: &[u8]) -> bool {
     parts(kind).iter().try_fold(body, |rest, part| after(part, rest)).is_some()
 }
 
-/// What follows a part.
+/// Returns the bytes after a part.
 fn after<'a>(part: &Part, bytes: &'a [u8]) -> Option<&'a [u8]> {
     match part {
         Bytes(count) => bytes.get(*count..),
         Text => text(bytes).map(|(_, rest)| rest),
-        // The parser reads whole pairs, and beyond the length where that ends within one.
+        // The parser reads whole pairs, beyond the length if the length ends within a pair.
         Pairs => {
             let (length, mut rest) = length(bytes)?;
             let all = rest.len();
@@ -68,13 +68,13 @@ fn after<'a>(part: &Part, bytes: &'a [u8]) -> Option<&'a [u8]> {
     }
 }
 
-/// The bytes behind a length of four bytes, and what follows them.
+/// Splits off a length of four bytes and that many bytes; returns those bytes and the rest.
 fn text(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = length(bytes)?;
     rest.split_at_checked(length)
 }
 
-/// A length of four bytes, and what follows it.
+/// Splits off a length of four bytes; returns it and the rest.
 fn length(bytes: &[u8]) -> Option<(usize, &[u8])> {
     let (length, rest) = bytes.split_first_chunk()?;
     Some((usize::try_from(u32::from_le_bytes(*length)).ok()?, rest))

@@ -52,13 +52,13 @@ fn chunks_of_every_compression_are_read() {
     let expected = ["one", "two", "one", "two", "between", "one", "two"].map(str::to_owned).to_vec();
     assert_eq!(messages(&bytes), (expected, 0, None));
     let wrong = [MAGIC, &chunk("zstd", inside.len(), sum ^ 1, &zstd), &message("after")].concat();
-    assert_eq!(messages(&wrong), (vec!["after".to_owned()], 1, Some("the check sum of a chunk is wrong".to_owned())));
+    assert_eq!(messages(&wrong), (vec!["after".to_owned()], 1, Some("the checksum of a chunk is wrong".to_owned())));
     let other = [MAGIC, &chunk("brotli", inside.len(), sum, &zstd)].concat();
     assert_eq!(messages(&other).1, 1);
 }
 
 #[test]
-fn of_a_chunk_that_was_cut_its_whole_records_are_given() {
+fn complete_records_of_a_truncated_chunk_are_read() {
     let inside: Vec<u8> = (0..200).flat_map(|k| message(&format!("message {k}"))).collect();
     for (name, packed) in
         [("", inside.clone()), ("lz4", lz4(&inside)), ("zstd", zstd::encode_all(inside.as_slice(), 3).unwrap())]
@@ -70,7 +70,7 @@ fn of_a_chunk_that_was_cut_its_whole_records_are_given() {
         }
         assert_eq!(messages(&bytes).0.len(), 200);
     }
-    // Packed bytes come in blocks, and the whole ones of a cut chunk are read.
+    // Compressed bytes are in blocks. The complete blocks of a truncated chunk are read.
     let noise = |k: u32| k.wrapping_mul(2_654_435_761) ^ (k.wrapping_mul(k) << 7);
     let inside: Vec<u8> = (0..60_000).flat_map(|k| message(&format!("message {k} {}", noise(k)))).collect();
     let packed =
@@ -83,24 +83,24 @@ fn of_a_chunk_that_was_cut_its_whole_records_are_given() {
 }
 
 #[test]
-fn a_chunk_that_unpacks_to_too_much_is_left_out() {
+fn a_chunk_that_unpacks_to_too_many_bytes_is_not_read() {
     let zeros = vec![0; 65 << 20];
     let packed = zstd::encode_all(zeros.as_slice(), 3).unwrap();
     let bytes = [MAGIC, &chunk("zstd", zeros.len(), 0, &packed), &message("after")].concat();
     let (texts, damaged, problem) = messages(&bytes);
     assert_eq!((texts.as_slice(), damaged), (["after".to_owned()].as_slice(), 1));
-    assert!(problem.unwrap().ends_with("no more than 67108864 are unpacked"));
-    // A size that is too small is no way around the limit.
+    assert!(problem.unwrap().ends_with("the limit is 67108864 bytes"));
+    // A stated size that is too small does not bypass the limit.
     let bytes = [MAGIC, &chunk("zstd", 100, 0, &packed)].concat();
     assert_eq!(messages(&bytes).0.len(), 0);
-    // Nor are many chunks.
+    // Many chunks do not bypass it either.
     let zeros = &zeros[..9 * (4 << 20)];
     let one = chunk("zstd", zeros.len(), 0, &zstd::encode_all(zeros, 3).unwrap());
     assert_eq!(messages(&[MAGIC, &one, &one].concat()).1, 1);
 }
 
 #[test]
-fn lengths_that_reach_beyond_a_record_are_no_reason_to_stop() {
+fn records_after_one_with_invalid_lengths_are_read() {
     let huge = u32::MAX.to_le_bytes();
     for kind in 0..=255 {
         for body in [[vec![1; 4], huge.repeat(12)].concat(), huge.repeat(20), vec![0; 40], vec![]] {
@@ -114,7 +114,7 @@ fn lengths_that_reach_beyond_a_record_are_no_reason_to_stop() {
 
 #[test]
 fn a_list_of_offsets_may_end_within_a_pair() {
-    // The parser reads the pair to its end. What follows would be taken for a length elsewhere, and gigabytes reserved for it.
+    // The parser reads the last pair to its end. It would then take the following bytes for a length and reserve gigabytes.
     let (size, huge) = (3_u32.to_le_bytes(), u32::MAX.to_le_bytes().repeat(20));
     let body = [[0; 32].as_slice(), &size, &[0; 3], &[0; 7], &[0; 8], &huge].concat();
     assert!(!layout::fits(op::CHUNK_INDEX, &body));

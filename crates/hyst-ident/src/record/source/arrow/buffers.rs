@@ -8,7 +8,7 @@ use super::flatbuffer::{Table, i64_at};
 use super::schema::Number;
 use crate::record::source::columnar::{Clock, decimal, half, unpacked_limit};
 
-/// The buffers and field nodes of a batch, which its fields take in turn.
+/// The buffers and field nodes of a batch. Its fields use them in order.
 pub(super) struct Batch<'a> {
     rows: usize,
     body: &'a [u8],
@@ -16,7 +16,7 @@ pub(super) struct Batch<'a> {
     nodes: &'a [u8],
     /// Offset and length of each buffer, 16 bytes each.
     buffers: &'a [u8],
-    /// Numbers of the further buffers that views have, 8 bytes each.
+    /// Numbers of the variadic buffers of views, 8 bytes each.
     variadic: &'a [u8],
     codec: Option<Codec>,
 }
@@ -55,12 +55,12 @@ impl<'a> Batch<'a> {
         Ok(Self { rows, body, nodes: vector(1, 16), buffers: vector(2, 16), variadic: vector(4, 8), codec })
     }
 
-    /// Rows of every column.
+    /// Returns the number of rows of every column.
     pub(super) fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The node of the next field.
+    /// Returns the node of the next field.
     pub(super) fn node(&mut self) -> Result<Node, Fault> {
         let read = |node: &[u8]| Some((usize::try_from(i64_at(node, 0)?).ok()?, i64_at(node, 8)?));
         let (rows, nulls) =
@@ -68,7 +68,7 @@ impl<'a> Batch<'a> {
         Ok(Node { rows, nulls: nulls != 0 })
     }
 
-    /// The next buffer as it is stored.
+    /// Returns the next buffer, as stored.
     pub(super) fn buffer(&mut self) -> Result<&'a [u8], Fault> {
         let place = |entry: &[u8]| {
             let (start, length) = (usize::try_from(i64_at(entry, 0)?).ok()?, usize::try_from(i64_at(entry, 8)?).ok()?);
@@ -77,7 +77,7 @@ impl<'a> Batch<'a> {
         take(&mut self.buffers, 16).and_then(place).ok_or_else(|| Fault::damaged("a buffer is outside its batch"))
     }
 
-    /// Passes over buffers.
+    /// Skips buffers.
     pub(super) fn skip(&mut self, buffers: usize, variadic: bool) -> Result<(), Fault> {
         let mut count = buffers;
         if variadic {
@@ -88,22 +88,22 @@ impl<'a> Batch<'a> {
         bytes.map(|_| ()).ok_or_else(|| Fault::damaged("a batch has too few buffers"))
     }
 
-    /// The first `wanted` bytes of a buffer, unpacked.
+    /// Unpacks the first `wanted` bytes of a buffer.
     pub(super) fn unpack(&self, stored: &'a [u8], wanted: usize) -> Result<Cow<'a, [u8]>, Fault> {
         let short = || Fault::damaged("a buffer is shorter than its column");
         let (Some(codec), false) = (self.codec, stored.is_empty()) else {
             return stored.get(..wanted).map(Cow::Borrowed).ok_or_else(short);
         };
         let (length, packed) = (i64_at(stored, 0).ok_or_else(short)?, &stored[8..]);
-        // A buffer that compression would have made larger is stored as it is.
+        // A buffer that compression would enlarge is stored uncompressed.
         if length == -1 {
             return packed.get(..wanted).map(Cow::Borrowed).ok_or_else(short);
         }
         let length = usize::try_from(length).ok().filter(|length| *length >= wanted).ok_or_else(short)?;
-        // Parts of a longer column may come with all of it.
+        // A batch with a part of a column may contain the whole column, so `length` may exceed `wanted`.
         if length > unpacked_limit(packed.len()) {
             return Err(Fault::new(
-                "a buffer expands to more than 200 times its size; write the columns of the record alone, as CSV",
+                "a buffer unpacks to more than 200 times its size; write only the columns of the record, as CSV",
             ));
         }
         let failed = |error: std::io::Error| Fault::damaged(format!("a compressed buffer is damaged ({error})"));
@@ -116,7 +116,7 @@ impl<'a> Batch<'a> {
                     .map_err(failed)?;
                 bytes
             }
-            // In one step: a stream would allocate the window that its header claims.
+            // Unpacked in one step, because a stream would allocate the window size that its header states.
             Codec::Zstandard => zstd::bulk::decompress(packed, length).map_err(failed)?,
         };
         if bytes.len() < wanted {
@@ -127,7 +127,7 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Appends the numbers in `bytes`; null rows give ticks that no clock may start at, so that `valid` is asked first.
+/// Appends the numbers in `bytes`. Null rows are not converted, because a clock must not start at their ticks.
 pub(super) fn append(
     numbers: &mut Vec<f64>,
     number: Number,
@@ -172,7 +172,7 @@ pub(super) fn append(
     }
 }
 
-/// Whether the bit of a row is set.
+/// Returns whether the bit of a row is set.
 pub(super) fn is_set(bits: &[u8], row: usize) -> bool {
     bits.get(row / 8).is_some_and(|byte| byte >> (row % 8) & 1 == 1)
 }

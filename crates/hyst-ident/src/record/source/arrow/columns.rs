@@ -1,4 +1,4 @@
-//! Columns that grow with each record batch.
+//! The columns of a file, extended by each record batch.
 
 use std::collections::HashMap;
 
@@ -9,13 +9,13 @@ use super::{BATCH, DICTIONARY, Fault};
 use crate::record::source::columnar::{Clock, unpacked_limit};
 use crate::record::source::{Head, Table};
 
-/// Columns of a table of lists, as `name[1]`; more than this many are an image or a waveform in each row.
+/// Longest list that is read as columns `name[1]`, `name[2]`, …. Longer lists are images or waveforms.
 const MAX_LIST: usize = 1000;
 
-/// Columns of a file, lists taken apart.
+/// Largest number of columns of a file, including elements of lists.
 const MAX_COLUMNS: usize = 100_000;
 
-/// The columns of a file, and what is needed to read further batches.
+/// The columns of a file, and the state for reading further batches.
 pub(super) struct Columns {
     schema: Schema,
     store: Store,
@@ -32,17 +32,17 @@ struct Column {
     numbers: Numbers,
 }
 
-/// Numbers of a column so far.
+/// The numbers of a column so far.
 struct Numbers {
     values: Vec<f64>,
     clock: Clock,
 }
 
-/// Bytes that further values may take.
+/// The memory that further values may take \[bytes\].
 struct Memory(usize);
 
 impl Columns {
-    /// Without rows; `size` is the file's.
+    /// Makes columns without rows. `size` is the size of the file \[bytes\].
     pub(super) fn new(schema: Schema, size: usize) -> Result<Self, Fault> {
         let mut columns = Vec::new();
         for field in &schema.fields {
@@ -52,7 +52,7 @@ impl Columns {
         Ok(Self { schema, store: Store { columns, dictionaries: HashMap::new(), memory } })
     }
 
-    /// Takes the rows of a message; messages of other kinds are passed over.
+    /// Reads the rows of a message. Messages of other kinds are skipped.
     pub(super) fn take(&mut self, kind: u8, header: flatbuffer::Table<'_>, body: &[u8]) -> Result<(), Fault> {
         match kind {
             BATCH => {
@@ -76,9 +76,9 @@ impl Columns {
         }
     }
 
-    /// Moves the columns to `table`; keys and values that the file states of itself.
+    /// Moves the columns to `table` and returns the key-value metadata of the file.
     pub(super) fn fill(self, table: &mut Table) -> Vec<(String, String)> {
-        // A single row is a setting, not a record.
+        // A column with a single row is a setting, not a measurement.
         for column in self.store.columns.into_iter().filter(|column| column.numbers.values.len() >= 2) {
             table.push(column.head, column.numbers.values);
         }
@@ -86,13 +86,13 @@ impl Columns {
     }
 }
 
-/// Adds the columns that a field gives, in the order in which a batch is read.
+/// Adds the columns of a field, in the order of a batch.
 fn add_columns(field: &Field, path: &str, columns: &mut Vec<Column>) -> Result<(), Fault> {
     let name = if path.is_empty() { field.name.clone() } else { format!("{path}.{}", field.name) };
     let mut add = |name: String, unit: &Option<String>, number: Option<Number>| {
         if columns.len() >= MAX_COLUMNS {
             return Err(Fault::new(format!(
-                "there are more than {MAX_COLUMNS} columns; write the file with those of the record alone"
+                "there are more than {MAX_COLUMNS} columns; write only the columns of the record"
             )));
         }
         let head = Head { unit: unit.clone(), ..Head::new(name) };
@@ -117,7 +117,7 @@ impl Memory {
         let rest = count.checked_mul(size_of::<f64>()).and_then(|bytes| self.0.checked_sub(bytes));
         let too_many = || {
             Fault::new(
-                "there are more than 200 times as many bytes of numbers as the file has; write the columns of the record alone, as CSV",
+                "the numbers unpack to more than 200 times the size of the file; write only the columns of the record, as CSV",
             )
         };
         self.0 = rest.ok_or_else(too_many)?;
@@ -131,7 +131,7 @@ impl Numbers {
         Self { values: Vec::new(), clock: Clock::new(per_second) }
     }
 
-    /// Reads the numbers of the next field, which has `rows` rows; `outer` are the valid ones of the struct that it is in.
+    /// Reads the numbers of the next field, which has `rows` rows. `outer` are the valid rows of the enclosing struct.
     fn read(
         &mut self,
         memory: &mut Memory,
@@ -155,14 +155,14 @@ impl Numbers {
 
 /// Reads the node of the next field, which has `rows` rows, and its first buffer.
 ///
-/// It gives the bits of the rows that are valid in the field and in the struct that it is in; `None` if all are.
+/// Returns the bits of the rows that are valid in the field and in the enclosing struct; `None` if all rows are valid.
 fn validity(batch: &mut Batch<'_>, rows: usize, outer: Option<&[u8]>) -> Result<Option<Vec<u8>>, Fault> {
     let node = batch.node()?;
     if node.rows != rows {
         return Err(Fault::damaged("the column is not as long as the others"));
     }
     let stored = batch.buffer()?;
-    // Without nulls the buffer may be empty.
+    // The buffer may be empty if there are no nulls.
     if !node.nulls || stored.is_empty() {
         return Ok(outer.map(<[u8]>::to_vec));
     }
@@ -174,7 +174,7 @@ fn validity(batch: &mut Batch<'_>, rows: usize, outer: Option<&[u8]>) -> Result<
 }
 
 impl Store {
-    /// Reads the rows of a field, and of those inside it; `outer` are the valid rows of the struct that it is in.
+    /// Reads the rows of a field and of its children. `outer` are the valid rows of the enclosing struct.
     fn read(
         &mut self,
         batch: &mut Batch<'_>,
@@ -205,7 +205,7 @@ impl Store {
         read.map_err(|fault| fault.of(field))
     }
 
-    /// Numbers that are stored once each, and their numbers in each row.
+    /// Reads indices into a dictionary and appends the numbers that they select.
     fn read_indices(
         &mut self,
         batch: &mut Batch<'_>,
@@ -226,7 +226,7 @@ impl Store {
         Ok(())
     }
 
-    /// Lists of one length: column k has the k-th number of each.
+    /// Reads lists of one length. Column k has the k-th number of each list.
     fn read_lists(
         &mut self,
         batch: &mut Batch<'_>,
@@ -237,7 +237,7 @@ impl Store {
         let (rows, length) = (batch.rows(), columns.len());
         let valid = validity(batch, rows, outer)?;
         let mut all = Numbers::new(Some(number));
-        // All columns of a list count from one midnight.
+        // All columns of a list count from the same midnight.
         all.clock = self.columns.get(columns.start).map_or(all.clock, |first| first.numbers.clock);
         let count = rows.checked_mul(length).ok_or_else(|| Fault::damaged("there are too many rows"))?;
         all.read(&mut self.memory, batch, number, count, None)?;
@@ -263,7 +263,7 @@ impl Store {
     }
 }
 
-/// Passes over a field and those inside it.
+/// Skips a field and its children.
 fn skip(batch: &mut Batch<'_>, field: &Field) -> Result<(), Fault> {
     batch.node()?;
     batch.skip(field.buffers, field.variadic)?;
@@ -271,7 +271,7 @@ fn skip(batch: &mut Batch<'_>, field: &Field) -> Result<(), Fault> {
 }
 
 impl Fault {
-    /// Names the column that is at fault.
+    /// Adds the name of the column.
     fn of(self, field: &Field) -> Self {
         Self(format!("column \"{}\": {}", field.name, self.0))
     }

@@ -1,4 +1,4 @@
-//! Tables of FlatBuffers, the encoding of Arrow's messages. Every access is checked; what is outside the buffer is absent.
+//! Tables of FlatBuffers, the encoding of Arrow messages. Every access is checked: a field outside the buffer is absent.
 
 /// A table inside a buffer.
 #[derive(Clone, Copy)]
@@ -7,7 +7,7 @@ pub(super) struct Table<'a> {
     at: usize,
 }
 
-/// The bytes of an element at `at`.
+/// Returns the bytes of an element at `at`.
 fn bytes<const N: usize>(buffer: &[u8], at: usize) -> Option<[u8; N]> {
     buffer.get(at..at.checked_add(N)?)?.try_into().ok()
 }
@@ -25,12 +25,12 @@ fn u16_at(buffer: &[u8], at: usize) -> Option<u16> {
 }
 
 impl<'a> Table<'a> {
-    /// The table that a buffer begins with.
+    /// Returns the root table of a buffer.
     pub(super) fn root(buffer: &'a [u8]) -> Option<Self> {
         Some(Self { buffer, at: u32_at(buffer, 0)? as usize })
     }
 
-    /// Where a field is; `None` if the table leaves it at its default.
+    /// Returns the place of a field; `None` if the field has its default.
     fn field(&self, number: usize) -> Option<usize> {
         let back = i64::from(u32_at(self.buffer, self.at)?.cast_signed());
         // The list of fields may be before the table or after it.
@@ -59,7 +59,7 @@ impl<'a> Table<'a> {
         self.field(number).and_then(|at| i64_at(self.buffer, at)).unwrap_or(default)
     }
 
-    /// Where the object is that a field refers to.
+    /// Returns the place of the object that a field refers to.
     fn target(&self, number: usize) -> Option<usize> {
         let at = self.field(number)?;
         at.checked_add(u32_at(self.buffer, at)? as usize)
@@ -74,7 +74,7 @@ impl<'a> Table<'a> {
         std::str::from_utf8(bytes).ok()
     }
 
-    /// The bytes of a vector whose elements take `width` bytes each.
+    /// Returns the bytes of a vector whose elements have `width` bytes.
     pub(super) fn vector(&self, number: usize, width: usize) -> Option<&'a [u8]> {
         let at = self.target(number)?;
         let length = (u32_at(self.buffer, at)? as usize).checked_mul(width)?;
@@ -82,7 +82,7 @@ impl<'a> Table<'a> {
         self.buffer.get(start..start.checked_add(length)?)
     }
 
-    /// The tables of a vector of tables.
+    /// Returns the tables of a vector of tables.
     pub(super) fn tables(&self, number: usize) -> impl Iterator<Item = Self> + use<'a> {
         let buffer = self.buffer;
         let start = self.target(number).map_or(0, |at| at.saturating_add(4));
@@ -93,7 +93,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// The pairs of a vector of keys and values.
+    /// Returns the pairs of a vector of keys and values.
     pub(super) fn pairs(&self, number: usize) -> impl Iterator<Item = (&'a str, &'a str)> + use<'a> {
         self.tables(number).filter_map(|pair| Some((pair.text(0)?, pair.text(1)?)))
     }

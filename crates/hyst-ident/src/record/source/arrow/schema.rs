@@ -1,19 +1,19 @@
-//! The schema: which columns there are, of which type, and how many buffers each takes.
+//! The schema: the columns, their types and the number of their buffers.
 
 use super::flatbuffer::Table;
 use super::{FILE, Fault};
 use crate::record::source::columnar::is_unit_key;
 
-/// Fields inside fields; no table of numbers needs more than three.
+/// Deepest nesting of fields. Tables of numbers need at most three levels.
 const MAX_DEPTH: usize = 16;
-/// Fields of a file, those inside others included.
+/// Largest number of fields of a file, including nested fields.
 const MAX_FIELDS: usize = 100_000;
-/// Bytes of all names, units and statements: a text can be referred to any number of times.
+/// Largest size of all names, units and metadata \[bytes\]. A text can be referred to any number of times.
 const MAX_TEXT: usize = 16 << 20;
-/// Statements about one field.
+/// Largest number of metadata pairs of one field.
 const MAX_PAIRS: usize = 1000;
 
-/// Numbers of one width, and what they mean.
+/// A type of numbers, with its width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Number {
     Float {
@@ -28,7 +28,7 @@ pub(super) enum Number {
         bytes: usize,
         scale: i32,
     },
-    /// Ticks since 1970; those of four bytes are days.
+    /// Ticks since 1970. Ticks of four bytes are days.
     Instant {
         bytes: usize,
         per_second: i64,
@@ -36,7 +36,7 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// Bytes that `rows` of them take.
+    /// Returns the size of `rows` numbers \[bytes\].
     pub(super) fn size(self, rows: usize) -> Option<usize> {
         match self {
             Self::Boolean => Some(rows.div_ceil(8)),
@@ -48,20 +48,20 @@ impl Number {
     }
 }
 
-/// What the values of a field are.
+/// The type of the values of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
     Number(Number),
-    /// Indices into the dictionary of this number, which holds numbers.
+    /// Indices into the dictionary `id`, which holds numbers.
     Dictionary {
         id: i64,
         index: Number,
     },
     /// A struct, whose fields are columns.
     Struct,
-    /// Lists of this many numbers.
+    /// Lists of this length, of numbers.
     Lists(usize),
-    /// Text, lists of varying length and the like. They are passed over.
+    /// Text, lists of varying length and other types, which are skipped.
     Other,
 }
 
@@ -71,18 +71,18 @@ pub(super) struct Field {
     pub(super) name: String,
     pub(super) unit: Option<String>,
     pub(super) kind: Kind,
-    /// Buffers of its own, without those of its children.
+    /// Number of buffers without those of its children.
     pub(super) buffers: usize,
-    /// Whether it has a number of further buffers that each batch states.
+    /// Whether each batch states a number of further buffers.
     pub(super) variadic: bool,
     pub(super) children: Vec<Field>,
 }
 
-/// The type of a dictionary's values.
+/// The type of the values of a dictionary.
 #[derive(Clone, Debug)]
 pub(super) struct Dictionary {
     pub(super) id: i64,
-    /// A field without a name that holds them.
+    /// The field that describes the values.
     pub(super) values: Field,
 }
 
@@ -91,21 +91,21 @@ pub(super) struct Dictionary {
 pub(super) struct Schema {
     pub(super) fields: Vec<Field>,
     pub(super) dictionaries: Vec<Dictionary>,
-    /// Keys and values of the whole file.
+    /// Key-value metadata of the file.
     pub(super) statements: Vec<(String, String)>,
 }
 
 impl Schema {
-    /// The schema in a message or footer; `open` is the Python function that opens such a file.
+    /// Parses the schema in a message or footer. `open` is the Python function that opens such a file.
     ///
     /// # Errors
-    /// When it is nested too deeply, has a type that is not known, or was written with the other byte order.
+    /// If it is nested too deeply, has an unknown type, or is big-endian.
     pub(super) fn parse(table: Table<'_>, open: &str) -> Result<Self, Fault> {
         if table.i16(0, 0) != 0 {
             let line =
                 format!("pyarrow.feather.write_feather(pyarrow.ipc.{open}(\"{FILE}\").read_all(), \"new.feather\")");
             return Err(Fault::new(format!(
-                "the numbers are big-endian, which is not read; in Python, {line} rewrites them"
+                "the numbers are big-endian, which is not supported; in Python, {line} rewrites them"
             )));
         }
         let mut reading = Reading { count: 0, text: 0, dictionaries: Vec::new() };
@@ -118,9 +118,9 @@ impl Schema {
 }
 
 struct Reading {
-    /// Fields so far.
+    /// Number of fields so far.
     count: usize,
-    /// Bytes of text so far.
+    /// Size of the text so far \[bytes\].
     text: usize,
     dictionaries: Vec<Dictionary>,
 }
@@ -150,11 +150,11 @@ impl Reading {
         })
     }
 
-    /// A field that holds indices into a dictionary of what `values` describes.
+    /// Makes a field of indices into a dictionary of `values`.
     fn encoded(&mut self, values: Field, encoding: Table<'_>) -> Field {
         let id = encoding.i64(0, 0);
         let index = encoding.table(1).map_or(Some(Number::Integer { bytes: 4, signed: true }), integer);
-        // Clocks count from the first row, and a dictionary has none.
+        // Dictionaries of times are not supported, because clocks count from the first row.
         let numeric = matches!(&values.kind, Kind::Number(number) if !matches!(number, Number::Instant { .. }));
         let kind = index.filter(|_| numeric).map_or(Kind::Other, |index| Kind::Dictionary { id, index });
         let (name, unit) = (values.name.clone(), values.unit.clone());
@@ -179,12 +179,12 @@ fn integer(table: Table<'_>) -> Option<Number> {
     Some(Number::Integer { bytes, signed: table.u8(1, 0) != 0 })
 }
 
-/// Ticks per second, and the symbol, of a time unit.
+/// Returns ticks per second and symbol of a time unit.
 fn time_unit(unit: i16) -> Option<(i64, &'static str)> {
     [(1, "s"), (1000, "ms"), (1_000_000, "us"), (1_000_000_000, "ns")].get(usize::try_from(unit).ok()?).copied()
 }
 
-/// Kind, number of buffers and unit of a type, as Arrow's `Schema.fbs` numbers them.
+/// Returns kind, number of buffers and unit of a type, by its number in Arrow's `Schema.fbs`.
 fn type_of(
     number: u8,
     parameters: Option<Table<'_>>,
@@ -231,12 +231,13 @@ fn type_of(
             }
             _ => (Kind::Other, 1, None),
         },
-        // Intervals and bytes of fixed length; lists and maps: validity, and values or offsets.
+        // Intervals, bytes of fixed length, lists and maps: validity, and values or offsets.
         11 | 12 | 15 | 17 | 21 => (Kind::Other, 2, None),
-        // Text and bytes: validity, offsets, values. Views: validity and views. Lists by view: validity, offsets, sizes.
+        // Text and bytes: validity, offsets, values. Lists by view: validity, offsets, sizes.
         4 | 5 | 19 | 20 | 25 | 26 => (Kind::Other, 3, None),
+        // Views: validity and views.
         BINARY_VIEW | TEXT_VIEW => (Kind::Other, 2, None),
-        // Unions: the type of each row, and its offset where they are dense.
+        // Unions: the type of each row, and its offset if the union is dense.
         14 => (Kind::Other, 1 + usize::from(small(0, 0) == 1), None),
         _ => {
             return Err(Fault::new(format!(

@@ -1,4 +1,4 @@
-//! Files that are put together byte by byte.
+//! Files built byte by byte.
 
 use proptest::prelude::*;
 
@@ -15,14 +15,14 @@ enum Value {
     Text(&'static str),
     Table(Fields),
     Tables(Vec<Fields>),
-    /// Structs in a vector of this many.
+    /// A vector of this number of structs.
     Structs(usize, Vec<u8>),
 }
 use Value::{Byte, Int, Long, Short, Structs, Tables, Text};
 
 type Fields = Vec<(usize, Value)>;
 
-/// A table, and where it begins in these bytes.
+/// Returns the bytes of a table, and the place of the table in them.
 fn flat(fields: &Fields) -> (Vec<u8>, usize) {
     let count = fields.iter().map(|(number, _)| number + 1).max().unwrap_or(0);
     let start = 4 + 2 * count;
@@ -49,7 +49,7 @@ fn flat(fields: &Fields) -> (Vec<u8>, usize) {
     (bytes, start)
 }
 
-/// A value that is stored behind the table, and where it begins in these bytes.
+/// Returns the bytes of a value that is stored after the table, and the place of the value in them.
 fn outside(value: &Value) -> (Vec<u8>, usize) {
     let vector = |count: usize, elements: &[u8]| [&(count as u32).to_le_bytes()[..], elements].concat();
     match value {
@@ -88,7 +88,7 @@ fn double(name: &'static str) -> Fields {
     field(name, 3, vec![(0, Short(2))])
 }
 
-/// Header and body of a batch: for each column its rows and nulls, and its buffers.
+/// Returns header and body of a batch. `columns` has rows, nulls and buffers of each column.
 fn batch(rows: i64, columns: &[(i64, i64, &[Vec<u8>])]) -> (Fields, Vec<u8>) {
     let (mut nodes, mut buffers, mut body) = (Vec::new(), Vec::new(), Vec::new());
     for (rows, nulls, own) in columns {
@@ -119,7 +119,7 @@ fn stream(schema: Fields, batches: &[(Fields, Vec<u8>)]) -> Vec<u8> {
     bytes
 }
 
-/// Time in ns, a voltage with its unit and a null, a text, and a displacement.
+/// A stream with a time in ns, a voltage with its unit and a null, a text, and a displacement.
 fn small_stream() -> Vec<u8> {
     let unit = (6, Tables(vec![vec![(0, Text("unit")), (1, Text("mV"))]]));
     let voltage = [double("u"), vec![unit]].concat();
@@ -136,7 +136,7 @@ fn small_stream() -> Vec<u8> {
     stream(vec![(1, Tables(fields))], &[batch(2, &columns)])
 }
 
-/// A file of one column with two batches, of which the footer lists those with these numbers.
+/// A file with one column and two batches. The footer lists the batches `listed`.
 fn small_file(listed: &[usize]) -> Vec<u8> {
     let mut bytes = b"ARROW1\0\0".to_vec();
     let mut places = Vec::new();
@@ -240,13 +240,13 @@ fn integers_of_all_widths_keep_their_values() {
         let bytes = [vec![255; bits as usize / 8], vec![1], vec![0; bits as usize / 8 - 1]].concat();
         let schema = vec![(1, Tables(vec![field("n", 2, vec![(0, Int(bits)), (1, Byte(u8::from(signed)))])]))];
         let table = read("x", &stream(schema, &[batch(2, &[(2, 0, &[vec![], bytes])])])).unwrap();
-        // The largest integer of 64 bits has no double; the nearest is one more.
+        // The largest 64-bit integer is rounded up to the nearest double.
         assert_eq!(table.values[0], [minus_one, 1.0], "{bits}");
     }
 }
 
 #[test]
-fn what_is_not_read_is_explained() {
+fn files_that_are_not_supported_are_refused_with_the_reason() {
     assert!(refused(b"FEA1 and more").contains("pandas.read_feather(\"x.arrow\").to_feather"));
     let big = stream(vec![(0, Short(1)), (1, Tables(vec![double("u")]))], &[]);
     assert!(refused(&big).contains("big-endian"));
@@ -264,8 +264,8 @@ fn what_is_not_read_is_explained() {
 }
 
 #[test]
-fn memory_follows_from_the_file() {
-    // A few bytes of Zstandard hold 64 MB of zeros, and two columns of them are too many.
+fn memory_is_limited_by_the_size_of_the_file() {
+    // A few bytes of Zstandard unpack to 64 MB of zeros. Two such columns exceed the limit.
     let rows = 8 << 20;
     let packed = zstd::bulk::compress(&vec![0; 8 * rows], 1).unwrap();
     let buffer = [&(8 * rows as i64).to_le_bytes()[..], &packed].concat();
@@ -273,17 +273,17 @@ fn memory_follows_from_the_file() {
     let (mut header, body) = batch(rows as i64, &[(rows as i64, 0, &column[..]), (rows as i64, 0, &column)]);
     header.push((3, Value::Table(vec![(0, Byte(1))])));
     let bytes = stream(vec![(1, Tables(vec![double("u"), double("y")]))], &[(header, body)]);
-    assert!(refused(&bytes).contains("column \"y\": there are more than 200 times"));
+    assert!(refused(&bytes).contains("column \"y\": the numbers unpack to more than 200 times"));
     let claim = batch(1 << 50, &[(1 << 50, 0, &[vec![], vec![]])]);
     assert!(refused(&stream(vec![(1, Tables(vec![double("u")]))], &[claim])).contains("200 times"));
-    // Lists of a thousand numbers, ten thousand times.
+    // A thousand columns of lists of a thousand numbers.
     let list = [field("l", 16, vec![(0, Int(1000))]), vec![(5, Tables(vec![double("item")]))]].concat();
     let lists = stream(vec![(1, Tables(vec![list; 1000]))], &[]);
     assert!(refused(&lists).contains("more than 100000 columns"));
 }
 
 #[test]
-fn batches_that_overlap_are_refused() {
+fn overlapping_batches_are_refused() {
     assert_eq!(read("x", &small_file(&[1, 0])).unwrap().values, [[3.0, 4.0, 1.0, 2.0]]);
     assert!(refused(&small_file(&[0; 50])).contains("the list of batches"));
 }

@@ -1,18 +1,18 @@
-//! The index of a table that pandas wrote.
+//! The index of a pandas table.
 
 use super::Table;
 
-/// How pandas names an index that has no name, in front of its number.
+/// The prefix of the pandas name of an index without a name. A number follows.
 const NAMELESS: &str = "__index_level_";
-/// What such a column is called here.
+/// The name of such a column here.
 const INDEX: &str = "index";
 
-/// The column that holds the index of a pandas table, where that index holds times.
+/// Returns the index column of a pandas table, if the index has times.
 ///
-/// `json` is the metadata that pandas adds. An index without a name is renamed to `index`. Integers without a unit are row numbers.
+/// `json` is the metadata that pandas adds. An index without a name is renamed to `index`. Integers without a unit are row numbers, not times.
 pub(super) fn index_of_times(table: &mut Table, json: &str) -> Option<usize> {
     let metadata: serde_json::Value = serde_json::from_str(json).ok()?;
-    // An index of several levels is no time; one that counts rows is described, not stored.
+    // An index of several levels is not a time. An index that counts the rows is described, not stored.
     let [name] = metadata.get("index_columns")?.as_array()?.as_slice() else { return None };
     let name = name.as_str()?;
     let column = table.heads.iter().position(|head| head.name == name)?;
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn row_numbers_are_no_times() {
+    fn row_numbers_are_not_times() {
         assert_eq!(axis_of("n", None, [0.0, 1.0], r#"{"index_columns": ["n"]}"#).0, Axis::Unknown);
         for json in [
             r#"{"index_columns": [{"kind": "range"}]}"#,

@@ -1,32 +1,33 @@
-//! One table of topics that were sampled by different clocks.
+//! Alignment of topics with nearly the same times.
 
 use super::clock::Clock;
 use super::series::Series;
 
-/// Share of messages by which two topics may differ, and that may have no message of the other nearby.
+/// Largest share of messages that may be missing in one of two topics.
 const MAX_LOST_SHARE: f64 = 0.01;
-/// Fewest messages of which one may be lost.
+/// Fewest messages of a topic of which one may be missing.
 const MIN_TO_LOSE: usize = 8;
-/// Longest step that is bridged, as a multiple of the usual one: at 2 a message is lost.
+/// Longest step that is interpolated, as a multiple of the usual step. At 2 a message is lost.
 const MAX_STEP: f64 = 1.75;
-/// Topics of which a note tells.
-const MOST_NOTES: usize = 8;
+/// Largest number of topics with a note each.
+const MAX_NOTES: usize = 8;
 
-/// How the messages of a topic lie to those of another \[ns\].
+/// The times of a topic relative to those of a reference topic \[ns\].
 struct Shift {
-    /// The usual distance, negative where they come earlier.
+    /// The median time difference; negative if the messages are earlier.
     usual: i64,
-    /// The usual time from message to message of the other topic.
+    /// The median time step of the reference topic.
     period: i64,
-    /// The usual time from message to message of the topic itself.
+    /// The median time step of the topic.
     own_period: i64,
-    /// Whether the messages that both have are at the same times.
+    /// Whether all messages that both topics have are at the same times.
     is_none: bool,
 }
 
-/// Interpolates topics to the times of others that have as many messages at nearly the same times; a note for each.
+/// Interpolates topics to the times of other topics with as many messages at nearly the same times.
 ///
-/// The topic with most messages keeps its values, and of those with as many the first. So do topics that fit none.
+/// The topic with the most messages (the first, if several have as many) is not interpolated, and neither are topics that match no other.
+/// Returns one note per interpolated topic.
 pub(crate) fn align(topics: &mut [(Series, Clock)]) -> Vec<String> {
     let mut order: Vec<usize> = (0..topics.len()).collect();
     order.sort_by_key(|at| std::cmp::Reverse(topics[*at].0.rows()));
@@ -56,8 +57,8 @@ pub(crate) fn align(topics: &mut [(Series, Clock)]) -> Vec<String> {
             }
         }
     }
-    let more = notes.len().saturating_sub(MOST_NOTES);
-    notes.truncate(MOST_NOTES);
+    let more = notes.len().saturating_sub(MAX_NOTES);
+    notes.truncate(MAX_NOTES);
     notes.extend((more > 0).then(|| format!("{more} more topics are interpolated in the same way")));
     notes
 }
@@ -72,11 +73,11 @@ fn note(topic: &str, reference: &str, shift: &Shift, empty: usize) -> String {
     let (usual, period) = (ms(shift.usual), ms(shift.period));
     let rows = if empty == 0 { String::new() } else { format!("; {rows} no value") };
     format!(
-        "{topic} is interpolated linearly to the times of {reference}: its messages come {usual} ms {side} those (period {period} ms){rows}"
+        "{topic} is interpolated linearly to the times of {reference}: its messages are {usual} ms {side} those (period {period} ms){rows}"
     )
 }
 
-/// A number with three digits that count.
+/// Formats a number with three significant digits.
 fn significant(value: f64) -> String {
     let digits = if value > 0.0 { (2 - value.log10().floor() as i32).clamp(0, 9) as usize } else { 0 };
     let text = format!("{value:.digits$}");
@@ -87,7 +88,7 @@ fn is_increasing(times: &[i64]) -> bool {
     times.is_sorted_by(|a, b| a < b)
 }
 
-/// The middle of some numbers.
+/// Returns the lower median.
 fn median(mut of: Vec<i64>) -> Option<i64> {
     let middle = of.len().checked_sub(1)? / 2;
     Some(*of.select_nth_unstable(middle).1)
@@ -97,7 +98,7 @@ fn period(times: &[i64]) -> Option<i64> {
     median(times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect()).filter(|period| *period > 0)
 }
 
-/// How `times` lie to those of `reference`; `None` unless there are as many and nearly the same ones.
+/// Compares `times` with those of `reference`; `None` unless there are as many times and nearly the same ones.
 fn shift(reference: &[i64], times: &[i64]) -> Option<Shift> {
     let most = reference.len().max(times.len());
     let lost = (MAX_LOST_SHARE * most as f64) as usize;
@@ -124,7 +125,7 @@ fn shift(reference: &[i64], times: &[i64]) -> Option<Shift> {
     Some(Shift { usual: median(offsets)?, period, own_period, is_none })
 }
 
-/// Values at other times; NaN before the first, after the last, and within steps that are too long.
+/// Interpolates values to other times; NaN before the first, after the last, and within steps that are too long.
 fn interpolated(values: &[f64], from: &[i64], to: &[i64], longest: i64) -> Vec<f64> {
     let mut at = 0;
     let value = |time: &i64| {
@@ -151,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_interpolated_between_their_times_only() {
+    fn values_are_not_extrapolated_or_interpolated_across_long_steps() {
         let found = interpolated(&[0.0, 10.0, 20.0, 50.0], &[1, 11, 21, 51], &[0, 1, 6, 16, 21, 30, 51, 60], 17);
         let text = format!("{found:?}");
         assert_eq!(text, "[NaN, 0.0, 5.0, 15.0, 20.0, NaN, 50.0, NaN]");
@@ -164,7 +165,7 @@ mod tests {
         let times = every(1000, 0, 300);
         assert_eq!(usual(&times, &every(1000, 400, 300)), Some(400));
         assert_eq!(usual(&times, &every(1000, -400, 299)), Some(-400));
-        assert_eq!(usual(&times, &every(1000, 600, 300)), Some(-400), "all but one have one nearby");
+        assert_eq!(usual(&times, &every(1000, 600, 300)), Some(-400), "all but one have a message nearby");
         assert_eq!(usual(&times, &every(1000, 5400, 300)), None);
         assert_eq!(usual(&times, &every(1000, 0, 290)), None);
         assert_eq!(usual(&times, &every(1010, 0, 300)), None);

@@ -1,9 +1,9 @@
-//! Messages of ROS 2: CDR, version 1.
+//! ROS 2 messages in CDR version 1.
 
 use super::ros2::{Count, Definitions, Field, Kind, Number};
 use super::series::Series;
 
-/// Fields inside of fields.
+/// Deepest nesting of fields.
 const MAX_DEPTH: usize = 32;
 
 impl Definitions {
@@ -18,7 +18,7 @@ impl Definitions {
             [0, 1] => true,
             [high, low] => {
                 return Err(format!(
-                    "its CDR representation is 0x{high:02x}{low:02x}, and only 0x0000 and 0x0001 are read"
+                    "its CDR representation is 0x{high:02x}{low:02x}; only 0x0000 and 0x0001 are supported"
                 ));
             }
             _ => false,
@@ -30,19 +30,19 @@ impl Definitions {
 
 struct Cdr<'a> {
     definitions: &'a Definitions,
-    /// What follows the encapsulation header; numbers are aligned from here on.
+    /// The bytes after the encapsulation header. Numbers are aligned relative to their start.
     bytes: &'a [u8],
     at: usize,
     is_little: bool,
 }
 
 impl<'a> Cdr<'a> {
-    /// Reports the numbers of a definition's fields; `None` passes over them.
+    /// Reports the numbers of the fields of a definition, or skips them if `series` is `None`.
     fn fields(&mut self, number: usize, mut series: Option<&mut Series>, depth: usize) -> Result<(), String> {
         let depth = depth.checked_sub(1).ok_or_else(|| format!("its fields are nested more than {MAX_DEPTH} deep"))?;
         let definitions = self.definitions;
         let fields = &definitions.all[number];
-        // What has no fields is sent as a byte.
+        // A message without fields is encoded as one byte.
         if fields.is_empty() {
             return self.skip(1, 1);
         }
@@ -115,7 +115,7 @@ impl<'a> Cdr<'a> {
         usize::try_from(length).map_err(|error| error.to_string())
     }
 
-    /// The bytes of a number, the last significant first.
+    /// Reads the bytes of a number, in little-endian order.
     fn take<const SIZE: usize>(&mut self) -> Result<[u8; SIZE], String> {
         let at = self.at.next_multiple_of(SIZE);
         let mut bytes: [u8; SIZE] =
@@ -127,7 +127,7 @@ impl<'a> Cdr<'a> {
         Ok(bytes)
     }
 
-    /// Passes over so many numbers of a size.
+    /// Skips `count` numbers of `size` bytes.
     fn skip(&mut self, count: usize, size: usize) -> Result<(), String> {
         if count == 0 {
             return Ok(());
@@ -142,7 +142,7 @@ impl<'a> Cdr<'a> {
     }
 }
 
-/// Says in which field a message ends; only the innermost is named.
+/// Adds the name of the innermost field to an error.
 fn in_field(error: String, name: &str) -> String {
     if error.contains("in the field") { error } else { format!("{error}, in the field {name}") }
 }

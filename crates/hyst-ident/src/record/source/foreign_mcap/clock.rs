@@ -1,4 +1,4 @@
-//! Times of a topic's messages.
+//! The times of the messages of a topic.
 
 use std::rc::Rc;
 
@@ -6,11 +6,11 @@ use super::series::Series;
 
 const NS_PER_S: i64 = 1_000_000_000;
 const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
-/// Largest number of seconds of a stamp, so that its nanoseconds are a whole number of 64 bits: beyond the year 2200.
+/// Largest number of seconds of a time stamp (year 2223), so that its nanoseconds fit 64 bits.
 const MAX_SECONDS: f64 = 8e9;
-/// Fields that a stamp may be in.
+/// Fields that may have a time stamp.
 const STAMPS: [&str; 3] = [".header.stamp", ".timestamp", ".stamp"];
-/// The two parts of a stamp, as ROS, Foxglove, Gazebo and Protobuf name them.
+/// Names of the two parts of a time stamp in ROS, Foxglove, Gazebo and Protobuf.
 const PARTS: [(&str, &str); 5] =
     [("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("seconds", "nanos"), ("sec", "nanoseconds")];
 
@@ -22,7 +22,7 @@ pub(crate) struct Clock {
     pub(crate) times: Rc<[i64]>,
 }
 
-/// The topic does not count: topics with the same times have the same clock.
+/// The topic is not compared: topics with the same times have the same clock.
 impl PartialEq for Clock {
     fn eq(&self, other: &Self) -> bool {
         Rc::ptr_eq(&self.times, &other.times) || self.times == other.times
@@ -30,7 +30,7 @@ impl PartialEq for Clock {
 }
 
 impl Clock {
-    /// The stamps of a topic's messages, whose columns are taken out, or the times at which they were logged; and a remark.
+    /// Returns the time stamps of the messages and removes their columns, or returns the log times. The second value is a note.
     pub(crate) fn of(series: &mut Series) -> (Self, Option<String>) {
         let topic = series.topic.clone();
         let logged =
@@ -38,7 +38,7 @@ impl Clock {
         let Some((seconds, nanoseconds, times)) = stamps(series) else {
             let clock = Self { times: logged(series), topic };
             let note = (!clock.moves())
-                .then(|| format!("{}: all messages have the same time, which is left out", clock.topic));
+                .then(|| format!("{}: all messages have the same time, which is not used", clock.topic));
             return (clock, note);
         };
         let stated = Self { topic, times: times.into() };
@@ -48,22 +48,24 @@ impl Clock {
             return (stated, None);
         }
         let clock = Self { times: logged(series), ..stated };
-        let note = format!("{}: the stamps of its messages never change; times are those of logging", clock.topic);
+        let note = format!("{}: the time stamps of its messages are all equal; the log times are used", clock.topic);
         (clock, Some(note))
     }
 
-    /// Whether there is more than one time.
+    /// Returns whether there is more than one time.
     pub(crate) fn moves(&self) -> bool {
         self.times.iter().any(|time| Some(time) != self.times.first())
     }
 
-    /// Times from `zero` \[ns\] on \[s\]. The difference is taken of whole numbers: a double has no nanoseconds of 1970.
+    /// Returns the times since `zero` \[ns\] in seconds.
+    ///
+    /// Integers are subtracted, because a double does not resolve nanoseconds since 1970.
     pub(crate) fn seconds_from(&self, zero: i64) -> Vec<f64> {
         self.times.iter().map(|time| time.saturating_sub(zero) as f64 / NS_PER_S as f64).collect()
     }
 }
 
-/// The paths of the two parts of the messages' stamps, and the stamps \[ns\].
+/// Returns the paths of the two parts of the time stamps, and the time stamps \[ns\].
 fn stamps(series: &Series) -> Option<(String, String, Vec<i64>)> {
     let of = |path: &str| series.whole(path).map(|at| &series.columns[at].values);
     STAMPS.iter().flat_map(|stamp| PARTS.map(|(s, ns)| (format!("{stamp}.{s}"), format!("{stamp}.{ns}")))).find_map(
@@ -81,7 +83,9 @@ fn stamps(series: &Series) -> Option<(String, String, Vec<i64>)> {
     )
 }
 
-/// From when on the times of each clock count \[ns\]: the midnight before the first of those that start within a day of one another.
+/// Returns the zero of each clock \[ns\]: midnight before the first message.
+///
+/// Clocks that start within a day of one another share one zero.
 pub(crate) fn zeros<'a>(clocks: impl Iterator<Item = &'a Clock>) -> Vec<i64> {
     let firsts: Vec<i64> = clocks.map(|clock| clock.times.first().copied().unwrap_or(0)).collect();
     let mut order: Vec<usize> = (0..firsts.len()).collect();

@@ -1,4 +1,4 @@
-//! How the messages of a schema are read.
+//! Selection of the decoder for the messages of a schema.
 
 use std::collections::HashMap;
 
@@ -13,20 +13,20 @@ pub(crate) struct Schema {
     pub(crate) data: Vec<u8>,
 }
 
-/// Reads messages.
+/// A decoder of messages.
 #[derive(Debug)]
 pub(crate) enum Decoder {
-    /// With the units of the fields.
+    /// JSON, with the units of the fields.
     Json(HashMap<String, String>),
     Ros2(ros2::Definitions),
     Protobuf(protobuf::Kind),
 }
 
 impl Decoder {
-    /// For messages of this encoding.
+    /// Makes the decoder for messages with `encoding` and `schema`.
     ///
     /// # Errors
-    /// If messages of this encoding or schema are not read; the reason.
+    /// The reason, if the encoding or the schema is not supported.
     pub(crate) fn new(encoding: &str, schema: Option<&Schema>) -> Result<Self, String> {
         let of = schema.map_or("", |schema| schema.encoding.as_str());
         match (encoding, of, schema) {
@@ -36,15 +36,13 @@ impl Decoder {
             ("protobuf", "protobuf", Some(schema)) => {
                 protobuf::Kind::parse(&schema.name, &schema.data).map(Self::Protobuf)
             }
-            ("cdr" | "protobuf", _, None) => {
-                Err(format!("its schema is missing, without which {encoding} is not readable"))
-            }
-            ("cdr" | "protobuf", ..) => Err(format!("its schema is in {of:?}, which is not read")),
-            _ => Err(format!("its messages are in {encoding:?}, which is not read")),
+            ("cdr" | "protobuf", _, None) => Err(format!("its schema is missing, which is needed to read {encoding}")),
+            ("cdr" | "protobuf", ..) => Err(format!("its schema is in {of:?}, which is not supported")),
+            _ => Err(format!("its messages are in {encoding:?}, which is not supported")),
         }
     }
 
-    /// The encoding as people call it.
+    /// Returns the name of the encoding.
     pub(crate) fn words(&self) -> &'static str {
         match self {
             Self::Json(_) => "JSON",
@@ -56,7 +54,7 @@ impl Decoder {
     /// Reports the numbers of a message.
     ///
     /// # Errors
-    /// If the message is damaged; the reason.
+    /// The reason, if the message is damaged.
     pub(crate) fn decode(&self, message: &[u8], series: &mut Series) -> Result<(), String> {
         match self {
             Self::Json(_) => json::decode(message, series),
@@ -65,12 +63,12 @@ impl Decoder {
         }
     }
 
-    /// Units that the schema states, by the fields' paths with `[]` for an index.
+    /// Returns the units that the schema states, by path, with `[]` for an index.
     pub(crate) fn units(&self) -> HashMap<String, String> {
         match self {
             Self::Json(units) => units.clone(),
             Self::Ros2(definitions) => definitions.units(),
-            // Comments, where units would be, are not in the schema.
+            // The schema does not contain the comments, which may state units.
             Self::Protobuf(_) => HashMap::new(),
         }
     }

@@ -1,4 +1,4 @@
-//! Numbers of a JSON message.
+//! The numbers of a JSON message.
 
 use std::fmt;
 
@@ -6,13 +6,13 @@ use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, Seq
 
 use super::series::Series;
 
-/// Reports the numbers of a message; nesting is limited by the parser.
+/// Reports the numbers of a message. The parser limits the nesting.
 ///
 /// # Errors
-/// If the message is no JSON.
+/// If the message is not valid JSON.
 pub(crate) fn decode(message: &[u8], series: &mut Series) -> Result<(), String> {
     let Err(error) = parse(message, series) else { return Ok(()) };
-    // Python and others write NaN, which JSON does not have.
+    // Python and other languages write NaN, which is not valid JSON.
     if let Some(message) = without_nan(message) {
         series.discard();
         series.begin();
@@ -29,8 +29,8 @@ fn parse(message: &[u8], series: &mut Series) -> Result<(), serde_json::Error> {
     parser.end()
 }
 
-/// A value of any kind at the series' path. No tree of it is made: of many small values it would take far more memory than
-/// the message has bytes.
+/// A value of any kind at the path of the series. No tree is built, because a tree of many small values needs far more memory than the
+/// message.
 struct Value<'a>(&'a mut Series);
 
 impl<'de> DeserializeSeed<'de> for Value<'_> {
@@ -72,7 +72,7 @@ impl<'de> Visitor<'de> for Value<'_> {
         Ok(())
     }
 
-    /// A null: no number in this row.
+    /// A null has no number.
     fn visit_unit<E: Error>(self) -> Result<(), E> {
         Ok(())
     }
@@ -108,7 +108,7 @@ impl<'de> Visitor<'de> for Value<'_> {
     }
 }
 
-/// A key, whose value's path the series then has.
+/// A key. The series enters its field.
 struct Key<'a>(&'a mut Series);
 
 impl<'de> DeserializeSeed<'de> for Key<'_> {
@@ -131,7 +131,7 @@ impl Visitor<'_> for Key<'_> {
     }
 }
 
-/// The message with null for NaN and infinities; `None` if it has none.
+/// Returns the message with null for NaN and infinities; `None` if it has neither.
 fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
     let mut changed = Vec::with_capacity(message.len());
     let (mut rest, mut in_text, mut found) = (message, false, false);
@@ -143,7 +143,7 @@ fn without_nan(message: &[u8]) -> Option<Vec<u8>> {
             (rest, found) = (&rest[word.len()..], true);
             continue;
         }
-        // What is behind a backslash ends no text.
+        // A character after a backslash does not end a text.
         let taken = if in_text && *byte == b'\\' { 2.min(rest.len()) } else { 1 };
         in_text ^= *byte == b'"';
         changed.extend(&rest[..taken]);

@@ -1,4 +1,4 @@
-//! Units that a JSON schema states.
+//! Units in a JSON schema.
 
 use std::collections::HashMap;
 
@@ -6,14 +6,14 @@ use serde_json::{Map, Value};
 
 use super::stated_unit::stated_unit;
 
-/// Bytes of a schema in which units are looked for.
+/// Largest schema that is searched for units \[bytes\].
 const MAX_SIZE: usize = 1 << 20;
-/// Parts of a schema that are looked at; references make it grow without bounds.
+/// Largest number of parts of a schema that are searched. References can make a schema infinite.
 const MAX_PARTS: usize = 10_000;
-/// Fields inside of fields.
+/// Deepest nesting of fields.
 const MAX_DEPTH: usize = 16;
 
-/// Units by the fields' paths, with `[]` for an index.
+/// Returns the units by path, with `[]` for an index.
 pub(crate) fn units(schema: &[u8]) -> HashMap<String, String> {
     let schema =
         Some(schema).filter(|schema| schema.len() <= MAX_SIZE).and_then(|schema| serde_json::from_slice(schema).ok());
@@ -30,20 +30,20 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Looks at a part of the schema and what is inside of it.
+    /// Searches a part of the schema and its subparts.
     fn part(&mut self, part: &Value, path: &str, depth: usize) {
         self.parts += 1;
         let Some(part) = part.as_object().filter(|_| depth > 0 && self.parts <= MAX_PARTS) else { return };
         if let Some(unit) = unit(part) {
             self.units.entry(path.to_owned()).or_insert_with(|| unit.clone());
-            // The unit of an array is that of its elements.
+            // The unit of an array applies to its elements.
             self.units.entry(format!("{path}[]")).or_insert(unit);
         }
         let root = self.root;
         if let Some(at) = part.get("$ref").and_then(Value::as_str).and_then(|at| root.pointer(at.strip_prefix('#')?)) {
             self.part(at, path, depth - 1);
         }
-        // An optional value is one of a number and null.
+        // An optional number is either a number or null.
         for name in ["anyOf", "oneOf", "allOf"] {
             for option in part.get(name).and_then(Value::as_array).into_iter().flatten() {
                 self.part(option, path, depth - 1);
@@ -60,7 +60,7 @@ impl Search<'_> {
     }
 }
 
-/// The unit of a field, as its own keyword or in its description.
+/// Returns the unit of a field, from the keyword `unit` or `units` or from its description.
 fn unit(field: &Map<String, Value>) -> Option<String> {
     let text = |name: &str| field.get(name).and_then(Value::as_str).map(str::trim).filter(|text| !text.is_empty());
     let own = text("unit").or_else(|| text("units")).map(super::shortened);

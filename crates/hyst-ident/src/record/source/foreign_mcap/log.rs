@@ -7,19 +7,19 @@ use mcap::records::{Channel, Record};
 
 use crate::record::log::LogRecords;
 
+use super::budget::Budget;
 use super::decoder::{Decoder, Schema};
-use super::room::Room;
 use super::series::Series;
 
-/// Topics of one file; further ones are left out.
+/// Largest number of topics of one file. Further topics are not read.
 const MAX_TOPICS: usize = 1024;
-/// Bytes that the columns may take whatever the size of the file.
+/// Size up to which the columns may always grow \[bytes\].
 const ALWAYS_READ: usize = 64 << 20;
-/// How many times the size of the file the columns may take beyond that.
+/// Largest ratio of the size of larger columns to the size of the file.
 const MAX_EXPANSION: usize = 200;
-/// Bytes that schemas may have whatever the size of the file: a parsed one takes some forty times its size.
+/// Size up to which schemas are always read \[bytes\]. A parsed schema takes about forty times its size.
 const ALWAYS_SCHEMAS: usize = 4 << 20;
-/// How many times the size of the file the schemas may have beyond that.
+/// Largest ratio of the size of larger schemas to the size of the file.
 const MAX_SCHEMA_EXPANSION: usize = 20;
 
 /// A topic that is read.
@@ -30,37 +30,37 @@ pub(crate) struct Topic {
     channel: Channel,
 }
 
-/// Where the messages of a channel go.
+/// The topic that the messages of a channel belong to.
 #[derive(Clone, Copy, Debug)]
 enum Target {
     Topic(usize),
     Nowhere,
 }
 
-/// What was read of a file.
+/// The contents of a file.
 #[derive(Debug)]
 pub(crate) struct Log {
-    /// In the order of their first messages.
+    /// The topics in the order of their first messages.
     pub(crate) topics: Vec<Topic>,
-    /// Topics of which nothing is read, with the reason.
+    /// Topics that are not read, with the reason.
     pub(crate) left_out: Vec<String>,
     targets: HashMap<u16, Target>,
     decoders: HashMap<(u16, String), Result<Rc<Decoder>, String>>,
-    room: Room,
+    budget: Budget,
     messages: usize,
-    /// Messages whose channel is not known.
+    /// Number of messages whose channel is not known.
     orphans: usize,
-    /// What is wrong with the first damaged record, and how many there are.
+    /// The problem of the first damaged record, and the number of damaged records.
     damaged: Option<(String, usize)>,
     is_closed: bool,
 }
 
-/// Schemas and channels, which the file states before the messages and repeats at its end.
+/// The schemas and channels of a file. They are before the messages and again at the end.
 #[derive(Debug, Default)]
 struct Catalogue {
     schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Channel>,
-    /// Bytes of the schemas.
+    /// Size of the schemas \[bytes\].
     size: usize,
 }
 
@@ -68,11 +68,11 @@ impl Log {
     /// Reads all messages.
     ///
     /// # Errors
-    /// If the file is no MCAP file, or holds far more numbers than its size lets expect.
+    /// If the file is not an MCAP file, or has far more numbers than its size allows.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, String> {
         let mut catalogue = Catalogue::default();
         let log = Self::pass(bytes, &mut catalogue)?;
-        // The chunk that states a channel may be damaged; the end of the file states it again.
+        // If the chunk with a channel is damaged, the channel is found at the end of the file, and a second pass reads its messages.
         if log.orphans > 0 { Self::pass(bytes, &mut catalogue) } else { Ok(log) }
     }
 
@@ -84,13 +84,13 @@ impl Log {
             left_out: Vec::new(),
             targets: HashMap::new(),
             decoders: HashMap::new(),
-            room: Room::new(most),
+            budget: Budget::new(most),
             messages: 0,
             orphans: 0,
             damaged: None,
             is_closed: false,
         };
-        let mut records = LogRecords::new(bytes).ok_or("the file does not begin as an MCAP file does")?;
+        let mut records = LogRecords::new(bytes).ok_or("the file does not begin like an MCAP file")?;
         for record in &mut records {
             match record {
                 Record::Schema { header, data } if catalogue.size.saturating_add(data.len()) <= most_schemas => {
@@ -106,9 +106,9 @@ impl Log {
                 Record::Message { header, data } => {
                     log.messages += 1;
                     log.add(header.channel_id, header.log_time, &data, catalogue);
-                    if log.room.is_used_up() {
+                    if log.budget.is_used_up() {
                         return Err(format!(
-                            "the messages hold more than {most} numbers, far more than a log of {} bytes can; record again",
+                            "the messages hold more than {most} numbers, far more than a log of {} bytes can hold; record again",
                             bytes.len()
                         ));
                     }
@@ -147,7 +147,9 @@ impl Log {
         }
     }
 
-    /// The topic of a channel. Channels that differ in nothing but their number, as after a restart of the recorder, are one topic.
+    /// Returns the topic of a channel.
+    ///
+    /// Channels that differ only in their number, for example after a restart of the recorder, are one topic.
     fn open(&mut self, channel: &Channel, catalogue: &Catalogue) -> Target {
         let alike = |topic: &Topic| {
             let other = &topic.channel;
@@ -168,14 +170,18 @@ impl Log {
             .or_insert_with(|| Decoder::new(&channel.message_encoding, schema).map(Rc::new))
             .clone()
             .and_then(|decoder| {
-                if self.topics.len() < MAX_TOPICS { Ok(decoder) } else { Err(format!("{MAX_TOPICS} topics are read")) }
+                if self.topics.len() < MAX_TOPICS {
+                    Ok(decoder)
+                } else {
+                    Err(format!("only {MAX_TOPICS} topics are read"))
+                }
             });
         let same = self.topics.iter().filter(|topic| topic.channel.topic == channel.topic).count();
         let name = super::shortened(&channel.topic);
         let name = if same == 0 { name } else { format!("{name}#{}", same + 1) };
         match decoder {
             Ok(decoder) => {
-                let series = Series::new(name, self.room.clone());
+                let series = Series::new(name, self.budget.clone());
                 self.topics.push(Topic { series, decoder, channel: channel.clone() });
                 Target::Topic(self.topics.len() - 1)
             }
@@ -186,12 +192,12 @@ impl Log {
         }
     }
 
-    /// Whether there is no message.
+    /// Returns whether there is no message.
     pub(crate) fn is_empty(&self) -> bool {
         self.messages == 0
     }
 
-    /// The encodings of the topics, as `JSON and Protobuf`.
+    /// Returns the encodings of the topics, such as `JSON and Protobuf`.
     pub(crate) fn encodings(&self) -> String {
         let mut words: Vec<&str> = self.topics.iter().map(|topic| topic.decoder.words()).collect();
         words.sort_unstable();
@@ -199,12 +205,12 @@ impl Log {
         words.join(" and ")
     }
 
-    /// Whether its end is there.
+    /// Returns whether the end of the file is present.
     pub(crate) fn is_closed(&self) -> bool {
         self.is_closed
     }
 
-    /// What of the file is damaged.
+    /// Returns notes on damaged parts of the file.
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if let Some((problem, count)) = &self.damaged {
@@ -212,7 +218,7 @@ impl Log {
             notes.push(format!("{pieces} of the log left out: {}", super::shortened(problem)));
         }
         if self.orphans > 0 {
-            notes.push(format!("{} messages left out whose channel the log does not state", self.orphans));
+            notes.push(format!("{} messages left out: their channel is not in the log", self.orphans));
         }
         notes
     }

@@ -1,4 +1,4 @@
-//! Messages of Protobuf, whose descriptors are in the schema.
+//! Protobuf messages. Their descriptors are in the schema.
 
 use std::fmt::Display;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,32 +9,34 @@ use prost_reflect::{DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMe
 
 use super::series::Series;
 
-/// Bytes of a message: a decoded one takes some fifty times its size. Larger ones are images and point clouds.
+/// Largest message \[bytes\]. Decoded, it takes about fifty times its size. Larger messages are images and point clouds.
 const MAX_MESSAGE: usize = 1 << 20;
-/// Versions of the language that schemas are read in; without a name it is proto2.
+/// Supported versions of the schema language. No name means proto2.
 const SYNTAXES: [&str; 3] = ["", "proto2", "proto3"];
-/// Fields inside of fields.
+/// Deepest nesting of fields.
 const MAX_DEPTH: usize = 32;
 
-/// The kind of the messages of a schema.
+/// The message type of a schema.
 #[derive(Clone, Debug)]
 pub(crate) struct Kind(MessageDescriptor);
 
 impl Kind {
-    /// Parses a schema; `name` is that of the message, as `lab.Sample`.
+    /// Parses a schema. `name` is the name of the message type, such as `lab.Sample`.
     ///
     /// # Errors
-    /// If the descriptors are damaged, or the message is not among them.
+    /// If the descriptors are damaged or do not contain the message type.
     pub(crate) fn parse(name: &str, schema: &[u8]) -> Result<Self, String> {
         let damaged = |error: &dyn Display| format!("its schema is damaged ({error})");
         let set = FileDescriptorSet::decode(schema).map_err(|error| damaged(&error))?;
-        // The crate panics at any other syntax, editions among them.
+        // The crate panics at any other syntax, including editions.
         if let Some(other) = set.file.iter().map(FileDescriptorProto::syntax).find(|syntax| !SYNTAXES.contains(syntax))
         {
             let other = super::shortened(other);
-            return Err(format!("its schema is in the Protobuf syntax {other:?}, and proto2 and proto3 are read"));
+            return Err(format!(
+                "its schema is in the Protobuf syntax {other:?}; only proto2 and proto3 are supported"
+            ));
         }
-        let pool = unwound(|| DescriptorPool::from_file_descriptor_set(set).map_err(|error| damaged(&error)))?;
+        let pool = without_panic(|| DescriptorPool::from_file_descriptor_set(set).map_err(|error| damaged(&error)))?;
         let kind = pool.get_message_by_name(name.trim_start_matches('.'));
         kind.map(Self).ok_or_else(|| format!("its schema does not define {:?}", super::shortened(name)))
     }
@@ -45,9 +47,9 @@ impl Kind {
     /// If the message is damaged, or too large.
     pub(crate) fn decode(&self, message: &[u8], series: &mut Series) -> Result<(), String> {
         if message.len() > MAX_MESSAGE {
-            return Err(format!("it has {} bytes, and up to {MAX_MESSAGE} are read", message.len()));
+            return Err(format!("it has {} bytes; the limit is {MAX_MESSAGE} bytes", message.len()));
         }
-        unwound(|| {
+        without_panic(|| {
             let message = DynamicMessage::decode(self.0.clone(), message).map_err(|error| error.to_string())?;
             report(&message, series, MAX_DEPTH);
             Ok(())
@@ -55,15 +57,15 @@ impl Kind {
     }
 }
 
-/// What a call to the Protobuf crate returns. Its code is not ours, and a panic on damaged data cannot be ruled out.
-fn unwound<T>(call: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+/// Calls the Protobuf crate and converts a panic to an error, because the crate may panic on damaged data.
+fn without_panic<T>(call: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|_| Err("it is damaged".to_owned()))
 }
 
 fn report(message: &DynamicMessage, series: &mut Series, depth: usize) {
     let Some(depth) = depth.checked_sub(1) else { return };
     for field in message.descriptor().fields() {
-        // A number that is not in the message is 0, unless its absence can be told apart.
+        // A number that is not in the message is 0, unless the field has presence.
         if field.supports_presence() && !message.has_field(&field) {
             continue;
         }

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use super::stated_unit::stated_unit;
 
-/// Parts of a definition whose units are looked for; it may refer to others many times.
+/// Largest number of parts of a definition that are searched for units. It may refer to others many times.
 const MAX_PARTS: usize = 10_000;
-/// Fields inside of fields whose units are looked for.
+/// Deepest nesting of fields that are searched for units.
 const MAX_DEPTH: usize = 16;
 
 /// A number in a message.
@@ -41,7 +41,7 @@ impl Number {
         })
     }
 
-    /// Bytes.
+    /// Returns the size \[bytes\].
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -52,21 +52,21 @@ impl Number {
     }
 }
 
-/// What a field is.
+/// The type of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Number(Number),
     Text,
-    /// Fields of the definition with this number.
+    /// The fields of the definition with this number.
     Fields(usize),
 }
 
-/// How often a field comes.
+/// The number of values of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     One,
     Fixed(usize),
-    /// As often as the message says.
+    /// The message states the number.
     Counted,
 }
 
@@ -79,21 +79,21 @@ pub(crate) struct Field {
     unit: Option<String>,
 }
 
-/// A definition and those it refers to. The first is that of the message.
+/// The definition of a message (the first) and those that it refers to.
 #[derive(Clone, Debug)]
 pub(crate) struct Definitions {
     pub(crate) all: Vec<Vec<Field>>,
 }
 
-/// What a schema may leave out: everybody knows it.
+/// Definitions that a schema may omit.
 const BUILT_IN: &str = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n===\n\
                         MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec\n";
 
 impl Definitions {
-    /// Parses a schema; `name` is that of the message, as `sensor_msgs/msg/Temperature`.
+    /// Parses a schema. `name` is the name of the message type, such as `sensor_msgs/msg/Temperature`.
     ///
     /// # Errors
-    /// If a line is no field, or a definition is missing.
+    /// If a line is not a field, or a definition is missing.
     pub(crate) fn parse(name: &str, schema: &[u8]) -> Result<Self, String> {
         let text = String::from_utf8_lossy(schema);
         let sections = sections(name, &text).into_iter().chain(sections("", BUILT_IN).into_iter().skip(1));
@@ -110,7 +110,7 @@ impl Definitions {
         Ok(Self { all: all? })
     }
 
-    /// Units in comments behind fields, by the fields' paths with `[]` for an index.
+    /// Returns the units in comments after fields, by path, with `[]` for an index.
     pub(crate) fn units(&self) -> HashMap<String, String> {
         let (mut units, mut parts) = (HashMap::new(), 0);
         let mut open = vec![(0, String::new(), 0)];
@@ -135,12 +135,12 @@ impl Definitions {
 
 /// The lines of a definition.
 struct Section<'a> {
-    /// As `package/Type`.
+    /// The name, such as `package/Type`.
     name: String,
     lines: Vec<&'a str>,
 }
 
-/// The definitions of a schema, which lines of `=` divide.
+/// Returns the definitions of a schema. Lines of `=` separate them.
 fn sections<'a>(name: &str, text: &'a str) -> Vec<Section<'a>> {
     let mut sections = vec![Section { name: without_msg(name), lines: Vec::new() }];
     for line in text.lines().map(str::trim) {
@@ -156,14 +156,14 @@ fn sections<'a>(name: &str, text: &'a str) -> Vec<Section<'a>> {
     sections
 }
 
-/// `package/msg/Type` as `package/Type`.
+/// Converts `package/msg/Type` to `package/Type`.
 fn without_msg(name: &str) -> String {
     name.replacen("/msg/", "/", 1)
 }
 
-/// The field of a line; `None` for a constant.
+/// Parses the field of a line; `None` for a constant.
 fn field(line: &str, package: &str, numbers: &HashMap<&str, usize>) -> Result<Option<Field>, String> {
-    let bad = || format!("its schema has a line that is no field: {:?}", super::shortened(line));
+    let bad = || format!("its schema has a line that is not a field: {:?}", super::shortened(line));
     let (line, comment) = split_comment(line);
     let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(bad)?;
     let rest = rest.trim_start();
@@ -186,7 +186,11 @@ fn field(line: &str, package: &str, numbers: &HashMap<&str, usize>) -> Result<Op
     let kind = match (kind, Number::parse(kind)) {
         (_, Some(number)) => Kind::Number(number),
         ("string", _) => Kind::Text,
-        ("wstring", _) => return Err(format!("its field {name:?} is a wstring, whose size depends on the sender")),
+        ("wstring", _) => {
+            return Err(format!(
+                "its field {name:?} is a wstring, which is not supported because its size depends on the sender"
+            ));
+        }
         _ => {
             let (whole, own) = (without_msg(kind), format!("{package}/{kind}"));
             let header = Some("std_msgs/Header").filter(|_| kind == "Header");
@@ -198,7 +202,7 @@ fn field(line: &str, package: &str, numbers: &HashMap<&str, usize>) -> Result<Op
     Ok(Some(Field { name: name.to_owned(), kind, count, unit: comment.and_then(stated_unit) }))
 }
 
-/// A line, and the comment behind it; a `#` in quotes begins none.
+/// Splits a line into the part before a comment and the comment. A `#` in quotes does not begin a comment.
 fn split_comment(line: &str) -> (&str, Option<&str>) {
     let mut quote = None;
     for (at, c) in line.char_indices() {
@@ -240,12 +244,12 @@ mod tests {
         );
         let of = |text: &str| Definitions::parse("lab/msg/Sample", text.as_bytes()).unwrap_err();
         assert_eq!(of("lab/Other x"), "its schema does not define \"lab/Other\"");
-        assert!(of("float64[0] x").contains("no field"));
-        assert!(of("float64").contains("no field"));
+        assert!(of("float64[0] x").contains("not a field"));
+        assert!(of("float64").contains("not a field"));
     }
 
     #[test]
-    fn a_definition_that_refers_to_itself_is_no_endless_loop() {
+    fn a_definition_that_refers_to_itself_does_not_loop_forever() {
         let text = "Sample[] a\nSample[] b\nfloat64 x # V\n";
         assert!(Definitions::parse("lab/msg/Sample", text.as_bytes()).unwrap().units().len() <= MAX_PARTS);
     }

@@ -1,30 +1,30 @@
-//! The numbers of one topic: a row for each message, a column for each field.
+//! The numbers of one topic: one row per message, one column per field.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 
-use super::room::Room;
+use super::budget::Budget;
 
-/// Columns of one topic; further fields are left out.
+/// Largest number of columns of one topic. Further fields are not read.
 const MAX_COLUMNS: usize = 1024;
-/// Values of an array of fixed length that become columns; longer ones are images and point clouds.
+/// Largest length of an array that is read as columns. Longer arrays are images and point clouds.
 const MAX_ELEMENTS: usize = 256;
-/// Bytes of a field's path; fields with longer ones are left out.
+/// Longest path of a field \[bytes\]. Fields with longer paths are not read.
 const MAX_PATH: usize = 256;
-/// What a column takes beside its values, as a number of values.
+/// Memory of a column in addition to its values \[values\].
 const COLUMN_COST: usize = 32;
 
 /// A numeric field.
 #[derive(Clone, Debug)]
 pub(crate) struct Column {
-    /// Its name behind the topic's, as `.state.value` or `.data[2]`.
+    /// The name after that of the topic, such as `.state.value` or `.data[2]`.
     pub(crate) path: String,
     pub(crate) unit: Option<String>,
-    /// May end before the last row until the series is complete.
+    /// The values. They may have fewer rows than the topic until [`Series::complete`].
     pub(crate) values: Vec<f64>,
 }
 
-/// How many values an array has.
+/// The lengths of an array in all messages.
 #[derive(Clone, Copy, Debug)]
 struct Lengths {
     shortest: usize,
@@ -37,31 +37,31 @@ impl Lengths {
     }
 }
 
-/// The numbers of one topic. A decoder walks through a message and reports where it is, and every number.
+/// The numbers of one topic. A decoder reports the path and value of every number of a message.
 #[derive(Debug)]
 pub(crate) struct Series {
     pub(crate) topic: String,
     pub(crate) columns: Vec<Column>,
-    /// When each message was logged \[ns\].
+    /// The log time of each message \[ns\].
     pub(crate) logged: Vec<u64>,
-    /// Messages that could not be read.
+    /// Number of messages that cannot be read.
     pub(crate) unread: usize,
-    /// Why the first of them could not.
+    /// The fault of the first of them.
     pub(crate) fault: Option<String>,
     arrays: BTreeMap<String, Lengths>,
     by_path: HashMap<String, usize>,
-    /// Columns before the row that is being read.
+    /// Number of columns before the current message.
     before: usize,
-    /// The column that the next number is likely in: fields come in the same order in each message.
+    /// The expected column of the next number: fields have the same order in each message.
     next: usize,
     path: String,
-    /// Whether there were fields beyond the limits.
+    /// Whether fields exceed the limits.
     has_more: bool,
-    room: Room,
+    budget: Budget,
 }
 
 impl Series {
-    pub(crate) fn new(topic: String, room: Room) -> Self {
+    pub(crate) fn new(topic: String, budget: Budget) -> Self {
         Self {
             topic,
             columns: Vec::new(),
@@ -74,7 +74,7 @@ impl Series {
             next: 0,
             path: String::new(),
             has_more: false,
-            room,
+            budget,
         }
     }
 
@@ -82,18 +82,18 @@ impl Series {
         self.logged.len()
     }
 
-    /// Begins the row of a message.
+    /// Begins a message.
     pub(crate) fn begin(&mut self) {
         (self.before, self.next) = (self.columns.len(), 0);
         self.path.clear();
     }
 
-    /// Ends the row.
+    /// Ends a message that was read completely.
     pub(crate) fn keep(&mut self, logged: u64) {
         self.logged.push(logged);
     }
 
-    /// Takes the numbers of a message back that could not be read to its end.
+    /// Removes the numbers of a message that was not read completely.
     pub(crate) fn discard(&mut self) {
         for column in self.columns.drain(self.before..) {
             self.by_path.remove(&column.path);
@@ -102,13 +102,13 @@ impl Series {
         self.columns.iter_mut().for_each(|column| column.values.truncate(rows));
     }
 
-    /// Counts a message that could not be read.
+    /// Counts a message that cannot be read.
     pub(crate) fn miss(&mut self, fault: String) {
         self.unread += 1;
         self.fault.get_or_insert(fault);
     }
 
-    /// Goes into a field; the way back out of it.
+    /// Enters a field. Returns the value for [`leave`](Self::leave).
     pub(crate) fn enter(&mut self, field: &str) -> usize {
         let back = self.path.len();
         self.path.push('.');
@@ -116,20 +116,20 @@ impl Series {
         back
     }
 
-    /// Goes into an element of an array, the first being 0; the way back out of it.
+    /// Enters an element of an array, counted from 0. Returns the value for [`leave`](Self::leave).
     pub(crate) fn enter_element(&mut self, index: usize) -> usize {
         let back = self.path.len();
-        // A text takes all that is written to it.
+        // Writing to a String does not fail.
         let _ = write!(self.path, "[{}]", index + 1);
         back
     }
 
-    /// Goes back out.
+    /// Leaves a field or an element.
     pub(crate) fn leave(&mut self, back: usize) {
         self.path.truncate(back);
     }
 
-    /// Reports the length of the array here; whether its values are wanted.
+    /// Reports the length of the array at the current path. Returns whether its values are wanted.
     pub(crate) fn array(&mut self, length: usize) -> bool {
         if let Some(lengths) = self.arrays.get_mut(&self.path) {
             lengths.shortest = lengths.shortest.min(length);
@@ -145,12 +145,12 @@ impl Series {
         false
     }
 
-    /// How many elements are wanted of the array here, whose length is not known yet.
+    /// Returns the number of wanted elements of the array at the current path, whose length is not known yet.
     pub(crate) fn wanted_elements(&self) -> usize {
         if self.arrays.get(&self.path).is_none_or(|lengths| lengths.is_fixed()) { MAX_ELEMENTS } else { 0 }
     }
 
-    /// Reports the number here.
+    /// Reports the number at the current path.
     pub(crate) fn number(&mut self, value: f64) {
         let Some(at) = self.column() else {
             self.has_more = true;
@@ -159,15 +159,15 @@ impl Series {
         self.next = at + 1;
         let (row, column) = (self.logged.len(), &mut self.columns[at].values);
         if column.len() > row {
-            // A field that comes twice in a message: the last counts.
+            // If a field occurs twice in a message, the last value applies.
             column[row] = value;
-        } else if self.room.take(row + 1 - column.len()) {
+        } else if self.budget.take(row + 1 - column.len()) {
             column.resize(row, f64::NAN);
             column.push(value);
         }
     }
 
-    /// The column of the field here; `None` if there are too many.
+    /// Returns the column of the current path; `None` if there are too many columns.
     fn column(&mut self) -> Option<usize> {
         if self.columns.get(self.next).is_some_and(|column| column.path == self.path) {
             return Some(self.next);
@@ -175,7 +175,7 @@ impl Series {
         if let Some(at) = self.by_path.get(&self.path) {
             return Some(*at);
         }
-        if self.path.len() > MAX_PATH || self.columns.len() >= MAX_COLUMNS || !self.room.take(COLUMN_COST) {
+        if self.path.len() > MAX_PATH || self.columns.len() >= MAX_COLUMNS || !self.budget.take(COLUMN_COST) {
             return None;
         }
         let at = self.columns.len();
@@ -184,7 +184,7 @@ impl Series {
         Some(at)
     }
 
-    /// Puts the rows into the order in which the messages were logged; in a file they may be in another.
+    /// Sorts the rows by log time. The order in the file may differ.
     pub(crate) fn sort(&mut self) {
         if self.logged.is_sorted() {
             return;
@@ -198,16 +198,16 @@ impl Series {
         }
     }
 
-    /// Gives every column a value in each row, and leaves out arrays whose length changes.
+    /// Extends every column to all rows and removes arrays whose length changes.
     ///
     /// # Errors
-    /// If that needs too much memory, as where fields have another name in each message.
+    /// If this needs too much memory, for example because fields have another name in each message.
     pub(crate) fn complete(&mut self) -> Result<(), String> {
         let uneven: Vec<String> = self.uneven().map(|(path, _)| format!("{path}[")).collect();
         self.columns.retain(|column| !uneven.iter().any(|path| column.path.starts_with(path)));
         let rows = self.logged.len();
         let missing = self.columns.iter().map(|column| rows - column.values.len()).sum();
-        if !self.room.take(missing) {
+        if !self.budget.take(missing) {
             let topic = &self.topic;
             return Err(format!(
                 "the messages of {topic} have too many different fields; log a topic with fixed fields"
@@ -224,33 +224,33 @@ impl Series {
         self.arrays.iter().map(|(path, lengths)| (path, *lengths)).filter(|(_, lengths)| !lengths.is_fixed())
     }
 
-    /// Takes the column of a field out; `None` if there is none with a value in each row.
+    /// Removes and returns the column of a field; `None` if no column has a value in each row.
     pub(crate) fn take(&mut self, path: &str) -> Option<Vec<f64>> {
         let at = self.whole(path)?;
         Some(self.columns.remove(at).values)
     }
 
-    /// The number of a field's column, if it has a value in each row.
+    /// Returns the number of the column of a field, if it has a value in each row.
     pub(crate) fn whole(&self, path: &str) -> Option<usize> {
         let at = self.columns.iter().position(|column| column.path == path)?;
         let values = &self.columns[at].values;
         (values.len() == self.rows() && !values.iter().any(|value| value.is_nan())).then_some(at)
     }
 
-    /// Units of the fields by their paths, with `[]` for every index.
+    /// Sets the units. `units` are by path, with `[]` for every index.
     pub(crate) fn set_units(&mut self, units: &HashMap<String, String>) {
         for column in &mut self.columns {
             column.unit = units.get(&any_index(&column.path)).cloned();
         }
     }
 
-    /// What was left out.
+    /// Returns notes on what is not read.
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let (topic, unread) = (&self.topic, self.unread);
         if let Some(fault) = self.fault.as_ref().filter(|_| self.rows() > 0) {
-            let were = if unread == 1 { "message is" } else { "messages are" };
-            notes.push(format!("{topic}: {unread} {were} left out that could not be read ({fault})"));
+            let messages = if unread == 1 { "message is" } else { "messages are" };
+            notes.push(format!("{topic}: {unread} {messages} not readable and left out ({fault})"));
         }
         let arrays: Vec<String> = self
             .uneven()
@@ -273,17 +273,17 @@ impl Series {
         notes
     }
 
-    /// Why no column is made of the topic.
+    /// Returns why the topic gives no column.
     pub(crate) fn why_unused(&self) -> String {
         match (&self.fault, self.rows()) {
-            (Some(fault), 0) => format!("{} messages could not be read: {fault}", self.unread),
+            (Some(fault), 0) => format!("{} messages cannot be read: {fault}", self.unread),
             (_, 0 | 1) => format!("{} message", self.rows()),
             (_, rows) => format!("{rows} messages without numbers"),
         }
     }
 }
 
-/// The path with `[]` for every index in it.
+/// Returns the path with `[]` for every index.
 fn any_index(path: &str) -> String {
     let mut any = String::new();
     for (k, part) in path.split('[').enumerate() {

@@ -1,33 +1,35 @@
-//! The unit in a comment or a description.
+//! Units in comments and descriptions.
 
 use crate::record::heading::Unit;
 
-/// Characters of a unit in square brackets that is not known.
+/// Largest number of characters of an unknown unit in square brackets.
 const MAX_UNKNOWN: usize = 16;
 
-/// The unit that a text states, as `V`, `drive voltage [V]`, `position (µm)` or `temperature in degrees Celsius`; as it is written there.
+/// Returns the unit that a text states, as it is written there.
+///
+/// Recognised are `V`, `drive voltage [V]`, `position (µm)` and `temperature in degrees Celsius`.
 pub(crate) fn stated_unit(text: &str) -> Option<String> {
     let text = text.trim().trim_end_matches(['.', ';', ',']);
     let square = inside(text, '[', ']');
-    // The (s) of "sample(s)" is no unit.
+    // The (s) of "sample(s)" is not a unit.
     let round = inside(text, '(', ')').filter(|_| text.contains(" (") || text.starts_with('('));
     let behind = |word: &str| text.rsplit_once(word).map(|(_, unit)| unit.trim());
-    // The shortest of values, and not minutes.
+    // "min" alone means minimum, not minutes.
     let whole = Some(text).filter(|text| !text.eq_ignore_ascii_case("min"));
     let candidates = [square, round, behind(" in "), behind(", "), behind(": "), whole];
     let found = candidates.into_iter().flatten().find_map(known);
-    // Square brackets hold units even where nobody knows them; of other words it cannot be told.
+    // A text in square brackets is a unit even if it is not known. Other unknown words are not.
     let is_unit =
         |unit: &&str| !unit.is_empty() && unit.chars().count() <= MAX_UNKNOWN && !unit.contains([' ', ',', '=']);
     found.or_else(|| square.filter(is_unit)).map(str::to_owned)
 }
 
-/// What stands in the last brackets of a text.
+/// Returns the text in the last brackets.
 fn inside(text: &str, open: char, close: char) -> Option<&str> {
     Some(text.rsplit_once(open)?.1.split_once(close)?.0.trim())
 }
 
-/// The unit, if it is known.
+/// Returns the unit, if it is known.
 fn known(text: &str) -> Option<&str> {
     let text = text.strip_prefix("degrees ").or_else(|| text.strip_prefix("Degrees ")).unwrap_or(text);
     Unit::parse(text).map(|_| text)

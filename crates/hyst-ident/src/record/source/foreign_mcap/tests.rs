@@ -12,7 +12,7 @@ fn fault(bytes: &[u8]) -> String {
     read("x.mcap", bytes).unwrap_err().to_string()
 }
 
-/// Names, units and values of the columns.
+/// Returns names, units and values of the columns.
 fn columns(table: &Table) -> Vec<(&str, Option<&str>, &[f64])> {
     let columns = table.heads.iter().zip(&table.values);
     columns.map(|(head, values)| (head.name.as_str(), head.unit.as_deref(), values.as_slice())).collect()
@@ -125,12 +125,12 @@ fn topics_of_two_clocks_become_one_table() {
     assert_eq!(names, expected);
     assert!(table.values[2][0].is_nan());
     assert_eq!((table.values[2][1], table.values[2][19], table.values[4].len()), (0.75, 18.75, 5));
-    let note = "/b is interpolated linearly to the times of /a: its messages come 62.5 ms after those (period 250 ms); 1 row has no value";
+    let note = "/b is interpolated linearly to the times of /a: its messages are 62.5 ms after those (period 250 ms); 1 row has no value";
     assert_eq!(table.notes, [note]);
 }
 
 #[test]
-fn a_lost_message_leaves_a_row_without_a_value() {
+fn a_lost_message_gives_a_row_without_a_value() {
     let messages: Vec<String> = (0..20).map(|k| format!("{{\"x\": {k}}}")).collect();
     let messages: Vec<&str> = messages.iter().map(String::as_str).collect();
     let (whole, mut lossy) = (Topic::json("/a", "{}", &messages), Topic::json("/b", "{}", &messages));
@@ -143,7 +143,7 @@ fn a_lost_message_leaves_a_row_without_a_value() {
 }
 
 #[test]
-fn times_are_those_of_logging_where_stamps_are_of_no_use() {
+fn log_times_are_used_if_time_stamps_are_all_equal() {
     let stamped = [
         r#"{"header": {"stamp": {"sec": 0, "nanosec": 0}}, "x": NaN}"#,
         r#"{"header": {"stamp": {"sec": 0, "nanosec": 0}}, "x": 2, "t": "NaN"}"#,
@@ -153,7 +153,7 @@ fn times_are_those_of_logging_where_stamps_are_of_no_use() {
     let table = table(&log(&[topic]));
     assert_eq!(table.values[0], [3661.0, 3661.25]);
     assert_eq!((table.heads[3].name.as_str(), table.values[3][0], table.values[3][1].is_nan()), ("/a.x", 2.0, true));
-    assert_eq!(table.notes, ["/a: the stamps of its messages never change; times are those of logging"]);
+    assert_eq!(table.notes, ["/a: the time stamps of its messages are all equal; the log times are used"]);
     let mut still = Topic::json("/a", "{}", &["1", "2"]);
     still.times = vec![5; 2];
     let table = read("x.mcap", &log(&[still])).unwrap();
@@ -161,19 +161,19 @@ fn times_are_those_of_logging_where_stamps_are_of_no_use() {
 }
 
 #[test]
-fn what_cannot_be_read_is_named() {
+fn topics_that_cannot_be_read_are_named_with_the_reason() {
     assert_eq!(
         fault(MAGIC),
         "x.mcap: MCAP: the file has no message (the log was cut off: its end is missing); copy the file again, or record again"
     );
     let text =
         fault(&log(&[Topic::json("/a", "{}", &[r#"{"x": "text"}"#; 2]), Topic::json("/b", "{}", &["{\"x\": 1"; 2])]));
-    assert!(text.contains("no topic has two messages with numbers: /a (2 messages without numbers); /b (2 messages could not be read: not valid JSON: EOF"), "{text}");
+    assert!(text.contains("no topic has two messages with numbers: /a (2 messages without numbers); /b (2 messages cannot be read: not valid JSON: EOF"), "{text}");
     let other = |encoding, schema| {
         fault(&log(&[Topic::new("/a", encoding, ("lab/msg/X", schema, b"float64 x\nlab/Y y"), vec![vec![0; 12]; 2])]))
     };
-    assert!(other("ros1", "ros1msg").contains("/a (its messages are in \"ros1\", which is not read)"));
-    assert!(other("cdr", "ros2idl").contains("/a (its schema is in \"ros2idl\", which is not read)"));
+    assert!(other("ros1", "ros1msg").contains("/a (its messages are in \"ros1\", which is not supported)"));
+    assert!(other("cdr", "ros2idl").contains("/a (its schema is in \"ros2idl\", which is not supported)"));
     assert!(other("cdr", "ros2msg").contains("/a (its schema does not define \"lab/Y\")"));
     assert!(other("protobuf", "protobuf").contains("/a (its schema is damaged"));
     let mut editions = protobuf_topic();
@@ -182,7 +182,7 @@ fn what_cannot_be_read_is_named() {
     let schema = [&schema[..at], b"protoX", &schema[at + 6..]].concat();
     editions.schema.2 = &schema;
     let text = fault(&log(&[editions]));
-    assert!(text.contains("in the Protobuf syntax \"protoX\", and proto2 and proto3 are read"), "{text}");
+    assert!(text.contains("in the Protobuf syntax \"protoX\"; only proto2 and proto3 are supported"), "{text}");
     let cdr = |message: &[u8]| {
         fault(&log(&[Topic::new("/a", "cdr", ("lab/msg/X", "ros2msg", b"float64 x"), vec![message.to_vec(); 2])]))
     };
@@ -192,12 +192,12 @@ fn what_cannot_be_read_is_named() {
     mixed.times.truncate(3);
     assert_eq!(
         table(&log(&[mixed])).notes,
-        ["/a: 1 message is left out that could not be read (not valid JSON: expected value at line 1 column 1)"]
+        ["/a: 1 message is not readable and left out (not valid JSON: expected value at line 1 column 1)"]
     );
 }
 
 #[test]
-fn channels_that_are_alike_are_one_topic_and_others_are_told_apart() {
+fn equal_channels_are_one_topic_and_others_are_numbered() {
     let (one, mut again) = (Topic::json("/a", "{}", &["1", "2"]), Topic::json("/a", "{}", &["3", "4"]));
     again.times.iter_mut().for_each(|time| *time += 2 * STEP);
     let (other, cut) = (Topic::json("/a", "{\"x\": 1}", &["5", "6"]), Topic::json("/b", "{}", &["7"]));

@@ -1,20 +1,20 @@
-//! Lists of texts beside a matrix: the names and the units of its columns.
+//! Lists of texts with the names and units of the columns of a matrix.
 
-/// A list of texts and its name in the file.
+/// A list of texts, with its name in the file.
 #[derive(Clone, Debug)]
 pub(crate) struct TextList {
     pub(crate) name: String,
     pub(crate) texts: Vec<String>,
 }
 
-/// Words in the names of lists that name columns.
+/// Words in the names of lists of column names.
 const NAMING: [&str; 10] = ["name", "label", "head", "col", "chan", "var", "signal", "title", "item", "field"];
 /// Words in the names of lists of units.
 const UNITS: [&str; 2] = ["unit", "einheit"];
 
-/// Names and units of a matrix with `columns` columns, from the lists beside it.
+/// Returns names and units of the columns of a matrix with `columns` columns.
 ///
-/// A list belongs to the matrix if it has as many texts. Of several that could be the names, the one counts that is called so.
+/// A list fits if it has one text per column. If several lists could be the names, the name of the list decides.
 pub(crate) fn of_matrix(lists: &[TextList], columns: usize) -> (Option<&[String]>, Option<&[String]>) {
     if columns < 2 {
         return (None, None);
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_of_the_right_length_name_columns() {
+    fn lists_of_matching_length_are_column_names() {
         let list = |name: &str, texts: &[&str]| TextList {
             name: name.into(),
             texts: texts.iter().map(ToString::to_string).collect(),

@@ -1,21 +1,21 @@
-//! Sample rates and periods that a file states as one number beside its arrays.
+//! Sample rates and periods that a file states as one number.
 
-/// How the time between rows was stated; a rate is preferred, for it is a whole number more often.
+/// A stated sample rate or period. A rate is preferred, because it is more often a whole number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
-    /// The time between rows \[s\].
+    /// The sample period \[s\].
     pub(crate) step: f64,
     is_rate: bool,
 }
 
 impl Rate {
-    /// This one, or `other` if that was stated as a rate and this was not.
+    /// Returns `other` if only that is stated as a rate, else this one.
     pub(crate) fn or_better(self, other: Self) -> Self {
         if other.is_rate && !self.is_rate { other } else { self }
     }
 }
 
-/// The time between rows if `name` is what programs call a sample rate or period; `unit` is what the file says of it.
+/// Returns the sample period if `name` is a usual name of a sample rate or period. `unit` is its unit in the file.
 pub(crate) fn step_of(name: &str, value: f64, unit: Option<&str>) -> Option<Rate> {
     let plain: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
     let is_rate = match plain.as_str() {
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_and_periods_are_known_by_name() {
+    fn rates_and_periods_are_recognised_by_name() {
         let step = |name, value, unit| step_of(name, value, unit).map(|rate| rate.step);
         assert_eq!(step("Fs", 1000.0, None), Some(1e-3));
         assert_eq!(step("sample_rate", 10.0, Some("kHz")), Some(1e-4));

@@ -1,36 +1,36 @@
-//! Groups that hold the same columns and differ in a number: each is a segment of one record.
+//! Groups with the same columns and a number in their names, which are joined as segments of one record.
 
 use std::collections::HashMap;
 
 use super::{Clock, Column};
 
-/// Numbers up to here are exact in a column of doubles.
+/// Largest integer up to which a double is exact.
 const LARGEST: u64 = 1 << 53;
 
-/// The name without the number at its end, and the number: `run_12` is `run` and 12.
+/// Splits a name into its stem and the number at its end: `run_12` is `run` and 12.
 pub(crate) fn number_of(name: &str) -> Option<(&str, u64)> {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let number = name[stem.len()..].parse().ok().filter(|number| *number <= LARGEST)?;
     Some((stem.trim_end_matches(['_', '-', ' ', '.', '#']), number))
 }
 
-/// One group: its number, its path and its columns.
+/// A group with its number, path and columns.
 pub(crate) struct Part {
     pub(crate) number: u64,
     pub(crate) path: String,
     pub(crate) columns: Vec<Column>,
 }
 
-/// Joins groups of the same columns in the order of their numbers, and adds a column `segment` of these numbers.
+/// Joins groups with the same columns in the order of their numbers, and adds a column `segment` of these numbers.
 ///
 /// # Errors
-/// Gives the groups back where they are not alike.
+/// Returns the groups if their columns differ.
 pub(crate) fn join(stem: &str, separator: char, mut parts: Vec<Part>) -> Result<Vec<Column>, Vec<Part>> {
     parts.sort_by_key(|part| part.number);
     let Some(rows) = parts.iter().map(rows_of).collect::<Option<Vec<usize>>>().filter(|_| are_alike(&parts)) else {
         return Err(parts);
     };
-    // What is as long as the rest in every group; a matrix of gains beside the signals has no rows in common with them.
+    // Only columns that have the rows of the signals in every group are joined. A matrix of gains, for example, has other rows.
     let count = parts[0].columns.len();
     let joined: Vec<usize> = (0..count)
         .filter(|at| parts.iter().zip(&rows).all(|(part, rows)| part.columns[*at].values.len() == *rows))
@@ -58,7 +58,7 @@ pub(crate) fn join(stem: &str, separator: char, mut parts: Vec<Part>) -> Result<
     Ok(columns)
 }
 
-/// Rows of a group: those of most of its columns, and of the longer where two are equal.
+/// Returns the number of rows of most columns of a group; of two equally frequent numbers, the larger.
 fn rows_of(part: &Part) -> Option<usize> {
     let mut count: HashMap<usize, usize> = HashMap::new();
     for column in &part.columns {
@@ -67,7 +67,7 @@ fn rows_of(part: &Part) -> Option<usize> {
     count.into_iter().max_by_key(|(rows, columns)| (*columns, *rows)).map(|(rows, _)| rows)
 }
 
-/// Whether at least two groups have the same columns in the same order, and each a number of its own.
+/// Returns whether there are at least two groups, all with the same columns in the same order and different numbers.
 fn are_alike(parts: &[Part]) -> bool {
     let alike = |part: &Part, one: &Column, first: &Column| {
         let place = |part: &Part, column: &Column| column.path.strip_prefix(part.path.as_str()).map(str::to_owned);
@@ -81,7 +81,7 @@ fn are_alike(parts: &[Part]) -> bool {
     parts.len() > 1 && parts.windows(2).all(|pair| pair[0].number != pair[1].number) && parts.iter().all(like_first)
 }
 
-/// The clock that a column has in every group.
+/// Returns the clock that a column has in every group.
 fn common_clock(parts: &[Part], at: usize) -> Clock {
     let target = |part: &Part| match part.columns[at].clock {
         Clock::Column(identity) => part.columns.iter().position(|column| column.identity == Some(identity)),
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn names_end_in_numbers() {
+    fn numbers_at_the_end_of_names_are_split_off() {
         assert_eq!(number_of("run_12"), Some(("run", 12)));
         assert_eq!(number_of("007"), Some(("", 7)));
         assert_eq!(number_of("run"), None);
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_that_differ_stay_apart() {
+    fn groups_with_different_columns_are_not_joined() {
         let mut other = part(3, 4);
         other.columns.pop();
         assert!(join("/run", '/', vec![part(1, 4), other]).is_err());

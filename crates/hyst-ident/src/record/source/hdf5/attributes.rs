@@ -6,8 +6,8 @@ use hdf5_reader::group::Group;
 
 use super::values;
 
-/// Lists and numbers in attributes are short; what is longer is data.
-const MOST_TEXTS: u64 = 100_000;
+/// Longest list of texts in an attribute. Longer lists are data.
+const MAX_TEXTS: u64 = 100_000;
 
 /// The attributes of one object.
 pub(super) struct Attributes(Vec<Attribute>);
@@ -17,7 +17,7 @@ impl Attributes {
         Self(dataset.attributes())
     }
 
-    /// Those of a group; none where they are damaged, for the data can do without.
+    /// Returns the attributes of a group; empty if they are damaged, because they are not essential.
     pub(super) fn of_group(group: &Group) -> Self {
         Self(group.attributes().unwrap_or_default())
     }
@@ -26,12 +26,12 @@ impl Attributes {
         self.0.iter().find(|attribute| attribute.name == name)
     }
 
-    /// Texts of the first attribute with one of these names, whatever the case, that has texts.
+    /// Returns the texts of the first attribute with one of these names (ignoring case) that has texts.
     pub(super) fn texts(&self, names: &[&str]) -> Option<Vec<String>> {
         names.iter().find_map(|name| self.0.iter().filter(|a| a.name.eq_ignore_ascii_case(name)).find_map(texts))
     }
 
-    /// The same, where it is one text.
+    /// Returns the text of the first such attribute, if it has one text.
     pub(super) fn text(&self, names: &[&str]) -> Option<String> {
         self.texts(names)
             .and_then(|texts| <[String; 1]>::try_from(texts).ok())
@@ -39,12 +39,12 @@ impl Attributes {
             .filter(|text| !text.is_empty())
     }
 
-    /// The number of an attribute.
+    /// Returns the number of an attribute.
     pub(super) fn number(&self, name: &str) -> Option<f64> {
         self.get(name).and_then(number)
     }
 
-    /// All attributes that are one number.
+    /// Returns all attributes that are one number.
     pub(super) fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().filter_map(|attribute| Some((attribute.name.as_str(), number(attribute)?)))
     }
@@ -59,7 +59,7 @@ fn number(attribute: &Attribute) -> Option<f64> {
 }
 
 fn texts(attribute: &Attribute) -> Option<Vec<String>> {
-    let count = attribute.num_elements().ok().filter(|count| *count <= MOST_TEXTS)?;
+    let count = attribute.num_elements().ok().filter(|count| *count <= MAX_TEXTS)?;
     let texts = if count == 1 { attribute.read_string().ok().map(|text| vec![text]) } else { None };
     let texts = texts.or_else(|| attribute.read_strings().ok())?;
     Some(texts.iter().map(|text| text.trim_matches(['\0', ' ', '\n', '\t']).to_owned()).collect())

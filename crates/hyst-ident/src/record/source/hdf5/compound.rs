@@ -1,21 +1,21 @@
-//! Tables of records: a column a field.
+//! Tables of compound types: one column per field.
 
 use hdf5_reader::dataset::Dataset;
 use hdf5_reader::messages::datatype::Datatype;
 
 use super::values;
 use crate::record::source::elements::Storage;
-use crate::record::source::gather::{Column, Room};
+use crate::record::source::gather::{Budget, Column};
 
-/// Columns of one field.
-const MOST_PARTS: u64 = 4096;
+/// Largest number of columns of one field.
+const MAX_PARTS: u64 = 4096;
 
-/// Columns of a dataset of records with these units; fields that are no numbers are left out.
+/// Returns the columns of a dataset of a compound type. Fields that are not numbers are not read.
 pub(super) fn columns(
     path: &str,
     dataset: &Dataset,
     units: Option<&[String]>,
-    room: &mut Room,
+    budget: &mut Budget,
 ) -> Result<Vec<Column>, String> {
     let Datatype::Compound { size, fields } = dataset.dtype() else { return Ok(Vec::new()) };
     let (step, rows) = (*size as usize, dataset.num_elements().unwrap_or(u64::MAX));
@@ -35,8 +35,8 @@ pub(super) fn columns(
         }
     }
     let text: usize = found.iter().map(|(name, ..)| 2 * (path.len() + name.len())).sum();
-    room.take(text as u64)?;
-    let bytes = values::bytes(path, dataset, found.len() as u64, room)?;
+    budget.take(text as u64)?;
+    let bytes = values::bytes(path, dataset, found.len() as u64, budget)?;
     let column = |(name, first, storage, unit): (String, usize, Storage, Option<String>)| {
         let values = storage.column(&bytes, first, step, rows as usize);
         Column {
@@ -49,14 +49,14 @@ pub(super) fn columns(
     Ok(found.into_iter().map(column).collect())
 }
 
-/// How the numbers of a field are stored, and how many there are a row.
+/// Returns the storage of the numbers of a field, and their number per row.
 fn parts(datatype: &Datatype) -> Option<(Storage, usize)> {
     match datatype {
         Datatype::Array { base, dims } => {
             let count = dims
                 .iter()
                 .try_fold(1_u64, |count, dim| count.checked_mul(*dim))
-                .filter(|count| *count <= MOST_PARTS)?;
+                .filter(|count| *count <= MAX_PARTS)?;
             Some((values::storage(base)?, count as usize))
         }
         datatype => Some((values::storage(datatype)?, 1)),

@@ -1,16 +1,16 @@
-//! Compressions that h5py writes and the HDF5 crate leaves out, and what to do about others.
+//! Compression filters that h5py writes and the HDF5 crate does not have, and messages about other filters.
 
 use std::io::Read;
 
 use hdf5_reader::FilterRegistry;
 use hdf5_reader::error::Error;
 
-/// h5py's `compression="lzf"`.
+/// `compression="lzf"` of h5py.
 const LZF: u16 = 32_000;
-/// hdf5plugin's `Zstd()`.
+/// `Zstd()` of hdf5plugin.
 const ZSTANDARD: u16 = 32_015;
 
-/// The crate's filters and these two; none gives more than `most` bytes.
+/// Returns the filters of the crate and these two. None returns more than `most` bytes.
 pub(super) fn registry(most: usize) -> FilterRegistry {
     let mut registry = FilterRegistry::new();
     let lzf_of = move |data: &[u8], settings: &[u32]| {
@@ -30,7 +30,7 @@ pub(super) fn registry(most: usize) -> FilterRegistry {
     registry
 }
 
-/// LZF (Lehmann): runs of literal bytes, and copies of what came before.
+/// Decodes LZF (Lehmann): runs of literal bytes, and copies of earlier bytes.
 fn lzf(data: &[u8], most: usize) -> Option<Vec<u8>> {
     let mut own = Vec::with_capacity(most.min(data.len().saturating_mul(4)));
     let mut at = 0;
@@ -59,12 +59,12 @@ fn lzf(data: &[u8], most: usize) -> Option<Vec<u8>> {
     Some(own)
 }
 
-/// What to say of an object that cannot be read.
+/// Returns the message about an object that cannot be read.
 pub(super) fn unreadable(path: &str, error: &Error) -> String {
     let reason = innermost(error);
     match reason {
         Error::UnsupportedFilter(_) => format!(
-            "dataset {path} is compressed by a filter that is not read ({reason}); rewrite the file with h5repack -f GZIP=4 in.h5 out.h5, \
+            "dataset {path} is compressed by a filter that is not supported ({reason}); rewrite the file with h5repack -f GZIP=4 in.h5 out.h5, \
              or in Python: import h5py, hdf5plugin; h5py.File('out.h5', 'w')['{}'] = h5py.File('in.h5')['{path}'][:]",
             path.trim_start_matches('/')
         ),
@@ -72,7 +72,7 @@ pub(super) fn unreadable(path: &str, error: &Error) -> String {
     }
 }
 
-/// The error itself, without the paths around it.
+/// Returns the innermost error, without the paths around it.
 pub(super) fn innermost(error: &Error) -> &Error {
     match error {
         Error::Context { source, .. } => innermost(source),
@@ -86,9 +86,9 @@ mod tests {
 
     #[test]
     fn lzf_is_unpacked() {
-        // Two literals, then five bytes from two back.
+        // Two literals, then a copy of five bytes from two bytes back.
         assert_eq!(lzf(&[1, b'a', b'b', 3 << 5, 1], 64).unwrap(), b"abababa");
-        // A long copy has one more byte of length.
+        // A long copy has one more length byte.
         assert_eq!(lzf(&[0, b'x', 7 << 5, 3, 0], 64).unwrap(), [b'x'; 13]);
         assert_eq!(lzf(&[0, b'x', 7 << 5, 200, 0], 64), None);
         assert_eq!(lzf(&[5, b'a'], 64), None);
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_filter_names_the_way_out() {
+    fn the_message_about_an_unknown_filter_states_what_to_do() {
         let error = Error::UnsupportedFilter("filter id 32001".into()).with_context("x");
         let message = unreadable("/run/x", &error);
         assert!(message.contains("h5repack") && message.contains("/run/x") && message.contains("32001"), "{message}");

@@ -1,4 +1,4 @@
-//! The workspace in a file of MATLAB's version 7.3: structs are groups, cells refer to datasets in the group `#refs#`.
+//! The workspace in a MATLAB 7.3 file: structs are groups, and cells refer to datasets in the group `#refs#`.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -11,26 +11,27 @@ use hdf5_reader::reference::read_object_references;
 use super::attributes::Attributes;
 use super::filters::unreadable;
 use super::values;
-use crate::record::source::gather::Room;
+use crate::record::source::gather::Budget;
 use crate::record::source::mat::from_codes;
 use crate::record::source::mat::tree::{Array, Structs, Value};
 
-/// Structs in structs.
-const DEEPEST: u32 = 32;
-/// Arrays of a file, those in cells and structs counted.
-const MOST_ARRAYS: usize = 200_000;
-/// The class of an array, as `double`.
+/// Deepest nesting of structs.
+const MAX_DEPTH: u32 = 32;
+/// Largest number of arrays of a file, including those in cells and structs.
+const MAX_ARRAYS: usize = 200_000;
+/// The attribute with the class of an array, such as `double`.
 const CLASS: [&str; 1] = ["MATLAB_class"];
-const OBJECT: &str = "is an object of MATLAB: save its parts as arrays, as t = x.Time; y = x.Data; save file.mat t y";
+const OBJECT: &str =
+    "is a MATLAB object; save its parts as arrays, for example t = x.Time; y = x.Data; save file.mat t y";
 
-/// The variables of a file.
-pub(super) fn variables(root: &Group, room: &mut Room) -> Result<Structs<'static>, String> {
-    let mut reader = Reader { root, room, objects: None, left: MOST_ARRAYS };
-    let (names, values) = reader.members("", root, DEEPEST)?;
+/// Reads the variables of a file.
+pub(super) fn variables(root: &Group, budget: &mut Budget) -> Result<Structs<'static>, String> {
+    let mut reader = Reader { root, budget, objects: None, left: MAX_ARRAYS };
+    let (names, values) = reader.members("", root, MAX_DEPTH)?;
     Ok(Structs { names, elements: vec![values] })
 }
 
-/// What a reference leads to.
+/// The target of a reference.
 #[derive(Clone)]
 enum Object {
     Dataset(Box<Dataset>),
@@ -39,19 +40,19 @@ enum Object {
 
 struct Reader<'r> {
     root: &'r Group,
-    room: &'r mut Room,
-    /// What is in `#refs#`, by address, once it was needed.
+    budget: &'r mut Budget,
+    /// The objects in `#refs#` by address; `None` until they are needed.
     objects: Option<HashMap<u64, Object>>,
-    /// Arrays that may still come.
+    /// Number of further arrays that are allowed.
     left: usize,
 }
 
 impl Reader<'_> {
-    /// The datasets and groups of a group; names that begin with # are MATLAB's own.
+    /// Reads the datasets and groups of a group. Names that begin with # are internal names of MATLAB.
     fn members(&mut self, path: &str, group: &Group, depth: u32) -> Result<(Vec<String>, Vec<Array<'static>>), String> {
         let depth = depth
             .checked_sub(1)
-            .ok_or_else(|| format!("structs are nested more than {DEEPEST} deep; save the signals alone"))?;
+            .ok_or_else(|| format!("structs are nested more than {MAX_DEPTH} deep; save only the signals"))?;
         let (groups, datasets) = group.member_names().map_err(|error| unreadable(path, &error))?;
         let (mut names, mut values) = (Vec::new(), Vec::new());
         let below = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
@@ -71,19 +72,17 @@ impl Reader<'_> {
     }
 
     fn claim(&mut self) -> Result<(), String> {
-        self.left = self
-            .left
-            .checked_sub(1)
-            .ok_or_else(|| format!("more than {MOST_ARRAYS} arrays; save the signals alone"))?;
+        self.left =
+            self.left.checked_sub(1).ok_or_else(|| format!("more than {MAX_ARRAYS} arrays; save only the signals"))?;
         Ok(())
     }
 
-    /// A struct, or an array of structs: then each field is a dataset of references.
+    /// Reads a struct or an array of structs. In an array of structs each field is a dataset of references.
     fn group(&mut self, path: &str, group: &Group, depth: u32) -> Result<Array<'static>, String> {
         self.claim()?;
         let attributes = Attributes::of_group(group);
         if attributes.get("MATLAB_sparse").is_some() {
-            return Ok(Array::unread("is sparse: save full(…) of it"));
+            return Ok(Array::unread("is sparse; save full(…) of it"));
         }
         if attributes.text(&CLASS).is_some_and(|class| class != "struct") {
             return Ok(Array::unread(OBJECT));
@@ -124,7 +123,7 @@ impl Reader<'_> {
         if attributes.get("MATLAB_object_decode").is_some() {
             return Ok(Array::unread(OBJECT));
         }
-        // MATLAB stores columns first, so dimensions come the other way round.
+        // MATLAB stores arrays column by column, so the dimensions are reversed.
         let mut dims = values::dims(dataset).unwrap_or_default();
         dims.reverse();
         while dims.len() < 2 {
@@ -138,12 +137,12 @@ impl Reader<'_> {
         }
         let Some(storage) = values::storage(dataset.dtype()) else {
             let value = match dataset.dtype() {
-                Datatype::Compound { .. } => Value::Unread("is complex: save real(…) or abs(…) of it".to_owned()),
-                _ => Value::Text(values::texts(dataset, self.room).unwrap_or_default()),
+                Datatype::Compound { .. } => Value::Unread("is complex; save real(…) or abs(…) of it".to_owned()),
+                _ => Value::Text(values::texts(dataset, self.budget).unwrap_or_default()),
             };
             return Ok(Array { dims, value });
         };
-        let bytes = values::bytes(path, dataset, 1, self.room)?;
+        let bytes = values::bytes(path, dataset, 1, self.budget)?;
         if class == Some("char") {
             let codes: Vec<u16> = storage.all(&bytes).into_iter().map(|code| code as u16).collect();
             return Ok(Array { value: Value::Text(from_codes(&codes, dims[0])), dims });
@@ -151,7 +150,7 @@ impl Reader<'_> {
         Ok(Array { dims, value: Value::Numbers { bytes: Cow::Owned(bytes), storage } })
     }
 
-    /// Cells, or one field of an array of structs: then the structs have no names.
+    /// Reads cells, or one field of an array of structs. The structs then have no names.
     fn references(
         &mut self,
         path: &str,
@@ -162,8 +161,8 @@ impl Reader<'_> {
     ) -> Result<Array<'static>, String> {
         let depth = depth
             .checked_sub(1)
-            .ok_or_else(|| format!("cells are nested more than {DEEPEST} deep; save the signals alone"))?;
-        let bytes = values::bytes(path, dataset, 1, self.room)?;
+            .ok_or_else(|| format!("cells are nested more than {MAX_DEPTH} deep; save only the signals"))?;
+        let bytes = values::bytes(path, dataset, 1, self.budget)?;
         let addresses = read_object_references(&bytes, 8).map_err(|error| unreadable(path, &error))?;
         let mut values = Vec::new();
         for address in addresses {
@@ -172,7 +171,7 @@ impl Reader<'_> {
                 Some(Object::Group(group)) => self.group(path, &group, depth)?,
                 None => {
                     self.claim()?;
-                    Array::unread("refers to nothing")
+                    Array::unread("has an invalid reference")
                 }
             });
         }
@@ -192,7 +191,7 @@ impl Reader<'_> {
             let mut objects = HashMap::new();
             if let Ok(group) = self.root.group("#refs#") {
                 let (groups, datasets) = group.member_names().map_err(|error| unreadable("#refs#", &error))?;
-                for name in datasets.iter().chain(&groups).take(MOST_ARRAYS) {
+                for name in datasets.iter().chain(&groups).take(MAX_ARRAYS) {
                     if let Ok(dataset) = group.dataset(name) {
                         objects.insert(dataset.address(), Object::Dataset(Box::new(dataset)));
                     } else if let Ok(inner) = group.group(name) {

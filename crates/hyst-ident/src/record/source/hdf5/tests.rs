@@ -1,4 +1,4 @@
-//! HDF5 files, written byte by byte.
+//! HDF5 files, built byte by byte.
 
 mod writer;
 
@@ -36,7 +36,7 @@ fn vectors_and_tables_are_columns() {
 }
 
 #[test]
-fn attributes_name_columns_and_give_units_rates_and_scales() {
+fn attributes_give_names_units_rates_and_scales() {
     let data = Node::table(&[2, 2], &[0.0, 1.0, 2.0, 3.0])
         .with("columns", Attribute::texts(&["time", "sensor"]))
         .with("unit", Attribute::texts(&["s", "um"]));
@@ -54,7 +54,7 @@ fn attributes_name_columns_and_give_units_rates_and_scales() {
 }
 
 #[test]
-fn a_rate_beside_holds_for_the_group() {
+fn a_rate_in_a_group_applies_to_its_datasets() {
     let group = Node::group(vec![("x", Node::vector(&[1.0, 2.0])), ("dt", Node::table(&[], &[0.25]))]);
     let found = table(&File::new(vec![("run", group)]).bytes());
     assert_eq!(found.heads[0].axis, Axis::Even { start: 0.0, step: 0.25 });
@@ -66,11 +66,11 @@ fn numbered_groups_are_segments() {
     let found = table(&File::new(vec![("run_10", run(10.0)), ("run_9", run(9.0))]).bytes());
     assert_eq!(names(&found), ["segment", "/run/x"]);
     assert_eq!(found.values, [[9.0, 9.0, 10.0, 10.0], [9.0, 9.5, 10.0, 10.5]]);
-    assert!(found.notes[0].contains("2 groups, as /run_9 and /run_10"), "{:?}", found.notes);
+    assert!(found.notes[0].contains("2 groups (/run_9 to /run_10)"), "{:?}", found.notes);
 }
 
 #[test]
-fn matlab_stores_columns_first() {
+fn arrays_of_matlab_are_stored_column_by_column() {
     let data = Node::table(&[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with("MATLAB_class", Attribute::text("double"));
     let rig = Node::group(vec![("data", data)]).with("MATLAB_class", Attribute::text("struct"));
     let found = table(&File::new(vec![("rig", rig)]).matlab());
@@ -79,7 +79,7 @@ fn matlab_stores_columns_first() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn damaged_files_are_refused_with_the_reason() {
     let message = |bytes: &[u8]| read("x.h5", bytes).unwrap_err().to_string();
     let bytes = File::new(vec![("t", Node::vector(&[0.0, 0.5, 1.0]))]).bytes();
     assert!(message(&bytes[..bytes.len() - 8]).contains("cut off"));
@@ -94,7 +94,7 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn no_cut_and_no_change_leads_to_a_panic() {
+fn truncated_and_damaged_files_do_not_panic() {
     let run = |k: f64| Node::group(vec![("x", Node::vector(&[k, k + 0.5])), ("dt", Node::table(&[], &[k]))]);
     let data = Node::table(&[3, 2], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
         .with("MATLAB_class", Attribute::text("double"))
@@ -114,11 +114,11 @@ fn no_cut_and_no_change_leads_to_a_panic() {
         for _ in 0..3000 {
             let mut changed = bytes.clone();
             for _ in 0..=random(3) {
-                // Behind the block of MATLAB's, of which nothing is read.
+                // Only bytes after the MATLAB header, which is not read, are changed.
                 let at = random(changed.len() - file.start(&changed)) + file.start(&changed);
                 changed[at] = [0, 1, 0x7f, 0x80, 0xff, random(256) as u8][random(6)];
             }
-            // A change is read only where the checksum agrees.
+            // The checksums are updated, because blocks with a wrong checksum are not read.
             checksummed(&mut changed, &file.blocks(&bytes));
             let _ = read("x", &changed);
         }

@@ -1,4 +1,4 @@
-//! Numbers of a dataset.
+//! The numbers of a dataset.
 
 use hdf5_reader::ByteOrder;
 use hdf5_reader::dataset::Dataset;
@@ -6,9 +6,9 @@ use hdf5_reader::messages::datatype::Datatype;
 
 use super::filters::unreadable;
 use crate::record::source::elements::{Kind, Storage};
-use crate::record::source::gather::Room;
+use crate::record::source::gather::Budget;
 
-/// How numbers of this type are stored; `None` where it is no number.
+/// Returns the storage of numbers of this type; `None` if the type is not a number.
 pub(super) fn storage(datatype: &Datatype) -> Option<Storage> {
     let (kind, order) = match datatype {
         Datatype::FloatingPoint { size, byte_order } => match size {
@@ -25,7 +25,7 @@ pub(super) fn storage(datatype: &Datatype) -> Option<Storage> {
             _ => (unsigned(*size)?, byte_order),
         },
         Datatype::Bitfield { size, byte_order } => (unsigned(*size)?, byte_order),
-        // Booleans are an enumeration.
+        // Booleans are enumerations.
         Datatype::Enum { base, .. } if matches!(**base, Datatype::FixedPoint { .. }) => return storage(base),
         _ => return None,
     };
@@ -42,28 +42,28 @@ fn unsigned(size: u8) -> Option<Kind> {
     })
 }
 
-/// The bytes of a dataset, and room for as many doubles as it has elements times `columns`.
-pub(super) fn bytes(path: &str, dataset: &Dataset, columns: u64, room: &mut Room) -> Result<Vec<u8>, String> {
+/// Reads the bytes of a dataset. Reserves also the memory of `columns` doubles per element.
+pub(super) fn bytes(path: &str, dataset: &Dataset, columns: u64, budget: &mut Budget) -> Result<Vec<u8>, String> {
     let elements = dataset.num_elements().unwrap_or(u64::MAX);
     let bytes = dataset.raw_element_size().map_or(u64::MAX, |size| elements.saturating_mul(size as u64));
     let widened = elements.saturating_mul(8).saturating_mul(columns);
-    room.take(bytes.saturating_add(widened)).map_err(|what| format!("dataset {path} {what}"))?;
+    budget.take(bytes.saturating_add(widened)).map_err(|what| format!("dataset {path} {what}"))?;
     dataset.read_raw_bytes().map_err(|error| unreadable(path, &error))
 }
 
-/// Dimensions of a dataset as lengths in memory.
+/// Returns the dimensions of a dataset.
 pub(super) fn dims(dataset: &Dataset) -> Option<Vec<usize>> {
     dataset.shape().iter().map(|dim| usize::try_from(*dim).ok()).collect()
 }
 
-/// Texts of a dataset of few; `None` where it has none.
-pub(super) fn texts(dataset: &Dataset, room: &mut Room) -> Option<Vec<String>> {
-    const MOST: u64 = 100_000;
+/// Reads the texts of a dataset; `None` if it has no texts or too many.
+pub(super) fn texts(dataset: &Dataset, budget: &mut Budget) -> Option<Vec<String>> {
+    const MAX_TEXTS: u64 = 100_000;
     let is_text = matches!(dataset.dtype(), Datatype::String { .. } | Datatype::VarLen { .. });
-    if !is_text || dataset.num_elements().ok()? > MOST {
+    if !is_text || dataset.num_elements().ok()? > MAX_TEXTS {
         return None;
     }
-    room.take(dataset.raw_byte_len().ok()? as u64).ok()?;
+    budget.take(dataset.raw_byte_len().ok()? as u64).ok()?;
     let texts = dataset.read_strings().ok()?;
     Some(texts.iter().map(|text| text.trim_matches(['\0', ' ']).to_owned()).collect())
 }

@@ -1,4 +1,4 @@
-//! Columns of an HDF5 file: every vector and table of numbers in every group.
+//! The columns of an HDF5 file: every vector and table of numbers in every group.
 
 mod dataset;
 mod instants;
@@ -11,26 +11,26 @@ use hdf5_reader::group::Group;
 use super::attributes::Attributes;
 use super::filters::{innermost, unreadable};
 use super::values;
-use crate::record::source::gather::{Clock, Column, Part, Rate, Room, TextList, join, number_of, step_of};
+use crate::record::source::gather::{Budget, Clock, Column, Part, Rate, TextList, join, number_of, step_of};
 
-/// Groups in groups.
-const DEEPEST: u32 = 32;
-/// Groups and datasets of a file.
-const MOST_OBJECTS: usize = 100_000;
-/// Reasons that are listed for datasets that are not read.
-const MOST_NOTES: usize = 8;
+/// Deepest nesting of groups.
+const MAX_DEPTH: u32 = 32;
+/// Largest number of groups and datasets of a file.
+const MAX_OBJECTS: usize = 100_000;
+/// Largest number of notes on datasets that are not read.
+const MAX_NOTES: usize = 8;
 const UNITS: [&str; 2] = ["units", "unit"];
 
-/// Finds columns; one for a file.
+/// Finds the columns of one file.
 pub(super) struct Walk<'r> {
-    room: &'r mut Room,
+    budget: &'r mut Budget,
     notes: Vec<String>,
-    /// Addresses of groups; a link may lead back to one.
+    /// Addresses of the groups that were read. A link may refer to one of them again.
     seen: HashSet<u64>,
     objects: usize,
 }
 
-/// What holds for all datasets of a group.
+/// The properties of a group that apply to all its datasets.
 struct Scope {
     clock: Clock,
     /// Lists that may name the columns of a table.
@@ -38,19 +38,19 @@ struct Scope {
 }
 
 impl<'r> Walk<'r> {
-    pub(super) fn new(room: &'r mut Room) -> Self {
-        Self { room, notes: Vec::new(), seen: HashSet::new(), objects: 0 }
+    pub(super) fn new(budget: &'r mut Budget) -> Self {
+        Self { budget, notes: Vec::new(), seen: HashSet::new(), objects: 0 }
     }
 
-    /// What was left out, and why.
+    /// Returns notes on datasets that are not read.
     pub(super) fn notes(self) -> Vec<String> {
         self.notes
     }
 
-    /// All columns of a file.
+    /// Returns all columns of a file.
     pub(super) fn file(&mut self, root: &Group) -> Result<Vec<Column>, String> {
         let mut columns = Vec::new();
-        self.group("", root, DEEPEST, None, &mut columns)?;
+        self.group("", root, MAX_DEPTH, None, &mut columns)?;
         Ok(columns)
     }
 
@@ -68,8 +68,8 @@ impl<'r> Walk<'r> {
         let shown = if path.is_empty() { "/" } else { path };
         let (groups, names) = group.member_names().map_err(|error| unreadable(shown, &error))?;
         self.objects += groups.len() + names.len();
-        if self.objects > MOST_OBJECTS {
-            return Err(format!("more than {MOST_OBJECTS} groups and datasets; write the signals alone to a file"));
+        if self.objects > MAX_OBJECTS {
+            return Err(format!("more than {MAX_OBJECTS} groups and datasets; write only the signals to a file"));
         }
         let mut datasets = Vec::with_capacity(names.len());
         for name in names {
@@ -92,7 +92,7 @@ impl<'r> Walk<'r> {
         }
         let depth = depth.checked_sub(1).ok_or_else(|| {
             let start: String = path.chars().take(40).collect();
-            format!("groups are nested more than {DEEPEST} deep in {start}…; write the signals nearer to the root")
+            format!("groups are nested more than {MAX_DEPTH} deep in {start}…; write the signals closer to the root")
         })?;
         let mut inner = Vec::with_capacity(groups.len());
         for name in groups {
@@ -108,7 +108,7 @@ impl<'r> Walk<'r> {
         Ok(())
     }
 
-    /// What the attributes, the single numbers and the lists of texts of a group say of its arrays.
+    /// Returns the properties of a group from its attributes, single numbers and lists of texts, and its sample rate.
     fn scope(
         &mut self,
         attributes: &Attributes,
@@ -120,15 +120,18 @@ impl<'r> Walk<'r> {
         let mut lists = Vec::new();
         for (name, path, dataset) in datasets {
             if let (Some(storage), Ok(1)) = (values::storage(dataset.dtype()), dataset.num_elements()) {
-                // Only names of rates are looked at.
+                // Only numbers with the name of a rate or period are read.
                 if step_of(name, 1.0, None).is_some() {
-                    let value =
-                        storage.all(&values::bytes(path, dataset, 1, self.room)?).first().copied().unwrap_or(f64::NAN);
+                    let value = storage
+                        .all(&values::bytes(path, dataset, 1, self.budget)?)
+                        .first()
+                        .copied()
+                        .unwrap_or(f64::NAN);
                     let unit = Attributes::of_dataset(dataset).text(&UNITS);
                     let rate = step_of(name, value, unit.as_deref());
                     own = own.into_iter().chain(rate).reduce(Rate::or_better);
                 }
-            } else if let Some(texts) = values::texts(dataset, self.room) {
+            } else if let Some(texts) = values::texts(dataset, self.budget) {
                 lists.push(TextList { name: name.clone(), texts });
             }
         }
@@ -140,7 +143,7 @@ impl<'r> Walk<'r> {
         Ok((Scope { clock, lists }, rate))
     }
 
-    /// Adds the columns of groups; those of groups that differ in a number alone as segments.
+    /// Adds the columns of groups. Groups whose names differ only in a number are joined as segments.
     fn join(&mut self, path: &str, groups: Vec<(String, Vec<Column>)>, columns: &mut Vec<Column>) {
         let mut families: Vec<(String, Vec<(String, Part)>)> = Vec::new();
         for (name, own) in groups {
@@ -163,7 +166,7 @@ impl<'r> Walk<'r> {
             let stem = if stem.is_empty() { path.to_owned() } else { format!("{path}/{stem}") };
             match join(&stem, '/', parts.into_iter().map(|(_, part)| part).collect()) {
                 Ok(joined) => {
-                    self.note(format!("{count} groups, as {path}/{first} and {path}/{last}, are read as segments"));
+                    self.note(format!("{count} groups ({path}/{first} to {path}/{last}) are read as segments"));
                     columns.extend(joined);
                 }
                 Err(parts) => columns.extend(parts.into_iter().flat_map(|part| part.columns)),
@@ -172,7 +175,7 @@ impl<'r> Walk<'r> {
     }
 
     fn note(&mut self, what: String) {
-        if self.notes.len() < MOST_NOTES {
+        if self.notes.len() < MAX_NOTES {
             self.notes.push(what);
         }
     }

@@ -2,13 +2,13 @@
 
 use super::numbers::{Format, number};
 
-/// What ends a header.
+/// The last line of a header.
 pub(crate) const END: &str = "***End_of_Header***";
-/// What the file and a segment begin with.
+/// The first words of the file and of a segment.
 pub(crate) const FILE: &str = "LabVIEW Measurement";
 pub(crate) const SEGMENT: &str = "Channels";
 
-/// Where the times of a row are.
+/// The columns with the times of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum XColumns {
     No,
@@ -16,7 +16,7 @@ pub(crate) enum XColumns {
     Multi,
 }
 
-/// The file's header.
+/// The header of the file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FileHeader {
     pub(crate) format: Format,
@@ -26,16 +26,16 @@ pub(crate) struct FileHeader {
 }
 
 impl FileHeader {
-    /// Reads the header of which these are the lines.
+    /// Parses the lines of the header.
     pub(crate) fn parse(lines: &[&str]) -> Result<Self, String> {
-        // The separator is between a tag and its value, so that its own tag need not be understood.
+        // The separator is the character after a tag, so the value of the tag `Separator` is not needed.
         let after =
             |tag: &str| lines.iter().find_map(|line| line.strip_prefix(tag)).and_then(|rest| rest.chars().next());
         let separator =
             after("Separator").or_else(|| after("Decimal_Separator")).filter(|c| !c.is_alphanumeric()).unwrap_or('\t');
         let value = |tag: &str| {
             let is_tag = |line: &&&str| line.split(separator).next().is_some_and(|own| own.trim() == tag);
-            // A decimal comma may be the value of a tag in a file that is separated by commas.
+            // In a file that is separated by commas, the value of a tag may be a comma.
             lines
                 .iter()
                 .find(is_tag)
@@ -59,7 +59,7 @@ impl FileHeader {
     }
 }
 
-/// A segment's header.
+/// The header of a segment.
 #[derive(Clone, Debug)]
 pub(crate) struct SegmentHeader<'a> {
     lines: Vec<Vec<&'a str>>,
@@ -70,21 +70,21 @@ impl<'a> SegmentHeader<'a> {
         Self { lines: lines.iter().map(|line| line.split(separator).map(str::trim).collect()).collect() }
     }
 
-    /// Number of channels, as it is stated.
+    /// Returns the stated number of channels.
     pub(crate) fn channels(&self) -> Option<usize> {
         self.cells(SEGMENT).first()?.parse().ok()
     }
 
-    /// The cells after a tag.
+    /// Returns the cells after a tag.
     fn cells(&self, tag: &str) -> &[&'a str] {
         self.lines.iter().find(|cells| cells[0] == tag).map_or(&[], |cells| &cells[1..])
     }
 
-    /// What a tag says of the channels whose values are in these cells of a row.
+    /// Returns the values of a tag for the channels in these cells of a row.
     pub(crate) fn of_channels(&self, tag: &str, channels: &[usize]) -> Vec<Option<&'a str>> {
         let cells = self.cells(tag);
         let filled: Vec<&'a str> = cells.iter().copied().filter(|cell| !cell.is_empty()).collect();
-        // Where there is one for each channel, their order is enough; else a channel's cell is above its values.
+        // With one value per channel the order is sufficient. Otherwise the cell of a channel is above its values.
         if filled.len() == channels.len() {
             return filled.into_iter().map(Some).collect();
         }
@@ -94,12 +94,12 @@ impl<'a> SegmentHeader<'a> {
         channels.iter().map(above).collect()
     }
 
-    /// The first cell of a tag.
+    /// Returns the first filled cell of a tag.
     pub(crate) fn first(&self, tag: &str) -> Option<&'a str> {
         self.cells(tag).iter().copied().find(|cell| !cell.is_empty())
     }
 
-    /// Seconds at which the segment starts, counted from some midnight: date and time of its first channel.
+    /// Returns the start of the segment \[s\], from date and time of its first channel. The zero is an arbitrary midnight.
     pub(crate) fn start(&self, decimal: char) -> Option<f64> {
         let mut date = self
             .first("Date")?
@@ -109,7 +109,7 @@ impl<'a> SegmentHeader<'a> {
         let mut clock = self.first("Time")?.split(':');
         let (hour, minute) = (clock.next()?.parse::<u32>().ok()?, clock.next()?.parse::<u32>().ok()?);
         let second = number(clock.next()?, decimal)?;
-        // Months from March on, so that a leap day is the last of its year.
+        // The year begins in March, so a leap day is the last day of its year.
         let (year, month) = if month <= 2 { (year - 1, month + 9) } else { (year, month - 3) };
         let days = year * 365 + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day;
         Some(days as f64 * 86_400.0 + f64::from(hour) * 3600.0 + f64::from(minute) * 60.0 + second)

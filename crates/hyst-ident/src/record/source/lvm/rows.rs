@@ -3,15 +3,15 @@
 use super::header::{END, FILE, FileHeader, SEGMENT, SegmentHeader, XColumns};
 use super::numbers::{Format, midnight, number, since};
 
-/// Characters of a cell that a message shows.
-const MOST_SHOWN: usize = 24;
-/// Seconds since 1904 that are a date and not a duration: 30 years.
+/// Largest number of characters of a cell in a message.
+const MAX_SHOWN: usize = 24;
+/// Smallest time that is a date and not a duration \[s since 1904\]: 30 years.
 const EARLIEST_DATE: f64 = 1e9;
 
-/// What a column holds.
+/// The role of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Role {
-    /// Times of the channel that follows, or of all.
+    /// Times of the next channel, or of all channels.
     Time,
     Channel,
 }
@@ -23,17 +23,17 @@ pub(crate) struct Column {
     pub(crate) role: Role,
     pub(crate) unit: Option<String>,
     pub(crate) values: Vec<f64>,
-    /// Samples that the header states.
+    /// Number of samples that the header states.
     pub(crate) samples: Option<usize>,
     /// Time of the first row \[s\].
     pub(crate) start: f64,
     /// Sample period \[s\].
     pub(crate) step: Option<f64>,
-    /// Its cell in a row.
+    /// The number of the cell in a row.
     cell: usize,
 }
 
-/// All segments of a file, one below the other.
+/// All segments of a file, in sequence.
 #[derive(Debug)]
 pub(crate) struct Content {
     pub(crate) columns: Vec<Column>,
@@ -48,10 +48,10 @@ struct Reader<'a> {
     lines: Vec<&'a str>,
     at: usize,
     header: FileHeader,
-    /// What is subtracted from times in seconds since 1904.
+    /// The zero of absolute times \[s since 1904\].
     midnight: i64,
     content: Content,
-    /// When the first segment starts \[s\].
+    /// Start of the first segment \[s\].
     first_start: Option<f64>,
     ends_with_line: bool,
 }
@@ -71,7 +71,7 @@ pub(crate) fn read(text: &str) -> Result<Content, String> {
         } else if line.trim().is_empty() {
             reader.at += 1;
         } else if line.starts_with("***Start_Special***") {
-            // Settings of a program, which say nothing of the values.
+            // Settings of a program are not needed.
             while reader.lines.get(reader.at).is_some_and(|line| !line.starts_with("***End_Special***")) {
                 reader.at += 1;
             }
@@ -87,7 +87,7 @@ pub(crate) fn read(text: &str) -> Result<Content, String> {
 }
 
 impl<'a> Reader<'a> {
-    /// The lines of a header, without the one that ends it.
+    /// Returns the lines of a header without the last one.
     fn header_lines(&mut self, what: &str) -> Result<Vec<&'a str>, String> {
         let rest = &self.lines[self.at..];
         let end = rest.iter().position(|line| line.starts_with(END));
@@ -120,10 +120,10 @@ impl<'a> Reader<'a> {
             let same = |(one, other): (&Column, &Column)| one.role == other.role && one.name == other.name;
             if layout.len() != self.content.columns.len() || !layout.iter().zip(&self.content.columns).all(same) {
                 return Err(format!(
-                    "line {first_line}: the channels are not those of the first segment; save the segments in files of their own"
+                    "line {first_line}: the channels are not those of the first segment; save each segment in a separate file"
                 ));
             }
-            // The same columns may be in other cells.
+            // The columns may be in other cells than before.
             for (column, other) in self.content.columns.iter_mut().zip(&layout) {
                 column.cell = other.cell;
             }
@@ -138,7 +138,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The names of a segment's columns, or those that it would have.
+    /// Returns the names of the columns of a segment, or default names if the segment has none.
     fn names(&mut self, segment: &SegmentHeader<'a>) -> Option<Vec<String>> {
         let Format { separator, decimal } = self.header.format;
         while self.lines.get(self.at)?.trim().is_empty() {
@@ -163,7 +163,7 @@ impl<'a> Reader<'a> {
         Some(names)
     }
 
-    /// The columns that a segment's header describes.
+    /// Returns the columns that the header of a segment describes.
     fn layout(&mut self, names: &[String], segment: &SegmentHeader<'a>) -> Vec<Column> {
         let decimal = self.header.format.decimal;
         let is_time = |name: &str| name.starts_with("X_Value") || name.starts_with("X Value");
@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
                 let step = steps.next().flatten().and_then(|step| number(step, decimal));
                 column.step = step.filter(|step| *step > 0.0 && is_over_time);
             } else if self.header.x_columns == XColumns::No {
-                // Without times in the rows their cells are empty.
+                // If the rows have no times, these cells are empty.
                 continue;
             }
             columns.push(column);
@@ -257,7 +257,7 @@ impl<'a> Reader<'a> {
                 let value = if is_time { since(cell, decimal, self.midnight) } else { number(cell, decimal) };
                 let column = &mut self.content.columns[at];
                 let Some(value) = value else {
-                    let shown: String = cell.trim().chars().take(MOST_SHOWN).collect();
+                    let shown: String = cell.trim().chars().take(MAX_SHOWN).collect();
                     let what = format!("line {}, column \"{}\": \"{shown}\" is not a number", self.at, column.name);
                     return Err(format!("{what}; write it as 1{decimal}25, or remove the line"));
                 };
@@ -275,15 +275,16 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Moves the times of a segment that starts at `row` behind those before, where they begin anew: to the date and time of its
-    /// header, or else one step behind.
+    /// Shifts the times of a segment that starts at `row`, if they restart.
+    ///
+    /// The segment then starts at the date and time of its header, or else one step after the segment before.
     fn follow(&mut self, row: usize, segment: &SegmentHeader<'a>) {
         let Some(clock) = self.content.columns.iter().find(|column| column.role == Role::Time).filter(|_| row > 0)
         else {
             return;
         };
         let (last, first) = (clock.values[row - 1], clock.values[row]);
-        // Times that are missing cannot be compared.
+        // Missing times cannot be compared.
         if first > last || first.is_nan() || last.is_nan() {
             return;
         }
@@ -296,6 +297,6 @@ impl<'a> Reader<'a> {
             column.values[row..].iter_mut().for_each(|time| *time += shift);
         }
         let number = self.content.starts.len();
-        self.content.notes.push(format!("the times of segment {number} begin anew; they are read {shift} s later"));
+        self.content.notes.push(format!("the times of segment {number} restart; {shift} s are added to them"));
     }
 }

@@ -1,20 +1,20 @@
-//! Columns of an LVM file from its rows.
+//! The table of an LVM file.
 
 use super::header::XColumns;
 use super::rows::{Content, Role};
 use crate::record::source::{Axis, Head, Table};
 
-/// What LabVIEW calls the times of a row.
+/// The name of a time column in LabVIEW.
 const TIMES: &str = "X_Value";
 
-/// The columns of a file.
+/// Makes the table of a file.
 pub(crate) fn table(content: Content) -> Result<Table, String> {
     let mut table = Table::new("LabVIEW LVM");
     table.notes.clone_from(&content.notes);
     let Content { mut columns, starts, x_columns, .. } = content;
     let rows = columns.first().map_or(0, |column| column.values.len());
     if x_columns == XColumns::Multi && starts.len() == 1 {
-        // Channels of different length are filled up with empty cells.
+        // Shorter channels are padded with empty cells.
         for column in &mut columns {
             let used = column.values.iter().rposition(|value| !value.is_nan()).map_or(0, |last| last + 1);
             column.values.truncate(used);
@@ -38,8 +38,8 @@ pub(crate) fn table(content: Content) -> Result<Table, String> {
             continue;
         }
         if is_time {
-            // Times of their own have the name of their channel, and no unit: several columns in seconds are ambiguous, and the
-            // axis is in seconds anyway.
+            // A time column of a single channel has the name of the channel and no unit, because several columns in seconds are
+            // ambiguous. The axis is in seconds in any case.
             let head = if are_same {
                 Head { unit: column.unit.clone(), ..Head::new(TIMES) }
             } else {

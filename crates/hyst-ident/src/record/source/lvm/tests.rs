@@ -40,14 +40,14 @@ fn one_column_of_times_is_shared() {
     assert_eq!((&table.values[0], &table.values[2]), (&vec![0.5, 0.6], &vec![-0.3, 4.0]));
     assert!(table.values[1][1].is_nan());
     assert!(table.notes.is_empty(), "{:?}", table.notes);
-    // In the code page of Windows.
+    // The code page of Windows.
     let latin: Vec<u8> = one().chars().map(|c| c as u8).collect();
     assert_eq!(read("x.lvm", &latin).unwrap().heads[2].unit.as_deref(), Some("µm"));
     assert!(is(&latin) && is(&[MARK, &latin].concat()) && !is(b"LabVIEW"));
 }
 
 #[test]
-fn without_times_in_rows_they_are_even() {
+fn rows_without_times_have_even_times() {
     let text = file_header(',', "No")
         + &segment("10:00:00,0", &["\t1,25\t3", "\t2,25\t4"]).replace("0.5", "0,5").replace("0.1", "0,1");
     let table = read("x.lvm", text.as_bytes()).unwrap();
@@ -57,7 +57,7 @@ fn without_times_in_rows_they_are_even() {
 }
 
 #[test]
-fn times_of_each_channel_are_one_column_where_they_are_the_same() {
+fn equal_times_of_all_channels_are_one_column() {
     let text = |second: &str| {
         file_header('.', "Multi")
             + "Channels\t2\t\t\t\r\nSamples\t2\t\t2\t\r\nY_Unit_Label\tV\t\tum\t\r\nX0\t0\t\t0\t\r\nDelta_X\t1\t\t1\t\r\n***End_of_Header***\r\n\
@@ -81,8 +81,8 @@ fn each_header_begins_a_segment() {
     assert_eq!(names(&table), ["X_Value", "U", "Position", "segment"]);
     assert_eq!(table.values[0], [0.5, 0.6, 7.5, 7.6]);
     assert_eq!(table.values[3], [0.0, 0.0, 1.0, 1.0]);
-    assert!(table.notes[0].contains("segment 2 begin anew; they are read 7 s later"), "{:?}", table.notes);
-    // Without a date that helps, one step behind; special blocks say nothing.
+    assert!(table.notes[0].contains("segment 2 restart; 7 s are added to them"), "{:?}", table.notes);
+    // Without a later date the segment starts one step later. Special blocks are ignored.
     let special = "***Start_Special***\r\n1\t2\r\n***End_Special***\r\n";
     let table = read("x.lvm", (one() + special + &segment("10:00:00.0", &["0.5\t1\t2"])).as_bytes()).unwrap();
     assert!((table.values[0][2] - 0.7).abs() < 1e-12, "{:?}", table.values[0]);
@@ -102,7 +102,7 @@ fn absolute_times_are_seconds_since_midnight() {
 }
 
 #[test]
-fn faults_are_named_by_line_and_column() {
+fn errors_state_line_and_column() {
     let message = error(&one().replace("1.25", "1,25"));
     assert!(message.contains("line 20, column \"U\": \"1,25\" is not a number"), "{message}");
     let message = error(&one().replace("0.5\t1.25\t-3e-1\t", "0.5\t1.25"));
@@ -112,7 +112,7 @@ fn faults_are_named_by_line_and_column() {
     assert!(error(&file_header('.', "Two")).contains("X_Columns \"Two\""));
     let text = one();
     let cut = read("x.lvm", &text.as_bytes()[..text.len() - 5]);
-    assert!(cut.is_err(), "one row is left: {cut:?}");
+    assert!(cut.is_err(), "one complete row: {cut:?}");
     let text = one() + "0.7\t1.";
     let table = read("x.lvm", text.as_bytes()).unwrap();
     assert_eq!(table.values[0].len(), 2);
@@ -120,7 +120,7 @@ fn faults_are_named_by_line_and_column() {
 }
 
 #[test]
-fn no_beginning_of_a_file_panics() {
+fn truncated_files_do_not_panic() {
     let text = one() + &segment("10:00:07.0", &["0.5\t1\t2", "0.6\t3\t4"]);
     for length in 0..text.len() {
         let _ = read("x.lvm", &text.as_bytes()[..length]);
@@ -130,7 +130,7 @@ fn no_beginning_of_a_file_panics() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
     #[test]
-    fn no_damage_panics(changes in proptest::collection::vec((any::<prop::sample::Index>(), prop::sample::select(b"\t\n .,-0179eE*XSC\xB5\xFF".to_vec())), 1..8), multi: bool) {
+    fn damaged_bytes_do_not_panic(changes in proptest::collection::vec((any::<prop::sample::Index>(), prop::sample::select(b"\t\n .,-0179eE*XSC\xB5\xFF".to_vec())), 1..8), multi: bool) {
         let mut bytes = (file_header('.', if multi { "Multi" } else { "One" })
             + &segment("10:00:00.0", &["0.5\t1.25\t-3e-1", "0.6\tNaN\t4"])
             + &segment("10:00:07.0", &["0.5\t1\t2", "0.6\t3\t4"])).into_bytes();

@@ -1,7 +1,7 @@
-//! The signals in a tree of MATLAB arrays, however a program laid them out.
+//! The signals in a tree of MATLAB arrays.
 //!
-//! Vectors and tables of numbers become columns wherever they are. Structs that dSPACE ControlDesk, Simulink and `timeseries` write are
-//! known: there a column gets its name, its unit and its times from fields beside it.
+//! Vectors and tables of numbers become columns wherever they are. In the structs of dSPACE ControlDesk, Simulink and `timeseries`, other fields
+//! give the name, unit and times of a column.
 
 mod matrix;
 mod programs;
@@ -9,28 +9,28 @@ mod programs;
 use std::collections::{HashMap, HashSet};
 
 use super::tree::{Array, Fields, Structs, Value};
-use crate::record::source::gather::{Clock, Column, Part, Rate, Room, TextList, join, step_of};
+use crate::record::source::gather::{Budget, Clock, Column, Part, Rate, TextList, join, step_of};
 use matrix::About;
 
-/// Reasons that are listed for arrays that are not read.
-const MOST_NOTES: usize = 8;
+/// Largest number of notes on arrays that are not read.
+const MAX_NOTES: usize = 8;
 
-/// Finds columns; one for a file.
+/// Finds the columns of one file.
 pub(crate) struct Layout<'r> {
-    room: &'r mut Room,
+    budget: &'r mut Budget,
     notes: Vec<String>,
-    /// The identity of the next column that others may name as their clock.
+    /// The identity of the next column that others may use as their clock.
     next_identity: u64,
-    /// Clocks by a hash of their values.
+    /// The identities of clocks by a hash of their values.
     clocks: HashMap<u64, u64>,
 }
 
-/// What holds for all arrays of a struct.
+/// The properties of a struct that apply to all its arrays.
 #[derive(Clone, Copy)]
 struct Scope<'t> {
     /// Path of the struct; empty for the workspace.
     path: &'t str,
-    /// The sample period that it, or a struct around it, states.
+    /// The sample period that the struct or an outer struct states.
     rate: Option<Rate>,
 }
 
@@ -45,16 +45,16 @@ impl Scope<'_> {
 }
 
 impl<'r> Layout<'r> {
-    pub(crate) fn new(room: &'r mut Room) -> Self {
-        Self { room, notes: Vec::new(), next_identity: 0, clocks: HashMap::new() }
+    pub(crate) fn new(budget: &'r mut Budget) -> Self {
+        Self { budget, notes: Vec::new(), next_identity: 0, clocks: HashMap::new() }
     }
 
-    /// What was left out, and why.
+    /// Returns notes on arrays that are not read.
     pub(crate) fn notes(self) -> Vec<String> {
         self.notes
     }
 
-    /// The columns of a file with these variables.
+    /// Returns the columns of a file with these variables.
     pub(crate) fn file(&mut self, variables: &Structs<'_>) -> Result<Vec<Column>, String> {
         let mut columns = Vec::new();
         for fields in variables.iter() {
@@ -63,7 +63,7 @@ impl<'r> Layout<'r> {
         Ok(columns)
     }
 
-    /// Columns of one struct.
+    /// Adds the columns of one struct.
     fn fields(&mut self, outer: Scope<'_>, fields: Fields<'_, '_>, columns: &mut Vec<Column>) -> Result<(), String> {
         let own =
             fields.iter().filter_map(|(name, value)| step_of(name, value.scalar()?, None)).reduce(Rate::or_better);
@@ -83,7 +83,7 @@ impl<'r> Layout<'r> {
         Ok(())
     }
 
-    /// Columns of an array that is not numbers of a struct.
+    /// Adds the columns of an array that is not a numeric field of a struct.
     fn array(&mut self, scope: Scope<'_>, array: &Array<'_>, columns: &mut Vec<Column>) -> Result<(), String> {
         match &array.value {
             Value::Numbers { .. } => self.numbers(scope.path, array, &About::new(scope.clock()), columns),
@@ -103,12 +103,12 @@ impl<'r> Layout<'r> {
         }
     }
 
-    /// Columns of a struct or an array of them.
+    /// Adds the columns of a struct or an array of structs.
     fn structs(&mut self, scope: Scope<'_>, structs: &Structs<'_>, columns: &mut Vec<Column>) -> Result<(), String> {
         if let [values] = structs.elements.as_slice() {
             return self.fields(scope, Fields { names: &structs.names, values }, columns);
         }
-        // Structs of the same signals are segments, as measured one after the other.
+        // Structs with the same signals are segments that were measured one after the other.
         let mut parts = Vec::with_capacity(structs.elements.len());
         for (k, fields) in structs.iter().enumerate() {
             let path = format!("{}({})", scope.path, k + 1);
@@ -133,22 +133,23 @@ impl<'r> Layout<'r> {
     }
 
     fn note(&mut self, what: String) {
-        if self.notes.len() < MOST_NOTES {
+        if self.notes.len() < MAX_NOTES {
             self.notes.push(what);
         }
     }
 }
 
-/// Lists of texts among the fields of a struct.
+/// Returns the lists of texts among the fields of a struct.
 fn lists(fields: Fields<'_, '_>) -> Vec<TextList> {
     fields.iter().filter_map(|(name, value)| Some(TextList { name: name.to_owned(), texts: value.texts()? })).collect()
 }
 
-/// The units that a struct states of its fields, by their names in small letters: in a field `voltage_unit`, or in the struct `units` under the same
-/// name.
+/// The units of the fields of a struct, by name in lower case.
 struct Units {
-    beside: HashMap<String, String>,
-    inside: HashMap<String, String>,
+    /// Units in fields such as `voltage_unit`.
+    fields: HashMap<String, String>,
+    /// Units in a struct `units`, in a field with the name of the signal.
+    struct_fields: HashMap<String, String>,
 }
 
 impl Units {
@@ -165,17 +166,16 @@ impl Units {
             }
             texts
         };
-        let inside = fields.get(&["units", "unit"]).and_then(|(_, units)| units.structs()?.iter().next());
+        let units = fields.get(&["units", "unit"]).and_then(|(_, units)| units.structs()?.iter().next());
         Self {
-            beside: texts(fields, &["unit", "units"]),
-            inside: inside.map(|units| texts(units, &[""])).unwrap_or_default(),
+            fields: texts(fields, &["unit", "units"]),
+            struct_fields: units.map(|units| texts(units, &[""])).unwrap_or_default(),
         }
     }
 
     fn of_field(&self, name: &str) -> Option<String> {
         let name = name.to_lowercase();
-        let beside =
-            || ["_unit", "_units", "unit", "units"].iter().find_map(|e| self.beside.get(&format!("{name}{e}")));
-        beside().or_else(|| self.inside.get(&name)).cloned()
+        let own = || ["_unit", "_units", "unit", "units"].iter().find_map(|e| self.fields.get(&format!("{name}{e}")));
+        own().or_else(|| self.struct_fields.get(&name)).cloned()
     }
 }

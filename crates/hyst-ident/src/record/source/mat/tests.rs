@@ -1,4 +1,4 @@
-//! Files of these versions, written byte by byte.
+//! MATLAB files of versions 4 to 7, built byte by byte.
 
 mod writer;
 
@@ -55,7 +55,7 @@ fn compressed_variables_and_version_4_are_read() {
 }
 
 #[test]
-fn structs_are_paths_and_a_rate_gives_times() {
+fn structs_give_paths_and_a_rate_gives_times() {
     let inner = structs(&["voltage", "voltage_unit"], &[&[array("", &[2, 1], numbers(&[1.0, 2.0])), text("", "V")]]);
     let outer = structs(&["Fs", "run"], &[&[array("", &[1, 1], numbers(&[1000.0])), array("", &[1, 1], inner)]]);
     let found = table(&file(&[array("rig", &[1, 1], outer)], false));
@@ -64,7 +64,7 @@ fn structs_are_paths_and_a_rate_gives_times() {
 }
 
 #[test]
-fn lists_name_the_columns_of_a_table() {
+fn lists_of_texts_name_the_columns_of_a_table() {
     let matrix = array("data", &[2, 2], numbers(&[0.0, 1.0, 5.0, 6.0]));
     let labels = array("names", &[1, 2], cells(&[text("", "Time"), text("", "Sensor")]));
     let symbols = array("units", &[1, 2], cells(&[text("", "s"), text("", "µm")]));
@@ -73,7 +73,7 @@ fn lists_name_the_columns_of_a_table() {
 }
 
 #[test]
-fn control_desk_names_signals() {
+fn signals_of_control_desk_are_read() {
     let signal = |name: &str, unit: &str, values: &[f64]| {
         [text("", name), text("", unit), array("", &[1, 2], numbers(values)), array("", &[1, 1], numbers(&[1.0]))]
     };
@@ -88,7 +88,7 @@ fn control_desk_names_signals() {
 }
 
 #[test]
-fn simulink_gives_times() {
+fn times_of_simulink_are_read() {
     let vector = |values: &[f64]| array("", &[values.len() as i32, 1], numbers(values));
     let series = |values: &[f64]| {
         let info = structs(&["Units"], &[&[text("", "um")]]);
@@ -111,7 +111,7 @@ fn simulink_gives_times() {
     assert_eq!((names(&found), units(&found)), (vec!["out.time", "u", "y"], vec!["s", "", ""]));
     assert_eq!(found.heads[2].axis, Axis::Column(0));
 
-    // The times of a signal come last where it is a matrix.
+    // In a matrix signal the last dimension is the time.
     let cube = array("", &[2, 1, 3], numbers(&[1.0, 10.0, 2.0, 20.0, 3.0, 30.0]));
     let series = structs(&["Time", "Data"], &[&[vector(&[0.0, 1.0, 2.0]), cube]]);
     let found = table(&file(&[array("s", &[1, 1], series)], false));
@@ -127,12 +127,12 @@ fn structs_of_the_same_signals_are_segments() {
 }
 
 #[test]
-fn what_cannot_be_read_is_named() {
+fn arrays_that_cannot_be_read_are_named() {
     let complex = array("z", &[2, 1], numbers(&[1.0, 2.0])).complex();
     let wrong = message(&file(&[complex, text("remark", "none")], false));
-    assert!(wrong.contains("x.mat: MATLAB 5: holds no column") && wrong.contains("\"z\" is complex"), "{wrong}");
+    assert!(wrong.contains("x.mat: MATLAB 5: no column") && wrong.contains("\"z\" is complex"), "{wrong}");
     let wrong = message(&file(&[array("t", &[4, 1], numbers(&[1.0]))], false));
-    assert!(wrong.contains("variable \"t\": 1 numbers where 4"), "{wrong}");
+    assert!(wrong.contains("variable \"t\": 1 numbers found, but 4"), "{wrong}");
     let mut deep = empty();
     for _ in 0..100 {
         deep = array("deep", &[1, 1], structs(&["a"], &[&[deep]]));
@@ -142,7 +142,7 @@ fn what_cannot_be_read_is_named() {
     assert!(message(&compressed(&zeros)).contains("expands"));
 }
 
-/// A file of most kinds of arrays.
+/// A file with most kinds of arrays.
 fn various() -> Vec<u8> {
     let vector = |values: &[f64]| array("", &[values.len() as i32, 1], numbers(values));
     let series = structs(&["Time", "Data", "Name"], &[&[vector(&[0.0, 0.2]), vector(&[1.0, 2.0]), text("", "u")]]);
@@ -161,7 +161,7 @@ fn various() -> Vec<u8> {
 }
 
 #[test]
-fn no_cut_and_no_change_leads_to_a_panic() {
+fn truncated_and_damaged_files_do_not_panic() {
     let plain = various();
     for bytes in [compressed(&plain), plain, version_4(&[("t", 1, &[0.0, 1.0]), ("y", 1, &[2.0, 3.0])], true)] {
         for end in 0..bytes.len() {

@@ -1,6 +1,6 @@
-//! Characters of MATLAB's texts.
+//! Texts of MATLAB, which are stored column by column.
 
-/// Lines of a text whose characters have these codes in UTF-16, column by column.
+/// Returns the lines of a text with these UTF-16 codes, which are stored column by column.
 pub(crate) fn from_codes(codes: &[u16], rows: usize) -> Vec<String> {
     if rows <= 1 {
         return lines(
@@ -8,12 +8,12 @@ pub(crate) fn from_codes(codes: &[u16], rows: usize) -> Vec<String> {
             1,
         );
     }
-    // Rows are told apart before pairs of codes become one character.
+    // Rows are separated before surrogate pairs are decoded.
     let row = |row: usize| codes.iter().skip(row).step_by(rows).copied().collect::<Vec<u16>>();
     (0..rows.min(codes.len())).map(|at| String::from_utf16_lossy(&row(at)).trim_end().to_owned()).collect()
 }
 
-/// Lines of a text whose characters come column by column.
+/// Returns the lines of a text whose characters are stored column by column.
 pub(super) fn lines(characters: Vec<char>, rows: usize) -> Vec<String> {
     if characters.is_empty() {
         return Vec::new();

@@ -1,10 +1,10 @@
-//! What MATLAB's workspace holds: arrays of numbers, texts, cells and structs.
+//! The tree of a MATLAB workspace: arrays of numbers, texts, cells and structs.
 
 use std::borrow::Cow;
 
 use crate::record::source::elements::{Kind, Storage};
 
-/// An array; elements of one column follow each other.
+/// An array, stored column by column.
 #[derive(Clone, Debug)]
 pub(crate) struct Array<'a> {
     /// Rows, columns and further dimensions.
@@ -12,7 +12,7 @@ pub(crate) struct Array<'a> {
     pub(crate) value: Value<'a>,
 }
 
-/// What an array is made of.
+/// The value of an array.
 #[derive(Clone, Debug)]
 pub(crate) enum Value<'a> {
     Numbers {
@@ -23,7 +23,7 @@ pub(crate) enum Value<'a> {
     Text(Vec<String>),
     Cells(Vec<Array<'a>>),
     Structs(Structs<'a>),
-    /// Why it is not read.
+    /// The reason why the array is not read.
     Unread(String),
 }
 
@@ -31,7 +31,7 @@ pub(crate) enum Value<'a> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Structs<'a> {
     pub(crate) names: Vec<String>,
-    /// One value a field, in the order of the names.
+    /// The structs. Each has one value per field, in the order of the names.
     pub(crate) elements: Vec<Vec<Array<'a>>>,
 }
 
@@ -43,7 +43,7 @@ pub(crate) struct Fields<'t, 'a> {
 }
 
 impl Value<'_> {
-    /// No numbers.
+    /// Makes an empty array of numbers.
     pub(crate) fn empty() -> Self {
         let storage = Storage { kind: Kind::F64, big_endian: false };
         Self::Numbers { bytes: Cow::Borrowed(&[]), storage }
@@ -51,19 +51,19 @@ impl Value<'_> {
 }
 
 impl<'a> Structs<'a> {
-    /// Its structs.
+    /// Returns the structs.
     pub(crate) fn iter(&self) -> impl Iterator<Item = Fields<'_, 'a>> {
         self.elements.iter().map(|values| Fields { names: &self.names, values })
     }
 }
 
 impl<'t, 'a> Fields<'t, 'a> {
-    /// Fields with their names.
+    /// Returns the fields with their names.
     pub(crate) fn iter(self) -> impl Iterator<Item = (&'t str, &'t Array<'a>)> {
         self.names.iter().map(String::as_str).zip(self.values)
     }
 
-    /// The first field with one of these names, whatever the case; its number and its value.
+    /// Finds the first field with one of these names, ignoring case. Returns its number and value.
     pub(crate) fn get(self, names: &[&str]) -> Option<(usize, &'t Array<'a>)> {
         names.iter().find_map(|wanted| {
             let at = self.names.iter().position(|name| name.eq_ignore_ascii_case(wanted))?;
@@ -71,7 +71,7 @@ impl<'t, 'a> Fields<'t, 'a> {
         })
     }
 
-    /// The text of the first field with one of these names, where it is one line.
+    /// Returns the text of the first field with one of these names and one line of text.
     pub(crate) fn text(self, names: &[&str]) -> Option<&'t str> {
         names.iter().find_map(|name| self.get(&[name])?.1.text())
     }
@@ -82,7 +82,7 @@ impl<'a> Array<'a> {
         Self { dims: Vec::new(), value: Value::Unread(why.into()) }
     }
 
-    /// A text of one line that is not blank, also where it is the only one in a cell array.
+    /// Returns a text of one line that is not blank. It may be the only cell of a cell array.
     pub(crate) fn text(&self) -> Option<&str> {
         match &self.value {
             Value::Text(lines) => match lines.as_slice() {
@@ -97,7 +97,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// Several texts: a cell array of nothing else, or rows of characters.
+    /// Returns several texts: a cell array of texts, or rows of characters.
     pub(crate) fn texts(&self) -> Option<Vec<String>> {
         let texts: Vec<String> = match &self.value {
             Value::Text(lines) => lines.iter().map(|line| line.trim().to_owned()).collect(),
@@ -113,12 +113,12 @@ impl<'a> Array<'a> {
         (texts.len() > 1).then_some(texts)
     }
 
-    /// How many elements the dimensions ask for.
+    /// Returns the number of elements.
     pub(crate) fn count(&self) -> Option<usize> {
         count(&self.dims)
     }
 
-    /// The number of an array of one.
+    /// Returns the number of an array with one element.
     pub(crate) fn scalar(&self) -> Option<f64> {
         match &self.value {
             Value::Numbers { bytes, storage } if self.count() == Some(1) => storage.all(bytes).first().copied(),
@@ -126,7 +126,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// Whether it is an array of at least two numbers.
+    /// Returns whether this is an array of at least two numbers.
     pub(crate) fn is_numbers(&self) -> bool {
         matches!(self.value, Value::Numbers { .. }) && self.count().is_some_and(|count| count > 1)
     }
@@ -139,7 +139,7 @@ impl<'a> Array<'a> {
     }
 }
 
-/// The product of dimensions.
+/// Returns the product of dimensions; `None` if it overflows.
 pub(crate) fn count(dims: &[usize]) -> Option<usize> {
     dims.iter().try_fold(1_usize, |product, dim| product.checked_mul(*dim))
 }

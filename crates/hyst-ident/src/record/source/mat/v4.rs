@@ -1,4 +1,4 @@
-//! Version 4: one matrix after the other, each behind 20 bytes and its name.
+//! Version 4: a sequence of matrices, each after a header of 20 bytes and its name.
 
 use std::borrow::Cow;
 
@@ -7,14 +7,14 @@ use super::tree::{Array, Structs, Value, count};
 use crate::record::source::elements::{Kind, Storage};
 
 const HEADER: usize = 20;
-/// MATLAB takes names of 63 characters; other writers are not far from it.
+/// Longest name. MATLAB allows 63 characters; other programs may allow more.
 const LONGEST_NAME: usize = 256;
 
 /// The first 20 bytes of a matrix.
 #[derive(Clone, Copy, Debug)]
 struct Header {
     storage: Storage,
-    /// 0: numbers, 1: text, 2: sparse.
+    /// Class of the matrix; 0: numbers, 1: text, 2: sparse.
     class: u32,
     dims: [usize; 2],
     complex: bool,
@@ -27,7 +27,7 @@ impl Header {
             let own = *bytes.get(4 * at..)?.first_chunk()?;
             Some(if big_endian { u32::from_be_bytes(own) } else { u32::from_le_bytes(own) })
         };
-        // The type's thousands digit is the byte order, the tens are the number's type, the ones the class.
+        // Digits of the type: thousands = byte order, tens = type of the numbers, ones = class.
         let big_endian = word(0, false)? > 4052;
         let kind = word(0, big_endian)?;
         if kind / 1000 != u32::from(big_endian) || kind / 100 % 10 != 0 || kind % 10 > 2 {
@@ -54,7 +54,7 @@ impl Header {
     }
 }
 
-/// Whether a file begins as one of version 4 does, which has no signature: a header that makes sense, then a name.
+/// Returns whether a file begins with a valid header and a name. Version 4 has no signature.
 pub(super) fn is(bytes: &[u8]) -> bool {
     let Some(header) = Header::parse(bytes) else { return false };
     let name = bytes.get(HEADER..).unwrap_or_default();
@@ -66,7 +66,7 @@ pub(super) fn is(bytes: &[u8]) -> bool {
         && name[letters..].iter().all(|byte| *byte == 0)
 }
 
-/// The matrices of a file.
+/// Reads the matrices of a file.
 pub(super) fn variables(bytes: &[u8]) -> Result<Structs<'_>, String> {
     let (mut names, mut values) = (Vec::new(), Vec::new());
     let mut at = 0;
@@ -89,7 +89,8 @@ pub(super) fn variables(bytes: &[u8]) -> Result<Structs<'_>, String> {
         let Some(data) = end.and_then(|end| rest.get(start..end)) else {
             let [rows, columns] = header.dims;
             return Err(format!(
-                "variable {number}, \"{name}\", announces {rows} × {columns} numbers, more than the file holds; the file is cut off or this size is damaged: copy it again, or save it again"
+                "variable {number}, \"{name}\", states {rows} × {columns} numbers, more than the file holds; \
+                 the file is cut off or damaged: copy it again, or save it again"
             ));
         };
         values.push(array(header, data));
@@ -105,8 +106,8 @@ fn array(header: Header, data: &[u8]) -> Array<'_> {
             let codes: Vec<char> = header.storage.all(data).into_iter().map(|code| char::from(code as u8)).collect();
             Value::Text(text::lines(codes, header.dims[0]))
         }
-        2 => Value::Unread("is sparse: save full(…) of it".to_owned()),
-        _ if header.complex => Value::Unread("is complex: save real(…) or abs(…) of it".to_owned()),
+        2 => Value::Unread("is sparse; save full(…) of it".to_owned()),
+        _ if header.complex => Value::Unread("is complex; save real(…) or abs(…) of it".to_owned()),
         _ => Value::Numbers { bytes: Cow::Borrowed(data), storage: header.storage },
     };
     Array { dims: header.dims.to_vec(), value }

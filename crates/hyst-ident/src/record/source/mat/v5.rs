@@ -1,4 +1,4 @@
-//! Versions 5 to 7: tagged elements, each variable an element by itself, since version 7 compressed.
+//! Versions 5 to 7: tagged elements. Each variable is one element, which is compressed since version 7.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -6,27 +6,27 @@ use std::io::Read;
 use super::text;
 use super::tree::{Array, Structs, Value, count};
 use crate::record::source::elements::{Kind, Storage};
-use crate::record::source::gather::Room;
+use crate::record::source::gather::Budget;
 
 const HEADER: usize = 128;
-/// Structs in structs.
-const DEEPEST: u32 = 32;
-/// Arrays of a file, those in cells and structs counted.
-const MOST_ARRAYS: usize = 1_000_000;
-const MOST_DIMENSIONS: usize = 32;
+/// Deepest nesting of structs.
+const MAX_DEPTH: u32 = 32;
+/// Largest number of arrays of a file, including those in cells and structs.
+const MAX_ARRAYS: usize = 1_000_000;
+const MAX_DIMENSIONS: usize = 32;
 
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
 const CUT: &str = "the file ends inside it; it is cut off: copy it again";
 
-/// What the first 128 bytes say.
+/// The header of a file: the first 128 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header {
     big_endian: bool,
 }
 
-/// Whether a file begins as one of version 5 does, be it cut off inside the header.
+/// Returns whether a file begins like one of version 5, also if it is truncated inside the header.
 pub(super) fn is(bytes: &[u8]) -> bool {
     match bytes.get(HEADER - 4..HEADER) {
         Some(end) => end == [0, 1, b'I', b'M'] || end == [1, 0, b'M', b'I'],
@@ -40,15 +40,15 @@ pub(super) fn header(bytes: &[u8]) -> Result<Header, String> {
     Ok(Header { big_endian })
 }
 
-/// The content of a variable's element, behind its tag.
+/// The element of a variable.
 pub(super) struct Part<'a> {
     bytes: Cow<'a, [u8]>,
-    /// Where the content begins and ends.
+    /// The range of the content without the tag.
     range: std::ops::Range<usize>,
 }
 
-/// Elements of all variables, uncompressed.
-pub(super) fn unpack<'a>(bytes: &'a [u8], header: Header, room: &mut Room) -> Result<Vec<Part<'a>>, String> {
+/// Returns the elements of all variables, uncompressed.
+pub(super) fn unpack<'a>(bytes: &'a [u8], header: Header, budget: &mut Budget) -> Result<Vec<Part<'a>>, String> {
     let mut parts = Vec::new();
     let mut elements = Elements { bytes: bytes.get(HEADER..).unwrap_or_default(), big_endian: header.big_endian };
     while !elements.bytes.is_empty() {
@@ -57,10 +57,10 @@ pub(super) fn unpack<'a>(bytes: &'a [u8], header: Header, room: &mut Room) -> Re
         match kind {
             MATRIX => parts.push(Part { bytes: Cow::Borrowed(content), range: 0..content.len() }),
             COMPRESSED => {
-                let own = inflate(content, room).map_err(fault)?;
+                let own = inflate(content, budget).map_err(fault)?;
                 let mut inner = Elements { bytes: &own, big_endian: header.big_endian };
                 if let (MATRIX, content) = inner.next().map_err(fault)? {
-                    // The tag of a matrix is never short.
+                    // The tag of a matrix always has eight bytes.
                     let range = 8..8 + content.len();
                     parts.push(Part { bytes: Cow::Owned(own), range });
                 }
@@ -71,23 +71,23 @@ pub(super) fn unpack<'a>(bytes: &'a [u8], header: Header, room: &mut Room) -> Re
     Ok(parts)
 }
 
-fn inflate(content: &[u8], room: &mut Room) -> Result<Vec<u8>, String> {
+fn inflate(content: &[u8], budget: &mut Budget) -> Result<Vec<u8>, String> {
     let mut own = Vec::new();
-    let read = flate2::read::ZlibDecoder::new(content).take(room.left().saturating_add(1)).read_to_end(&mut own);
+    let read = flate2::read::ZlibDecoder::new(content).take(budget.remaining().saturating_add(1)).read_to_end(&mut own);
     read.map_err(|error| format!("cannot be unpacked ({error}); the file is damaged: copy it again"))?;
-    room.take(own.len() as u64)?;
+    budget.take(own.len() as u64)?;
     Ok(own)
 }
 
-/// The variables in the elements.
+/// Parses the variables in the elements.
 pub(super) fn variables<'a>(parts: &'a [Part<'_>], header: Header) -> Result<Structs<'a>, String> {
     let (mut names, mut values) = (Vec::new(), Vec::new());
-    let mut left = MOST_ARRAYS;
+    let mut left = MAX_ARRAYS;
     for part in parts {
         let elements = Elements { bytes: &part.bytes[part.range.clone()], big_endian: header.big_endian };
-        let mut matrix = Matrix { elements, left: &mut left, depth: DEEPEST };
+        let mut matrix = Matrix { elements, left: &mut left, depth: MAX_DEPTH };
         let start = matrix.start().map_err(|what| format!("variable {}: {what}", names.len() + 1))?;
-        // A nameless variable is MATLAB's own: what objects consist of.
+        // A variable without a name belongs to MATLAB objects.
         if start.name.is_empty() {
             continue;
         }
@@ -98,7 +98,7 @@ pub(super) fn variables<'a>(parts: &'a [Part<'_>], header: Header) -> Result<Str
     Ok(Structs { names, elements: vec![values] })
 }
 
-/// Elements that follow each other.
+/// A sequence of elements.
 struct Elements<'a> {
     bytes: &'a [u8],
     big_endian: bool,
@@ -117,10 +117,10 @@ impl<'a> Elements<'a> {
         Ok(own)
     }
 
-    /// The type and the content of the next element.
+    /// Returns the type and the content of the next element.
     fn next(&mut self) -> Result<(u32, &'a [u8]), String> {
         let word = self.word()?;
-        // Up to four bytes stand in the tag itself.
+        // A content of up to four bytes is in the tag itself.
         if word >> 16 != 0 {
             let own = self.take(4)?.get(..(word >> 16) as usize);
             return Ok((word & 0xffff, own.ok_or("a short element is longer than four bytes; save the file again")?));
@@ -157,7 +157,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// What an array begins with.
+/// The beginning of an array.
 struct Start {
     class: u32,
     complex: bool,
@@ -168,30 +168,30 @@ struct Start {
 /// An array being parsed.
 struct Matrix<'a, 'b> {
     elements: Elements<'a>,
-    /// Arrays that may still come.
+    /// Number of further arrays that are allowed.
     left: &'b mut usize,
-    /// Levels that may still come.
+    /// Number of further levels that are allowed.
     depth: u32,
 }
 
 impl<'a> Matrix<'a, '_> {
     fn start(&mut self) -> Result<Start, String> {
-        *self.left = self.left.checked_sub(1).ok_or("more than a million arrays; save the signals alone")?;
-        // A field that was never set.
+        *self.left = self.left.checked_sub(1).ok_or("more than a million arrays; save only the signals")?;
+        // A field that was not set is empty.
         if self.elements.bytes.is_empty() {
             return Ok(Start { class: 6, complex: false, dims: vec![0, 0], name: String::new() });
         }
         let flags =
             self.elements.numbers()?.first().copied().ok_or("an array without flags; save the file again")? as u32;
         let (class, complex) = (flags & 0xff, flags & 0x800 != 0);
-        // An object has its name where others have their dimensions.
+        // An object has its name in the place of the dimensions.
         if class == 17 {
             let name = String::from_utf8_lossy(self.elements.next()?.1).into_owned();
             return Ok(Start { class, complex, dims: Vec::new(), name });
         }
         let dims: Vec<usize> = self.elements.numbers()?.into_iter().map(|dim| dim.max(0.0) as usize).collect();
-        if dims.len() > MOST_DIMENSIONS {
-            return Err(format!("more than {MOST_DIMENSIONS} dimensions; save the file again"));
+        if dims.len() > MAX_DIMENSIONS {
+            return Err(format!("more than {MAX_DIMENSIONS} dimensions; save the file again"));
         }
         let name = String::from_utf8_lossy(self.elements.next()?.1).trim_end_matches('\0').to_owned();
         Ok(Start { class, complex, dims, name })
@@ -210,8 +210,8 @@ impl<'a> Matrix<'a, '_> {
                 Value::Structs(self.structs(count)?)
             }
             4 => Value::Text(self.text(start.dims.first().copied().unwrap_or(1))?),
-            5 => Value::Unread("is sparse: save full(…) of it".to_owned()),
-            6..=15 if start.complex => Value::Unread("is complex: save real(…) or abs(…) of it".to_owned()),
+            5 => Value::Unread("is sparse; save full(…) of it".to_owned()),
+            6..=15 if start.complex => Value::Unread("is complex; save real(…) or abs(…) of it".to_owned()),
             6..=15 if count == 0 => Value::empty(),
             6..=15 => {
                 let (kind, content) = self.elements.next()?;
@@ -219,40 +219,40 @@ impl<'a> Matrix<'a, '_> {
                 if content.len() / storage.kind.size() != count {
                     let found = content.len() / storage.kind.size();
                     return Err(format!(
-                        "{found} numbers where {count} are announced; the file is damaged: copy it again"
+                        "{found} numbers found, but {count} are stated; the file is damaged: copy it again"
                     ));
                 }
                 Value::Numbers { bytes: Cow::Borrowed(content), storage }
             }
             16 => Value::Unread("is a function".to_owned()),
             17 => Value::Unread(
-                "is an object of MATLAB: save its parts as arrays, as t = x.Time; y = x.Data; save file.mat t y"
+                "is a MATLAB object; save its parts as arrays, for example t = x.Time; y = x.Data; save file.mat t y"
                     .to_owned(),
             ),
-            _ => Value::Unread("is of a class that is not known".to_owned()),
+            _ => Value::Unread("has an unknown class".to_owned()),
         })
     }
 
-    /// Refuses a count of arrays that the bytes behind it cannot hold; the shortest takes eight.
+    /// Refuses a number of arrays that the remaining bytes cannot hold. The shortest array has eight bytes.
     fn claim(&self, count: usize) -> Result<(), String> {
         if count > self.elements.bytes.len() / 8 + 1 {
             return Err(format!(
-                "{count} elements are announced, more than there are bytes for; the file is damaged: copy it again"
+                "{count} elements are stated, more than the file can hold; the file is damaged: copy it again"
             ));
         }
         Ok(())
     }
 
-    /// An array inside this one.
+    /// Parses an array inside this one.
     fn inner(&mut self) -> Result<Array<'a>, String> {
         let (kind, content) = self.elements.next()?;
         if kind != MATRIX {
-            return Err("an element is no array; the file is damaged: copy it again".to_owned());
+            return Err("an element is not an array; the file is damaged: copy it again".to_owned());
         }
         let depth = self
             .depth
             .checked_sub(1)
-            .ok_or_else(|| format!("structs are nested more than {DEEPEST} deep; save the signals alone"))?;
+            .ok_or_else(|| format!("structs are nested more than {MAX_DEPTH} deep; save only the signals"))?;
         let elements = Elements { bytes: content, big_endian: self.elements.big_endian };
         let mut inner = Matrix { elements, left: self.left, depth };
         let start = inner.start()?;

@@ -8,20 +8,22 @@ use super::{add, numbered};
 use crate::record::source::{Axis, Table};
 use zip::ZipArchive;
 
-/// Bytes that an archive may hold whatever its size.
+/// Size up to which an archive may always unpack \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// How many times its size an archive may hold beyond that.
+/// Largest ratio of unpacked to packed size of larger archives.
 const MAX_EXPANSION: u64 = 200;
 const EXTENSION: &str = ".npy";
-/// Names of scalars that state a sample rate \[Hz\], or a sample period \[s\].
+/// Names of scalars with a sample rate \[Hz\] or a sample period \[s\].
 const RATES: [&str; 8] = ["fs", "Fs", "FS", "fs_hz", "sample_rate", "SampleRate", "sample_rate_hz", "sampling_rate"];
 const PERIODS: [&str; 6] = ["dt", "Ts", "dt_s", "sample_period", "SamplePeriod", "sample_period_s"];
-/// Names of texts that name the columns of a table beside them.
+/// Names of text arrays with the column names of a table.
 const TITLES: [&str; 8] = ["columns", "names", "labels", "channels", "header", "headers", "fields", "column_names"];
-/// What the name of units has in it, in lower case.
+/// Part of the name of text arrays with units, in lower case.
 const UNITS: &str = "unit";
 
-/// Whether `bytes` are an archive of arrays. The first name is enough, so that an archive that is cut off is known too.
+/// Returns whether `bytes` are an archive of arrays.
+///
+/// The first name is checked first, so that a truncated archive is recognised too.
 pub(crate) fn is(bytes: &[u8]) -> bool {
     if !bytes.starts_with(b"PK\x03\x04") {
         return false;
@@ -34,7 +36,7 @@ pub(crate) fn is(bytes: &[u8]) -> bool {
     archive.is_ok_and(|archive| archive.file_names_raw().any(|name| name.ends_with(EXTENSION.as_bytes())))
 }
 
-/// An array's bytes.
+/// The bytes of an array.
 struct Member {
     name: String,
     bytes: Vec<u8>,
@@ -54,22 +56,22 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Table, String> {
             Err(what) => return Err(format!("\"{}\": {what}", member.name)),
         }
     }
-    let beside = Beside::find(&arrays);
+    let stated = Stated::find(&arrays);
     let mut steps = Vec::new();
     for (name, array) in &arrays {
         let of_field = |field: &str| if field.is_empty() { (*name).to_owned() } else { format!("{name}.{field}") };
-        let titles = beside.titles(array.columns());
+        let titles = stated.titles(array.columns());
         let titled = |field: &str, column: usize| match &titles {
-            // The name alone, where the table's name and a column's cannot be told apart.
+            // If the column name has a path separator, the name of the table is omitted.
             Some(titles) if field.is_empty() && titles[column].contains(['/', '!']) => titles[column].clone(),
             Some(titles) if field.is_empty() => format!("{name}/{}", titles[column]),
             _ => numbered(&of_field(field), array, column),
         };
-        let unit = |column: usize| beside.unit(name, array.columns(), column);
+        let unit = |column: usize| stated.unit(name, array.columns(), column);
         add(&mut table, name, array, titled, unit);
-        steps.resize(table.heads.len(), beside.steps.get(folder(name)).copied());
+        steps.resize(table.heads.len(), stated.steps.get(folder(name)).copied());
     }
-    // A rate counts for the longest columns: shorter ones are of another rate, or no signals.
+    // A rate applies to the longest columns. Shorter columns have another rate or are not signals.
     let longest = table.values.iter().map(Vec::len).max().unwrap_or(0);
     for ((head, values), step) in table.heads.iter_mut().zip(&table.values).zip(steps) {
         if let Some(step) = step.filter(|_| values.len() == longest) {
@@ -79,7 +81,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Table, String> {
     Ok(table)
 }
 
-/// Unpacks the arrays of an archive; all together no more than numbers ever take.
+/// Unpacks the arrays of an archive, with a limit on their total size.
 fn unpack(bytes: &[u8]) -> Result<Vec<Member>, String> {
     const AGAIN: &str = "the file may be cut off: copy it again";
     let mut archive = ZipArchive::new(Cursor::new(bytes))
@@ -99,31 +101,31 @@ fn unpack(bytes: &[u8]) -> Result<Vec<Member>, String> {
         read.map_err(|error| format!("\"{array}\" cannot be unpacked ({error}); {AGAIN}"))?;
         let Some(rest) = allowed.checked_sub(unpacked.len() as u64) else {
             return Err(format!(
-                "\"{array}\" expands to more than {MAX_EXPANSION} times the file's size; save only the arrays of the record"
+                "\"{array}\" expands to more than {MAX_EXPANSION} times the size of the file; save only the arrays of the record"
             ));
         };
         allowed = rest;
         if !unpacked.starts_with(TAG) {
-            return Err(format!("\"{array}\" is no NumPy array; save the archive with numpy.savez"));
+            return Err(format!("\"{array}\" is not a NumPy array; save the archive with numpy.savez"));
         }
         members.push(Member { name: array.to_owned(), bytes: unpacked });
     }
     Ok(members)
 }
 
-/// What small arrays say of the others.
-struct Beside {
-    /// Texts: one, or one for each column of a table.
+/// Names, units and sample periods that text arrays and scalars state for other arrays.
+struct Stated {
+    /// Text arrays: one text, or one text per column of a table.
     texts: Vec<(String, Vec<String>)>,
-    /// Sample periods \[s\] by the folder of the scalar that states them.
+    /// Sample periods \[s\] by the folder of the scalar.
     steps: HashMap<String, f64>,
-    /// Units of arrays by their names.
+    /// Units by the name of the array.
     units: HashMap<String, String>,
 }
 
-impl Beside {
+impl Stated {
     fn find(arrays: &[(&str, Array<'_>)]) -> Self {
-        let mut beside = Self { texts: Vec::new(), steps: HashMap::new(), units: HashMap::new() };
+        let mut stated = Self { texts: Vec::new(), steps: HashMap::new(), units: HashMap::new() };
         for (name, array) in arrays {
             let [field] = array.fields.as_slice() else { continue };
             if array.columns() != 1 {
@@ -131,20 +133,20 @@ impl Beside {
             }
             if let Some(texts) = array.texts(field) {
                 if let ([unit], Some(of)) = (texts.as_slice(), unit_of(name)) {
-                    beside.units.insert(of.to_owned(), unit.clone());
+                    stated.units.insert(of.to_owned(), unit.clone());
                 }
-                beside.texts.push(((*name).to_owned(), texts));
+                stated.texts.push(((*name).to_owned(), texts));
             } else if array.shape == Shape::Scalar
                 && let Some(&[number]) = array.numbers(field, 0).as_deref()
                 && let Some(step) = step(leaf(name), number)
             {
-                beside.steps.entry(folder(name).to_owned()).or_insert(step);
+                stated.steps.entry(folder(name).to_owned()).or_insert(step);
             }
         }
-        beside
+        stated
     }
 
-    /// The names of a table's columns: of texts with one for each column, those with a name for such texts, or else the only ones.
+    /// Returns the column names of a table: a text array with one text per column and a name from [`TITLES`], or else the only such array.
     fn titles(&self, columns: usize) -> Option<Vec<String>> {
         let is_whole = |texts: &[String]| texts.len() == columns && texts.iter().all(|text| !text.is_empty());
         let is_title = |(name, texts): &&(String, Vec<String>)| {
@@ -167,12 +169,12 @@ impl Beside {
     }
 }
 
-/// The array whose unit `name` is, as `voltage_unit`.
+/// Returns the array whose unit `name` states: `voltage` for `voltage_unit`.
 fn unit_of(name: &str) -> Option<&str> {
     [".unit", ".units", "_unit", "_units", "/unit", "/units"].iter().find_map(|end| name.strip_suffix(end))
 }
 
-/// The sample period that a scalar states.
+/// Returns the sample period \[s\] that a scalar states.
 fn step(name: &str, number: f64) -> Option<f64> {
     let step = if RATES.contains(&name) {
         1.0 / number

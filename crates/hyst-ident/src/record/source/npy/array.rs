@@ -3,32 +3,32 @@
 use super::dtype::{Field, Kind, Tick, fields};
 use super::literal::Literal;
 
-/// What an NPY file begins with.
+/// The first bytes of an NPY file.
 pub(crate) const TAG: &[u8] = b"\x93NUMPY";
 
-/// The numbers in an array, by its lengths.
+/// The shape of an array without lengths of 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Shape {
     Scalar,
     Vector(usize),
-    /// Rows and columns, at least as many rows.
+    /// Rows and columns, with at least as many rows as columns.
     Table(usize, usize),
-    /// None of these.
+    /// Any other shape.
     Other,
 }
 
-/// An array whose values are still bytes.
+/// An array whose values are not converted yet.
 #[derive(Debug)]
 pub(crate) struct Array<'a> {
     pub(crate) fields: Vec<Field>,
     pub(crate) shape: Shape,
-    /// Its lengths, as the file states them.
+    /// The lengths in the file.
     pub(crate) lengths: Vec<usize>,
-    /// Bytes after its last value.
+    /// Number of bytes after the last value.
     pub(crate) surplus: usize,
-    /// Column after column, as Fortran has it.
+    /// Whether the array is stored column by column (Fortran order).
     is_by_column: bool,
-    /// Bytes of an element.
+    /// Size of an element \[bytes\].
     size: usize,
     values: &'a [u8],
 }
@@ -41,17 +41,17 @@ impl<'a> Array<'a> {
         let (fields, size) = fields(description)?;
         let shape = header.get("shape").and_then(Literal::list);
         let lengths: Option<Vec<usize>> = shape.and_then(|shape| shape.iter().map(Literal::integer).collect());
-        let lengths = lengths.ok_or("its header states no possible shape; the file is damaged: save it again")?;
+        let lengths = lengths.ok_or("its header states no valid shape; the file is damaged: save it again")?;
         if fields.iter().any(|field| field.kind == Kind::Objects) {
             return Err(
-                "it holds Python objects (pickled), which are not read; save numpy.asarray(x, dtype=float) instead"
+                "it holds Python objects (pickled), which are not supported; save numpy.asarray(x, dtype=float) instead"
                     .into(),
             );
         }
         let count = lengths.iter().try_fold(1_usize, |count, length| count.checked_mul(*length));
         let needed = count.and_then(|count| count.checked_mul(size)).filter(|needed| *needed <= body.len());
         let Some(needed) = needed else {
-            let what = format!("its shape {lengths:?} needs more bytes than the {} that are there", body.len());
+            let what = format!("its shape {lengths:?} needs more than the {} bytes in the file", body.len());
             return Err(format!("{what}; the file is cut off: copy it again"));
         };
         let (values, surplus) = body.split_at(needed);
@@ -59,7 +59,7 @@ impl<'a> Array<'a> {
         Ok(Self { fields, shape: shape_of(&lengths), lengths, surplus: surplus.len(), is_by_column, size, values })
     }
 
-    /// Number of columns that a field has.
+    /// Returns the number of columns of a field.
     pub(crate) fn columns(&self) -> usize {
         match self.shape {
             Shape::Scalar | Shape::Vector(_) => 1,
@@ -68,7 +68,7 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// The elements of a column, from a field's first byte on.
+    /// Returns the bytes of a field in each element of a column.
     fn items<'b>(&'b self, field: &'b Field, column: usize) -> impl Iterator<Item = &'a [u8]> + 'b {
         let (rows, columns) = match self.shape {
             Shape::Scalar => (1, 1),
@@ -83,8 +83,9 @@ impl<'a> Array<'a> {
         })
     }
 
-    /// The numbers of a column; times in seconds, dates since the midnight (UTC) before the first. None for texts and what else is
-    /// no number.
+    /// Returns the numbers of a column; `None` for texts and other types that are not numbers.
+    ///
+    /// Times are in seconds, dates in seconds since the midnight (UTC) before the first.
     pub(crate) fn numbers(&self, field: &Field, column: usize) -> Option<Vec<f64>> {
         let items = self.items(field, column);
         let order = |item: &[u8]| word(item, field.big_endian);
@@ -101,7 +102,7 @@ impl<'a> Array<'a> {
         })
     }
 
-    /// The texts of a field's first column; None where it holds something else.
+    /// Returns the texts of the first column of a field; `None` if it does not hold texts.
     pub(crate) fn texts(&self, field: &Field) -> Option<Vec<String>> {
         let items = self.items(field, 0);
         match field.kind {
@@ -115,11 +116,11 @@ impl<'a> Array<'a> {
     }
 }
 
-/// Header and values of a file.
+/// Splits a file into header and values.
 fn header(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     const CUT: &str = "it ends within its header; the file is cut off: copy it again";
     let version = *bytes.get(TAG.len()).ok_or(CUT)?;
-    // The minor version says nothing.
+    // The minor version is not needed.
     let rest = bytes.get(TAG.len() + 2..).ok_or(CUT)?;
     let digits = match version {
         1 => 2,
@@ -137,7 +138,7 @@ fn header(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     Ok((text, body))
 }
 
-/// The shape without lengths of 1.
+/// Returns the shape without lengths of 1.
 fn shape_of(lengths: &[usize]) -> Shape {
     let long: Vec<usize> = lengths.iter().copied().filter(|length| *length != 1).collect();
     match *long.as_slice() {
@@ -148,19 +149,19 @@ fn shape_of(lengths: &[usize]) -> Shape {
     }
 }
 
-/// Up to eight bytes as an integer.
+/// Returns up to eight bytes as an integer.
 fn word(item: &[u8], big_endian: bool) -> u64 {
     let add = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
     if big_endian { item.iter().fold(0, add) } else { item.iter().rev().fold(0, add) }
 }
 
-/// The lowest bytes of `word` as a signed integer.
+/// Returns the lowest `size` bytes of `word` as a signed integer.
 fn signed(word: u64, size: usize) -> i64 {
     let unused = 64 - 8 * size.clamp(1, 8) as u32;
     (word << unused) as i64 >> unused
 }
 
-/// A number of IEEE's half precision.
+/// Converts an IEEE 754 half-precision number.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
     let magnitude = match exponent {
@@ -172,10 +173,11 @@ fn half(bits: u16) -> f64 {
     if bits >> 15 == 1 { -magnitude } else { magnitude }
 }
 
-/// Seconds of times. Dates are counted from the midnight before the first, in whole ticks: seconds since 1970 have no room for
-/// nanoseconds in a double.
+/// Converts times to seconds. Dates are counted from the midnight before the first.
+///
+/// Ticks are subtracted as integers, because a double does not resolve nanoseconds since 1970.
 fn seconds(ticks: Vec<i64>, is_date: bool, tick: Tick) -> Vec<f64> {
-    // NumPy's "not a time".
+    // NaT ("not a time") of NumPy.
     const NONE: i64 = i64::MIN;
     let scaled = |ticks: i64| i128::from(ticks) * tick.numerator;
     let day = 86_400 * tick.denominator;

@@ -1,15 +1,15 @@
-//! Types of NumPy arrays: what an element holds, and where.
+//! Types of NumPy arrays: the fields of an element.
 
 use super::literal::Literal;
 
-/// Fields of an element. Records have up to a few hundred.
-const MOST_FIELDS: usize = 4096;
-/// Bytes of all their names. A short header can repeat a long name.
-const MOST_LETTERS: usize = 1 << 20;
-/// Records inside one another.
-const DEEPEST: usize = 16;
+/// Largest number of fields of an element. Structured arrays have up to a few hundred.
+const MAX_FIELDS: usize = 4096;
+/// Largest size of all names of fields \[bytes\]. A short header can repeat a long name.
+const MAX_LETTERS: usize = 1 << 20;
+/// Deepest nesting of structured types.
+const MAX_DEPTH: usize = 16;
 
-/// What a field of an element holds.
+/// The type of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
     Float,
@@ -21,19 +21,19 @@ pub(crate) enum Kind {
         is_date: bool,
         tick: Tick,
     },
-    /// Text of one byte a character.
+    /// Text with one byte per character.
     Bytes,
-    /// Text of four bytes a character.
+    /// Text with four bytes per character.
     Text,
-    /// Pickled objects of Python.
+    /// Pickled Python objects.
     Objects,
-    /// Bytes that fill up a record.
+    /// Padding bytes of a structured type.
     Filler,
-    /// What is not read, in words.
+    /// A type that is not supported, in words.
     Other(&'static str),
 }
 
-/// The step of times, as a fraction of seconds.
+/// The unit of times, as a fraction of a second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tick {
     pub(crate) numerator: i128,
@@ -43,7 +43,7 @@ pub(crate) struct Tick {
 /// A field of an element, or the whole element of a plain array.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Field {
-    /// As `position`, `stage.position` or `force[2]`; empty for the whole element.
+    /// The name, such as `position`, `stage.position` or `force[2]`; empty for the whole element.
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) size: usize,
@@ -51,29 +51,28 @@ pub(crate) struct Field {
     pub(crate) offset: usize,
 }
 
-/// The fields of an element, and its size in bytes.
+/// Returns the fields of an element, and its size \[bytes\].
 pub(crate) fn fields(description: &Literal) -> Result<(Vec<Field>, usize), String> {
     let mut fields = Fields { list: Vec::new(), offset: 0, steps: 0, letters: 0 };
-    fields.add(description, "", DEEPEST)?;
+    fields.add(description, "", MAX_DEPTH)?;
     Ok((fields.list, fields.offset))
 }
 
 struct Fields {
     list: Vec<Field>,
     offset: usize,
-    /// Types seen so far. Records without fields can repeat one another without end.
+    /// Number of types so far. It limits nested types without fields.
     steps: usize,
+    /// Size of all names so far \[bytes\].
     letters: usize,
 }
 
 impl Fields {
     fn add(&mut self, description: &Literal, name: &str, depth: usize) -> Result<(), String> {
-        let depth = depth.checked_sub(1).ok_or("records are inside one another too deeply; save plain arrays")?;
+        let depth = depth.checked_sub(1).ok_or("structured types are nested too deeply; save plain arrays")?;
         (self.steps, self.letters) = (self.steps + 1, self.letters + name.len());
-        if self.steps > MOST_FIELDS || self.letters > MOST_LETTERS {
-            return Err(format!(
-                "an element has more than {MOST_FIELDS} fields; save the columns as arrays of their own"
-            ));
+        if self.steps > MAX_FIELDS || self.letters > MAX_LETTERS {
+            return Err(format!("an element has more than {MAX_FIELDS} fields; save each column as a separate array"));
         }
         match description {
             Literal::Text(text) => self.add_plain(text, name),
@@ -89,7 +88,7 @@ impl Fields {
         Ok(())
     }
 
-    /// Adds a record's field: a name or a pair of title and name, a type, and in some records a shape.
+    /// Adds a field of a structured type: a name or a pair of title and name, a type, and optionally a shape.
     fn add_record(&mut self, record: &Literal, parent: &str, depth: usize) -> Result<(), String> {
         let parts = record.list().unwrap_or(&[]);
         let name = match parts.first() {
@@ -106,9 +105,9 @@ impl Fields {
             }
             Some(length) => length.integer(),
         };
-        let count = count.filter(|count| *count <= MOST_FIELDS);
+        let count = count.filter(|count| *count <= MAX_FIELDS);
         let count = count.ok_or_else(|| {
-            format!("the field \"{name}\" has more than {MOST_FIELDS} numbers; save it as an array of its own")
+            format!("the field \"{name}\" has more than {MAX_FIELDS} numbers; save it as a separate array")
         })?;
         (1..=count).try_for_each(|at| self.add(description, &format!("{name}[{at}]"), depth))
     }
@@ -119,7 +118,7 @@ fn unknown(name: &str) -> String {
     format!("the type{of} is not known; save numbers of type float64")
 }
 
-/// Kind, size and byte order of a type as `<f8`.
+/// Returns kind, size and byte order of a type such as `<f8`.
 fn plain(text: &str) -> Option<(Kind, usize, bool)> {
     let rest = text.trim_start_matches(['<', '>', '|', '=']);
     let letter = rest.chars().next()?;
@@ -131,9 +130,10 @@ fn plain(text: &str) -> Option<(Kind, usize, bool)> {
         ('i', 1 | 2 | 4 | 8) => Kind::Signed,
         ('u', 1 | 2 | 4 | 8) => Kind::Unsigned,
         ('b', 1) => Kind::Bool,
-        ('M' | 'm', 8) => {
-            tick(rest).map_or(Kind::Other("times of no fixed step"), |tick| Kind::Time { is_date: letter == 'M', tick })
-        }
+        ('M' | 'm', 8) => tick(rest).map_or(Kind::Other("times without a unit of fixed length"), |tick| Kind::Time {
+            is_date: letter == 'M',
+            tick,
+        }),
         ('S' | 'a', _) => Kind::Bytes,
         ('U', _) => return Some((Kind::Text, size.checked_mul(4)?, text.starts_with('>'))),
         ('O', _) => Kind::Objects,
@@ -144,7 +144,7 @@ fn plain(text: &str) -> Option<(Kind, usize, bool)> {
     Some((kind, size, text.starts_with('>')))
 }
 
-/// The step of `M8[25us]`. Months and years have no fixed one.
+/// Returns the unit of a time type such as `M8[25us]`; `None` for months and years, whose length is not fixed.
 fn tick(text: &str) -> Option<Tick> {
     let inside = text.split_once('[')?.1.strip_suffix(']')?;
     let letters = inside.trim_start_matches(|c: char| c.is_ascii_digit());

@@ -1,7 +1,7 @@
-//! Python literals, as the header of an NPY file has one.
+//! Python literals, which the header of an NPY file consists of.
 
-/// Literals inside one another; headers have four to six.
-const DEEPEST: usize = 32;
+/// Deepest nesting of literals. Headers have four to six levels.
+const MAX_DEPTH: usize = 32;
 
 /// A literal.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,12 +16,12 @@ pub(crate) enum Literal {
 }
 
 impl Literal {
-    /// Reads the literal at the start of `text`.
+    /// Parses the literal at the start of `text`.
     pub(crate) fn parse(text: &str) -> Option<Self> {
-        Parser { rest: text }.literal(DEEPEST)
+        Parser { rest: text }.literal(MAX_DEPTH)
     }
 
-    /// The value of a dictionary's key.
+    /// Returns the value of a key of a dictionary.
     pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         let Self::Dictionary(pairs) = self else { return None };
         pairs.iter().find(|(own, _)| own.text() == Some(key)).map(|(_, value)| value)
@@ -45,7 +45,7 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// Passes over blanks and then `token`, if it is next.
+    /// Skips blanks and then `token`. Returns false if `token` is not next.
     fn eat(&mut self, token: &str) -> bool {
         self.rest = self.rest.trim_start();
         let Some(rest) = self.rest.strip_prefix(token) else { return false };
@@ -80,7 +80,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Items with commas between them, up to `close`.
+    /// Parses items with commas between them, up to `close`.
     fn items<T>(&mut self, close: &str, item: impl Fn(&mut Self) -> Option<T>) -> Option<Vec<T>> {
         let mut items = Vec::new();
         loop {
@@ -110,7 +110,7 @@ impl Parser<'_> {
     fn integer(&mut self) -> Option<Literal> {
         let end = self.rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(self.rest.len());
         let (digits, rest) = self.rest.split_at(end);
-        // Python 2 wrote long integers with an L.
+        // Python 2 writes long integers with an L at the end.
         self.rest = rest.strip_prefix('L').unwrap_or(rest);
         digits.parse().ok().map(Literal::Integer)
     }

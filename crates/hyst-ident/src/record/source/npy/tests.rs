@@ -89,7 +89,7 @@ fn dates_are_seconds_since_midnight() {
 }
 
 #[test]
-fn structured_arrays_name_their_fields() {
+fn fields_of_structured_arrays_are_columns() {
     let header = "{'descr': [('t', '<u2'), ('', '|V1'), (('title', 'pos'), [('x', '|i1'), ('y', '|i1')]), ('f', '|u1', (2,))], \
                   'fortran_order': False, 'shape': (2,), }";
     let table = read("x.npy", &npy(header, &[1, 0, 9, 2, 3, 4, 5, 10, 0, 9, 20, 30, 40, 50])).unwrap();
@@ -119,7 +119,7 @@ fn archives_have_names_units_and_rates() {
     assert_eq!(table.values[1], [2.0, 4.0, 6.0]);
     assert_eq!(table.heads[2].unit.as_deref(), Some("mV"));
     assert_eq!(table.heads[0].axis, Axis::Even { start: 0.0, step: 1e-3 });
-    // Of another rate.
+    // This column is shorter, so the rate does not apply.
     assert_eq!(table.heads[2].axis, Axis::Unknown);
     let bare = npz(&members[..1]);
     assert_eq!(names(&read("x.npz", &bare).unwrap()), ["data[1]", "data[2]"]);
@@ -139,7 +139,7 @@ fn damaged_files_are_refused() {
     for shape in ["(18446744073709551615, 3)", "(99999999999999999999,)", "(-1,)", "3"] {
         error(&array("<f8", shape, &[0; 48]));
     }
-    // No bytes for so many elements.
+    // Elements without bytes.
     assert!(error(&array("|S0", "(1000000000000,)", &[])).contains("no array has columns"));
     assert!(error(&array("|O", "(2,)", &[0; 16])).contains("pickled"));
     let deep = format!("{{'descr': {}, 'fortran_order': False, 'shape': (2,)}}", "[".repeat(5000));
@@ -163,7 +163,7 @@ fn an_archive_that_expands_too_far_is_refused() {
     let size = (packed.total_in() as u32).to_le_bytes();
     let packed = packed.finish().unwrap();
     let mut bytes = npz(&[("a.npy", packed)]);
-    // Method 8 and the size, in both headers.
+    // Set method 8 (deflate) and the size in both headers.
     let directory = bytes.windows(4).rposition(|word| word == b"PK\x01\x02").unwrap();
     bytes[8] = 8;
     bytes[directory + 10] = 8;
@@ -176,7 +176,7 @@ fn an_archive_that_expands_too_far_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
     #[test]
-    fn no_damage_panics(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), is_archive: bool) {
+    fn damaged_bytes_do_not_panic(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6), is_archive: bool) {
         let header = "{'descr': [('t', '<u2'), ('f', '|u1', (2,)), ('x', '<M8[us]')], 'fortran_order': False, 'shape': (3, 1), }";
         let mut bytes = npy(header, &[7; 36]);
         if is_archive {

@@ -1,4 +1,4 @@
-//! The numbers of a column, whatever type they are stored as.
+//! The numbers of a column of any stored type.
 
 use parquet::basic::{ConvertedType, IntType, LogicalType, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -10,31 +10,31 @@ use crate::record::source::columnar::{Clock, decimal, half};
 
 /// Rows that are decoded at a time.
 const ROWS: usize = 8192;
-/// The Julian day of 1970-01-01, from which timestamps of 96 bits are counted.
+/// The Julian day number of 1970-01-01. Timestamps of 96 bits have Julian days.
 const JULIAN_DAY_OF_1970: i128 = 2_440_588;
 
-/// What stored values mean.
+/// The meaning of stored values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Meaning {
     Number,
     Unsigned,
     Half,
-    /// Integers with this many digits after the point.
+    /// Integers with this number of digits after the decimal point.
     Decimal(i32),
-    /// A number of days since 1970.
+    /// Days since 1970.
     Days(Clock),
     /// Ticks since 1970.
     Instant(Clock),
-    /// A time in this unit.
+    /// Times in this unit.
     Ticks(&'static str),
 }
 
 /// The numbers of a column so far.
 pub(super) struct Numbers {
     meaning: Meaning,
-    /// Definition level of a value that is there, where there may be nulls.
+    /// The definition level of a value that is not null; `None` if nulls are not allowed.
     defined: Option<i16>,
-    /// NaN stands for null.
+    /// The values; NaN for null.
     pub(super) values: Vec<f64>,
 }
 
@@ -47,10 +47,10 @@ fn per_second(unit: &TimeUnit) -> (i64, &'static str) {
 }
 
 impl Meaning {
-    /// What the values of a column mean; `None` if they are no numbers.
+    /// Returns the meaning of the values of a column; `None` if they are not numbers.
     fn of(descriptor: &ColumnDescriptor) -> Option<Self> {
         let scaled = Self::Decimal(descriptor.type_scale());
-        // Older programs state the converted type alone.
+        // Older programs state only the converted type.
         let stated = match (descriptor.logical_type_ref(), descriptor.converted_type()) {
             (Some(LogicalType::Decimal { .. }), _) | (None, ConvertedType::DECIMAL) => Some(scaled),
             (Some(LogicalType::Date), _) | (None, ConvertedType::DATE) => Some(Self::Days(Clock::new(1))),
@@ -68,12 +68,12 @@ impl Meaning {
             (Some(LogicalType::Float16), _) => Some(Self::Half),
             _ => None,
         };
-        // A column of nulls alone has no type.
+        // A column that has only nulls has no type.
         if descriptor.logical_type_ref() == Some(&LogicalType::Unknown) {
             return None;
         }
         match descriptor.physical_type() {
-            // Decimal numbers of more bytes have more digits than any measured value.
+            // Decimal numbers of more than 16 bytes are not supported: they have more digits than any measured value.
             Type::FIXED_LEN_BYTE_ARRAY if descriptor.type_length() > 16 => None,
             Type::BOOLEAN | Type::FLOAT | Type::DOUBLE => Some(Self::Number),
             Type::INT32 | Type::INT64 => Some(stated.filter(|stated| *stated != Self::Half).unwrap_or(Self::Number)),
@@ -100,7 +100,7 @@ impl Meaning {
         i64::try_from(since).map_or(f64::NAN, |since| self.integer(since))
     }
 
-    /// A half, or an integer in big-endian order.
+    /// Converts a half-precision number, or an integer in big-endian order.
     fn bytes(&self, bytes: &[u8]) -> f64 {
         match (self, bytes) {
             (Self::Half, [low, high]) => half(u16::from_le_bytes([*low, *high])),
@@ -115,14 +115,14 @@ impl Meaning {
 }
 
 impl Numbers {
-    /// None yet, of a column; `None` if it holds no numbers.
+    /// Makes an empty column; `None` if the column does not hold numbers.
     pub(super) fn of(descriptor: &ColumnDescriptor) -> Option<Self> {
         let level = descriptor.max_def_level();
         let defined = (level > 0).then_some(level);
         Some(Self { meaning: Meaning::of(descriptor)?, defined, values: Vec::new() })
     }
 
-    /// The unit that the type states.
+    /// Returns the unit that the type states.
     pub(super) fn unit(&self) -> Option<&'static str> {
         match self.meaning {
             Meaning::Days(_) | Meaning::Instant(_) => Some("s"),

@@ -1,24 +1,24 @@
-//! Sizes in a Parquet file that the decoder takes at their word: it allocates what a page claims before it looks at the page.
+//! Check of page sizes in a Parquet file. The decoder allocates the stated size of a page before it reads the page.
 
 use parquet::basic::Compression;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
 use super::Fault;
 
-/// Structs inside structs of a page header; the format has three.
+/// Deepest nesting of structs in a page header. The format has three levels.
 const MAX_DEPTH: u32 = 8;
-/// Elements of a list in a page header, which has none.
+/// Largest number of elements of a list in a page header. The format has no lists there.
 const MAX_ELEMENTS: u64 = 65_536;
 
-/// The kind of a page with a dictionary.
+/// The kind of a dictionary page.
 const DICTIONARY_PAGE: i64 = 2;
-/// The encodings of pages that refer to it.
+/// The encodings of pages that need a dictionary.
 const DICTIONARY_ENCODINGS: [i64; 2] = [2, 8];
 
-/// Checks that the pages of `columns` are inside the file and that all of them together unpack to `limit` bytes at most.
+/// Checks that the pages of `columns` are inside the file and together unpack to at most `limit` bytes.
 ///
 /// # Errors
-/// When they are not, or are compressed in a way that is not read.
+/// If they are not, or if their compression is not supported.
 pub(super) fn check(bytes: &[u8], metadata: &ParquetMetaData, columns: &[usize], limit: usize) -> Result<(), Fault> {
     let mut free = Free { unpacked: limit as u64, values: (limit / size_of::<f64>()) as u64 };
     for group in metadata.row_groups() {
@@ -30,7 +30,7 @@ pub(super) fn check(bytes: &[u8], metadata: &ParquetMetaData, columns: &[usize],
     Ok(())
 }
 
-/// What further pages may take.
+/// The limits for further pages.
 struct Free {
     unpacked: u64,
     values: u64,
@@ -44,7 +44,7 @@ fn check_chunk(bytes: &[u8], column: &ColumnChunkMetaData, free: &mut Free) -> R
     };
     if let Some(codec) = codec {
         return Err(Fault::new(format!(
-            "{codec} compression is not read; write the file again with compression=\"zstd\""
+            "{codec} compression is not supported; write the file again with compression=\"zstd\""
         )));
     }
     let outside = || Fault::damaged("its values are outside the file");
@@ -72,22 +72,22 @@ fn check_chunk(bytes: &[u8], column: &ColumnChunkMetaData, free: &mut Free) -> R
 #[derive(Default)]
 struct Page {
     kind: i64,
-    /// How the values of a page of data are encoded.
+    /// The encoding of the values of a data page.
     encoding: i64,
     unpacked: i64,
     packed: i64,
-    /// Values of a page of data.
+    /// Number of values of a data page.
     values: i64,
-    /// Values of a dictionary.
+    /// Number of values of a dictionary.
     dictionary: i64,
-    /// Bytes of the levels of a page of version 2, which are not compressed.
+    /// Size of the levels of a version 2 page, which are not compressed \[bytes\].
     levels: [i64; 2],
 }
 
 impl Page {
     fn read(header: &mut Compact<'_>) -> Option<Self> {
         let mut page = Self { unpacked: -1, packed: -1, ..Self::default() };
-        // The fields of `PageHeader`, and of the structs in it for data (5), dictionary (7) and data of version 2 (8).
+        // The fields of `PageHeader` (0) and of its structs for data (5), dictionary (7) and data of version 2 (8).
         header.read_struct(0, MAX_DEPTH, &mut |outer, field, value| match (outer, field) {
             (0, 1) => page.kind = value,
             (5, 2) | (8, 4) => page.encoding = value,
@@ -102,7 +102,7 @@ impl Page {
         Some(page)
     }
 
-    /// Checks a page behind whose header `rest` bytes of the column follow.
+    /// Checks a page. `rest` is the number of bytes of the column after its header.
     fn check(&self, rest: u64, free: &mut Free) -> Result<(), Fault> {
         let all = [self.unpacked, self.packed, self.values, self.dictionary, self.levels[0], self.levels[1]];
         let size = |value: i64| u64::try_from(value).ok();
@@ -114,22 +114,22 @@ impl Page {
             return Err(Fault::damaged("a page is longer than the column"));
         }
         if self.levels[0] + self.levels[1] > self.packed.min(self.unpacked) {
-            return Err(Fault::damaged("a page is shorter than it says"));
+            return Err(Fault::damaged("a page is shorter than its stated size"));
         }
-        // A value of a dictionary takes a bit at least.
+        // A value of a dictionary takes at least one bit.
         if self.dictionary > self.unpacked.saturating_mul(8) {
-            return Err(Fault::damaged("a dictionary is shorter than it says"));
+            return Err(Fault::damaged("a dictionary is shorter than its stated size"));
         }
         let fits = free.unpacked.checked_sub(unpacked).zip(free.values.checked_sub(values));
         let (unpacked, values) = fits.ok_or_else(|| {
-            Fault::new("there are more than 200 times as many bytes of numbers as the file has; write the columns of the record alone, as CSV")
+            Fault::new("the numbers unpack to more than 200 times the size of the file; write only the columns of the record, as CSV")
         })?;
         *free = Free { unpacked, values };
         Ok(())
     }
 }
 
-/// Thrift's compact protocol, as far as page headers need it.
+/// The part of Thrift's compact protocol that page headers use.
 struct Compact<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -165,7 +165,7 @@ impl Compact<'_> {
         Some(())
     }
 
-    /// Reads a struct and gives each integer in it to `field`, with the number of the struct it is in and its own.
+    /// Reads a struct and calls `field` for each integer: number of the struct, number of the field, value.
     fn read_struct(&mut self, number: i16, depth: u32, field: &mut dyn FnMut(i16, i16, i64)) -> Option<()> {
         let depth = depth.checked_sub(1)?;
         let mut own = 0_i16;

@@ -1,4 +1,4 @@
-//! Files that the crate's own writer makes; those of other programs are in the tests of layouts.
+//! Files made by the writer of the crate. Files of other programs are in tests/layouts.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ enum Values {
 }
 use Values::{Bytes as FixedBytes, Double, Flag, Float, Int, Julian, Long, Text};
 
-/// A file of row groups that all hold the same two rows.
+/// A file whose row groups all have the same two rows.
 fn file(schema: &str, groups: usize, properties: WriterProperties, columns: &[Values]) -> Vec<u8> {
     let schema = Arc::new(parse_message_type(&format!("message m {{ {schema} }}")).unwrap());
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap();
@@ -78,7 +78,7 @@ fn refused(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn row_groups_follow_one_another() {
+fn row_groups_are_concatenated() {
     let bytes = small();
     assert!(is(&bytes));
     let table = read("x.parquet", &bytes).unwrap();
@@ -90,7 +90,7 @@ fn row_groups_follow_one_another() {
 }
 
 #[test]
-fn types_become_numbers() {
+fn all_types_are_converted_to_numbers() {
     let schema = "required float f; required boolean b; required int32 n (UINT_32); required int64 m (UINT_64);
         required int32 d (DATE); required int64 us (TIMESTAMP_MICROS); required int32 clock (TIME_MILLIS); required int96 old;
         required int32 dec (DECIMAL(9, 2)); required fixed_len_byte_array(2) half (FLOAT16); required fixed_len_byte_array(3) big (DECIMAL(6, 1));
@@ -136,7 +136,7 @@ fn types_become_numbers() {
 }
 
 #[test]
-fn the_index_of_a_pandas_table_is_its_time() {
+fn the_index_of_a_pandas_table_is_the_time_axis() {
     let pandas = KeyValue::new("pandas".to_owned(), r#"{"index_columns": ["t"]}"#.to_owned());
     let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![pandas])).build();
     let bytes = file(
@@ -150,7 +150,7 @@ fn the_index_of_a_pandas_table_is_its_time() {
 }
 
 #[test]
-fn what_is_not_read_is_explained() {
+fn files_that_are_not_supported_are_refused_with_the_reason() {
     let bytes = small();
     let cut = refused(&bytes[..bytes.len() - 1]);
     assert!(cut.starts_with("x.parquet: Parquet: the end of the file is missing;"), "{cut}");

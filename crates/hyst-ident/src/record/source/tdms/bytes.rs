@@ -1,9 +1,9 @@
 //! Bytes of a TDMS file: integers and texts in either byte order, and the types of values.
 
-/// What a reader beyond the end of its bytes reports.
-const TOO_SHORT: &str = "a description of objects is longer than the bytes that are there";
+/// The error of reading beyond the end.
+const TOO_SHORT: &str = "a description of objects is longer than its bytes";
 
-/// Reads one item after another; never beyond the end.
+/// Reads one item after another and checks the end.
 pub(crate) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -44,7 +44,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// The first bytes of an item, in little-endian order; zeros stand for those that are not there.
+/// Returns the first bytes of an item in little-endian order. Missing bytes are zero.
 fn little_endian<const N: usize>(item: &[u8], big_endian: bool) -> [u8; N] {
     let mut array = [0; N];
     for (to, from) in array.iter_mut().zip(item) {
@@ -56,19 +56,19 @@ fn little_endian<const N: usize>(item: &[u8], big_endian: bool) -> [u8; N] {
     array
 }
 
-/// A time stamp: 2⁻⁶⁴ s since 1904-01-01 UTC.
+/// Returns a time stamp \[2⁻⁶⁴ s since 1904-01-01 UTC\].
 ///
-/// The file has whole seconds and a fraction in two words of 64 bits: both orders read as one integer of 128 bits.
+/// The file has whole seconds and a fraction in two words of 64 bits. In both byte orders they form one integer of 128 bits.
 pub(crate) fn moment(item: &[u8], big_endian: bool) -> i128 {
     i128::from_le_bytes(little_endian(item, big_endian))
 }
 
-/// Seconds in a difference of two time stamps. One rounding: the power of two is exact.
+/// Converts a difference of two time stamps to seconds. It is rounded once, because the power of two is exact.
 pub(crate) fn seconds(difference: i128) -> f64 {
     difference as f64 / 2_f64.powi(64)
 }
 
-/// The midnight (UTC) before a time stamp.
+/// Returns the midnight (UTC) before a time stamp.
 pub(crate) fn midnight(moment: i128) -> i128 {
     const DAY: i128 = 86_400 << 64;
     moment.div_euclid(DAY).saturating_mul(DAY)
@@ -92,7 +92,7 @@ pub(crate) enum Kind {
     Text,
     /// Complex numbers, of 8 or 16 bytes.
     Complex(usize),
-    /// A channel of DAQmx, whose values are in [scalers](super::objects::Scaler).
+    /// A DAQmx channel, whose values are in [scalers](super::objects::Scaler).
     Scalers,
     Void,
 }
@@ -109,7 +109,7 @@ impl Kind {
             6 => Self::U16,
             7 => Self::U32,
             8 => Self::U64,
-            // 0x19 and 0x1A are of a channel with a unit, which is in a property.
+            // 0x19 and 0x1A are numbers of a channel with a unit, which is in a property.
             9 | 0x19 => Self::F32,
             10 | 0x1A => Self::F64,
             0x20 => Self::Text,
@@ -122,7 +122,7 @@ impl Kind {
         })
     }
 
-    /// The type of a DAQmx scaler, which has numbers of its own.
+    /// Returns the type of a DAQmx scaler. Its codes differ from those of other values.
     pub(crate) fn of_scaler(code: u32) -> Option<Self> {
         const KINDS: [Kind; 10] = [
             Kind::U8,
@@ -136,11 +136,11 @@ impl Kind {
             Kind::F32,
             Kind::F64,
         ];
-        // Files with DAQmx data describe their time stamps in the same way.
+        // Files with DAQmx data describe time stamps as scalers too.
         if code == u32::MAX { Some(Kind::Time) } else { KINDS.get(code as usize).copied() }
     }
 
-    /// Bytes of a value; texts have none of their own.
+    /// Returns the size of a value \[bytes\]; `None` for texts and scalers.
     pub(crate) fn size(self) -> Option<usize> {
         Some(match self {
             Self::Void => 0,
@@ -158,7 +158,7 @@ impl Kind {
         !matches!(self, Self::Void | Self::Time | Self::Text | Self::Complex(_) | Self::Scalers)
     }
 
-    /// The number at the start of `item`.
+    /// Returns the number at the start of `item`.
     pub(crate) fn number(self, item: &[u8], big_endian: bool) -> f64 {
         match self {
             Self::I8 => f64::from(i8::from_le_bytes(little_endian(item, big_endian))),

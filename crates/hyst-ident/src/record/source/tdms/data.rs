@@ -1,17 +1,17 @@
-//! Raw data of a segment: chunks, each with the values of one channel after the other, or rows with a value of each channel.
+//! Raw data of a segment: either chunks with all values of one channel after the other, or rows with one value per channel.
 
 use super::bytes::{Kind, moment};
 use super::objects::{Index, Object, Scaler, Values};
 
-/// Values that DAQmx scalers may have for each byte of raw data: a byte has eight digital lines.
+/// Largest number of values of DAQmx scalers per byte of raw data. A byte has eight digital lines.
 const SCALED_PER_BYTE: usize = 8;
 
-/// How a segment's raw data lie.
+/// The layout of the raw data of a segment.
 #[derive(Clone, Copy)]
 pub(crate) struct Layout {
-    /// Row by row.
+    /// Whether the data are stored row by row.
     pub(crate) is_interleaved: bool,
-    /// Whether the file ends before the segment does.
+    /// Whether the file ends before the segment.
     pub(crate) is_cut: bool,
     pub(crate) big_endian: bool,
 }
@@ -31,7 +31,7 @@ pub(crate) fn read(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [
         is_text |= index.kind == Kind::Text;
     }
     match is_text {
-        // Programs set the flag for a single channel of text too.
+        // Some programs also set the flag for a single channel of text.
         true if layout.is_interleaved && active.len() > 1 => {
             Err("texts cannot be interleaved; copy the file again".into())
         }
@@ -58,8 +58,8 @@ fn contiguous(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Objec
         let (bytes, after) = rest.split_at(taken);
         rest = after;
         let missing = chunk - taken as u64;
-        // Of a chunk that is cut off, those rows are complete that the last channel has. A chunk that is short without being
-        // cut off has the same part of each channel.
+        // In a truncated chunk, the rows that the last channel has are complete. A short chunk that is not truncated has the
+        // same share of every channel.
         let (part, whole) = match missing {
             0 => (1, 1),
             _ if layout.is_cut => (last.saturating_sub(missing), last),
@@ -75,7 +75,7 @@ fn contiguous(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Objec
             let used = if kind == Kind::Text { share(index.bytes) } else { share(index.count) * size };
             if is_packed && u128::from(used) * u128::from(whole) != u128::from(index.bytes) * u128::from(part) {
                 let what =
-                    format!("the raw data of {} bytes are no whole number of rows; copy the file again", raw.len());
+                    format!("the raw data of {} bytes are not a whole number of rows; copy the file again", raw.len());
                 return Err(named(object, &what));
             }
             let end = at.saturating_add(usize::try_from(used).unwrap_or(usize::MAX)).min(bytes.len());
@@ -111,7 +111,7 @@ fn interleaved(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Obje
     Ok(())
 }
 
-/// Adds values to a channel; texts and complex numbers are passed over.
+/// Adds values to a channel. Texts and complex numbers are skipped.
 fn append<'a>(
     object: &mut Object,
     kind: Kind,
@@ -130,14 +130,14 @@ fn append<'a>(
         _ => {
             return Err(named(
                 object,
-                "numbers, times or DAQmx data follow one another in one channel; write them to separate channels",
+                "the type of its values changes (numbers, times, DAQmx data); write them to separate channels",
             ));
         }
     }
     Ok(())
 }
 
-/// DAQmx data: each chunk has one buffer for each card, each buffer has rows, and scalers say where in a row a value is.
+/// Reads DAQmx data: each chunk has one buffer per card, each buffer has rows, and scalers state the place of a value in a row.
 fn daqmx(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Object]) -> Result<(), String> {
     let indices: Vec<(usize, Index)> =
         active.iter().filter_map(|object| objects[*object].index.clone().map(|index| (*object, index))).collect();
@@ -149,7 +149,7 @@ fn daqmx(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Object]) -
     while !rest.is_empty() {
         let (bytes, after) = rest.split_at(chunk.min(rest.len()));
         rest = after;
-        // Buffers that follow one another do not end at the same row when the file is cut off.
+        // In a truncated file, the buffers of a chunk do not end at the same row.
         if bytes.len() < chunk && layout.is_cut && is_several {
             break;
         }
@@ -181,11 +181,11 @@ fn daqmx(raw: &[u8], layout: Layout, active: &[usize], objects: &mut [Object]) -
 struct Buffer {
     start: usize,
     bytes: usize,
-    /// Bytes of a row.
+    /// Size of a row \[bytes\].
     width: usize,
 }
 
-/// The buffers of a chunk. A buffer is as long as the longest channel in it.
+/// Returns the buffers of a chunk. A buffer is as long as the longest channel in it.
 fn buffers(indices: &[(usize, Index)], objects: &[Object]) -> Result<Vec<Buffer>, String> {
     let widths = indices.first().map_or(&[][..], |(_, index)| &index.widths);
     let mut rows = vec![0_u64; widths.len()];
@@ -214,7 +214,7 @@ fn buffers(indices: &[(usize, Index)], objects: &[Object]) -> Result<Vec<Buffer>
     buffers.ok_or_else(|| "DAQmx buffers have an impossible size; copy the file again".into())
 }
 
-/// The value of a scaler in a row.
+/// Returns the value of a scaler in a row.
 fn value(scaler: &Scaler, row: &[u8], big_endian: bool) -> f64 {
     let byte = if scaler.is_digital { scaler.offset / 8 } else { scaler.offset };
     let item = row.get(byte..).filter(|item| item.len() >= scaler.kind.size().unwrap_or(0));
@@ -229,7 +229,7 @@ fn scaled(object: &mut Object, id: u32, numbers: impl Iterator<Item = f64>) -> R
     let Values::Scalers(scalers) = &mut object.values else {
         return Err(named(
             object,
-            "DAQmx and other data follow one another in one channel; write them to separate channels",
+            "the type of its values changes (DAQmx and other data); write them to separate channels",
         ));
     };
     match scalers.iter_mut().find(|(own, _)| *own == id) {

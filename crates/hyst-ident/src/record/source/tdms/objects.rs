@@ -9,43 +9,43 @@ use super::bytes::Kind;
 pub(crate) enum Property {
     Number(f64),
     Text(String),
-    /// 2⁻⁶⁴ s since 1904.
+    /// A time stamp \[2⁻⁶⁴ s since 1904\].
     Time(i128),
 }
 
-/// A place of values in a DAQmx buffer.
+/// The place of values in a DAQmx buffer.
 #[derive(Clone, Debug)]
 pub(crate) struct Scaler {
     pub(crate) kind: Kind,
     pub(crate) buffer: usize,
-    /// The byte, or for a digital line the bit, in a row of the buffer.
+    /// The byte in a row of the buffer; for a digital line the bit.
     pub(crate) offset: usize,
     pub(crate) id: u32,
     pub(crate) is_digital: bool,
 }
 
-/// How the raw data of a channel lie in each chunk of a segment.
+/// The raw data of a channel in each chunk of a segment.
 #[derive(Clone, Debug)]
 pub(crate) struct Index {
     pub(crate) kind: Kind,
-    /// Values in a chunk.
+    /// Number of values in a chunk.
     pub(crate) count: u64,
-    /// Bytes in a chunk.
+    /// Size in a chunk \[bytes\].
     pub(crate) bytes: u64,
     pub(crate) scalers: Vec<Scaler>,
-    /// Bytes of a row in each DAQmx buffer.
+    /// Size of a row in each DAQmx buffer \[bytes\].
     pub(crate) widths: Vec<usize>,
 }
 
-/// Values of a channel as the file has them.
+/// Values of a channel, before scaling.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum Values {
     #[default]
     None,
     Numbers(Vec<f64>),
-    /// 2⁻⁶⁴ s since 1904.
+    /// Time stamps \[2⁻⁶⁴ s since 1904\].
     Times(Vec<i128>),
-    /// Values of DAQmx scalers by their numbers.
+    /// Values of DAQmx scalers, by their numbers.
     Scalers(Vec<(u32, Vec<f64>)>),
 }
 
@@ -65,12 +65,12 @@ impl Values {
 pub(crate) struct Object {
     /// Empty for the file.
     pub(crate) group: String,
-    /// None for the file and for groups.
+    /// `None` for the file and for groups.
     pub(crate) channel: Option<String>,
     pub(crate) properties: HashMap<String, Property>,
     pub(crate) values: Values,
     pub(crate) index: Option<Index>,
-    /// Start times that segments state after the first, and the row at which each counts.
+    /// Start times in later segments, each with the row at which it applies.
     pub(crate) restarts: Vec<(usize, i128)>,
     /// Whether the sample period changes after the first value.
     pub(crate) changes_period: bool,
@@ -93,8 +93,7 @@ impl Object {
         if let Some(Property::Time(time)) = self.properties.get(property) { Some(*time) } else { None }
     }
 
-    /// A later segment may repeat a property or change it: the last value counts. The times of a waveform are those of its
-    /// first value.
+    /// Sets a property. The last value in the file applies, except for the start of a waveform, where the first value applies.
     pub(crate) fn set(&mut self, name: String, value: Property) {
         if self.values.rows() > 0 {
             match (name.as_str(), &value, self.properties.get(&name)) {

@@ -1,17 +1,19 @@
-//! NI's scales: properties that say how raw values become physical ones, as LabVIEW shows them.
+//! NI scales: properties for the conversion of raw values to physical values.
 
 use super::objects::{Object, Values};
 
-/// What an input source says when it is the raw data.
+/// The input source that means the raw data.
 const RAW: f64 = u32::MAX as f64;
-/// Scales of a channel, and steps from one to another: files have one to four.
-const MOST_STEPS: usize = 64;
-/// Coefficients of a polynomial, and rows of a table.
-const MOST_COEFFICIENTS: f64 = 4096.0;
-/// Coefficients of a polynomial that does not state how many it has.
+/// Largest number of scales of a channel, and of steps between them. Files have one to four.
+const MAX_STEPS: usize = 64;
+/// Largest number of coefficients of a polynomial, and of rows of a table.
+const MAX_COEFFICIENTS: f64 = 4096.0;
+/// Number of coefficients of a polynomial that does not state it.
 const DEFAULT_COEFFICIENTS: f64 = 4.0;
 
-/// The physical values of a channel; `stated` are the objects that may state its scales: the channel, its group, the file.
+/// Converts the values of a channel to physical values.
+///
+/// `stated` are the objects that may state its scales: the channel, its group and the file.
 pub(crate) fn apply<'a>(values: Values, mut stated: impl Iterator<Item = &'a Object>) -> Result<Vec<f64>, String> {
     let scaled = stated.find_map(|object| Some((object, count(object)?)));
     if let Some((object, count)) = scaled.filter(|(object, _)| object.text("NI_Scaling_Status") != Some("scaled")) {
@@ -21,15 +23,15 @@ pub(crate) fn apply<'a>(values: Values, mut stated: impl Iterator<Item = &'a Obj
     match values {
         Values::Numbers(values) => Ok(values),
         Values::Scalers(mut scalers) if scalers.len() == 1 => Ok(scalers.swap_remove(0).1),
-        _ => Err("it has several DAQmx scalers and no scale that says which one counts".into()),
+        _ => Err("it has several DAQmx scalers and no scale that selects one of them".into()),
     }
 }
 
-/// How many scales an object states.
+/// Returns the number of scales that an object states.
 fn count(object: &Object) -> Option<usize> {
     let stated = object.number("NI_Number_Of_Scales").map(|count| count as usize);
     let found = || {
-        (0..MOST_STEPS).rev().find(|at| object.text(&format!("NI_Scale[{at}]_Scale_Type")).is_some()).map(|at| at + 1)
+        (0..MAX_STEPS).rev().find(|at| object.text(&format!("NI_Scale[{at}]_Scale_Type")).is_some()).map(|at| at + 1)
     };
     stated.or_else(found).filter(|count| *count > 0)
 }
@@ -37,14 +39,14 @@ fn count(object: &Object) -> Option<usize> {
 struct Scales<'a> {
     object: &'a Object,
     raw: &'a Values,
-    /// Scales computed so far: sums refer to two others, and a damaged file may refer in circles.
+    /// Number of scales computed so far. Sums refer to two other scales, and a damaged file may refer in circles.
     steps: usize,
 }
 
 impl Scales<'_> {
     fn scale(&mut self, at: usize) -> Result<Vec<f64>, String> {
         self.steps += 1;
-        if at >= MOST_STEPS || self.steps > MOST_STEPS {
+        if at >= MAX_STEPS || self.steps > MAX_STEPS {
             return Err("its scales refer to one another in a circle".into());
         }
         let Some(kind) = self.object.text(&format!("NI_Scale[{at}]_Scale_Type")) else {
@@ -69,7 +71,7 @@ impl Scales<'_> {
                 self.mapped(&prefix, |x| interpolated(&table, x))
             }
             "Add" => self.both(&prefix, |left, right| left + right),
-            // The right operand is the minuend, as NI's own programs have it.
+            // The right operand is the minuend, as in the programs of NI.
             "Subtract" => self.both(&prefix, |left, right| right - left),
             "AdvancedAPI" => self.mapped(&prefix, |x| x),
             other => Err(format!("its scale \"{other}\" is not supported")),
@@ -80,11 +82,11 @@ impl Scales<'_> {
         self.object.number(property).ok_or_else(|| format!("its scale has no \"{property}\""))
     }
 
-    /// Properties `name[0]`, `name[1]` …; as many as `count` says, or the property `name_Size`.
+    /// Returns the properties `name[0]`, `name[1]` …. Their number is `count`, or the property `name_Size` if `count` is NaN.
     fn numbers(&self, name: &str, count: f64) -> Result<Vec<f64>, String> {
         let count = if count.is_nan() { self.number(&format!("{name}_Size"))? } else { count };
-        if !(0.0..=MOST_COEFFICIENTS).contains(&count) {
-            return Err(format!("its scale has {count} numbers \"{name}\""));
+        if !(0.0..=MAX_COEFFICIENTS).contains(&count) {
+            return Err(format!("its scale states {count} values \"{name}\", which is impossible"));
         }
         (0..count as usize).map(|at| self.number(&format!("{name}[{at}]"))).collect()
     }
@@ -102,7 +104,7 @@ impl Scales<'_> {
         Ok(left)
     }
 
-    /// The values that a scale is applied to.
+    /// Returns the values that a scale is applied to.
     fn source(&mut self, property: &str) -> Result<Vec<f64>, String> {
         match (self.object.number(property).unwrap_or(RAW), self.raw) {
             (source, Values::Numbers(values)) if source >= RAW => Ok(values.clone()),
@@ -111,7 +113,7 @@ impl Scales<'_> {
         }
     }
 
-    /// The values of a DAQmx scaler, which take the place of a scale.
+    /// Returns the values of a DAQmx scaler that has the number of a scale.
     fn scaler(&self, at: usize) -> Result<Vec<f64>, String> {
         let found = match self.raw {
             Values::Scalers(scalers) => scalers.iter().find(|(id, _)| *id as usize == at),
@@ -121,7 +123,7 @@ impl Scales<'_> {
     }
 }
 
-/// Pairs of a table with rising inputs.
+/// Returns the pairs of a table in the order of increasing inputs.
 fn table(inputs: Vec<f64>, outputs: Vec<f64>) -> Result<Vec<(f64, f64)>, String> {
     let mut pairs: Vec<(f64, f64)> = inputs.iter().copied().zip(outputs.iter().copied()).collect();
     if pairs.first().zip(pairs.last()).is_some_and(|(first, last)| first.0 > last.0) {
@@ -129,12 +131,12 @@ fn table(inputs: Vec<f64>, outputs: Vec<f64>) -> Result<Vec<(f64, f64)>, String>
     }
     let is_rising = pairs.windows(2).all(|pair| pair[0].0 < pair[1].0);
     if pairs.is_empty() || !is_rising || inputs.len() != outputs.len() {
-        return Err("its scale has a table that does not rise".into());
+        return Err("the inputs of its scale table do not increase".into());
     }
     Ok(pairs)
 }
 
-/// The output at `x`, on a straight line between two pairs and constant beyond the ends.
+/// Interpolates a table linearly at `x`; constant outside.
 fn interpolated(table: &[(f64, f64)], x: f64) -> f64 {
     let above = table.partition_point(|pair| pair.0 <= x);
     match (above.checked_sub(1).and_then(|below| table.get(below)), table.get(above)) {

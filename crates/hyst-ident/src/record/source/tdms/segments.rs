@@ -1,6 +1,6 @@
 //! Segments of a TDMS file: a lead-in, a description of objects, and raw data.
 //!
-//! A segment describes only what differs from the segment before it. Objects are the file, its groups and their channels.
+//! A segment describes only the differences from the segment before. Objects are the file, its groups and their channels.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::bytes::{Cursor, Kind};
 use super::data;
 use super::objects::{Index, Object, Property, Scaler};
 
-/// Bytes of a lead-in.
+/// Size of a lead-in \[bytes\].
 const LEAD_IN: usize = 28;
 /// The tag of a segment.
 const TAG: &[u8] = b"TDSm";
@@ -18,26 +18,26 @@ const HAS_NEW_LIST: u32 = 1 << 2;
 const HAS_RAW_DATA: u32 = 1 << 3;
 const IS_INTERLEAVED: u32 = 1 << 5;
 const IS_BIG_ENDIAN: u32 = 1 << 6;
-/// Values of the index that come before the raw data's type.
+/// Headers of a raw data index.
 const NO_RAW_DATA: u32 = u32::MAX;
 const AS_BEFORE: u32 = 0;
 const DAQMX_SCALERS: u32 = 0x1269;
 const DAQMX_DIGITAL_LINES: u32 = 0x126A;
-/// DAQmx scalers of a channel: one, or a few whose sum is the value.
-const MOST_SCALERS: u32 = 256;
+/// Largest number of DAQmx scalers of a channel. Usual are one, or a few whose sum is the value.
+const MAX_SCALERS: u32 = 256;
 
 /// The objects of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) objects: Vec<Object>,
-    /// The segment in which the file is cut off; the first is 1.
+    /// The segment in which the file is truncated, counted from 1.
     pub(crate) cut_in: Option<usize>,
     by_path: HashMap<String, usize>,
     /// Objects of the segment, and whether they have raw data in it.
     listed: Vec<(usize, bool)>,
-    /// By object, its place in the list.
+    /// The place of each object in `listed`.
     place: Vec<Option<usize>>,
-    /// Objects with raw data in the segment, in their order.
+    /// Objects with raw data in the segment, in order.
     active: Vec<usize>,
 }
 
@@ -63,13 +63,13 @@ impl Contents {
         Ok(contents)
     }
 
-    /// Reads the segment at the start of `rest`; its length.
+    /// Reads the segment at the start of `rest` and returns its length.
     fn segment(&mut self, rest: &[u8], number: usize) -> Result<usize, String> {
         let flags = Cursor::new(&rest[TAG.len()..], false).u32()?;
         let big_endian = flags & IS_BIG_ENDIAN != 0;
         let mut lead_in = Cursor::new(&rest[12..], big_endian);
         let (length, metadata) = (lead_in.u64()?, lead_in.u64()?);
-        // A program that is stopped while it writes leaves all bits set.
+        // A program that is stopped while writing leaves a length with all bits set.
         let body = &rest[LEAD_IN..];
         let is_cut = usize::try_from(length).map_or(true, |length| length > body.len());
         let body = &body[..usize::try_from(length).unwrap_or(usize::MAX).min(body.len())];
@@ -81,7 +81,7 @@ impl Contents {
             if flags & HAS_RAW_DATA == 0 { Ok(()) } else { data::read(raw, layout, &self.active, &mut self.objects) }
         });
         if is_cut {
-            // What is wrong in it is wrong because it is cut.
+            // Errors in a truncated segment are due to the missing end.
             self.cut_in = Some(number);
         } else {
             done.map_err(|what| format!("segment {number}: {what}"))?;
@@ -89,7 +89,7 @@ impl Contents {
         Ok(LEAD_IN + body.len())
     }
 
-    /// Reads the description of a segment's objects.
+    /// Reads the description of the objects of a segment.
     fn describe(&mut self, described: &[u8], flags: u32, big_endian: bool) -> Result<(), String> {
         if flags & HAS_METADATA == 0 {
             return Ok(());
@@ -125,7 +125,7 @@ impl Contents {
         Ok(())
     }
 
-    /// The number of the object with this path.
+    /// Returns the number of the object with this path.
     fn object(&mut self, path: String) -> usize {
         if let Some(at) = self.by_path.get(&path) {
             return *at;
@@ -143,13 +143,15 @@ fn named(object: &Object, what: &str) -> String {
     format!("\"{}\": {what}", object.name())
 }
 
-/// Reads where an object's raw data lie; whether it has any in this segment.
+/// Reads the raw data index of an object. Returns whether the object has raw data in this segment.
 fn index(cursor: &mut Cursor<'_>, object: &mut Object) -> Result<bool, String> {
     let header = cursor.u32()?;
     match header {
         NO_RAW_DATA => return Ok(false),
         AS_BEFORE if object.index.is_none() => {
-            return Err("its values lie as before, but nothing comes before; copy the file again".into());
+            return Err(
+                "its raw data index refers to an earlier segment that does not exist; copy the file again".into()
+            );
         }
         AS_BEFORE => return Ok(true),
         _ => {}
@@ -162,14 +164,14 @@ fn index(cursor: &mut Cursor<'_>, object: &mut Object) -> Result<bool, String> {
     if matches!(header, DAQMX_SCALERS | DAQMX_DIGITAL_LINES) {
         let is_digital = header == DAQMX_DIGITAL_LINES;
         let scalers = cursor.u32()?;
-        if scalers > MOST_SCALERS {
+        if scalers > MAX_SCALERS {
             return Err(format!("{scalers} DAQmx scalers are impossible; the file is damaged: copy it again"));
         }
         for _ in 0..scalers {
             let code = cursor.u32()?;
             let kind = Kind::of_scaler(code).ok_or_else(|| unknown_type(code))?;
             let (buffer, offset) = (cursor.u32()? as usize, cursor.u32()? as usize);
-            // The sample format, which says nothing more.
+            // The sample format is not needed.
             cursor.take(if is_digital { 1 } else { 4 })?;
             index.scalers.push(Scaler { kind, buffer, offset, id: cursor.u32()?, is_digital });
         }
@@ -212,7 +214,7 @@ fn property(cursor: &mut Cursor<'_>) -> Result<(String, Property), String> {
     Ok((name, value))
 }
 
-/// The names in a path as `/'Group'/'Channel'`, where `''` stands for one quotation mark.
+/// Returns the names in a path such as `/'Group'/'Channel'`, where `''` means one quotation mark.
 fn parts(path: &str) -> Vec<String> {
     let mut parts = Vec::new();
     let mut characters = path.chars().peekable();

@@ -13,7 +13,7 @@ fn object(path: &str, index: &[u8]) -> Described {
 }
 
 impl Described {
-    /// Adds a property: the count is the last word before the properties, so the number so far is given.
+    /// Adds a property. `so_far` has the place of the count, which is before the properties, and the number of properties.
     fn with(mut self, so_far: &mut (usize, u32), name: &str, kind: u32, value: &[u8]) -> Self {
         if so_far.1 == 0 {
             so_far.0 = self.0.len() - 4;
@@ -25,7 +25,7 @@ impl Described {
     }
 }
 
-/// The index of `count` values of a type.
+/// Returns the raw data index of `count` values of a type.
 fn index(kind: u32, count: u64) -> Vec<u8> {
     [&20_u32.to_le_bytes()[..], &kind.to_le_bytes(), &1_u32.to_le_bytes(), &count.to_le_bytes()].concat()
 }
@@ -86,13 +86,13 @@ fn a_segment_without_description_continues_the_one_before() {
 }
 
 #[test]
-fn rows_that_are_complete_in_a_cut_file_are_read() {
+fn complete_rows_of_a_truncated_file_are_read() {
     let more = segment(8, &[], &doubles(&[7.0, 8.0, 9.0, 10.0, 11.0, 12.0]));
     let bytes = [waveforms(), more].concat();
     let table = read("x.tdms", &bytes[..bytes.len() - 9]).unwrap();
     assert_eq!(table.values, [[1.0, 2.0, 3.0, 7.0], [4.0, 5.0, 6.0, 10.0]]);
     assert!(table.notes[0].contains("cut off in its segment 2; the 4 rows"), "{:?}", table.notes);
-    // What a program leaves that is stopped while it writes.
+    // The length that a program leaves if it is stopped while writing.
     let mut bytes = waveforms();
     bytes[12..20].copy_from_slice(&u64::MAX.to_le_bytes());
     assert_eq!(read("x.tdms", &bytes).unwrap().values.len(), 2);
@@ -172,7 +172,7 @@ fn scales_are_applied() {
 }
 
 #[test]
-fn sums_of_scales_in_a_circle_end() {
+fn scales_that_refer_in_a_circle_are_refused() {
     let mut described = object("/'g'/'a'", &index(2, 2));
     let count = &mut (0, 0);
     described = described.with(count, "NI_Number_Of_Scales", 7, &1_u32.to_le_bytes());
@@ -212,7 +212,7 @@ fn runs_in_one_file_are_segments() {
     let table = read("x.tdms", &[run(100), run(100), run(200)].concat()).unwrap();
     assert_eq!(table.heads[1].name, "segment");
     assert_eq!(table.values[1], [0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-    assert!(table.notes[0].contains("starts anew at row 5"), "{:?}", table.notes);
+    assert!(table.notes[0].contains("restarts at row 5"), "{:?}", table.notes);
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn impossible_sizes_are_refused() {
     let huge = segment(DESCRIBED, &[object("/'g'/'a'", &index(10, 1 << 61))], &[0; 24]);
     assert!(error(&huge).contains("\"g/a\": 2305843009213693952 values are impossible"), "{}", error(&huge));
     let huge = segment(DESCRIBED, &[object("/'g'/'a'", &index(10, 1 << 40))], &[0; 25]);
-    assert!(error(&huge).contains("no whole number of rows"), "{}", error(&huge));
+    assert!(error(&huge).contains("not a whole number of rows"), "{}", error(&huge));
     let mut many = waveforms();
     many[28..32].copy_from_slice(&u32::MAX.to_le_bytes());
     assert!(error(&many).contains("segment 1"), "{}", error(&many));
@@ -229,7 +229,7 @@ fn impossible_sizes_are_refused() {
 }
 
 #[test]
-fn no_beginning_of_a_file_panics() {
+fn truncated_files_do_not_panic() {
     let bytes = [waveforms(), segment(8, &[], &doubles(&[0.0; 6]))].concat();
     for length in 0..bytes.len() {
         let _ = read("x.tdms", &bytes[..length]);
@@ -239,7 +239,7 @@ fn no_beginning_of_a_file_panics() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
     #[test]
-    fn no_damage_panics(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+    fn damaged_bytes_do_not_panic(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
         let mut bytes = [waveforms(), segment(8, &[], &doubles(&[0.0; 6]))].concat();
         for (at, byte) in changes {
             let at = at.index(bytes.len());

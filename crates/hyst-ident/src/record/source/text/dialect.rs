@@ -1,4 +1,4 @@
-//! Which dialect a table of text is written in.
+//! Detection of the dialect of a table of text.
 
 use super::super::numbers::{Cell, cell};
 use super::super::{Axis, Head};
@@ -6,7 +6,7 @@ use super::{axis_of_remarks, fields};
 use crate::record::columns::Role;
 use crate::record::heading::Unit;
 
-/// What separates two fields.
+/// The separator of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Delimiter {
     One(u8),
@@ -14,26 +14,26 @@ pub(super) enum Delimiter {
     Blanks,
 }
 
-/// Bytes at the beginning of a file that decide its dialect.
+/// Bytes at the beginning of a file from which the dialect is detected.
 const SAMPLE_BYTES: usize = 1 << 18;
-/// Minimum share of the cells in a column of numbers that are numbers or missing.
+/// Smallest share of cells with a number or a missing value in a column of numbers.
 const MIN_NUMERIC_SHARE: f64 = 0.5;
 
-/// Titles that a header may have beyond the fields of a row.
+/// Largest number of titles in a header in addition to the fields of a row.
 const MAX_FURTHER_TITLES: usize = 3;
 
-/// Bytes at the end of a file in which lines below the rows are looked for.
+/// Bytes at the end of a file that are searched for lines below the rows.
 const FOOTER_BYTES: usize = 1 << 12;
-/// Words with which a row of statistics begins.
+/// First words of a row of statistics.
 const STATISTICS: [&str; 11] =
     ["mean", "average", "avg", "min", "max", "std", "stdev", "rms", "sum", "total", "median"];
 
-/// How a table is written, and where its rows begin.
+/// The dialect of a table, and the place of its rows.
 #[derive(Clone, Debug)]
 pub(super) struct Dialect {
     pub(super) delimiter: Delimiter,
     pub(super) decimal: u8,
-    /// Fields of a row, an empty one at the end included.
+    /// Number of fields of a row, including an empty one at the end.
     pub(super) fields: usize,
     /// Byte at which the first row begins.
     pub(super) start: usize,
@@ -41,20 +41,20 @@ pub(super) struct Dialect {
     names: Option<usize>,
     /// Byte at which the line with the units begins.
     units: Option<usize>,
-    /// Fields that are columns.
+    /// Fields that are columns of numbers.
     columns: Vec<usize>,
-    /// Those of them that hold dates or times of day.
+    /// Columns with dates or times of day.
     dates: Vec<usize>,
-    /// Those of them that hold times of day: a date alone is no clock.
+    /// Columns with times of day, with or without a date.
     clocks: Vec<usize>,
-    /// The lines with names and units, which files that were put together repeat.
+    /// The lines with names and units. Concatenated files repeat them.
     headings: Vec<String>,
 }
 
 /// A line, and the byte at which it begins.
 type Line<'a> = (usize, &'a str);
 
-/// Lines that are not blank.
+/// Returns the lines that are not blank.
 pub(super) fn lines(text: &str, start: usize) -> impl Iterator<Item = Line<'_>> {
     let mut at = start;
     text[start..].split_inclusive('\n').filter_map(move |whole| {
@@ -65,7 +65,7 @@ pub(super) fn lines(text: &str, start: usize) -> impl Iterator<Item = Line<'_>> 
     })
 }
 
-/// A remark without the sign before it; `None` if the line is no remark.
+/// Returns a remark without its leading sign; `None` if the line is not a remark.
 pub(super) fn remark(line: &str) -> Option<&str> {
     let line = line.trim_start();
     ["#", "%", "//", "!"]
@@ -75,11 +75,11 @@ pub(super) fn remark(line: &str) -> Option<&str> {
 }
 
 impl Dialect {
-    /// The dialect with most numbers in the first rows; `None` without a row of numbers.
+    /// Finds the dialect with the most numbers in the first rows; `None` if there is no row of numbers.
     pub(super) fn find(text: &str) -> Option<Self> {
         let mut end = text.len();
         if end > SAMPLE_BYTES {
-            // Whole lines only, of which no sensible one is as long as the sample; a line feed is a character of its own in UTF-8.
+            // Complete lines only. A line feed is never part of another UTF-8 character.
             end = text.as_bytes()[..SAMPLE_BYTES].iter().rposition(|byte| *byte == b'\n')? + 1;
         }
         let sample: Vec<Line<'_>> = lines(&text[..end], 0).collect();
@@ -97,7 +97,7 @@ impl Dialect {
         best.map(|(_, dialect)| dialect)
     }
 
-    /// The dialect of a file whose first line has names of the record format and whose second has numbers.
+    /// Returns the dialect of a file whose first line has names of the record format and whose second line has numbers.
     fn of_records(sample: &[Line<'_>]) -> Option<Self> {
         let [(at, header), (first, row), ..] = *sample else { return None };
         let header = remark(header).unwrap_or(header);
@@ -131,7 +131,7 @@ impl Dialect {
         })
     }
 
-    /// How many more cells are numbers in this dialect than are not.
+    /// Returns the number of cells with a number minus that of other cells, and the dialect.
     fn scored(sample: &[Line<'_>], delimiter: Delimiter, decimal: u8) -> Option<(i64, Self)> {
         let quoted = || sample.iter().any(|(_, line)| line.contains('"'));
         if delimiter == Delimiter::One(b',') && decimal == b',' && !quoted() {
@@ -140,7 +140,7 @@ impl Dialect {
         let cells_of = |line: &str| fields(line, delimiter).iter().map(|f| cell(f.as_bytes(), decimal)).collect();
         let cells: Vec<Vec<Cell>> = sample.iter().map(|(_, line)| cells_of(line)).collect();
         let numbers_in = |row: &[Cell]| row.iter().filter(|cell| is_number(cell)).count();
-        // The number of fields that most rows of numbers have; remarks are short.
+        // The most frequent number of fields, weighted by the number of fields because remarks are short.
         let mut counts: Vec<(usize, usize)> = Vec::new();
         for row in cells.iter().filter(|row| numbers_in(row) > 0) {
             match counts.iter_mut().find(|(fields, _)| *fields == row.len()) {
@@ -155,11 +155,11 @@ impl Dialect {
             row.len() == count && numbers_in(row) > 0 && 2 * numbers_in(row) >= filled
         };
         let alike: Vec<usize> = (0..cells.len()).filter(|k| like_row(*k)).collect();
-        // Fields that hold numbers in most rows, and so in the first: remarks begin with a word.
+        // Fields that have a number in most rows must have one in the first row too. Remarks begin with a word.
         let numbers = |field: &usize| alike.iter().filter(|k| is_number(&cells[**k][*field])).count();
         let usual: Vec<usize> = (0..count).filter(|field| 2 * numbers(field) >= alike.len()).collect();
         let is_row = |k: usize| like_row(k) && usual.iter().all(|field| cells[k][*field] != Cell::Other);
-        // A line of remarks may look like a row, but two in sequence are rows.
+        // One line of remarks may look like a row. Two such lines in sequence are rows.
         let begins = |k: &usize| is_row(*k) && (alike.len() < 3 || *k + 1 == cells.len() || is_row(*k + 1));
         let first = (0..cells.len()).find(begins)?;
         let rows: Vec<&Vec<Cell>> = cells[first..].iter().filter(|row| row.len() == count).collect();
@@ -170,7 +170,7 @@ impl Dialect {
             share(*field, |cell| *cell != Cell::Other) >= MIN_NUMERIC_SHARE && share(*field, is_number) > 0.0
         };
         let columns: Vec<usize> = (0..count).filter(numeric).collect();
-        // Another decimal sign has to explain grouped thousands worse before these do.
+        // Grouped thousands count less, so that a decimal sign that explains the cells without groups is preferred.
         let grouped = |row: &[Cell]| row.iter().filter(|cell| matches!(cell, Cell::Grouped(_))).count();
         let surplus = |row: &Vec<Cell>| 2 * numbers_in(row) as i64 - count as i64 - grouped(row) as i64;
         if delimiter != Delimiter::One(b',') && hides_thousands(&sample[first..], delimiter, decimal, &columns) {
@@ -199,14 +199,14 @@ impl Dialect {
         Some((score, dialect))
     }
 
-    /// Fields of a line above the rows, if it has as many as they.
+    /// Returns the fields of a line above the rows, if it has as many fields as a row.
     fn titles<'a>(&self, line: &'a str) -> Option<Vec<&'a str>> {
         let line = remark(line).unwrap_or(line);
         let mut titles = fields(line, self.delimiter);
         if self.delimiter == Delimiter::Blanks && titles.len() != self.fields {
             titles = line.split("  ").map(str::trim).filter(|title| !title.is_empty()).collect();
         }
-        // Further ones, as for remarks or the times of an oscilloscope, have no rows.
+        // Further titles, for example for remarks or the times of an oscilloscope, have no cells in the rows.
         let more = titles.len().saturating_sub(self.fields);
         if self.fields > 1 && more <= MAX_FURTHER_TITLES {
             titles.truncate(self.fields);
@@ -216,7 +216,7 @@ impl Dialect {
         (titles.len() == self.fields && 2 * named >= self.columns.len().max(1)).then_some(titles)
     }
 
-    /// Looks for the lines with names and units above the first row.
+    /// Finds the lines with names and units above the first row.
     fn find_names(&mut self, above: &[Line<'_>]) {
         let mut titled = above.iter().rev().take(6).filter(|line| self.titles(line.1).is_some());
         let (last, before) = (titled.next().copied(), titled.next().copied());
@@ -225,7 +225,7 @@ impl Dialect {
         let units = self.titles(last.1).is_some_and(|titles| {
             let known = titles.iter().filter(|title| unit_in(title).is_some()).count();
             let none = titles.iter().filter(|title| is_dimensionless(title)).count();
-            // One that is not known, as "counts/s", may be among two that are.
+            // One unknown unit such as "counts/s" is allowed if at least two units are known.
             known > 0 && known + none + usize::from(known > 1) >= titles.len()
         });
         match before.filter(|_| units) {
@@ -234,7 +234,7 @@ impl Dialect {
         }
     }
 
-    /// The columns.
+    /// Returns the columns.
     pub(super) fn heads(&self, text: &str) -> Vec<Head> {
         let line = |at: Option<usize>| at.and_then(|at| self.titles(lines(text, at).next()?.1));
         let (names, units) = (line(self.names), line(self.units));
@@ -247,7 +247,7 @@ impl Dialect {
             let name = names.as_ref().map(|names| names[*field]).filter(|name| !name.is_empty());
             let unit = units.as_ref().and_then(|units| unit_in(units[*field]));
             let name = name.map_or_else(|| (field + 1).to_string(), str::to_owned);
-            // Dates are read as seconds.
+            // Times of day are converted to seconds.
             let unit = unit.or_else(|| self.clocks.contains(field).then_some("s"));
             Head { unit: unit.map(str::to_owned), axis, ..Head::new(name) }
         };
@@ -259,7 +259,7 @@ impl Dialect {
             }
         }
         if self.names.is_none() {
-            // Remarks may state names one by one, as `# NAME0 = Target position`.
+            // Remarks may state one name each: `# NAME0 = Target position`.
             for (key, name) in remarks().filter_map(|line| remark(line)?.split_once('=')) {
                 let number = key.trim().strip_prefix("NAME").and_then(|number| number.parse::<usize>().ok());
                 if let Some(head) = number.and_then(|number| heads.get_mut(number)) {
@@ -270,7 +270,7 @@ impl Dialect {
         heads
     }
 
-    /// Named fields that hold text in the first row, with that.
+    /// Returns the named fields with text in the first row, and this text.
     pub(super) fn texts(&self, text: &str) -> Vec<(String, String)> {
         let line = |at: usize| lines(text, at).next().map(|(_, line)| line);
         let names = self.names.and_then(line).and_then(|line| self.titles(line)).unwrap_or_default();
@@ -282,16 +282,16 @@ impl Dialect {
         (0..names.len()).filter(is_text).map(|field| (names[field].to_owned(), row[field].to_owned())).collect()
     }
 
-    /// Whether a line among the rows is a header again.
+    /// Returns whether a line between the rows repeats the header.
     pub(super) fn repeats_heading(&self, line: &str) -> bool {
-        // Nearly all lines begin with a digit, a sign or a blank: the comparison is for the others.
+        // Most lines begin with a digit, a sign or a blank and need no comparison.
         line.starts_with(|c: char| c.is_alphabetic() || c == '"') && self.headings.iter().any(|heading| heading == line)
     }
 
-    /// The lines below the last row that are no rows, as `Mean;…` or `END`: the byte at which they begin, and the first of them.
+    /// Finds lines below the last row that are not rows, such as `Mean;…` or `END`. Returns their first byte and first line.
     pub(super) fn footer<'a>(&self, text: &'a str) -> Option<Line<'a>> {
         let from = text.len().saturating_sub(FOOTER_BYTES);
-        // A line that the cut divides is no last line.
+        // Skip the incomplete line at the beginning.
         let from = if from > self.start {
             from + text.as_bytes()[from..].iter().position(|b| *b == b'\n')? + 1
         } else {
@@ -301,11 +301,11 @@ impl Dialect {
         let is_row =
             |line: &Line<'_>| remark(line.1).is_some() || self.repeats_heading(line.1) || !self.is_below_rows(line.1);
         let first = last.iter().rposition(is_row).map_or(0, |row| row + 1);
-        // The first row is one.
+        // The first row is always a row.
         last.get(first).copied().filter(|line| line.0 > self.start)
     }
 
-    /// Whether a line says something about the rows above it.
+    /// Returns whether a line is text or statistics below the rows.
     fn is_below_rows(&self, line: &str) -> bool {
         let found = fields(line, self.delimiter);
         let what = |field: &usize| found.get(*field).map(|text| cell(text.as_bytes(), self.decimal));
@@ -314,17 +314,17 @@ impl Dialect {
         if begins != Some(Cell::Other) || !first.starts_with(char::is_alphabetic) {
             return false;
         }
-        // A row whose first number is damaged is not left out.
+        // A row whose first number is damaged is still a row, which an error reports.
         let is_row = found.len() == self.fields && self.columns.iter().filter_map(what).any(|cell| is_number(&cell));
         !is_row || STATISTICS.iter().any(|word| first.to_lowercase().starts_with(word))
     }
 
-    /// The same, of a text whose rows begin at this byte.
+    /// Returns the dialect for a text whose rows begin at byte `start`.
     pub(super) fn starting_at(&self, start: usize) -> Self {
         Self { start, ..self.clone() }
     }
 
-    /// The midnight before the first row, in seconds since 1970: from there dates are counted.
+    /// Returns the midnight before the first row, in seconds since 1970. Times with a date are counted from it.
     pub(super) fn midnight(&self, text: &str) -> i64 {
         let Some((_, row)) = lines(text, self.start).next() else { return 0 };
         let row = fields(row, self.delimiter);
@@ -335,22 +335,22 @@ impl Dialect {
         first.unwrap_or(0)
     }
 
-    /// The field of a column.
+    /// Returns the field of a column.
     pub(super) fn field_of(&self, column: usize) -> usize {
         self.columns[column]
     }
 
-    /// The column of a field.
+    /// Returns the column of a field.
     pub(super) fn column_of(&self, field: usize) -> Option<usize> {
         self.columns.iter().position(|own| *own == field)
     }
 
-    /// Number of the line with the names.
+    /// Returns the number of the line with the names.
     pub(super) fn header_line(&self, text: &str) -> Option<u64> {
         self.names.map(|at| super::rows::line_at(text, at))
     }
 
-    /// Whether the table is written as the record format is: a header and nothing else above the first row.
+    /// Returns whether the table is written like the record format: comma-separated, with only a header above the first row.
     pub(super) fn is_plain(&self, text: &str) -> bool {
         let mut above = text[..self.start].lines().filter(|line| !line.is_empty());
         let is_header = above.next().is_some_and(|line| remark(line).is_none());
@@ -362,13 +362,13 @@ impl Dialect {
         comma && self.names.is_some() && self.units.is_none() && self.columns.len() == self.fields
     }
 
-    /// What was found, where it is not the record format.
+    /// Returns a note on the dialect if it is not that of the record format.
     pub(super) fn note(&self) -> Option<String> {
         let plain = self.delimiter == Delimiter::One(b',') && self.decimal == b'.';
         (!plain).then(|| format!("read with {}", self.words()))
     }
 
-    /// The dialect in words.
+    /// Returns the dialect in words.
     pub(super) fn words(&self) -> String {
         let between = match self.delimiter {
             Delimiter::Blanks => "blanks".to_owned(),
@@ -388,8 +388,10 @@ fn is_number(cell: &Cell) -> bool {
     matches!(cell, Cell::Number(_) | Cell::Grouped(_) | Cell::Time(_))
 }
 
-/// Whether the decimal sign is one between thousands: a column has numbers of three digits without it, and all numbers with it have three
-/// digits behind it, the zeros at the end included (`998`, `999`, `1.000`).
+/// Returns whether the decimal sign is a thousands separator (`998`, `999`, `1.000`).
+///
+/// This is the case if a column has numbers of three digits without the sign, and all numbers with it have exactly three digits after it, at
+/// least one of them with a trailing zero.
 fn hides_thousands(rows: &[Line<'_>], delimiter: Delimiter, decimal: u8, columns: &[usize]) -> bool {
     let sign = char::from(decimal);
     let rows: Vec<Vec<&str>> = rows.iter().map(|(_, line)| fields(line, delimiter)).collect();
@@ -406,7 +408,7 @@ fn hides_thousands(rows: &[Line<'_>], delimiter: Delimiter, decimal: u8, columns
     })
 }
 
-/// The unit in a cell of a row of units, without brackets.
+/// Returns the unit in a cell of a row of units, without brackets.
 fn unit_in(title: &str) -> Option<&str> {
     let inner = title.trim_matches(['(', ')', '[', ']', '{', '}', ' ']);
     Unit::parse(inner).map(|_| inner)
@@ -417,7 +419,7 @@ fn is_dimensionless(title: &str) -> bool {
     ["", "-", "1", "%", "n/a", "a.u.", "counts", "sequence"].contains(&inner.to_lowercase().as_str())
 }
 
-/// Units that an oscilloscope states above its table, as `Horizontal Units,s` and `Vertical Units,V,um`, by column.
+/// Returns the units that an oscilloscope states above its table, by column: `Horizontal Units,s`, `Vertical Units,V,um`.
 fn units_of_axes<'a>(remarks: impl Iterator<Item = &'a str>, delimiter: Delimiter) -> Vec<(usize, &'a str)> {
     let of = |line: &'a str| {
         let parts = fields(line, delimiter);
@@ -431,7 +433,7 @@ fn units_of_axes<'a>(remarks: impl Iterator<Item = &'a str>, delimiter: Delimite
     remarks.filter_map(of).flatten().collect()
 }
 
-/// Times that an oscilloscope states beside the names: columns `Start` and `Increment`, with their values in the row of units.
+/// Returns the times from the columns `Start` and `Increment` of an oscilloscope, whose values are in the row of units.
 fn start_and_increment(names: &[&str], units: &[&str]) -> Option<Axis> {
     let value = |name: &str| {
         let at = names.iter().position(|own| own.eq_ignore_ascii_case(name))?;

@@ -1,10 +1,10 @@
-//! Text in the encodings that instruments and spreadsheets write.
+//! Decoding of text: UTF-8, UTF-16 and Latin-1.
 
 use std::borrow::Cow;
 
 use crate::record::error::RecordError;
 
-/// The text of a file, and a note where its encoding is not UTF-8.
+/// Decodes the text of a file. Returns a note if the file is read as Latin-1.
 pub(super) fn decode<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, Option<String>), RecordError> {
     if let Some(rest) = bytes.strip_prefix(b"\xff\xfe") {
         return Ok((utf16(rest, u16::from_le_bytes), None));
@@ -39,7 +39,7 @@ fn utf16<'a>(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Cow<'a, str> {
     line_ends(Cow::Owned(text))
 }
 
-/// Where the first bytes are zero: in text of two bytes a character every other one is.
+/// The places of zeros in the first bytes. In UTF-16 text every other byte is zero.
 enum Zeros {
     None,
     Odd,
@@ -59,7 +59,7 @@ fn zeros(bytes: &[u8]) -> Zeros {
     }
 }
 
-/// Lines that end in `\n`: those that end in `\r` alone are translated.
+/// Replaces line ends `\r` by `\n`, unless the text has line ends `\n` or `\r\n`.
 fn line_ends(text: Cow<'_, str>) -> Cow<'_, str> {
     if text.contains('\r') && !text.contains('\n') { Cow::Owned(text.replace('\r', "\n")) } else { text }
 }

@@ -1,4 +1,4 @@
-//! The rows of a table of text, read in parallel.
+//! Parallel reading of the rows of a table of text.
 
 use std::ops::Range;
 
@@ -12,34 +12,34 @@ use super::fields;
 use crate::record::error::{Place, RecordError};
 use crate::record::grid::Printed;
 
-/// Bytes of a piece that one thread reads.
+/// Bytes per parallel task.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// What is wrong with a row.
+/// A fault in a row.
 #[derive(Debug)]
 pub(super) struct Fault {
-    /// Byte at which its line begins.
+    /// Byte at which the line begins.
     at: usize,
-    /// Lines before the text.
+    /// Number of lines of the file before the text.
     before: u64,
     kind: FaultKind,
 }
 
 #[derive(Debug)]
 enum FaultKind {
-    /// Another number of fields.
+    /// A wrong number of fields.
     Fields { found: usize, expected: usize, open_quote: bool },
-    /// A cell that is no number.
+    /// A cell that is not a number.
     Cell { field: usize, text: String },
 }
 
 impl Fault {
-    /// The same, of a text that begins at this line of its file.
+    /// Returns the fault for a text that begins at `line` of its file.
     pub(super) fn after(self, line: u64) -> Self {
         Self { before: line - 1, ..self }
     }
 
-    /// The message, with the name of a field's column.
+    /// Returns the error. `column` returns the column name of a field.
     pub(super) fn error(self, file: &str, text: &str, column: impl Fn(usize) -> String) -> RecordError {
         let (file, line) = (file.to_owned(), self.before + line_at(text, self.at));
         match self.kind {
@@ -49,7 +49,7 @@ impl Fault {
                 found,
                 expected,
                 column: column(expected - 1),
-                hint: if open_quote { "; a quotation mark may be left open there" } else { "" },
+                hint: if open_quote { "; a closing quotation mark may be missing in this line" } else { "" },
             },
             FaultKind::Cell { field, text } => {
                 RecordError::NotANumber { file, place: Place::Line(line), column: column(field), text }
@@ -61,27 +61,27 @@ impl Fault {
 /// The rows of a text.
 #[derive(Debug, Default)]
 pub(super) struct Read {
-    /// Those fields that were asked for.
+    /// The requested fields.
     pub(super) columns: Vec<Values>,
-    /// Lines that repeat the header.
+    /// Number of lines that repeat the header.
     pub(super) headings: usize,
-    /// Lines of remarks or blanks.
+    /// Number of lines with remarks or blanks.
     pub(super) others: usize,
 }
 
-/// Reads the fields with these numbers of all rows.
+/// Reads the fields `wanted` of all rows.
 pub(super) fn read(text: &str, dialect: &Dialect, wanted: &[usize]) -> Result<Read, Fault> {
     read_from(text, dialect, dialect.midnight(text), wanted)
 }
 
-/// The same, with dates counted from `midnight` \[s\].
+/// Reads as [`read`] does, with dates counted from `midnight` \[s\].
 pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[usize]) -> Result<Read, Fault> {
     let read = |piece| piece_of(text, piece, dialect, midnight, wanted);
-    // Of several faults the first in the text counts, whichever thread finds one first.
+    // The first fault in the text is reported, in whatever order the threads find faults.
     let pieces: Vec<Result<Read, Fault>> = pieces(text, dialect.start).into_par_iter().map(read).collect();
     let pieces: Vec<Read> = pieces.into_iter().collect::<Result<_, _>>()?;
     let rows: usize = pieces.iter().map(|piece| piece.columns.first().map_or(0, |column| column.numbers.len())).sum();
-    let mut all = Read { columns: wanted.iter().map(|_| with_room(rows)).collect(), headings: 0, others: 0 };
+    let mut all = Read { columns: wanted.iter().map(|_| with_capacity(rows)).collect(), headings: 0, others: 0 };
     for piece in pieces {
         all.headings += piece.headings;
         all.others += piece.others;
@@ -93,11 +93,11 @@ pub(super) fn read_from(text: &str, dialect: &Dialect, midnight: i64, wanted: &[
     Ok(all)
 }
 
-fn with_room(rows: usize) -> Values {
+fn with_capacity(rows: usize) -> Values {
     Values { numbers: Vec::with_capacity(rows), printed: Printed::default() }
 }
 
-/// Pieces of whole lines.
+/// Splits a text into pieces of complete lines.
 fn pieces(text: &str, start: usize) -> Vec<Range<usize>> {
     let bytes = text.as_bytes();
     let mut pieces = Vec::new();
@@ -118,9 +118,9 @@ fn piece_of(
     midnight: i64,
     wanted: &[usize],
 ) -> Result<Read, Fault> {
-    let room = piece.len() / (4 * dialect.fields);
-    let mut columns: Vec<Values> = wanted.iter().map(|_| with_room(room)).collect();
-    // Columns to which the number of each field goes.
+    let capacity = piece.len() / (4 * dialect.fields);
+    let mut columns: Vec<Values> = wanted.iter().map(|_| with_capacity(capacity)).collect();
+    // For each field the columns that receive its value.
     let mut goals: Vec<Vec<usize>> = vec![Vec::new(); dialect.fields];
     for (column, field) in wanted.iter().enumerate() {
         goals[*field].push(column);
@@ -136,22 +136,23 @@ fn piece_of(
     Ok(Read { columns, headings, others })
 }
 
-/// Where rows go.
+/// The values of the rows that were read.
 struct Rows<'a> {
     dialect: &'a Dialect,
-    /// From which dates are counted \[s\].
+    /// The time from which dates are counted \[s\].
     midnight: i64,
+    /// For each field the columns that receive its value.
     goals: &'a [Vec<usize>],
     columns: &'a mut [Values],
-    /// Lines that repeated the header.
+    /// Number of lines that repeat the header.
     headings: usize,
-    /// Lines of remarks or blanks.
+    /// Number of lines with remarks or blanks.
     others: usize,
 }
 
 impl Rows<'_> {
     fn take(&mut self, at: usize, line: &str) -> Result<(), Fault> {
-        // Nearly all lines are numbers alone.
+        // Fast path: most lines consist of numbers only.
         if let (Some(b'0'..=b'9' | b'-' | b'+' | b'.'), Delimiter::One(delimiter)) =
             (line.as_bytes().first(), self.dialect.delimiter)
             && self.take_numbers(line.as_bytes(), delimiter)
@@ -180,25 +181,25 @@ impl Rows<'_> {
         }
     }
 
-    /// Takes a line of as many numbers as a row has, without blanks; no other line.
+    /// Reads a line that consists of the numbers of a row without blanks. Returns false for any other line.
     fn take_numbers(&mut self, line: &[u8], delimiter: u8) -> bool {
         let mut at = 0;
         for (field, goals) in self.goals.iter().enumerate() {
             let Some(scanned) = scan(&line[at..], self.dialect.decimal).filter(|scanned| scanned.value.is_finite())
             else {
-                return self.take_back(field);
+                return self.undo(field);
             };
             at += scanned.bytes;
             let is_last = field + 1 == self.goals.len();
             match line.get(at) {
                 Some(byte) if *byte == delimiter && !is_last => at += 1,
                 None if is_last => {}
-                _ => return self.take_back(field),
+                _ => return self.undo(field),
             }
             for goal in goals {
                 let column = &mut self.columns[*goal];
                 column.numbers.push(scanned.value);
-                // The digits of times matter, and those come first.
+                // Only the digits of times are needed, and the time is the first column.
                 if *goal == 0 {
                     column.printed.join(scanned.printed);
                 }
@@ -207,8 +208,8 @@ impl Rows<'_> {
         true
     }
 
-    /// Takes back the numbers of a line up to a field.
-    fn take_back(&mut self, field: usize) -> bool {
+    /// Removes the numbers of a line up to `field`. Returns false.
+    fn undo(&mut self, field: usize) -> bool {
         for goal in self.goals[..field].iter().flatten() {
             self.columns[*goal].numbers.pop();
         }
@@ -230,7 +231,7 @@ impl Rows<'_> {
                 let value = match cell {
                     Cell::Number(value) | Cell::Grouped(value) => value,
                     Cell::Time(moment) => {
-                        // Seconds of a day have five digits before the point.
+                        // The seconds of a day have five digits before the decimal point.
                         let printed = Printed { decimals: moment.decimals, digits: 5 + moment.decimals };
                         goals.iter().for_each(|goal| self.columns[*goal].printed.join(printed));
                         moment.since(self.midnight)
@@ -248,7 +249,7 @@ impl Rows<'_> {
                 for goal in goals {
                     let column = &mut self.columns[*goal];
                     column.numbers.push(value);
-                    // The digits of times matter, and those come first.
+                    // Only the digits of times are needed, and the time is the first column.
                     if *goal == 0 && !is_moment {
                         take_digits(&mut column.printed, text, self.dialect.decimal);
                     }
@@ -266,22 +267,22 @@ impl Rows<'_> {
     }
 }
 
-/// The number of the line that holds byte `at`. Only messages ask for it.
+/// Returns the number of the line with byte `at`. Only messages need it.
 pub(super) fn line_at(text: &str, at: usize) -> u64 {
     1 + text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count() as u64
 }
 
-/// The number of the line of a row, counted from 0.
+/// Returns the line number of a row, which is counted from 0.
 pub(super) fn line_of_row(text: &str, dialect: &Dialect, row: usize) -> u64 {
     let is_row = |line: &str| remark(line).is_none() && !dialect.repeats_heading(line);
     let mut rows = lines(text, dialect.start).filter(|(_, line)| is_row(line));
     line_at(text, rows.nth(row).map_or(text.len(), |(at, _)| at))
 }
 
-/// A field as a message shows it: one line, not too long.
+/// Returns a field for a message: one line of limited length.
 pub(super) fn shortened(field: &str) -> String {
-    const MOST: usize = 40;
+    const MAX_CHARACTERS: usize = 40;
     let field = field.trim();
-    let text: String = field.chars().take(MOST).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    if field.chars().nth(MOST).is_some() { format!("{text}…") } else { text }
+    let text: String = field.chars().take(MAX_CHARACTERS).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if field.chars().nth(MAX_CHARACTERS).is_some() { format!("{text}…") } else { text }
 }

@@ -1,4 +1,4 @@
-//! Tables of text that are too large to hold: read block by block, several rows averaged into one.
+//! Large tables of text, which are read in blocks. Groups of rows are averaged into one.
 
 use std::cell::{Cell, RefCell};
 use std::fs::File;
@@ -12,18 +12,18 @@ use super::{Text, encoding};
 use crate::record::error::{Place, RecordError};
 use crate::record::grid::Printed;
 
-/// Bytes of a file from which on it is read in blocks.
+/// Smallest size of a file that is read in blocks \[bytes\].
 pub(crate) const LARGE_BYTES: u64 = 256 << 20;
-/// Rows that are kept of it: more than any fit uses.
+/// Largest number of rows after averaging. It is more than any fit uses.
 const MAX_ROWS: u64 = 2_000_000;
-/// Bytes of a block.
+/// Size of a block \[bytes\].
 const BLOCK_BYTES: usize = 32 << 20;
-/// Bytes at the beginning that tell the dialect and how long a row is.
+/// Bytes at the beginning from which the dialect and the length of a row are determined.
 const SAMPLE_BYTES: usize = 1 << 20;
-/// Step in time, as a multiple of the one before, across which rows are not averaged.
+/// Shortest time step of an interruption, as a multiple of the usual step.
 const MIN_GAP: f64 = 1.5;
 
-/// Called with the share of the file that is read.
+/// Progress callback. The argument is the share of the file that has been read.
 type Watch<'a> = &'a mut dyn FnMut(f64);
 
 /// A large table of text.
@@ -34,10 +34,10 @@ pub(crate) struct LargeText<'a> {
     dialect: Dialect,
     heads: Vec<Head>,
     notes: Vec<String>,
-    /// Rows of the file that become one.
+    /// Number of rows of the file that are averaged into one.
     factor: usize,
     watch: RefCell<Watch<'a>>,
-    /// Rows that filled no mean.
+    /// Number of rows in incomplete groups, which are dropped.
     dropped: Cell<u64>,
 }
 
@@ -45,7 +45,7 @@ impl<'a> LargeText<'a> {
     /// Opens the file at `path` if it is large and a table of text.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// If the file cannot be read.
     pub(crate) fn open(path: &Path, watch: Watch<'a>) -> Result<Option<Self>, RecordError> {
         let file = path.display().to_string();
         let io = |source| RecordError::Io { file: file.clone(), source };
@@ -58,14 +58,14 @@ impl<'a> LargeText<'a> {
         reader.read_exact(&mut sample).map_err(io)?;
         let whole = sample.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
         sample.truncate(whole);
-        // Of two bytes a character, or no text: those are read as a whole.
+        // UTF-16 and binary files are read as a whole.
         if sample.contains(&0) || sample.starts_with(b"\xff\xfe") || sample.starts_with(b"\xfe\xff") {
             return Ok(None);
         }
         let mark = if sample.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         let Ok(text) = Text::open(&file, &sample) else { return Ok(None) };
         let Text { text, dialect, heads, mut notes, .. } = text;
-        // Bytes of the text are bytes of the file in UTF-8 alone.
+        // Only in UTF-8 the bytes of the text are those of the file.
         if !matches!(text, std::borrow::Cow::Borrowed(_)) {
             return Ok(None);
         }
@@ -74,7 +74,10 @@ impl<'a> LargeText<'a> {
         let rows = (bytes as f64 / row_bytes) as u64;
         let factor = rows.div_ceil(MAX_ROWS).max(1) as usize;
         if factor > 1 {
-            notes.push(format!("about {:.1} million rows: every {factor} are averaged into one", rows as f64 / 1e6));
+            notes.push(format!(
+                "about {:.1} million rows: every {factor} rows are averaged into one",
+                rows as f64 / 1e6
+            ));
         }
         let dialect = dialect.starting_at(dialect.start + mark);
         let watch = RefCell::new(watch);
@@ -113,7 +116,7 @@ impl<'a> LargeText<'a> {
                 if block.len() < BLOCK_BYTES {
                     continue;
                 }
-                let what = format!("line {line} has no end within 32 MB; write a row on each line");
+                let what = format!("line {line} is longer than 32 MB; write one row per line");
                 return Err(RecordError::Damaged { file: self.file.clone(), format: "table of text", what });
             }
             let (text, _) = encoding::decode(&self.file, &block[..whole])?;
@@ -171,12 +174,12 @@ impl Contents for LargeText<'_> {
 
     fn late_notes(&self) -> Vec<String> {
         let dropped = self.dropped.get();
-        let note = format!("{dropped} rows before breaks do not fill a mean: left out");
+        let note = format!("{dropped} rows before interruptions are too few for a mean: left out");
         (dropped > 0).then_some(note).into_iter().collect()
     }
 
     fn place(&self, row: usize) -> Place {
-        // Where rows are averaged, the first of them.
+        // The first of the averaged rows.
         Place::Row(row * self.factor)
     }
 
@@ -185,13 +188,14 @@ impl Contents for LargeText<'_> {
     }
 }
 
-/// Means of some rows each, not across a change of segment or an interruption.
+/// Means of groups of rows, not across a change of segment or an interruption.
 struct Means {
     factor: usize,
-    /// Which columns are time and segment.
+    /// Index of the time column.
     time: Option<usize>,
+    /// Index of the segment column.
     labels: Option<usize>,
-    /// Step in time beyond which there is an interruption.
+    /// Longest time step without an interruption \[s\].
     longest: Option<f64>,
     /// Sum and number of the values of each column.
     sums: Vec<(f64, usize)>,
@@ -199,7 +203,7 @@ struct Means {
     /// Time and label of the row before.
     before: Option<(f64, f64)>,
     means: Vec<Vec<f64>>,
-    /// Rows that filled no mean.
+    /// Number of rows in incomplete groups.
     dropped: u64,
 }
 
@@ -219,7 +223,9 @@ impl Means {
         }
     }
 
-    /// The step of the first rows beyond which there is an interruption: the median of those that are not zero, as times may be printed coarsely.
+    /// Returns the longest time step without an interruption, from the median step of the first rows.
+    ///
+    /// Steps of zero are ignored, because times may be printed too coarsely.
     fn longest_step(time: &[f64]) -> f64 {
         let mut steps: Vec<f64> =
             time.windows(2).take(10_000).map(|t| t[1] - t[0]).filter(|step| *step > 0.0).collect();
@@ -242,7 +248,7 @@ impl Means {
                 self.before.is_some_and(|(before, other)| label != other || time - before > longest || time < before);
             if breaks {
                 self.dropped += self.rows as u64;
-                // The rest of a block would be off the even grid.
+                // A mean of an incomplete group would not be on the even grid.
                 self.clear();
             }
             for ((sum, count), column) in self.sums.iter_mut().zip(columns) {
@@ -268,7 +274,7 @@ impl Means {
         self.rows = 0;
     }
 
-    /// Rows that filled no mean, the last ones included.
+    /// Returns the number of rows in incomplete groups, including the last one.
     fn dropped(&self) -> u64 {
         self.dropped + self.rows as u64
     }
@@ -283,14 +289,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_averaged_but_not_across_a_break() {
+    fn rows_are_not_averaged_across_an_interruption() {
         let column = |numbers: Vec<f64>| Values { numbers, printed: Printed::default() };
         let time: Vec<f64> = (0..10).map(f64::from).chain((0..7).map(|k| f64::from(k) + 100.0)).collect();
         let label: Vec<f64> = (0..17).map(|k| if k < 13 { 0.0 } else { 1.0 }).collect();
         let value: Vec<f64> = (0..17).map(|k| if k == 1 { f64::NAN } else { f64::from(k) }).collect();
         let mut means = Means::new(Wanted { columns: &[0, 1, 2], time: Some(0), segment: Some(1) }, 3);
         let all = [time, label, value].map(column);
-        // In two blocks, as if the file were cut there.
+        // In two blocks, with a boundary inside a group.
         means.take(&all.clone().map(|c| column(c.numbers[..5].to_vec())));
         means.take(&all.map(|c| column(c.numbers[5..].to_vec())));
         assert_eq!(means.dropped(), 2);

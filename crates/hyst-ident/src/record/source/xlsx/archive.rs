@@ -1,4 +1,4 @@
-//! The ZIP archive that a workbook is.
+//! The ZIP archive of a workbook.
 
 use std::io::{Cursor, Read};
 
@@ -9,40 +9,40 @@ use super::Fault;
 /// First bytes of a ZIP archive, and of the files of Office before 2007.
 const ZIP: &[u8] = b"PK\x03\x04";
 const OLD_OFFICE: &[u8] = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1";
-/// Bytes at either end of an archive in which the names of its parts are looked for.
+/// Bytes at either end of an archive that are searched for the names of its parts.
 const SEARCHED: usize = 1 << 16;
-/// Bytes that a workbook may hold whatever its size.
+/// Size up to which a workbook may always unpack \[bytes\].
 const ALWAYS_UNPACKED: u64 = 64 << 20;
-/// How many times its size a workbook may hold beyond that; cells shrink to a tenth.
+/// Largest ratio of unpacked to packed size of larger workbooks. Cells compress by a factor of about 10.
 const MAX_EXPANSION: u64 = 200;
 
 /// Kinds of workbooks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
     Xlsx,
-    /// With sheets in binary.
+    /// Binary sheets.
     Xlsb,
-    /// LibreOffice Calc and others.
+    /// OpenDocument, of LibreOffice Calc and other programs.
     OpenDocument,
-    /// Before 2007, or encrypted.
+    /// Excel before 2007, or encrypted.
     Old,
 }
 
 impl Kind {
-    /// What to do about a kind that is not read.
+    /// Returns what to do about a kind that is not supported.
     pub(super) fn advice(self) -> Option<&'static str> {
         match self {
             Self::Xlsx => None,
-            Self::Xlsb => Some("the workbook is .xlsb, which is not read; save it as .xlsx or CSV"),
-            Self::OpenDocument => Some("the workbook is .ods, which is not read; save it as .xlsx or CSV"),
+            Self::Xlsb => Some("the workbook is .xlsb, which is not supported; save it as .xlsx or CSV"),
+            Self::OpenDocument => Some("the workbook is .ods, which is not supported; save it as .xlsx or CSV"),
             Self::Old => Some(
-                "the file is from Excel before 2007 or has a password, which is not read; save it without a password as .xlsx or CSV",
+                "the file is from Excel before 2007 or has a password, which is not supported; save it without a password as .xlsx or CSV",
             ),
         }
     }
 }
 
-/// What kind of workbook these bytes are; `None` for other files.
+/// Returns the kind of workbook; `None` for other files.
 pub(super) fn kind(bytes: &[u8]) -> Option<Kind> {
     if bytes.starts_with(OLD_OFFICE) {
         return Some(Kind::Old);
@@ -50,7 +50,7 @@ pub(super) fn kind(bytes: &[u8]) -> Option<Kind> {
     if !bytes.starts_with(ZIP) {
         return None;
     }
-    // Names are not compressed: each is before its part, and all are at the end. A file that is cut off has the first alone.
+    // Names are not compressed. Each name is before its part, and all names are at the end. A truncated file has only the first ones.
     let ends = [&bytes[..bytes.len().min(SEARCHED)], &bytes[bytes.len().saturating_sub(SEARCHED)..]];
     let has = |name: &[u8]| ends.iter().any(|end| end.windows(name.len()).any(|window| window == name));
     if has(b"xl/workbook.bin") {
@@ -64,12 +64,12 @@ pub(super) fn kind(bytes: &[u8]) -> Option<Kind> {
     }
 }
 
-/// Unpacks every part once, to know that it is whole and not larger than a workbook is.
+/// Unpacks every part once and checks that it is complete and not too large.
 ///
-/// The decoder reads parts into memory, and a part of a hundred kilobytes can unpack to a hundred megabytes.
+/// The decoder reads parts into memory, and a part of 100 kB can unpack to 100 MB.
 ///
 /// # Errors
-/// When it is not.
+/// If a part is damaged, or the parts together are too large.
 pub(super) fn check(bytes: &[u8]) -> Result<(), Fault> {
     let limit = ALWAYS_UNPACKED.max(MAX_EXPANSION.saturating_mul(bytes.len() as u64));
     let mut free = limit;
@@ -84,7 +84,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), Fault> {
         let size = copied.map_err(|error| Fault::damaged(format!("the part {name} cannot be unpacked ({error})")))?;
         let too_large = || {
             Fault::new(format!(
-                "the workbook expands to more than {} MB; save the sheet with the record alone, as CSV",
+                "the workbook expands to more than {} MB; save only the sheet with the record, as CSV",
                 limit >> 20
             ))
         };

@@ -1,4 +1,4 @@
-//! The cells of a sheet, taken as they come.
+//! The cells of a sheet, read one by one.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -8,24 +8,25 @@ use calamine::{DataRef, Xlsx, XlsxError};
 use super::Fault;
 use crate::record::source::numbers::{Cell, cell};
 
-/// Rows that are not empty among which the table begins.
+/// Largest number of non-empty rows that are searched for the beginning of the table.
 const TOP_ROWS: usize = 1000;
-/// Cells of these rows.
+/// Largest number of cells in these rows.
 const TOP_CELLS: usize = 1_000_000;
-/// Bytes of a title.
+/// Longest title \[bytes\].
 const MAX_TITLE: usize = 200;
-/// Rows and columns of a sheet.
+/// Largest number of rows of a sheet.
 const MAX_ROWS: u32 = 1 << 20;
+/// Largest number of columns of a sheet.
 const MAX_COLUMNS: u32 = 1 << 14;
-/// Days from 1900, as Excel counts them, to 1970.
+/// Date of 1970-01-01 in Excel \[days since 1900\].
 const DAYS_TO_1970: f64 = 25_569.0;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-/// What a cell holds.
+/// The content of a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Item {
     Number(f64),
-    /// A date and time, in days.
+    /// A date and time \[days\].
     Date(f64),
     Text(String),
     /// An error such as `#N/A`.
@@ -46,21 +47,21 @@ pub(super) type Value = (u32, f64);
 pub(super) struct Cells {
     pub(super) numbers: Vec<Value>,
     pub(super) dates: Vec<Value>,
-    /// Cells with text.
+    /// Number of cells with text.
     pub(super) texts: usize,
 }
 
 /// The cells of a sheet.
 #[derive(Debug, Default)]
 pub(super) struct Sheet {
-    /// The first rows whole, with the columns' numbers.
+    /// All cells of the first rows, by row and column.
     pub(super) top: BTreeMap<u32, BTreeMap<u32, Item>>,
-    /// All columns, by their numbers.
+    /// All columns, by number.
     pub(super) columns: BTreeMap<u32, Cells>,
 }
 
 impl Sheet {
-    /// Reads a sheet; `free` is how many more cells may be read.
+    /// Reads a sheet. `free` is the number of further cells that may be read.
     pub(super) fn read<R: Read + Seek>(workbook: &mut Xlsx<R>, name: &str, free: &mut usize) -> Result<Self, Fault> {
         let unreadable = |error: XlsxError| Fault::damaged(format!("the cells cannot be read ({error})"));
         let mut sheet = Self::default();
@@ -90,7 +91,7 @@ impl Sheet {
     }
 }
 
-/// What a cell holds; `None` if it is empty.
+/// Returns the content of a cell; `None` if it is empty.
 fn item(value: &DataRef<'_>) -> Option<Item> {
     Some(match value {
         DataRef::Empty => return None,
@@ -108,13 +109,13 @@ fn finite(number: f64, item: fn(f64) -> Item) -> Item {
     if number.is_finite() { item(number) } else { Item::Missing }
 }
 
-/// What a cell with text holds: programs write numbers as text too, some with a decimal comma.
+/// Returns the content of a cell with text. Some programs write numbers as text, some of them with a decimal comma.
 fn text(text: &str) -> Option<Item> {
     let text = text.trim();
     if text.is_empty() {
         return None;
     }
-    // Numbers are short, and a text may be a book.
+    // Only the beginning of a long text is kept.
     let end = (0..=text.len().min(MAX_TITLE)).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
     let short = &text[..end];
     let read = |decimal| cell(short.as_bytes(), decimal);

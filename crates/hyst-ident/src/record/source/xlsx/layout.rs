@@ -1,4 +1,4 @@
-//! Where the table of a sheet begins, and what its columns are called.
+//! The place of the table in a sheet, and the names and units of its columns.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,11 +7,11 @@ use super::{Column, Fault, rate};
 use crate::record::heading::Unit;
 use crate::record::source::{Axis, Head};
 
-/// Rows above the numbers among which the names are.
+/// Number of rows above the numbers that are searched for names.
 const ROWS_ABOVE: usize = 6;
-/// Steps per second that dates may be rounded to: a millisecond is what spreadsheets show, and a microsecond what a date can hold.
+/// Steps per second to which dates are rounded: spreadsheets show milliseconds, and a date resolves microseconds.
 const STEPS_PER_SECOND: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
-/// Error of a date \[s\]: a number of days of today with 16 digits, as programs write it, is exact to 0.5 µs.
+/// Largest error of a date \[s\]. A present date in days with 16 digits has an error of 0.5 µs.
 const DATE_ERROR_S: f64 = 1e-6;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
@@ -30,7 +30,7 @@ pub(super) struct Layout {
     units: Option<u32>,
 }
 
-/// Whether at least half of the cells of a row are numbers.
+/// Returns whether at least half of the filled cells of a row are numbers.
 fn is_like_row(row: &Row) -> bool {
     let numbers = row.values().filter(|item| item.is_number()).count();
     let filled = row.values().filter(|item| **item != Item::Missing).count();
@@ -43,7 +43,7 @@ impl Layout {
         let rows: Vec<(&u32, &Row)> =
             sheet.top.iter().filter(|(_, row)| row.values().any(|item| *item != Item::Missing)).collect();
         let alike: Vec<&Row> = rows.iter().map(|(_, row)| *row).filter(|row| is_like_row(row)).collect();
-        // Columns that hold numbers in most such rows, and so in the first.
+        // Columns that have a number in most rows must have one in the first row too.
         let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
         for (column, _) in alike.iter().flat_map(|row| row.iter()).filter(|(_, item)| item.is_number()) {
             *counts.entry(*column).or_default() += 1;
@@ -57,7 +57,7 @@ impl Layout {
                 && 2 * numbers >= counts.len()
                 && !usual().any(|item| matches!(item, Item::Text(_)))
         };
-        // A title may look like a row, but two in sequence are rows.
+        // One title may look like a row. Two such rows in sequence are rows.
         let begins = |k: &usize| {
             is_row(rows[*k].1) && (alike.len() < 3 || rows.get(*k + 1).is_none_or(|(_, next)| is_row(next)))
         };
@@ -69,7 +69,7 @@ impl Layout {
         Some(layout)
     }
 
-    /// Whether a column holds numbers, and not mostly text. A single number is a setting.
+    /// Returns whether a column has at least two numbers and not mostly text. A single number is a setting.
     fn is_column(&self, sheet: &Sheet, column: u32) -> bool {
         let count = |values: &[Value]| values.iter().filter(|(row, _)| *row >= self.first).count();
         let cells = &sheet.columns[&column];
@@ -77,20 +77,20 @@ impl Layout {
         numbers >= 2 && self.texts(sheet, column) <= numbers
     }
 
-    /// Cells of a column that hold text, without those above the table.
+    /// Returns the number of cells with text in a column, without those above the table.
     fn texts(&self, sheet: &Sheet, column: u32) -> usize {
         let above =
             sheet.top.range(..self.first).filter(|(_, row)| matches!(row.get(&column), Some(Item::Text(_)))).count();
         sheet.columns[&column].texts - above
     }
 
-    /// Whether a row has a title for at least half of the columns.
+    /// Returns whether a row has a title for at least half of the columns.
     fn has_titles(&self, row: &Row) -> bool {
         let named = self.columns.iter().filter(|column| matches!(row.get(column), Some(Item::Text(_)))).count();
         named > 0 && 2 * named >= self.columns.len()
     }
 
-    /// Looks for the rows with names and units above the first row.
+    /// Finds the rows with names and units above the first row.
     fn find_names(&mut self, above: &[(&u32, &Row)]) {
         let mut titled = above.iter().rev().take(ROWS_ABOVE).filter(|(_, row)| self.has_titles(row));
         let (last, before) = (titled.next().copied(), titled.next().copied());
@@ -102,16 +102,16 @@ impl Layout {
         }
     }
 
-    /// Whether the titles of a row are units.
+    /// Returns whether the titles of a row are units.
     fn is_units(&self, row: &Row) -> bool {
         let titles = || self.columns.iter().map(|column| title(row, *column).unwrap_or_default());
         let known = titles().filter(|title| unit_in(title).is_some()).count();
         let none = titles().filter(|title| is_dimensionless(title)).count();
-        // One that is not known, as "counts/s", may be among two that are.
+        // One unknown unit such as "counts/s" is allowed if at least two units are known.
         known > 0 && known + none + usize::from(known > 1) >= self.columns.len()
     }
 
-    /// The columns, with their rows aligned; `free` is how many numbers they may have.
+    /// Returns the columns with aligned rows. `free` is the number of values that they may still have.
     pub(super) fn columns(&self, mut sheet: Sheet, free: &mut usize) -> Result<Vec<Column>, Fault> {
         let rows = self.rows(&sheet);
         let count = rows.last().map_or(0, |(_, at)| *at + 1);
@@ -130,7 +130,7 @@ impl Layout {
                 }
             };
             if cells.dates.len() > cells.numbers.len() {
-                // Dates are read as seconds.
+                // Dates are converted to seconds.
                 head.unit = Some("s".to_owned());
                 let first = cells.dates.iter().filter(|(row, _)| *row >= self.first).min_by_key(|(row, _)| *row);
                 let midnight = first.map_or(0.0, |(_, days)| days.floor());
@@ -144,7 +144,7 @@ impl Layout {
         Ok(heads.into_iter().map(column).collect())
     }
 
-    /// Rows with a number in any of the columns, each with its number in the table; rows without are left out.
+    /// Returns the rows with a number in any of the columns, each with its number in the table.
     fn rows(&self, sheet: &Sheet) -> Vec<(u32, usize)> {
         let cells = || self.columns.iter().filter_map(|column| sheet.columns.get(column));
         let all = || {
@@ -159,7 +159,7 @@ impl Layout {
         filled.enumerate().map(|(at, (row, _))| (row as u32, at)).collect()
     }
 
-    /// Number, head and cells with text of a column.
+    /// Returns number and head of a column, and its number of cells with text.
     fn head(&self, sheet: &Sheet, column: u32, axis: Axis) -> (u32, Head, usize) {
         let in_row = |row: Option<u32>| title(sheet.top.get(&row?)?, column);
         let name = in_row(self.names).map_or_else(|| (column + 1).to_string(), str::to_owned);
@@ -175,7 +175,7 @@ fn title(row: &Row, column: u32) -> Option<&str> {
     }
 }
 
-/// Dates in seconds, rounded to the coarsest step that they all are near to.
+/// Rounds dates \[s\] to the coarsest step that agrees with all of them.
 fn round(dates: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let to = |steps: f64| dates.clone().map(move |date| (date * steps).round() / steps);
     let is_near =
@@ -184,7 +184,7 @@ fn round(dates: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     to(steps).collect()
 }
 
-/// The unit in a cell of a row of units, without brackets.
+/// Returns the unit in a cell of a row of units, without brackets.
 fn unit_in(title: &str) -> Option<&str> {
     let inner = title.trim_matches(['(', ')', '[', ']', '{', '}', ' ']);
     Unit::parse(inner).map(|_| inner)

@@ -1,10 +1,10 @@
-//! The sample rate that a sheet states above its table, as `Sample rate [Hz]` with 1000 in the cell to the right.
+//! The sample rate above the table of a sheet, such as `Sample rate [Hz]` with 1000 in the cell to the right.
 
 use std::collections::BTreeMap;
 
 use super::cells::Item;
 
-/// Names of a time between two rows.
+/// Names of a sample period.
 const PERIODS: [&str; 10] = [
     "dt",
     "ts",
@@ -17,28 +17,29 @@ const PERIODS: [&str; 10] = [
     "samplingperiod",
     "samplinginterval",
 ];
-/// Names of a rate.
+/// Names of a sample rate.
 const RATES: [&str; 5] = ["fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"];
 
-/// The time between two rows \[s\], where one of the rows above the table states it.
+/// Returns the sample period \[s\], if one of the rows above the table states it.
 pub(super) fn stated(above: &[&BTreeMap<u32, Item>]) -> Option<f64> {
     above.iter().find_map(|row| {
         let mut cells = row.values().skip_while(|item| !matches!(item, Item::Text(_)));
         let (Some(Item::Text(key)), Some(Item::Number(value))) = (cells.next(), cells.next()) else { return None };
-        let beside = if let Some(Item::Text(unit)) = cells.next() { Some(unit.as_str()) } else { None };
-        period(key, *value, beside)
+        let next = if let Some(Item::Text(unit)) = cells.next() { Some(unit.as_str()) } else { None };
+        period(key, *value, next)
     })
 }
 
-fn period(key: &str, value: f64, beside: Option<&str>) -> Option<f64> {
+/// Returns the sample period \[s\]. The unit is in brackets after the key, or in the cell `next` after the value.
+fn period(key: &str, value: f64, next: Option<&str>) -> Option<f64> {
     let (key, own) = key.split_once(['[', '(']).unwrap_or((key, ""));
     let own = own.trim_matches([')', ']', ' ']);
-    let unit = if own.is_empty() { beside.map_or("", str::trim) } else { own };
+    let unit = if own.is_empty() { next.map_or("", str::trim) } else { own };
     let word: String = key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
     if !(value > 0.0 && value.is_finite()) {
         return None;
     }
-    // Divided rather than multiplied: 1 ms is then the double nearest to 0.001 s.
+    // Division gives the double nearest to 0.001 s for 1 ms, multiplication may not.
     if PERIODS.contains(&word.as_str()) {
         match unit {
             "" | "s" | "sec" | "seconds" => Some(value),
@@ -63,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_and_periods_are_understood() {
+    fn rates_and_periods_are_recognised() {
         assert_eq!(period("Sample rate [Hz]", 1000.0, None), Some(1e-3));
         assert_eq!(period("Sampling rate:", 10.0, Some("kHz")), Some(1e-4));
         assert_eq!(period("dt", 0.5, None), Some(0.5));

@@ -1,4 +1,4 @@
-//! Workbooks whose parts are written by hand.
+//! Workbooks built from parts written by hand.
 
 use std::io::Write;
 
@@ -48,7 +48,7 @@ fn workbook(sheets: &[(&str, &str)]) -> Vec<u8> {
     zip.finish().unwrap().into_inner()
 }
 
-/// Rows of cells: numbers, `@` and a number for a date, `^` for a number that is written as text, and other text; nothing is an empty cell.
+/// Rows of cells: a number, `@` and a number for a date, `^` and a number for a number written as text, or text. Nothing makes an empty cell.
 fn rows(text: &str) -> String {
     let cell = |at: String, cell: &str| match (cell, cell.strip_prefix('@'), cell.strip_prefix('^')) {
         ("", _, _) => String::new(),
@@ -103,7 +103,7 @@ fn rows_are_aligned_and_empty_cells_are_nan() {
             && table.values[1][3] == 10.0
     );
     assert!(table.values[2][0].is_nan() && table.values[2][1..] == [5.0, 6.0, 7.0]);
-    assert_eq!(table.notes, ["cells with text among numbers count as empty: column \"u\" (1)"]);
+    assert_eq!(table.notes, ["cells with text between numbers are read as empty: column \"u\" (1)"]);
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn dates_are_seconds_since_midnight() {
 }
 
 #[test]
-fn sheets_behind_the_first_table_have_their_name_in_front() {
+fn columns_of_other_sheets_have_the_sheet_name_as_prefix() {
     let info = rows("Amplifier|20 V/V\nAmplitude|100\nRate|1000\nCycles|5");
     let data = rows("t|u\n0|1\n1|2");
     let table = read("x", &workbook(&[("Info", &info), ("A", &data), ("B", &data)])).unwrap();
@@ -133,7 +133,7 @@ fn a_rate_above_the_table_is_an_even_axis() {
 }
 
 #[test]
-fn what_is_not_read_is_explained() {
+fn files_that_are_not_supported_are_refused_with_the_reason() {
     assert!(refused(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1 old").contains("before 2007"));
     let ods = [b"PK\x03\x04".as_slice(), &[0; 26], b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet"].concat();
     assert!(refused(&ods).contains(".ods"));
@@ -149,7 +149,7 @@ fn what_is_not_read_is_explained() {
 }
 
 #[test]
-fn a_part_that_expands_without_end_is_refused() {
+fn a_part_that_expands_too_far_is_refused() {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     zip.start_file("xl/worksheets/sheet1.xml", SimpleFileOptions::default()).unwrap();
     let blanks = vec![b' '; 1 << 20];

@@ -1,9 +1,9 @@
-//! MCAP files made byte by byte.
+//! MCAP files for tests, built byte by byte.
 
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Time of the first message: 01:01:01 of a day \[ns\].
 pub(crate) const START: u64 = 20_000 * 86_400_000_000_000 + 3_661_000_000_000;
-/// Time from message to message \[ns\].
+/// Time between messages \[ns\].
 pub(crate) const STEP: u64 = 250_000_000;
 
 /// A topic with its messages.
@@ -57,7 +57,7 @@ fn text(bytes: &[u8]) -> Vec<u8> {
     [(bytes.len() as u32).to_le_bytes().as_slice(), bytes].concat()
 }
 
-/// Schemas, channels and messages.
+/// Returns schemas and channels, and messages.
 pub(crate) fn records(topics: &[Topic<'_>]) -> (Vec<u8>, Vec<u8>) {
     let stated = topics.iter().zip(1..).flat_map(|(topic, id)| topic.stated(id)).collect();
     let messages = topics
@@ -69,7 +69,7 @@ pub(crate) fn records(topics: &[Topic<'_>]) -> (Vec<u8>, Vec<u8>) {
     (stated, messages)
 }
 
-/// A chunk without a check sum.
+/// A chunk without a checksum.
 pub(crate) fn chunk(compression: &str, size: usize, packed: &[u8]) -> Vec<u8> {
     let (size, packed_size) = ((size as u64).to_le_bytes(), (packed.len() as u64).to_le_bytes());
     record(6, &[&[0; 16], size.as_slice(), &[0; 4], &text(compression.as_bytes()), &packed_size, packed].concat())
@@ -81,7 +81,7 @@ pub(crate) fn log(topics: &[Topic<'_>]) -> Vec<u8> {
     [MAGIC, &record(1, &[0; 8]), &stated, &messages, &record(2, &[0; 20]), MAGIC].concat()
 }
 
-/// A message of ROS 2.
+/// A ROS 2 message.
 pub(crate) struct Cdr {
     bytes: Vec<u8>,
     is_little: bool,
@@ -131,12 +131,12 @@ impl Cdr {
     }
 }
 
-/// A field of a Protobuf message with a length.
+/// A field of a Protobuf message, with its length.
 fn inside(number: u8, bytes: &[u8]) -> Vec<u8> {
     [&[number << 3 | 2, bytes.len() as u8], bytes].concat()
 }
 
-/// A field of a descriptor: name, number, label, type and type's name.
+/// A field of a descriptor: name, number, label, type and name of the type.
 fn field(name: &str, number: u8, label: u8, kind: u8, of: &str) -> Vec<u8> {
     let of = if of.is_empty() { Vec::new() } else { inside(6, of.as_bytes()) };
     inside(2, &[inside(1, name.as_bytes()), vec![3 << 3, number, 4 << 3, label, 5 << 3, kind], of].concat())

@@ -1,9 +1,9 @@
-//! Files that are cut off, damaged, or made to take much memory.
+//! Files that are truncated, damaged, or designed to use much memory.
 
 use super::build::*;
 use super::{Table, fault, read, table};
 
-/// Files of all kinds of messages, as they are and in chunks.
+/// Files with all kinds of messages, with and without chunks.
 fn files() -> Vec<Vec<u8>> {
     let schema = "std_msgs/Header header\nfloat64 x # V\nfloat32[3] y\nint16[] z\nP[] p\n===\nMSG: lab/P\nbool a\nP[] p\n===\nMSG: std_msgs/Header\n\
                   builtin_interfaces/Time stamp\nstring frame_id\n";
@@ -39,7 +39,7 @@ fn check(bytes: &[u8]) {
 }
 
 #[test]
-fn every_file_may_be_cut_anywhere() {
+fn truncation_at_any_byte_does_not_panic() {
     for file in files() {
         assert!(read("x.mcap", &file).is_ok());
         (0..file.len()).for_each(|length| check(&file[..length]));
@@ -47,7 +47,7 @@ fn every_file_may_be_cut_anywhere() {
 }
 
 #[test]
-fn any_bytes_may_be_wrong() {
+fn wrong_bytes_do_not_panic() {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move |below: usize| {
         state ^= state << 13;
@@ -74,7 +74,7 @@ fn any_bytes_may_be_wrong() {
 }
 
 #[test]
-fn channels_are_found_at_the_end_where_their_first_chunk_is_damaged() {
+fn channels_are_found_at_the_end_if_their_first_chunk_is_damaged() {
     let (stated, messages) = records(&[Topic::json("/a", "{}", &["1", "2"])]);
     let bytes = [MAGIC, &chunk("zstd", 10, b"damaged"), &messages, &stated, &record(2, &[0; 20]), MAGIC].concat();
     let table = table(&bytes);
@@ -86,7 +86,7 @@ fn channels_are_found_at_the_end_where_their_first_chunk_is_damaged() {
     );
 }
 
-/// A chunk of messages that repeats one text, with a few of another at its end.
+/// A chunk of messages that repeats one text, with other texts at its end.
 fn repeated(text: &str, times: usize, last: &[&str]) -> Vec<u8> {
     let texts: Vec<&str> = std::iter::repeat_n(text, times).chain(last.iter().copied()).collect();
     let (stated, messages) = records(&[Topic::json("/a", "{}", &texts)]);
@@ -96,11 +96,11 @@ fn repeated(text: &str, times: usize, last: &[&str]) -> Vec<u8> {
 }
 
 #[test]
-fn columns_take_no_more_memory_than_the_file_justifies() {
+fn the_memory_of_columns_is_limited_by_the_size_of_the_file() {
     let array = format!("[{}1]", "1,".repeat(250));
     let text = fault(&repeated(&array, 60_000, &[]));
     assert!(text.contains("far more than a log of"), "{text}");
-    // Fields that come once have a value in each row.
+    // A field that occurs once needs a value in each row.
     let last = format!("{{{}\"x\": 1}}", (0..500).map(|k| format!("\"x{k}\": 1,")).collect::<String>());
     let text = fault(&repeated("{}", 200_000, &[&last]));
     assert!(text.contains("far more than a log of"), "{text}");

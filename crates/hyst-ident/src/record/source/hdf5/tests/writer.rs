@@ -1,4 +1,4 @@
-//! Writes small files: superblock version 2, object headers version 2, data in the headers.
+//! A writer of small files: superblock version 2, object headers version 2, data in the headers.
 
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ impl Node {
         Self { members: vec![], data: Some((dims.to_vec(), values.to_vec())), attributes: vec![] }
     }
 
-    /// A dataset without the numbers that it claims to have.
+    /// A dataset without the numbers that its dimensions state.
     pub(super) fn claimed(dims: &[u64]) -> Self {
         Self::table(dims, &[])
     }
@@ -63,7 +63,7 @@ impl Node {
         self
     }
 
-    /// Appends the object behind its members; its address.
+    /// Appends the object after its members and returns its address.
     fn put(&self, bytes: &mut Vec<u8>, base: usize, blocks: &mut Vec<Range<usize>>) -> u64 {
         let members: Vec<(&str, u64)> =
             self.members.iter().map(|(name, node)| (*name, node.put(bytes, base, blocks))).collect();
@@ -139,19 +139,19 @@ impl File {
         self.write(0).0
     }
 
-    /// The file behind MATLAB's header.
+    /// Returns the file with a MATLAB header.
     pub(super) fn matlab(&self) -> Vec<u8> {
         let mut bytes = self.write(USER_BLOCK).0;
         bytes[..MATLAB.len()].copy_from_slice(MATLAB);
         bytes
     }
 
-    /// Where a file begins that this one wrote.
+    /// Returns the place at which the HDF5 data begin.
     pub(super) fn start(&self, bytes: &[u8]) -> usize {
         if bytes.starts_with(MATLAB) { USER_BLOCK } else { 0 }
     }
 
-    /// Ranges with a checksum behind them.
+    /// Returns the ranges that a checksum follows.
     pub(super) fn blocks(&self, bytes: &[u8]) -> Vec<Range<usize>> {
         self.write(self.start(bytes)).1
     }
@@ -172,7 +172,7 @@ impl File {
 
 use super::MATLAB;
 
-/// Writes checksums behind the ranges.
+/// Writes checksums after the ranges.
 pub(super) fn checksummed(bytes: &mut [u8], blocks: &[Range<usize>]) {
     for block in blocks {
         let sum = lookup3(&bytes[block.clone()]);
@@ -180,7 +180,7 @@ pub(super) fn checksummed(bytes: &mut [u8], blocks: &[Range<usize>]) {
     }
 }
 
-/// Jenkins' hash, as HDF5 takes it.
+/// Computes the Jenkins hash that HDF5 uses.
 fn lookup3(bytes: &[u8]) -> u32 {
     let start = 0xdead_beef_u32.wrapping_add(bytes.len() as u32);
     let (mut a, mut b, mut c) = (start, start, start);

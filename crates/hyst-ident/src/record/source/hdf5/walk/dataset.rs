@@ -1,4 +1,4 @@
-//! Columns of one dataset.
+//! The columns of one dataset.
 
 use hdf5_reader::dataset::Dataset;
 use hdf5_reader::messages::datatype::Datatype;
@@ -10,22 +10,22 @@ use crate::record::source::elements::Storage;
 use crate::record::source::gather::{Clock, Column, Rate, of_matrix, step_of};
 
 const NAMES: [&str; 6] = ["names", "columns", "column_names", "labels", "headers", "channel_names"];
-/// What netCDF calls a dimension that has a length and no values.
+/// The text with which netCDF marks a dimension without values.
 const NO_VALUES: &str = "This is a netCDF dimension but not a netCDF variable";
 
-/// What the attributes of a dataset say.
+/// The metadata in the attributes of a dataset.
 struct Stated {
     names: Option<Vec<String>>,
     units: Option<Vec<String>>,
     clock: Clock,
-    /// Values are codes: value = code · scale + offset (CF conventions of netCDF).
+    /// Scale of stored codes: value = code · scale + offset (CF conventions of netCDF).
     scale: f64,
     offset: f64,
     missing: Option<f64>,
 }
 
 impl Walk<'_> {
-    /// Adds the columns of a dataset that has some.
+    /// Adds the columns of a dataset.
     pub(super) fn dataset(
         &mut self,
         path: &str,
@@ -39,7 +39,7 @@ impl Walk<'_> {
         if let Datatype::Compound { fields, .. } = dataset.dtype() {
             let stated = Stated::of(&Attributes::of_dataset(dataset), scope, fields.len());
             let units = stated.units.filter(|units| units.len() == fields.len());
-            let found = compound::columns(path, dataset, units.as_deref(), self.room)?;
+            let found = compound::columns(path, dataset, units.as_deref(), self.budget)?;
             columns.extend(found.into_iter().map(|column| Column { clock: stated.clock, ..column }));
             return Ok(());
         }
@@ -61,8 +61,8 @@ impl Walk<'_> {
         let stated = Stated::of(&attributes, scope, count);
         let clock = clock_of(dataset, &attributes, axis).unwrap_or(stated.clock);
         let text = (count as u64).saturating_mul(2 * path.len() as u64);
-        self.room.take(text)?;
-        let bytes = values::bytes(path, dataset, 1, self.room)?;
+        self.budget.take(text)?;
+        let bytes = values::bytes(path, dataset, 1, self.budget)?;
         let (names, units) = of_matrix(&scope.lists, count);
         let names = stated.names.as_deref().or(names);
         let units = stated.units.as_deref().or(units);
@@ -84,21 +84,21 @@ impl Walk<'_> {
             columns.push(Column { owner, label, unit, clock, identity, ..Column::new(place, values) });
         }
         if stated.is_scaled() {
-            self.note(format!("{path}: values are scale_factor · code + add_offset, as its attributes say"));
+            self.note(format!("{path}: values are scale_factor · code + add_offset, from its attributes"));
         }
         Ok(())
     }
 
     fn not_a_table(&mut self, path: &str, dims: &[usize]) {
         let size = dims.iter().map(ToString::to_string).collect::<Vec<_>>().join(" × ");
-        let advice = if dims.len() == 2 { ": it is wider than long, transpose it" } else { "" };
-        self.note(format!("dataset {path} of {size} numbers is no table of columns{advice}"));
+        let advice = if dims.len() == 2 { ": it has more columns than rows; transpose it" } else { "" };
+        self.note(format!("dataset {path} of {size} numbers is not a table of columns{advice}"));
     }
 }
 
 impl Stated {
     fn of(attributes: &Attributes, scope: &Scope, columns: usize) -> Self {
-        // One text may list all: "s, V, um".
+        // One text may be a list: "s, V, um".
         let list = |names: &[&str]| {
             let texts = attributes.texts(names)?;
             let [text] = texts.as_slice() else { return Some(texts) };
@@ -120,7 +120,7 @@ impl Stated {
         self.scale != 1.0 || self.offset != 0.0
     }
 
-    /// Values of a column of a table that is stored row by row.
+    /// Returns the values of a column of a table that is stored row by row.
     fn values(&self, storage: Storage, bytes: &[u8], column: usize, columns: usize, rows: usize) -> Vec<f64> {
         let size = storage.kind.size();
         let mut values = storage.column(bytes, column * size, columns * size, rows);
@@ -134,7 +134,7 @@ impl Stated {
     }
 }
 
-/// The dimension scale that is attached to the rows.
+/// Returns the dimension scale of the rows.
 fn clock_of(dataset: &Dataset, attributes: &Attributes, axis: usize) -> Option<Clock> {
     let list = attributes.get("DIMENSION_LIST")?;
     let size = dataset.vlen_reference_size();

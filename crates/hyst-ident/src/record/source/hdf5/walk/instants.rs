@@ -1,8 +1,8 @@
-//! Times that count from a date, as `nanoseconds since 1970-01-01` (CF conventions of netCDF).
+//! Times since a date, such as `nanoseconds since 1970-01-01` (CF conventions of netCDF).
 
 use crate::record::source::elements::{Kind, Storage};
 
-/// Nanoseconds of the units that count from a date.
+/// Units of time and their size \[ns\].
 const UNITS: [(&[&str], i64); 7] = [
     (&["nanoseconds", "nanosecond", "ns"], 1),
     (&["microseconds", "microsecond", "us", "µs"], 1_000),
@@ -14,15 +14,15 @@ const UNITS: [(&[&str], i64); 7] = [
 ];
 const NANOSECONDS_A_DAY: i64 = 86_400_000_000_000;
 
-/// Seconds since the last full day before the first value, or `None` where the unit does not count from a date.
+/// Returns seconds since the last full day before the first value; `None` if the unit does not count from a date.
 ///
-/// A double has no room for nanoseconds since 1970, so that integers are subtracted before they are converted.
+/// A double does not resolve nanoseconds since 1970, so integers are subtracted before they are converted.
 pub(super) fn seconds(unit: &str, values: &[f64], bytes: &[u8], storage: Storage) -> Option<Vec<f64>> {
     let (word, _) = unit.split_once(" since ")?;
     let word = word.trim().to_lowercase();
     let (_, nanoseconds) = UNITS.iter().find(|(names, _)| names.contains(&word.as_str()))?;
     let a_day = NANOSECONDS_A_DAY / nanoseconds;
-    // Units of less than a second divide it, those of more are whole seconds: each rounds once.
+    // Units shorter than a second divide it, longer units are whole seconds. Each conversion rounds once.
     let to_seconds = |value: f64| {
         let second = 1_000_000_000;
         if *nanoseconds < second {
@@ -36,7 +36,7 @@ pub(super) fn seconds(unit: &str, values: &[f64], bytes: &[u8], storage: Storage
             |own: &[u8; 8]| if storage.big_endian { i64::from_be_bytes(*own) } else { i64::from_le_bytes(*own) };
         let whole: Vec<i64> = bytes.chunks_exact(8).filter_map(|own| own.first_chunk()).map(whole).collect();
         let start = whole.first()?.div_euclid(a_day).checked_mul(a_day)?;
-        // The smallest integer stands for no time.
+        // The smallest integer means a missing time.
         let of =
             |value: &i64| if *value == i64::MIN { f64::NAN } else { to_seconds(value.saturating_sub(start) as f64) };
         return Some(whole.iter().map(of).collect());

@@ -4,15 +4,15 @@ use super::super::tree::{Array, Value};
 use super::Layout;
 use crate::record::source::gather::{Clock, Column, TextList, of_matrix};
 
-/// What is known of an array beside its numbers.
+/// The metadata of an array.
 pub(super) struct About<'t> {
     pub(super) clock: Clock,
-    /// Rows of its clock, where that is a column.
+    /// The number of rows of the clock, if the clock is a column.
     pub(super) clock_rows: Option<usize>,
-    /// What it is called, and by which struct.
+    /// The label, and the struct that states it.
     pub(super) label: Option<(&'t str, &'t str)>,
     pub(super) unit: Option<String>,
-    /// Lists that may name its columns.
+    /// Lists of texts that may name the columns.
     pub(super) lists: &'t [TextList],
 }
 
@@ -22,25 +22,27 @@ impl About<'_> {
     }
 }
 
-/// Where the numbers of a column are, counted in numbers.
+/// The places of columns in an array \[numbers\].
 struct Columns {
     rows: usize,
     count: usize,
-    /// From one column to the next.
+    /// Distance from one column to the next.
     across: usize,
-    /// From one row to the next.
+    /// Distance from one row to the next.
     down: usize,
 }
 
 impl Columns {
-    /// The columns of an array with these dimensions: a vector has one, a table that is not wider than long as many as it is wide.
+    /// Returns the columns of an array with these dimensions.
+    ///
+    /// A vector is one column. A table is read if it does not have more columns than rows.
     fn of(dims: &[usize], clock_rows: Option<usize>) -> Option<Self> {
         let total = super::super::tree::count(dims)?;
         let long: Vec<usize> = dims.iter().copied().filter(|dim| *dim != 1).collect();
         match *long.as_slice() {
             [rows] => Some(Self { rows, count: 1, across: 0, down: 1 }),
             [rows, count] if dims[0] == rows && rows >= count => Some(Self { rows, count, across: rows, down: 1 }),
-            // Simulink puts the times of a matrix signal last.
+            // In matrix signals of Simulink the last dimension is the time.
             [.., rows] if Some(rows) == clock_rows && rows > 0 && total / rows <= rows => {
                 Some(Self { rows, count: total / rows, across: 1, down: total / rows })
             }
@@ -50,7 +52,7 @@ impl Columns {
 }
 
 impl Layout<'_> {
-    /// Adds the columns of an array of numbers; the number of the first of them.
+    /// Adds the columns of an array of numbers.
     pub(super) fn numbers(
         &mut self,
         path: &str,
@@ -83,7 +85,7 @@ impl Layout<'_> {
                 .or_else(|| about.unit.clone());
             let text =
                 place.len() + path.len() + label.as_ref().map_or(0, String::len) + unit.as_ref().map_or(0, String::len);
-            self.room.take((shape.rows as u64).saturating_mul(8).saturating_add(text as u64))?;
+            self.budget.take((shape.rows as u64).saturating_mul(8).saturating_add(text as u64))?;
             let values = storage.column(bytes, k * shape.across * size, shape.down * size, shape.rows);
             let owner = about.label.map_or(path, |(_, owner)| owner).to_owned();
             columns.push(Column { owner, label, unit, clock: about.clock, ..Column::new(place, values) });
@@ -94,10 +96,10 @@ impl Layout<'_> {
     fn not_a_table(&mut self, path: &str, dims: &[usize]) {
         let size = dims.iter().map(ToString::to_string).collect::<Vec<_>>().join(" × ");
         let advice = if dims.len() == 2 {
-            format!(": it is wider than long, transpose it ({path} = {path}.')")
+            format!(": it has more columns than rows; transpose it ({path} = {path}.')")
         } else {
             String::new()
         };
-        self.note(format!("\"{path}\" of {size} numbers is no table of columns{advice}"));
+        self.note(format!("\"{path}\" of {size} numbers is not a table of columns{advice}"));
     }
 }

@@ -1,4 +1,4 @@
-//! Structs as particular programs write them.
+//! Structs of particular programs.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -7,18 +7,18 @@ use super::matrix::About;
 use super::{Layout, Scope};
 use crate::record::source::gather::{Clock, Column};
 
-/// Fields in which signals are.
+/// Fields with the values of a signal.
 const DATA: [&str; 3] = ["Data", "values", "Value"];
-/// Fields with a signal's name.
+/// Fields with the name of a signal.
 const NAME: [&str; 3] = ["Name", "label", "blockName"];
-/// Fields with a signal's unit.
+/// Fields with the unit of a signal.
 const UNIT: [&str; 2] = ["Unit", "Units"];
 
-/// A clock that is a column, and how many rows it has.
+/// A clock and its number of rows.
 type Times = Option<(Clock, usize)>;
 
 impl Layout<'_> {
-    /// Columns of a struct that a known program wrote; the numbers of the fields that are done with.
+    /// Adds the columns of a struct of a known program. Returns the numbers of the fields that it has read.
     pub(super) fn programs(
         &mut self,
         scope: Scope<'_>,
@@ -34,7 +34,7 @@ impl Layout<'_> {
         if let Some((signals_at, signals)) = structs_in(fields, "signals")
             && let Some((time_at, time)) = fields.get(&["time"])
         {
-            // Simulink's time is in seconds.
+            // Simulink writes times in seconds.
             let times = self.time(&scope.path_of(&fields.names[time_at]), time, Some("s"), columns)?;
             for (k, signal) in signals.iter().enumerate() {
                 let path = scope.path_of(&format!("{}({})", fields.names[signals_at], k + 1));
@@ -48,7 +48,7 @@ impl Layout<'_> {
         if let Some((time_at, time)) = fields.get(&["Time"]).filter(|(_, time)| time.is_numbers()) {
             let unit = inner(fields, "TimeInfo").and_then(|info| info.text(&UNIT));
             let times = self.time(&scope.path_of(&fields.names[time_at]), time, unit, columns)?;
-            // Beside a time a list may name the columns of a table.
+            // A list of texts may name the columns of a table with a time.
             let lists = super::lists(fields);
             let about = About { unit: unit_of(fields), lists: &lists, ..about(scope, times) };
             self.numbers(&scope.path_of(&fields.names[data_at]), data, &about, columns)?;
@@ -69,7 +69,7 @@ impl Layout<'_> {
         Ok(Vec::new())
     }
 
-    /// dSPACE ControlDesk: X has the time axes, Y the signals, each with the number of its axis.
+    /// Adds the columns of dSPACE ControlDesk: X has the time axes, Y the signals, each with the number of its axis.
     fn control_desk(
         &mut self,
         scope: Scope<'_>,
@@ -102,7 +102,7 @@ impl Layout<'_> {
         Ok(())
     }
 
-    /// The columns of a struct with a signal's name, unit and numbers; `owner` is the struct that such structs are in.
+    /// Adds the columns of a struct with the name, unit and values of a signal. `owner` is the enclosing struct.
     fn signal(
         &mut self,
         scope: Scope<'_>,
@@ -117,7 +117,7 @@ impl Layout<'_> {
         self.numbers(&scope.path_of(&fields.names[at]), data, &about, columns)
     }
 
-    /// Adds a column of times, unless a column before has the same: many signals of a file share one clock.
+    /// Adds a time column, unless an earlier column has the same times. Many signals of a file share one clock.
     fn time(
         &mut self,
         path: &str,
@@ -148,7 +148,7 @@ impl Layout<'_> {
     }
 }
 
-/// The field `name` where it is a struct.
+/// Returns the field `name` if it is a struct.
 fn structs_in<'t, 'a>(fields: Fields<'t, 'a>, name: &str) -> Option<(usize, &'t Structs<'a>)> {
     let at = fields.names.iter().position(|own| own == name)?;
     match &fields.values.get(at)?.value {

@@ -1,4 +1,4 @@
-//! Writes small files.
+//! A writer of small files.
 
 use std::io::Write;
 
@@ -19,7 +19,7 @@ pub(super) enum Element {
     Array(Array),
 }
 
-/// The class of an array and what follows its name.
+/// The class of an array and the elements after its name.
 pub(super) type Content = (u32, Vec<Element>);
 
 impl Array {
@@ -49,7 +49,7 @@ pub(super) fn cells(cells: &[Array]) -> Content {
     (1, cells.iter().cloned().map(Element::Array).collect())
 }
 
-/// Structs with these fields, each with its values.
+/// Structs with these fields and values.
 pub(super) fn structs(names: &[&str], elements: &[&[Array]]) -> Content {
     let padded: Vec<u8> = names.iter().flat_map(|name| format!("{name:\0<32}").into_bytes()).collect();
     let values = elements.iter().flat_map(|element| element.iter().cloned().map(Element::Array));
@@ -104,7 +104,7 @@ fn put_array(bytes: &mut Vec<u8>, array: &Array, big_endian: bool) {
     put(bytes, 14, &own, big_endian);
 }
 
-/// A little-endian file with its variables compressed.
+/// A little-endian file with compressed variables.
 pub(super) fn compressed(file: &[u8]) -> Vec<u8> {
     let (header, mut rest) = file.split_at(128);
     let mut bytes = header.to_vec();
@@ -122,7 +122,7 @@ pub(super) fn compressed(file: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A file of version 4: matrices with their names and numbers of columns.
+/// A file of version 4. `variables` have a name, a number of columns and values.
 pub(super) fn version_4(variables: &[(&str, usize, &[f64])], big_endian: bool) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (name, columns, values) in variables {

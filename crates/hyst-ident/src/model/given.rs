@@ -1,43 +1,43 @@
-//! Models whose parameters come from elsewhere than a fit: a paper, another program, a person.
+//! Models with given parameters, for example from a paper or another program.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use hyst_core::{Env, Error, Stage};
 
-use super::operator::ROOM;
+use super::operator::DEFAULT_DEGC;
 use super::{Base, Channel, Effect, Effects, Model, units};
 use crate::BetweenSamples;
 use crate::record::{OutputUnit, is_input_column};
 
-/// The two ends of an actuator whose parameters come from elsewhere.
+/// Input and output of an actuator with given parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ends {
-    /// The input's column: `voltage_v`, or `QUANTITY_in_UNIT`.
+    /// The column of the input: `voltage_v` or `QUANTITY_in_UNIT`.
     pub input_column: String,
-    /// Lowest and highest input for which the parameters hold \[input unit\].
+    /// Minimum and maximum input for which the parameters are valid \[input unit\].
     pub input: (f64, f64),
-    /// The output's unit.
+    /// The unit of the output.
     pub output: OutputUnit,
-    /// Lowest and highest output \[output unit\]; those at rest at the two inputs, if not given.
+    /// Minimum and maximum output \[output unit\]. Default: the outputs at rest at the two inputs.
     pub output_range: Option<(f64, f64)>,
-    /// Sample rate to write into the file \[Hz\]; the parameters do not depend on it.
+    /// Sample rate for the file \[Hz\]. The parameters do not depend on it.
     pub rate_hz: f64,
 }
 
 impl Model {
-    /// A model of given parameters, fitted on nothing.
+    /// Makes a model of given parameters, without a fit.
     ///
     /// # Errors
-    /// Names what is no number, out of order, out of range or in another unit than the output: an end of the actuator, or a
-    /// parameter of a stage.
+    /// If a range or a parameter is not a finite number, not in order, out of range, or has another unit than the output. The error
+    /// names it.
     pub fn from_parameters(base: Base, effects: Effects, ends: &Ends) -> Result<Self, Error> {
         let Ends { input: (low, high), output, .. } = *ends;
         if !is_input_column(&ends.input_column) {
             return Err(Error::OutOfRange { name: "input_column", must: "voltage_v or QUANTITY_in_UNIT" });
         }
-        // Numbers that are none are refused as well.
+        // The comparison also refuses NaN.
         if !(low.is_finite() && high.is_finite() && low < high) {
-            return Err(Error::OutOfRange { name: "input_range", must: "two finite numbers, the lower one first" });
+            return Err(Error::OutOfRange { name: "input_range", must: "two finite numbers, the smaller one first" });
         }
         if !(ends.rate_hz.is_finite() && ends.rate_hz > 0.0) {
             return Err(Error::OutOfRange { name: "rate_hz", must: "positive" });
@@ -70,24 +70,24 @@ impl Model {
             None => model.at_rest([low, high], [stated, stated])?,
         };
         if !(least.is_finite() && most.is_finite() && least <= most) {
-            return Err(Error::OutOfRange { name: "output_range", must: "two finite numbers, the lower one first" });
+            return Err(Error::OutOfRange { name: "output_range", must: "two finite numbers, the smaller one first" });
         }
         (model.output.low, model.output.high) = (least, most);
         Ok(model)
     }
 
-    /// Temperature that the parameters are stated for \[°C\].
+    /// Returns the reference temperature of the parameters \[°C\].
     fn stated_degc(&self) -> f64 {
         match (&self.effects.temperature, &self.base) {
             (Some(gain), _) => gain.reference_degc,
             (None, Base::TdPi(p)) => p.reference_degc,
-            (None, _) => ROOM,
+            (None, _) => DEFAULT_DEGC,
         }
     }
 
-    /// Lowest and highest output at rest, over these inputs and temperatures \[°C\], without what is in the sensor.
+    /// Returns the minimum and maximum output at rest at these inputs and temperatures \[°C\], without effects of the sensor.
     pub(crate) fn at_rest(&self, inputs: [f64; 2], degc: [f64; 2]) -> Result<(f64, f64), Error> {
-        // Settled: the sample period does not matter there.
+        // The output at rest does not depend on the sample period.
         let chain = Box::new(self.without_sensor().build(1.0 / self.recorded_at_hz)?);
         let mut state = Box::new(chain.state());
         let mut outputs = Vec::new();
@@ -98,11 +98,13 @@ impl Model {
         Ok(crate::samples::range(outputs.into_iter()))
     }
 
-    /// The straight line through the ends of the record that it was fitted to: its slope \[output/input\], which falls where the model does, and its
-    /// output at the lowest input. What somebody without a model of the hysteresis would use.
+    /// Returns the straight line through the ends of the fitted range.
+    ///
+    /// The line is given by its slope \[output/input\] and its output at the minimum input. It is the compensation without a model of the
+    /// hysteresis. The slope is negative if the output of the model falls.
     ///
     /// # Errors
-    /// If the model cannot be run.
+    /// If the chain cannot be built.
     pub fn straight_line(&self) -> Result<(f64, f64), Error> {
         let chain = Box::new(self.without_sensor().build(1.0 / self.recorded_at_hz)?);
         let mut state = Box::new(chain.state());
@@ -113,7 +115,7 @@ impl Model {
         Ok(if rises { (stroke / span, self.output.low) } else { (-stroke / span, self.output.high) })
     }
 
-    /// The model without what is in the sensor only: a drive does not follow that.
+    /// Returns the model without effects of the sensor, which a drive does not compensate.
     pub(crate) fn without_sensor(&self) -> Self {
         let effects = self.effects.without(Effect::Drift).without(Effect::Interference);
         Self { effects, ..self.clone() }
@@ -140,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn the_output_range_is_that_of_rest_and_without_the_sensors_drift() {
+    fn the_default_output_range_is_at_rest_and_without_sensor_drift() {
         let effects =
             Effects { drift: Some(DriftParams { per_second: 3.0, ..DriftParams::default() }), ..Effects::default() };
         let model = Model::from_parameters(pi(0.1), effects, &ends()).unwrap();
@@ -150,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_that_are_none_are_named() {
+    fn invalid_ranges_are_refused_by_name() {
         let refused = |ends: Ends| match Model::from_parameters(pi(0.1), Effects::default(), &ends) {
             Err(Error::OutOfRange { name, .. }) => name,
             other => panic!("{other:?}"),

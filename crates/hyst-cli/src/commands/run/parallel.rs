@@ -1,4 +1,4 @@
-//! The model beside the device: what it expects, the force that what it does not expect may be, and whether it still explains what is measured.
+//! A model in parallel with the device: predicted output, force estimate, monitored residual.
 
 use hyst_core::{Build, Env, ForceObservation, ForceParams, Stage, Watch, WatchState};
 use hyst_hw::{Phase, Sample};
@@ -9,80 +9,82 @@ use super::adapt::{Adapting, Change};
 use super::sweep::Sweep;
 use crate::exit::{CommandError, CommandResult};
 
-/// Length of a block of the watch \[s\], longer than what a residual remembers, and fewest samples of one.
+/// Length of a block of monitored residuals \[s\], and its minimum length \[samples\].
+/// A block is longer than the correlation time of a residual.
 const BLOCK_S: f64 = 0.5;
-const FEWEST: f64 = 20.0;
-/// Residuals so many times as large as in the training are taken as usual.
-const USUAL: f64 = 2.0;
-/// Blocks of twice that size until it is told.
-const PATIENCE: f64 = 3.0;
+const MIN_BLOCK_SAMPLES: f64 = 20.0;
+/// RMS residual that is accepted, in multiples of that of the training record.
+const ACCEPTED_RATIO: f64 = 2.0;
+/// Number of blocks with twice the accepted residual after which the model is reported as lost.
+const BLOCKS_TO_LOST: f64 = 3.0;
 
-/// A model that is run with what is applied.
-pub(super) struct Beside {
+/// A model that runs with the applied voltages.
+pub(super) struct ParallelModel {
     chain: Box<HostChain>,
     state: Box<<HostChain as Stage<f64>>::State>,
-    /// Temperature where none is measured \[°C\].
+    /// Temperature if none is measured \[°C\].
     degc: f64,
-    /// When the run began, by the device's clock \[s\].
+    /// Start of the run by the device's clock \[s\].
     began_s: Option<f64>,
     segment: Option<usize>,
-    /// Whether nothing of this segment's record has come yet.
+    /// Whether no sample of this segment has arrived (ramp samples do not count).
     fresh: bool,
-    /// What was put out last \[V\].
+    /// Last voltage \[V\].
     last_v: f64,
-    /// What the sensor shows beyond the model before the reference begins: its zero of today.
+    /// Mean of output minus model before the reference: the present sensor zero.
     zero: Mean,
-    /// Whether the actuator still remembers what the model does not know of.
+    /// Whether the history of earlier drives still acts.
     sweep: Sweep,
-    /// Samples of this segment's record until it did not any more, and the next ones, which tell the zero from then on.
+    /// Number of samples of this segment until the history of earlier drives was erased.
+    /// `new_zero` is estimated from as many samples after that.
     before: usize,
-    anew: Mean,
+    new_zero: Mean,
     watch: Option<Watch<f64>>,
     watched: WatchState<f64>,
-    /// Whether anything was watched.
-    looked: bool,
+    /// Whether any sample was monitored.
+    has_watched: bool,
     block: u32,
     force: Option<ForceObservation<f64>>,
-    /// What the model left of its own record \[output unit\].
-    trained_to: Option<f64>,
+    /// RMSE of the model on its training record \[output unit\].
+    fitted_rmse: Option<f64>,
     lost_at: Option<f64>,
     now_lost: bool,
-    /// Of a model that is adapted.
+    /// `None` without `--adapt`.
     adapting: Option<Adapting>,
 }
 
-/// What the model says of one sample.
+/// Prediction of the model for one sample.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
+pub(super) struct Prediction {
     /// Output \[output unit\].
     pub(super) output: f64,
     /// Estimated force \[N\].
     pub(super) force: Option<f64>,
-    /// Whether that has just changed: the model explains the device, or does not.
+    /// Whether the model explains the output; `None` if that has not changed with this sample.
     pub(super) explains: Option<bool>,
 }
 
-/// How the watch has ended.
+/// Result of the monitoring of a model.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watched {
-    /// When the model stopped explaining the device for the first time, by the device's clock \[s\].
+    /// First time at which the model did not explain the output, by the device's clock \[s\].
     pub(super) lost_at: Option<f64>,
-    /// Residual of the last block \[output unit\].
+    /// RMS residual of the last block \[output unit\].
     pub(super) residual: f64,
-    /// What the model left of its own record \[output unit\].
-    pub(super) trained_to: f64,
+    /// RMSE of the model on its training record \[output unit\].
+    pub(super) fitted_rmse: f64,
 }
 
-/// Where an external force is estimated.
+/// Place of the force estimate.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Force {
-    /// Here, with the output's stiffness \[N/output unit\].
+    /// On this computer, with the stiffness of the output \[N/output unit\].
     Here(f64),
-    /// By the device.
+    /// On the device.
     OnDevice,
 }
 
-/// A mean under way.
+/// A running mean.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
     sum: f64,
@@ -100,8 +102,9 @@ impl Mean {
     }
 }
 
-impl Beside {
-    /// Beside a device that runs at `rate_hz`. `None` for a model that has to know the whole drive.
+impl ParallelModel {
+    /// Creates the model for a device that runs at `rate_hz`.
+    /// `None` for a model that needs the whole drive.
     pub(super) fn new(
         model: &Model,
         rate_hz: f64,
@@ -112,7 +115,7 @@ impl Beside {
         if model.between_samples != BetweenSamples::Linear {
             return Ok(None);
         }
-        // What a compliance explains is what an observer is to find.
+        // The compliance of the model is removed, because it would explain the force that the observer estimates.
         let stiffness = match force {
             Some(Force::Here(stiffness)) => Some(stiffness),
             _ => None,
@@ -123,8 +126,8 @@ impl Beside {
         };
         let chain = Box::new(free.build(1.0 / rate_hz).map_err(CommandError::bad_input)?);
         let observer = |stiffness| ForceParams { stiffness, kappa: 1.0, chi: 0.0 }.build(&());
-        let block = (BLOCK_S * rate_hz).max(FEWEST).round() as u32;
-        // Under a force that is looked for, a residual is no news.
+        let block = (BLOCK_S * rate_hz).max(MIN_BLOCK_SAMPLES).round() as u32;
+        // During a force estimate the residual contains the force and is not monitored.
         let sigma = model.rmse.filter(|rmse| *rmse > 0.0 && force.is_none());
         Ok(Some(Self {
             state: Box::new(chain.state()),
@@ -137,24 +140,25 @@ impl Beside {
             zero: Mean::default(),
             sweep: Sweep::new(),
             before: 0,
-            anew: Mean::default(),
-            looked: false,
+            new_zero: Mean::default(),
+            has_watched: false,
             block,
             watch: sigma
-                .map(|sigma| Watch::new(sigma, USUAL, PATIENCE, block))
+                .map(|sigma| Watch::new(sigma, ACCEPTED_RATIO, BLOCKS_TO_LOST, block))
                 .transpose()
                 .map_err(CommandError::failed)?,
             watched: WatchState::default(),
             force: stiffness.map(observer).transpose().map_err(CommandError::bad_input)?,
-            trained_to: model.rmse,
+            fitted_rmse: model.rmse,
             lost_at: None,
             now_lost: false,
             adapting,
         }))
     }
 
-    /// Takes the next sample of a segment, before which so many periods are missing: the device has held its last value in these.
-    pub(super) fn take(&mut self, segment: usize, phase: Phase, sample: &Sample, missing: usize) -> Expected {
+    /// Takes the next sample of a segment.
+    /// In the `missing` periods before it the device held its last value.
+    pub(super) fn take(&mut self, segment: usize, phase: Phase, sample: &Sample, missing: usize) -> Prediction {
         let began_s = *self.began_s.get_or_insert(sample.time_s);
         let env = Env {
             time: sample.time_s - began_s,
@@ -168,7 +172,7 @@ impl Beside {
             self.chain.step(&mut self.state, &env, sample.drive_v)
         } else {
             self.segment = Some(segment);
-            (self.zero, self.anew, self.sweep, self.before) = (Mean::default(), Mean::default(), Sweep::new(), 0);
+            (self.zero, self.new_zero, self.sweep, self.before) = (Mean::default(), Mean::default(), Sweep::new(), 0);
             self.fresh = true;
             self.adapting.iter().for_each(Adapting::begin_segment);
             self.chain.reset(&mut self.state, &env, sample.drive_v)
@@ -188,7 +192,7 @@ impl Beside {
         };
         let mut explains = None;
         if let (Some(watch), true) = (&self.watch, known) {
-            self.looked = true;
+            self.has_watched = true;
             let lost = watch.step(&mut self.watched, sample.output - output);
             explains = (lost != self.now_lost).then_some(!lost);
             self.now_lost = lost;
@@ -196,43 +200,45 @@ impl Beside {
                 self.lost_at.get_or_insert(sample.time_s);
             }
         }
-        Expected { output, force: self.force.map(|force| force.force(sample.output, output)), explains }
+        Prediction { output, force: self.force.map(|force| force.force(sample.output, output)), explains }
     }
 
-    /// Whether model and actuator have the same history. An actuator that remembers earlier runs stands elsewhere than the model until the drive has gone
-    /// over its range both ways; the zero is found anew then, over as long a time as that took.
-    fn known(&mut self, drive_v: f64, beyond: f64) -> bool {
-        // A force would be taken for a zero.
+    /// Whether model and actuator have the same history and the zero is known.
+    ///
+    /// The history of earlier runs acts until the drive has covered its range in both directions. Then the zero is estimated
+    /// again, over as many samples as that took. `residual` is output minus model.
+    fn known(&mut self, drive_v: f64, residual: f64) -> bool {
+        // During a force estimate the zero is not estimated again, because it would contain the force.
         if self.watch.is_none() {
             return true;
         }
         if !self.sweep.take(drive_v) {
             self.before += 1;
-            self.anew = Mean::default();
+            self.new_zero = Mean::default();
             return false;
         }
         let enough = self.before.max(self.block as usize);
-        if (self.anew.count as usize) < enough {
-            self.anew.add(beyond);
-            if self.anew.count as usize == enough {
-                (self.zero, self.before) = (self.anew, 0);
+        if (self.new_zero.count as usize) < enough {
+            self.new_zero.add(residual);
+            if self.new_zero.count as usize == enough {
+                (self.zero, self.before) = (self.new_zero, 0);
             }
             return false;
         }
         true
     }
 
-    /// What was learned, if it has changed.
+    /// Returns the adaptation if it has changed noticeably.
     pub(super) fn adapted(&self) -> Option<Change> {
-        self.adapting.as_ref()?.news()
+        self.adapting.as_ref()?.new_change()
     }
 
-    /// How the watch has ended; `None` where nothing was watched.
+    /// Returns the result of the monitoring; `None` if no sample was monitored.
     pub(super) fn watched(&self) -> Option<Watched> {
         self.watch?;
-        if !self.looked {
+        if !self.has_watched {
             return None;
         }
-        Some(Watched { lost_at: self.lost_at, residual: self.watched.last_rms(), trained_to: self.trained_to? })
+        Some(Watched { lost_at: self.lost_at, residual: self.watched.last_rms(), fitted_rmse: self.fitted_rmse? })
     }
 }

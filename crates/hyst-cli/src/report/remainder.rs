@@ -1,4 +1,4 @@
-//! What is left, where it lives, and what was not measured that might explain it.
+//! Section of the remainder: kind, distribution over the record, quantities that were not measured.
 
 use hyst_ident::diagnose::{Breakdown, RemainderKind};
 
@@ -6,9 +6,9 @@ use super::html::{Page, Table};
 use super::{Contents, words};
 use crate::text::{percent, short};
 
-/// The remainder.
+/// Writes the section.
 pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
-    page.section("left", "What is left");
+    page.section("remainder", "Remainder");
     let remainder = &c.diagnosis.findings.remainder;
     let share = percent(100.0 * remainder.variance_share);
     page.paragraph("verdict", &format!("{}, {share} of the output's variance", words::kind(remainder)));
@@ -20,14 +20,14 @@ pub(super) fn write(page: &mut Page, c: &Contents<'_>) {
     if remainder.kind != RemainderKind::None {
         let missing = not_measured(c);
         if !missing.is_empty() {
-            page.raw("<h3>What was not measured</h3>");
+            page.raw("<h3>Quantities that were not measured</h3>");
             page.list(&missing);
         }
     }
-    page.raw("<h3>Where it lives</h3>");
+    page.raw("<h3>Distribution over the record</h3>");
     page.paragraph(
         "soft",
-        "Root mean square of what the extended model leaves on the training record, part by part, and each part's share of the whole",
+        "RMS of the remainder on each part of the training record, and the share of each part in the whole",
     );
     page.raw("<div class=\"parts\">");
     for breakdown in &c.diagnosis.breakdowns {
@@ -49,22 +49,21 @@ fn table(breakdown: &Breakdown, unit: &str) -> Table {
     table
 }
 
-/// Columns that the record does not have, and what could hide there.
+/// Returns the columns that the record does not have, and what their effects look like without them.
 fn not_measured(c: &Contents<'_>) -> Vec<&'static str> {
     let mut missing = Vec::new();
     if c.train.temperature().is_none() {
         missing.push(
-            "Temperature (temperature_degc): a gain that follows it cannot be named without it, and looks like a gain or a zero \
-             that wanders over minutes",
+            "Temperature (temperature_degc): without it a temperature-dependent gain cannot be named; it appears as a gain or a zero \
+             that drifts over minutes",
         );
     }
     if c.train.load().is_none() {
-        missing.push(
-            "Load (load_n): an actuator that yields under a force looks like a zero that moves with whatever pushes",
-        );
+        missing
+            .push("Load (load_n): without it the deflection under a force appears as a zero that moves with the force");
     }
     if c.test.is_none() {
-        missing.push("A test record: errors on data that were not fitted are not known");
+        missing.push("A test record: the errors on data that were not fitted are unknown");
     }
     missing
 }

@@ -1,18 +1,18 @@
-//! How much memory the columns of a file may take.
+//! A limit on the memory of the columns of a file.
 
 use std::cell::Cell;
 use std::rc::Rc;
 
-/// How many more values the columns of a file may have, all topics together.
+/// The number of values that the columns of all topics may still add.
 #[derive(Clone, Debug)]
-pub(crate) struct Room(Rc<Cell<usize>>);
+pub(crate) struct Budget(Rc<Cell<usize>>);
 
-impl Room {
+impl Budget {
     pub(crate) fn new(values: usize) -> Self {
         Self(Rc::new(Cell::new(values)))
     }
 
-    /// Takes room for so many values; whether there was any.
+    /// Reserves memory for `values`. Returns false if the limit is exceeded.
     pub(crate) fn take(&self, values: usize) -> bool {
         let rest = self.0.get().checked_sub(values);
         self.0.set(rest.unwrap_or(0));

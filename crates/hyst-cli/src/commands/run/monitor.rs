@@ -1,44 +1,45 @@
-//! What is done with each sample of a run as it comes: log, limits, the model beside it, what a person sees.
+//! Handles each sample of a run when it arrives: log, limits, parallel model, view.
 
 use std::ops::ControlFlow;
 
 use hyst_hw::wire::Fault;
 use hyst_hw::{Phase, Progress, Sample};
 
-use super::beside::{Beside, Watched};
 use super::gaps::GapFinder;
 use super::guard::Guard;
-use super::view::{Seen, View};
+use super::parallel::{ParallelModel, Watched};
+use super::view::{Values, View};
 use crate::log::{LogError, LoggedEvent, LoggedSample, RunLog, RunStream};
 use crate::text;
 
-/// Everything that looks at a run.
-pub(super) struct Lookout<'a> {
+/// Monitors a run.
+pub(super) struct Monitor<'a> {
     pub(super) log: Option<&'a mut RunLog>,
-    /// Viewers that look on.
+    /// Stream for viewers.
     pub(super) stream: Option<RunStream>,
-    /// Why the log could not be written; from then on nothing is.
+    /// First error of the log; nothing is written to the log after it.
     pub(super) log_error: Option<LogError>,
-    pub(super) beside: Option<Beside>,
+    /// Model that runs in parallel with the device.
+    pub(super) model: Option<ParallelModel>,
     pub(super) guard: Guard,
     pub(super) gaps: GapFinder,
     pub(super) view: View,
-    /// What was wanted at each row of the record.
+    /// Wanted output at each row of the record.
     pub(super) wanted: &'a [Option<f64>],
-    /// Symbol of the output's unit.
+    /// Symbol of the output unit.
     pub(super) unit: &'a str,
-    /// Why the run is ended from here.
+    /// Fault with which this computer ends the run.
     pub(super) fault: Option<Fault>,
-    /// More about it.
+    /// Details of the fault.
     pub(super) detail: String,
-    /// Estimated force at each row of each segment \[N\]; empty where none is estimated.
+    /// Estimated force at each row of each segment \[N\]; empty without an estimate.
     pub(super) forces: Vec<Vec<f64>>,
-    /// Time of the newest sample \[s\].
+    /// Time of the latest sample \[s\].
     pub(super) now_s: f64,
 }
 
-impl Lookout<'_> {
-    /// Takes samples as they come; whether the run goes on.
+impl Monitor<'_> {
+    /// Takes new samples; returns whether the run continues.
     pub(super) fn take(&mut self, news: &Progress<'_>) -> ControlFlow<()> {
         let recorded = news.phase == Phase::Record;
         let first = news.done - if recorded { news.samples.len() } else { 0 };
@@ -59,17 +60,23 @@ impl Lookout<'_> {
         let missing = self.gaps.take(news.segment, sample).unwrap_or(0);
         if missing > 0 && self.gaps.gaps().times == 1 {
             let now = text::short(sample.time_s);
-            self.event("gap", format!("before {now} s the device held its last value for {missing} periods: the line is too slow for this rate"));
+            self.event(
+                "gap",
+                format!(
+                    "before {now} s the device held its last value for {missing} periods: the line is too slow for this \
+                     sample rate"
+                ),
+            );
         }
-        let expected = self.beside.as_mut().map(|beside| beside.take(news.segment, news.phase, sample, missing));
-        let force = expected.and_then(|e| e.force).or(sample.force_n);
+        let predicted = self.model.as_mut().map(|model| model.take(news.segment, news.phase, sample, missing));
+        let force = predicted.and_then(|p| p.force).or(sample.force_n);
         if news.phase == Phase::Record {
             self.forces.resize_with(self.forces.len().max(news.segment + 1), Vec::new);
             self.forces[news.segment].extend(force);
         }
         if self.log.is_some() || self.stream.is_some() {
             let mut logged = LoggedSample::new(news.segment + self.gaps.gaps().times, news.phase, sample, wanted);
-            logged.predicted = expected.map(|e| e.output);
+            logged.predicted = predicted.map(|p| p.output);
             logged.estimated_force_n = force;
             if self.log_error.is_none()
                 && let Some(log) = &mut self.log
@@ -78,21 +85,21 @@ impl Lookout<'_> {
             }
             self.stream.iter_mut().for_each(|stream| stream.sample(&logged));
         }
-        self.view.add(Seen { sample: *sample, wanted, predicted: expected.map(|e| e.output), force });
-        if let Some(change) = self.beside.as_ref().and_then(Beside::adapted) {
+        self.view.add(Values { sample: *sample, wanted, predicted: predicted.map(|p| p.output), force });
+        if let Some(change) = self.model.as_ref().and_then(ParallelModel::adapted) {
             self.note("adapted", change.text(self.unit));
         }
-        if let Some(explains) = expected.and_then(|e| e.explains) {
-            let (kind, text) = self.told(explains);
+        if let Some(explains) = predicted.and_then(|p| p.explains) {
+            let (kind, text) = self.change_of_model(explains);
             self.event(kind, text);
         }
         if self.fault.is_none()
-            && let Some(fault) = self.guard.look(sample, wanted)
+            && let Some(fault) = self.guard.check(sample, wanted)
         {
             self.detail = match (fault, wanted, sample.temperature_degc) {
                 (Fault::TrackingError, Some(wanted), _) => {
                     let away = text::short((sample.output - wanted).abs());
-                    format!(" ({away} {} away at {} s)", self.unit, text::short(sample.time_s))
+                    format!(" (error {away} {} at {} s)", self.unit, text::short(sample.time_s))
                 }
                 (Fault::Temperature, _, Some(degc)) => format!(" ({} °C)", text::short(degc)),
                 _ => String::new(),
@@ -101,7 +108,7 @@ impl Lookout<'_> {
         }
     }
 
-    /// Ends the run.
+    /// Ends the run with a fault.
     pub(super) fn end(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
@@ -109,33 +116,34 @@ impl Lookout<'_> {
         }
     }
 
-    /// How the watch stands, in words.
-    fn told(&self, explains: bool) -> (&'static str, String) {
+    /// Returns kind and text of the event that the model stopped or started to explain the output.
+    fn change_of_model(&self, explains: bool) -> (&'static str, String) {
         let (now, unit) = (text::short(self.now_s), self.unit);
         match self.watched() {
-            Some(Watched { residual, trained_to, .. }) if !explains => {
-                let (residual, usual) = (text::short(residual), text::short(trained_to));
+            Some(Watched { residual, fitted_rmse, .. }) if !explains => {
+                let (residual, fitted) = (text::short(residual), text::short(fitted_rmse));
                 let what = format!(
-                    "at {now} s the model has stopped explaining the device: {residual} {unit} of residual, {usual} {unit} where it was fitted"
+                    "at {now} s the model has stopped explaining the output: RMS residual {residual} {unit}, {fitted} {unit} \
+                     on the training record"
                 );
                 ("model-lost", what)
             }
-            _ => ("model-found", format!("at {now} s the model explains the device again")),
+            _ => ("model-found", format!("at {now} s the model explains the output again")),
         }
     }
 
-    /// How the watch stands.
+    /// Returns the state of the monitoring of the model.
     pub(super) fn watched(&self) -> Option<Watched> {
-        self.beside.as_ref().and_then(Beside::watched)
+        self.model.as_ref().and_then(ParallelModel::watched)
     }
 
-    /// Tells and logs what has happened.
+    /// Prints and logs an event.
     pub(super) fn event(&mut self, kind: &'static str, text: String) {
-        self.view.tell(&format!("{}: {text}", if kind == "model-found" { "note" } else { "warning" }));
+        self.view.print_above(&format!("{}: {text}", if kind == "model-found" { "note" } else { "warning" }));
         self.note(kind, text);
     }
 
-    /// Logs what has happened, and shows it to viewers.
+    /// Logs an event and sends it to viewers.
     pub(super) fn note(&mut self, kind: &'static str, text: String) {
         let event = LoggedEvent { time_s: self.now_s, kind, text };
         if self.log_error.is_none()
