@@ -94,7 +94,7 @@ fn temperature_makes_the_models_of_it_take_part() {
             "td-pi" => assert_eq!(*parameters, 7),
             "td-em" => {
                 assert_eq!(*parameters, 13);
-                assert!(how.contains("mass, stiffness") && how.contains("are those of the printed tube"), "{how}");
+                assert!(how.contains("mass, stiffness") && how.contains("are those of the published tube"), "{how}");
             }
             _ => assert_eq!(*parameters, 21),
         }

@@ -89,7 +89,7 @@ fn thresholds_and_widths_are_chosen_by_the_record() {
     let estimate = report["estimate"]["parameters"].as_array().unwrap();
     assert!(estimate.iter().any(|p| p["name"].as_str().unwrap().starts_with("thresholds")), "{report}");
     for (line, part) in [
-        ("--model preisach --thresholds 3", "preisach: a number of thresholds is for the convex fit of pi"),
+        ("--model preisach --thresholds 3", "preisach: a number of thresholds applies only to the convex fit of pi"),
         ("--model pi --optimizer de --seed 1 --thresholds 3", "elements"),
         ("--model pi --thresholds 0", "1 to 64"),
         ("--model dpm --thresholds 4", "dpm: a number of thresholds"),

@@ -93,7 +93,7 @@ fn an_amplifier_that_cannot_always_follow_is_no_effect() {
     let told = d.findings.remainder.slew_limit.unwrap_or_else(|| panic!("{said}"));
     assert!((told / limit - 1.0).abs() < 0.02, "{limit} V/s, {said}");
     // What acts beside it is told by what the model misses of the drive as the amplifier gives it.
-    assert!(said.contains("without what was found"), "{said}");
+    assert!(said.contains("without the effects found"), "{said}");
 }
 
 /// A jump is far steeper than all else, and an amplifier takes its time for it.

@@ -20,7 +20,8 @@ use crate::simulate::{Simulation, Zero, simulate};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SortedBy {
-    /// RMSE on the training record. A model with more parameters has a smaller one, whatever its value.
+    /// RMSE on the training record.
+    /// A model with more parameters has a smaller one, whatever its value.
     TrainRmse,
     /// RMSE on the test record, which no model has seen.
     TestRmse,
@@ -63,8 +64,8 @@ pub struct Compared {
     pub kind: Kind,
     /// Number of identified parameters, without the sensor's zero.
     pub parameters: usize,
-    /// Parameters that the record does not determine, or only together with others; `None` if the parameters are
-    /// elements of `tables`.
+    /// Parameters that the record does not determine, or only together with others.
+    /// `None` if the parameters are elements of `tables`.
     pub undetermined: Option<Vec<String>>,
     /// What the record says about each element of a table of weights: cells, nodes.
     #[serde(skip_serializing_if = "Vec::is_empty")]

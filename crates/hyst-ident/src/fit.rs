@@ -228,8 +228,8 @@ pub struct Fit {
     pub trials: Option<Trials>,
     /// Evaluations of the model.
     pub evaluations: u64,
-    /// RMS residual for each interpolation of the drive between samples that was tried \[y\]. Each is fitted to all
-    /// rows; rows that are start-up for any of them do not count. The model uses the better one.
+    /// RMS residual for each interpolation of the drive between samples that was tried \[y\].
+    /// Each is fitted to all rows; rows that are start-up for any of them do not count. The model uses the better one.
     pub between_samples: Vec<(BetweenSamples, f64)>,
 }
 

@@ -58,8 +58,8 @@ fn reciprocal(planner: &mut RealFftPlanner<f64>, b: &[f64], n: usize) -> Vec<f64
     r
 }
 
-/// Returns the first `n` samples of the LFDM's impulse response from rest \[y/u\]: the quotient of the two sides of Eq.
-/// 15.
+/// Returns the first `n` samples of the LFDM's impulse response from rest \[y/u\].
+/// They are the quotient of the two sides of Eq. 15.
 ///
 /// # Errors
 /// Those of the model's [`build`](hyst_core::Build::build).
@@ -85,7 +85,8 @@ fn held(u: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the output of the LFDM with full memory \[y\] for the input `u` \[u\], settled at its first value.
+/// Returns the output \[y\] of the LFDM with full memory for the input `u` \[u\].
+/// The model is settled at the first value.
 ///
 /// Zhu et al. 2018, eq. 6, 15.
 ///
@@ -110,7 +111,8 @@ pub fn lfdm(params: &LfdmParams, sampling: &Sampling, u: &[f64]) -> Result<Vec<f
     Ok(x)
 }
 
-/// Returns the output of the IFM with full memory \[y\] for the input `u` \[u\], settled at its first value.
+/// Returns the output \[y\] of the IFM with full memory for the input `u` \[u\].
+/// The model is settled at the first value.
 ///
 /// Zhu et al. 2018, eq. 10, 11, 15.
 ///

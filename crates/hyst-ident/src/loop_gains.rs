@@ -20,7 +20,8 @@ pub struct LoopGains {
 /// Dead time of the loop in sample periods: one to compute, half of one to hold the drive.
 const DEAD_TIME_PERIODS: f64 = 1.5;
 
-/// Computes the gains of `C(s) = kᵢ (1 + T s) / s` for an actuator with mean gain g, lag T, dead time and modes.
+/// Computes the gains of `C(s) = kᵢ (1 + T s) / s` for an actuator with mean gain g and lag T.
+/// A dead time and modes limit kᵢ.
 ///
 /// The zero cancels the lag, so the open loop is an integrator `ω/s` with `ω = kᵢ g`. A phase margin of 60° allows `ω =
 /// π / (6 τ)`, with τ the dead time plus one and a half sample periods. A gain margin of two at a mode with frequency f

@@ -43,8 +43,8 @@ pub enum MetricsError {
 pub struct Errors {
     /// Root mean square error over the rows that count, in the output's unit.
     pub rmse: f64,
-    /// `rmse` in percent of the span (maximum − minimum) of the measured output over the same rows. For a constant
-    /// output it is 0 if `rmse` is 0, otherwise infinite (`null` in JSON).
+    /// `rmse` in percent of the span (maximum − minimum) of the measured output over the same rows.
+    /// For a constant output it is 0 if `rmse` is 0, otherwise infinite (`null` in JSON).
     #[serde(deserialize_with = "null_as_infinity")]
     pub nrmse_percent: f64,
     /// Maximum magnitude of the error over the rows that count, in the output's unit.

@@ -33,13 +33,16 @@ pub struct SimulateOptions {
     pub zero: Zero,
     /// Temperature \[°C\] for a record without a temperature column.
     pub temperature: Option<f64>,
-    /// Whether each segment is one period of a steady state: it passes the model twice, and the second pass counts.
+    /// Whether each segment is one period of a steady state.
+    /// It passes the model twice, and the second pass counts.
     pub periodic: bool,
-    /// Whether a creep starts at rest regardless of the first rows: needed if an unknown force moves the output too.
+    /// Whether a creep starts at rest regardless of the first rows.
+    /// Needed if an unknown force moves the output too.
     pub at_rest: bool,
 }
 
-/// Inputs outside of the range that a model was fitted to. The prediction for them is an extrapolation.
+/// Inputs outside of the range that a model was fitted to.
+/// The prediction for them is an extrapolation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Extrapolated {
     /// Rows with such an input.
@@ -78,10 +81,11 @@ pub struct Simulation {
     pub zeros: Vec<f64>,
     /// Errors against the measured output, if there is one.
     pub errors: Option<Errors>,
-    /// Phase lead \[rad\] of the model's tone in each file, estimated from its first rows; 0 if the clock continues.
+    /// Phase lead \[rad\] of the model's tone in each file, estimated from its first rows.
+    /// It is 0 if the clock continues.
     pub tone_ahead: Vec<f64>,
-    /// Initial deviation of the creep in each segment: the level of the earlier rest minus the motion in the first row
-    /// \[output unit\]; 0 if the segment starts at rest.
+    /// Initial deviation of the creep in each segment \[output unit\].
+    /// It is the level of the earlier rest minus the motion in the first row, and 0 if the segment starts at rest.
     pub creep_away: Vec<f64>,
     /// Inputs outside of the model's range.
     pub extrapolated: Extrapolated,

@@ -2,8 +2,8 @@
 
 use super::{Kernel, Lanes, Row};
 
-/// Kernel of the TD-PI model with N thresholds in addition to r = 0; parameters α, ε, τ, η, a₀, a₁, b₀, b₁, as
-/// [`hyst_core::TdPi`].
+/// Kernel of the TD-PI model with N thresholds in addition to r = 0.
+/// Its parameters are α, ε, τ, η, a₀, a₁, b₀, b₁, as [`hyst_core::TdPi`].
 #[derive(Clone, Copy, Debug)]
 pub struct TdPiKernel<const N: usize> {
     /// T₀ \[°C\].

@@ -123,7 +123,7 @@ impl<'a> OwnModel<'a> {
             };
             let mut here = CurveFits { own, anew: None };
             if let Some(basis) = &anew {
-                let behind = self.on(basis, &blocks).beside(&problem).with_linear_effects_fixed();
+                let behind = self.on(basis, &blocks).with_blocks_of(&problem).with_linear_effects_fixed();
                 match shape::plain(&behind, hypothesis).map_err(stage)? {
                     // Only the thresholds were wrong; no curve is missing.
                     Some(plain) if shape::is_complete(&plain, richest) => {
@@ -147,7 +147,7 @@ impl<'a> OwnModel<'a> {
         if let Some((at, curved)) = best.filter(|(_, curved)| !complete(curved) && curved.takes(&plain, noise)) {
             let is_anew = bent[at].own.as_ref().is_none_or(|own| !std::ptr::eq(own, curved));
             let basis = bases[at].as_ref().filter(|_| is_anew).unwrap_or(self.basis);
-            let free = self.on(basis, &blocks).beside(&problem);
+            let free = self.on(basis, &blocks).with_blocks_of(&problem);
             let already: Vec<Cause> = known.causes().into_iter().chain([Cause::Effect(Effect::Asymmetry)]).collect();
             if let Some(from) = free.fit(&curved.trial.fit.hypothesis).map_err(stage)? {
                 progress("searching again with the curve added to the base model");

@@ -58,11 +58,10 @@ pub struct Remainder {
     pub kind: RemainderKind,
     /// Share of the variance of the output.
     pub variance_share: f64,
-    /// What has changed since the fit, if the same base model, refitted to this record, explains what a finer one
-    /// would.
+    /// Change since the fit, if a refit of the same base model explains what a finer one would.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
-    /// Slope above which the output does not follow the drive, as behind a current-limited amplifier \[input unit/s\].
+    /// Slope above which the output does not follow the drive (current-limited amplifier) \[input unit/s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slew_limit: Option<f64>,
     /// Description in a sentence.
@@ -245,8 +244,8 @@ pub struct Findings {
     pub before: OnRecords,
     /// Named effects, in the order of the signal chain.
     pub effects: Vec<Finding>,
-    /// Number of play operators of the extended model if their thresholds were chosen again; `None` if they are
-    /// unchanged. The original thresholds were chosen before the effects were known.
+    /// Number of play operators of the extended model, if their thresholds were chosen again.
+    /// The original thresholds were chosen before the effects were known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plays_placed_anew: Option<usize>,
     /// Suspects, most probable first.

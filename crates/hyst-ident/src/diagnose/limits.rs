@@ -170,9 +170,7 @@ impl Limits<'_> {
                 Limit::of(
                     size,
                     u,
-                    format!(
-                        "lag of the hysteresis behind a drive of {at} {u}/s, growing with the square root of the rate"
-                    ),
+                    format!("lag behind a drive of {at} {u}/s, growing with the square root of the rate"),
                 )
             }
             Effect::Temperature => {

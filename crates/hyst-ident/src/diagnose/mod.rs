@@ -85,7 +85,7 @@ pub struct Diagnosis {
     pub extended: Model,
     /// The findings with their evidence.
     pub findings: Findings,
-    /// Pictures to check by eye: the trace of each named effect in the record, and the whole model before and after.
+    /// Pictures to check by eye: the trace of each named effect, and the whole model before and after.
     pub pictures: Vec<Picture>,
     /// Breakdowns of the remainder by time, drive, branch and frequency.
     pub breakdowns: Vec<Breakdown>,
@@ -352,7 +352,7 @@ fn found_in(
         let own_model = OwnModel { basis: &own, ..own_model };
         remainder = changed::detect_change(&own_model, &start, found.noise, options.zero, remainder)?;
     }
-    let remainder = remainder.beside(only_loop, &useless);
+    let remainder = remainder.with_remarks(only_loop, &useless);
     let tests = test
         .map(|t| Ok::<_, FitError>((simulate(model, t, options.zero)?, simulate(&extended, t, options.zero)?)))
         .transpose()?;

@@ -23,8 +23,9 @@ pub struct Weighed {
     pub effect: Effect,
     /// Whether it was named.
     pub named: bool,
-    /// Logarithms of: the size in noise floors, the margin over the next best name, the final error in noise floors,
-    /// and the fall of the error.
+    /// Logarithms of four ratios.
+    /// They are the size in noise floors, the margin over the next best name, the final error in noise floors, and the
+    /// fall of the error.
     pub features: [f64; 4],
     /// Probability that the effect is present.
     pub probability: f64,

@@ -46,9 +46,9 @@ pub(super) fn judge(
     };
     let percent = |x: f64| 100.0 * x / span.max(f64::MIN_POSITIVE);
     let wanders = match (h.zero_wanders, h.gain_wanders) {
-        (true, true) => Some("the sensor's zero and the gain wander"),
-        (true, false) if h.effects.drift.is_some() => Some("in addition to the drift, the sensor's zero wanders"),
-        (true, false) => Some("the sensor's zero wanders"),
+        (true, true) => Some("the zero and the gain wander"),
+        (true, false) if h.effects.drift.is_some() => Some("in addition to the drift the zero wanders"),
+        (true, false) => Some("the zero wanders"),
         (false, true) => Some("the gain wanders"),
         (false, false) => None,
     };
@@ -172,12 +172,12 @@ fn is_within_law_accuracy(residual: &[f64], rows: &[usize], hysteresis: &[f64], 
 impl Remainder {
     /// Adds two remarks: the record repeats one loop \[Hz\]; effects found on a richer basis do not improve this base
     /// model.
-    pub(super) fn beside(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
+    pub(super) fn with_remarks(mut self, only_loop: Option<f64>, useless: &[Effect]) -> Self {
         let of_shapes = self.kind != RemainderKind::None && self.change.is_none();
         if let Some(hz) = only_loop.filter(|_| of_shapes) {
             self.description += &format!(
-                "; the record repeats one loop at {hz:.4} Hz, which separates neither rate-dependence, resonance, asymmetry and saturation \
-                 from the shape of the hysteresis nor a delay from a lag: drive several frequencies and amplitudes"
+                "; the record repeats one loop at {hz:.4} Hz: rate-dependence, resonance, asymmetry and saturation cannot be separated from \
+                 the shape of the hysteresis, nor a delay from a lag; drive several frequencies and amplitudes"
             );
         }
         if !useless.is_empty() && self.change.is_none() {

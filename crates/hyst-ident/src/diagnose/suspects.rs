@@ -15,7 +15,7 @@ pub fn usual_rival(effect: Effect) -> Effect {
     if effect == Effect::Lag { Effect::Creep } else { Effect::Lag }
 }
 
-/// Returns the options of `excite` for the range and rate of a record, and for the slope if the amplifier is slow.
+/// Returns the options of `excite` for a record's range and rate, and a slope for a slow amplifier.
 ///
 /// `slew_limit` is the slope that the amplifier did not follow \[input unit/s\].
 pub fn drive_options(model: &Model, period: f64, slew_limit: Option<f64>) -> String {

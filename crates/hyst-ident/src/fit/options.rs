@@ -11,8 +11,8 @@ use crate::optimize::{Method, MethodError};
 /// Optimizer of a fit.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Optimizer {
-    /// Chosen by the model: convex if it is linear in its weights, otherwise adaptive differential evolution over the
-    /// nonlinear parameters.
+    /// Chosen by the model.
+    /// Convex if it is linear in its weights, otherwise adaptive differential evolution over the nonlinear parameters.
     #[default]
     Auto,
     /// A single convex problem.
@@ -68,7 +68,8 @@ pub struct FitOptions {
     pub optimizer: Optimizer,
     /// Number of repetitions of a search with other random numbers; the best result is used.
     pub trials: usize,
-    /// Maximum number of evaluations of a trial; `None` for 1500 per variable (200 for a Bouc-Wen oscillator).
+    /// Maximum number of evaluations of a trial.
+    /// `None` for 1500 per variable (200 for a Bouc-Wen oscillator).
     pub evaluations: Option<u64>,
     /// Population size (members, particles or wolves); `None` for the default of the search.
     pub population: Option<usize>,
@@ -76,8 +77,8 @@ pub struct FitOptions {
     pub bounds: Vec<VariableBounds>,
     /// Form of a model that has more than one.
     pub form: Form,
-    /// Maximum number of thresholds of the convex fit of `pi`, chosen by the record. `None` for even thresholds, unless
-    /// no more chosen ones predict parts of the record clearly better.
+    /// Maximum number of thresholds of the convex fit of `pi`, chosen by the record.
+    /// `None` for even thresholds, unless no more chosen ones predict parts of the record clearly better.
     pub thresholds: Option<usize>,
 }
 

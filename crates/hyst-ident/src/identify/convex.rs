@@ -20,8 +20,8 @@ pub enum TableOf {
     Nodes,
 }
 
-/// How much of a table of weights the record determines. The fit gives undetermined elements the values of their
-/// neighbours.
+/// How much of a table of weights the record determines.
+/// The fit gives undetermined elements the values of their neighbours.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TableEstimate {
     /// Kind of the elements.
@@ -36,7 +36,8 @@ pub struct TableEstimate {
     pub untouched: usize,
     /// Mean of all elements \[their unit\].
     pub mean: f64,
-    /// Standard error of each element, in the order of the model's file; `None` if it is held or no row depends on it.
+    /// Standard error of each element, in the order of the model's file.
+    /// `None` if it is held or no row depends on it.
     pub std_errors: Vec<Option<f64>>,
 }
 

@@ -80,8 +80,9 @@ pub(crate) enum OtherParameter {
     Given,
     /// Chosen by the record before the fit: it has a standard error like the others.
     Chosen,
-    /// A convention. It can be changed together with others without an effect on the output, so its error is that of an
-    /// unknown number.
+    /// A convention.
+    /// It can be changed together with others without an effect on the output, so its error is that of an unknown
+    /// number.
     Convention,
 }
 

@@ -23,11 +23,12 @@ pub enum Determined {
     Yes,
     /// Determined and close to zero: within two standard errors, which are small.
     NearZero,
-    /// Determined only together with others: with the others known its error would be twenty times smaller, and the
-    /// error exceeds a twentieth of its value. The prediction for this record is known; this number is not.
+    /// Determined only together with others.
+    /// With the others known its error would be twenty times smaller, and the error exceeds a twentieth of its value.
+    /// The prediction for this record is known; this number is not.
     Together,
-    /// Not determined: its standard error exceeds half of a large change, or it exceeds a twentieth and the value may
-    /// be zero.
+    /// Not determined.
+    /// Its standard error exceeds half of a large change, or it exceeds a twentieth and the value may be zero.
     /// A large change is half of the bounds for a searched variable (at most a factor of e). For a weight or gain it is
     /// the value that makes an output like the measured one; for a part of a curve, the whole curve.
     No,
@@ -68,8 +69,8 @@ pub struct Estimate {
     pub left: f64,
     /// Correlation of the residual: rows per independent row.
     pub rows_per_independent: f64,
-    /// Number of fitted numbers, including those at a bound and without sensor zeros. A file may have more parameters,
-    /// if several follow from one number.
+    /// Number of fitted numbers, including those at a bound and without sensor zeros.
+    /// A file may have more parameters, if several follow from one number.
     pub fitted: usize,
     /// Parameters held at a bound; they have no standard error.
     pub held: Vec<String>,
@@ -173,8 +174,8 @@ impl Estimate {
         }
     }
 
-    /// Returns the standard error of a quantity with this gradient with respect to [`parameters`](Self::parameters),
-    /// such as a product or a ratio.
+    /// Returns the standard error of a function of the parameters, such as a product or a ratio.
+    /// `gradient` is with respect to [`parameters`](Self::parameters).
     pub fn std_error_of(&self, gradient: &[f64]) -> f64 {
         let g = DVector::from_column_slice(gradient);
         (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
@@ -185,7 +186,7 @@ impl Estimate {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Returns the names of the parameters that the record does not determine, or only together with others.
+    /// Returns the parameters that the record does not determine, or only together with others.
     pub fn undetermined(&self) -> Vec<&str> {
         let vague = |p: &&Parameter| matches!(p.determined, Determined::No | Determined::Together);
         self.parameters.iter().filter(vague).map(|p| p.name.as_str()).collect()

@@ -24,12 +24,13 @@ use crate::{BetweenSamples, Samples};
 pub struct Form {
     /// Exponent n of a Bouc-Wen model; `None` searches it.
     pub bouc_wen_n: Option<f64>,
-    /// Number of play operators of `gpi` and `td-pi` and of elements of `td-em`, maximum number of elements of
-    /// `maxwell-slip`.
+    /// Number of play operators (`gpi`, `td-pi`) or elements (`td-em`).
+    /// Maximum number for `maxwell-slip`.
     pub elements: Option<usize>,
     /// Kind of the elements of `maxwell-slip`.
     pub slip: SlipReading,
-    /// Interpolation of the drive of `bouc-wen-oscillator` between samples; `None` tries both and uses the better one.
+    /// Interpolation of the drive of `bouc-wen-oscillator` between samples.
+    /// `None` tries both and uses the better one.
     pub between_samples: Option<BetweenSamples>,
 }
 
@@ -40,8 +41,8 @@ impl Default for Form {
 }
 
 impl Form {
-    /// Names of the forms: those of `bouc-wen` after the first authors of their papers, and the elements of
-    /// `maxwell-slip`.
+    /// Names of the forms.
+    /// Those of `bouc-wen` are the first authors of the papers, those of `maxwell-slip` the elements.
     pub const NAMES: [&str; 4] = ["zhu", "xie", "backlash", "elasto-slip"];
 }
 
