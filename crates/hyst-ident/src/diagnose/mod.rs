@@ -170,8 +170,10 @@ fn found_in(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    // The plane of an operator that was fitted while something stood in the record holds no search: what it misses far from there looks like effects.
-    let few = (!matches!(own, BasisOf::Linearised(_))).then(|| own.as_ref());
+    // A linearised operator is not searched: its misfit far from its optimum looks like effects.
+    let is_searched = !matches!(own, BasisOf::Linearised(_));
+    // The own base is searched as well where it has fewer unknowns than the rich one.
+    let few = (is_searched && own.as_ref().len() < screening.len()).then(|| own.as_ref());
     let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows continues from what the one before has found.
     let searched = |samples: &Samples, from: &Hypothesis| {
@@ -295,7 +297,7 @@ fn found_in(
     }
     let asked = Own { samples: started.as_ref().unwrap_or(&samples), ..asked };
     // Rich memory may imitate an effect in one record. Where the own base with few effects does as well, that is the simpler explanation.
-    if found.named.is_empty() && only_loop.is_none() && few.is_some() {
+    if found.named.is_empty() && only_loop.is_none() && is_searched {
         progress("asking whether the model's own base with an effect explains as much");
         let asked = Own { basis: basis.as_ref().unwrap_or(&own), ..asked };
         if let Some(closing) = asked.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
