@@ -174,9 +174,10 @@ fn found_in(
     let unsolvable = || FitError::Unsolvable { record: train.name() };
     let blocks = Blocks::new(&samples, BLOCKS, SEARCH_ROWS);
     let start = hypothesis_of(model);
-    // The linearised operator was fitted before the effects were known. It is not used for the search: far from its
-    // parameters its linearisation error looks like effects.
-    let few = (!matches!(own, BasisOf::Linearised(_))).then(|| own.as_ref());
+    // A linearised operator is not searched: far from its parameters its linearisation error looks like effects.
+    let is_searched = !matches!(own, BasisOf::Linearised(_));
+    // The model's own base is also searched if it has fewer unknowns than the screening base.
+    let few = (is_searched && own.as_ref().len() < screening.len()).then(|| own.as_ref());
     let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows starts from the result of the previous search.
     let searched = |samples: &Samples, from: &Hypothesis| {
@@ -303,7 +304,7 @@ fn found_in(
     let own_model = OwnModel { samples: started.as_ref().unwrap_or(&samples), ..own_model };
     // With much memory a basis can imitate an effect in a single record. If the model's base with few effects fits as
     // well, that explanation is simpler.
-    if found.named.is_empty() && only_loop.is_none() && few.is_some() {
+    if found.named.is_empty() && only_loop.is_none() && is_searched {
         progress("searching for effects on the model's own base");
         let own_model = OwnModel { basis: basis.as_ref().unwrap_or(&own), ..own_model };
         if let Some(closing) = own_model.closing(&hypothesis, &start, richest, found.noise, options.seed, progress)? {
