@@ -10,6 +10,7 @@ pub mod fod_study;
 pub mod force_ranking;
 pub mod force_study;
 pub mod fuzz;
+pub mod guide;
 pub mod learning;
 pub mod logs;
 pub mod other_bench;

@@ -31,6 +31,7 @@ mod cli_surface;
 mod diagnosis;
 mod every_model;
 mod fuzz;
+mod guide;
 mod lab_records;
 mod learn;
 mod model_units;
