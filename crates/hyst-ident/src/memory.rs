@@ -11,7 +11,8 @@ use hyst_core::Error;
 use rayon::prelude::*;
 
 use crate::base::{Basis, Drag};
-use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
+use crate::criteria::{LAW_ACCURACY, MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
+use crate::metrics::rms;
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
 use crate::settle::{centre, first_cycles, windows};
@@ -158,15 +159,19 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     samples.segments.iter().map(|s| samples.input[s.start].abs() > MINOR_SHARE * reach).collect()
 }
 
-/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows.
+/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows. Near 0 V they count only where that fit
+/// follows the hysteresis elsewhere: the first rise of a virgin actuator is in no other rows, and a fit that misses something misses more of it there.
 pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let windows = windows(samples);
+    let (windows, away) = (windows(samples), away(samples));
     let centred = centre(samples, residual, &windows, &samples.blind);
+    let accuracy = LAW_ACCURACY * rms(&samples.hysteresis().1);
     let stands_out = |i: usize| {
         let start = samples.segments[i].start;
-        let rows = (start..start + windows[i]).filter(|k| !samples.blind[*k]);
-        let squares: f64 = rows.map(|k| centred[k] * centred[k]).sum();
-        squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * level(samples, &centred, &windows, i)
+        let rows: Vec<usize> = (start..start + windows[i]).filter(|k| !samples.blind[*k]).collect();
+        let squares: f64 = rows.iter().map(|k| centred[*k] * centred[*k]).sum();
+        let usual = level(samples, &centred, &windows, i);
+        let is_followed = away[i] || usual <= rows.len() as f64 * accuracy * accuracy;
+        is_followed && squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * usual
     };
     (0..samples.segments.len()).map(stands_out).collect()
 }

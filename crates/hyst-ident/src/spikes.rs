@@ -26,6 +26,8 @@ const STANDS_OUT: f64 = 5.0;
 const MORE_THAN_THE_DRIVE: f64 = 2.0;
 /// Least size of a spike in steps of the drive, likewise: from row to row a misfit changes by less than the output.
 const MORE_THAN_THE_MISFIT: f64 = 1.0;
+/// Share of the rows, at either end of the output's range, that do not count for its span.
+const OUTERMOST: f64 = 0.005;
 /// Share of the rows beyond which what stands out is no fault but the record.
 const MOST: f64 = 0.1;
 
@@ -76,8 +78,13 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], usual: f64, segments: &
         let (low, high) = crate::samples::range(x.iter().copied());
         (high - low).max(f64::MIN_POSITIVE)
     };
-    // A spike itself widens the output's span.
-    let per_input = span(output) / span(input);
+    // Without its outermost rows: a spike itself widens the output's span.
+    let inner = {
+        let mut sorted = output.to_vec();
+        let mut at = |share: f64| quantile(&mut sorted, share);
+        at(1.0 - OUTERMOST) - at(OUTERMOST)
+    };
+    let per_input = if inner > 0.0 { inner } else { span(output) } / span(input);
     let (mut beside, mut steps) = (Vec::new(), Vec::new());
     let usual = usual.max(digit);
     for s in segments {

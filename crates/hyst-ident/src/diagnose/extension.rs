@@ -108,8 +108,9 @@ impl<'a> Own<'a> {
         let (mut bent, mut bases): (Vec<Bent>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
         let complete = |curved: &shape::Curved| shape::is_complete(&curved.trial, richest);
         for side in [CurveSide::Output, CurveSide::Input] {
-            // A curve behind the operator is solved for; one before it has to be searched, and only where that is not enough.
-            if bent.iter().flat_map(Bent::curves).any(complete) {
+            // A curve behind the operator is solved for. One before it has to be searched, unless the first one leaves no more than noise: to predict as
+            // well as the rich base is not enough, since the right curve may predict better.
+            if bent.iter().flat_map(Bent::curves).any(|curved| shape::is_complete(&curved.trial, noise)) {
                 break;
             }
             let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
