@@ -472,8 +472,8 @@ mod tests {
         let (fitted, _) = fit_settled(&mut samples, &basis, &FitOptions::default(), &String::new).unwrap();
         assert!(!samples.pasts[0].is_empty());
         assert!(samples.settling.iter().all(|s| !s));
-        let hysteresis = crate::metrics::rms(&samples.hysteresis().1);
-        assert!(fitted.rmse() < crate::criteria::LAW_ACCURACY * hysteresis, "{} of {hysteresis}", fitted.rmse());
+        let hysteresis = rms(&samples.hysteresis().1);
+        assert!(fitted.rmse() < LAW_ACCURACY * hysteresis, "{} of {hysteresis}", fitted.rmse());
     }
 
     #[test]
