@@ -397,7 +397,7 @@ pub(crate) fn fit_settled(
         all = run(samples, basis)?;
     }
     let (mut found, late) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
-    if memory::standing_out(samples, &late.1).contains(&true) {
+    if memory::standing_out_where_followed(samples, &late.1).contains(&true) {
         // What the actuator remembers is no matter of the base that is fitted, and few plays are determined by few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
@@ -422,7 +422,7 @@ fn recalled(
     recalls: &Recalls<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
-    let asked = memory::standing_out(samples, &late.1);
+    let asked = memory::standing_out_where_followed(samples, &late.1);
     if !asked.contains(&true) {
         return Ok(found.1);
     }

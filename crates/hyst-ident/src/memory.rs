@@ -27,20 +27,84 @@ const DECAY: usize = 16;
 const AMPLITUDES: usize = 6;
 /// Rows from one turn to the next.
 const ROWS: usize = 16;
+/// How often the step is halved by which a turn is moved from the level next to it: to 1/1500 of the range.
+const HALVINGS: usize = 7;
 
-/// Pasts of a segment that begins at `u0` \[V\], as the drive went from 0 V on until then, without `u0` itself.
-pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
-    let (span, inside) = (high - low, LEVELS - 1);
-    let level = |i: usize| low + span * (i as f64 - BEYOND as f64) / inside as f64;
-    // Beyond the range, too: a device that is driven to one side is poled to it, and wide plays come to rest about any voltage.
-    let levels = || (0..LEVELS + 2 * BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
-    let mut turns: Vec<Vec<f64>> = levels().map(|u| vec![u]).collect();
-    // Two turns on one side of where the record begins wipe each other out.
-    for first in levels() {
-        turns.extend(levels().filter(|second| (second - u0) * (first - u0) < 0.0).map(|second| vec![first, second]));
+/// Drives before a segment, one of which it may have come from: each goes from 0 V on, and ends before the segment's first voltage.
+pub(crate) struct Candidates {
+    /// Where the segment begins \[V\].
+    u0: f64,
+    /// Between two levels at which the drive may have turned \[V\].
+    step: f64,
+    /// Turns \[V\] of those drives that a few turns describe.
+    turns: Vec<Vec<f64>>,
+    others: Vec<Vec<f64>>,
+}
+
+impl Candidates {
+    /// One or two turns at some levels, and drives that demagnetise.
+    pub(crate) fn new(u0: f64, (low, high): (f64, f64)) -> Self {
+        let (span, inside) = (high - low, LEVELS - 1);
+        let level = |i: usize| low + span * (i as f64 - BEYOND as f64) / inside as f64;
+        // Beyond the range, too: a device that is driven to one side is poled to it, and wide plays come to rest about any voltage.
+        let levels = || (0..LEVELS + 2 * BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
+        let mut turns: Vec<Vec<f64>> = levels().map(|u| vec![u]).collect();
+        // Two turns on one side of where the record begins wipe each other out.
+        for first in levels() {
+            turns
+                .extend(levels().filter(|second| (second - u0) * (first - u0) < 0.0).map(|second| vec![first, second]));
+        }
+        let others = (1..=AMPLITUDES).map(|i| decay(u0, span * i as f64 / AMPLITUDES as f64)).collect();
+        Self { u0, step: span / inside as f64, turns, others }
     }
-    let decays = (1..=AMPLITUDES).map(|i| decay(u0, span * i as f64 / AMPLITUDES as f64));
-    turns.iter().map(|turns| path(turns, u0)).chain(decays).collect()
+
+    /// And this one.
+    pub(crate) fn add(&mut self, past: Vec<f64>) {
+        self.others.push(past);
+    }
+
+    /// The past after which least is left of the first rows. None unless their error above the `level` of as many other rows falls by [`MIN_PAST_RATIO`]
+    /// (`level` and `squares` are Σ residual²). Near 0 V, where a memory may be that of a rest and what stands out a transient of the sensor, it has to
+    /// explain all but a [`NEGLIGIBLE_SHARE`] of that, or nothing may stand out any more: an actuator that was cycled before keeps a remanence at 0 V,
+    /// and no transient of a sensor has the course of a loop.
+    pub(crate) fn best(&self, level: f64, away: bool, squares: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
+        let from_rest = squares(&[]);
+        let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
+        if from_rest < stands_out {
+            return Vec::new();
+        }
+        let of_turns: Vec<f64> = self.turns.par_iter().map(|turns| squares(&path(turns, self.u0))).collect();
+        let of_others: Vec<f64> = self.others.par_iter().map(|past| squares(past)).collect();
+        let least = |all: &[f64]| all.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (of_turns, of_others) = (least(&of_turns), least(&of_others));
+        let turned = of_turns.map(|(at, left)| self.nearer(self.turns[at].clone(), left, &squares));
+        let other = of_others.map(|(at, left)| (self.others[at].clone(), left));
+        let best = turned.into_iter().chain(other).min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((past, least)) = best.filter(|(_, least)| *least < f64::INFINITY) else { return Vec::new() };
+        let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
+        let explains_all = least - level <= NEGLIGIBLE_SHARE * (from_rest - level);
+        if helps && (away || explains_all || least < stands_out) { past } else { Vec::new() }
+    }
+
+    /// The past of these turns once each is moved to where least is left, in steps that are halved.
+    fn nearer(&self, mut turns: Vec<f64>, mut least: f64, squares: &impl Fn(&[f64]) -> f64) -> (Vec<f64>, f64) {
+        let mut step = self.step;
+        for _ in 0..HALVINGS {
+            step /= 2.0;
+            for at in 0..turns.len() {
+                for by in [-step, step] {
+                    let mut moved = turns.clone();
+                    moved[at] += by;
+                    let left = squares(&path(&moved, self.u0));
+                    if left < least {
+                        (turns, least) = (moved, left);
+                        break;
+                    }
+                }
+            }
+        }
+        (path(&turns, self.u0), least)
+    }
 }
 
 /// How a device may have come to where a segment begins.
@@ -159,21 +223,46 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
     samples.segments.iter().map(|s| samples.input[s.start].abs() > MINOR_SHARE * reach).collect()
 }
 
-/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows. Near 0 V they count only where that fit
-/// follows the hysteresis elsewhere: the first rise of a virgin actuator is in no other rows, and a fit that misses something misses more of it there.
+/// Segments whose first rows miss more than a fit that has not seen them (`residual`) misses of as many other rows.
 pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
-    let (windows, away) = (windows(samples), away(samples));
-    let centred = centre(samples, residual, &windows, &samples.blind);
+    first_rows(samples, residual).iter().map(|rows| rows.stand_out()).collect()
+}
+
+/// The same; near 0 V only where that fit follows the hysteresis elsewhere: the first rise of a virgin actuator is in no other rows, and a fit that misses
+/// an effect may miss more of it there.
+pub(crate) fn standing_out_where_followed(samples: &Samples, residual: &[f64]) -> Vec<bool> {
     let accuracy = LAW_ACCURACY * rms(&samples.hysteresis().1);
-    let stands_out = |i: usize| {
+    let rows = first_rows(samples, residual);
+    let counts = |(rows, away): (&FirstRows, bool)| {
+        let is_followed = away || rows.usual <= rows.count as f64 * accuracy * accuracy;
+        is_followed && rows.stand_out()
+    };
+    rows.iter().zip(away(samples)).map(counts).collect()
+}
+
+/// What a fit misses of a segment's first rows, and of as many others \[Σ residual²\].
+struct FirstRows {
+    count: usize,
+    squares: f64,
+    usual: f64,
+}
+
+impl FirstRows {
+    fn stand_out(&self) -> bool {
+        self.squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * self.usual
+    }
+}
+
+fn first_rows(samples: &Samples, residual: &[f64]) -> Vec<FirstRows> {
+    let windows = windows(samples);
+    let centred = centre(samples, residual, &windows, &samples.blind);
+    let of = |i: usize| {
         let start = samples.segments[i].start;
         let rows: Vec<usize> = (start..start + windows[i]).filter(|k| !samples.blind[*k]).collect();
-        let squares: f64 = rows.iter().map(|k| centred[*k] * centred[*k]).sum();
-        let usual = level(samples, &centred, &windows, i);
-        let is_followed = away[i] || usual <= rows.len() as f64 * accuracy * accuracy;
-        is_followed && squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * usual
+        let squares = rows.iter().map(|k| centred[*k] * centred[*k]).sum();
+        FirstRows { count: rows.len(), squares, usual: level(samples, &centred, &windows, i) }
     };
-    (0..samples.segments.len()).map(stands_out).collect()
+    (0..samples.segments.len()).map(of).collect()
 }
 
 /// A drive with the past of each segment before it.
@@ -237,7 +326,7 @@ pub(crate) fn combined(
     basis.combined(weights, &all.drive, &all.segments, drag).map(|v| all.own(&v))
 }
 
-/// The past of each segment after which a fit follows its first rows [`best`]; none of segments that are not `asked` for. A past for each of
+/// The past of each segment after which a fit follows its first rows [`Candidates::best`]; none of segments that are not `asked` for. A past for each of
 /// some 340 combinations of turns is tried over the rows in which a start-up may lie, at most half of the segment. `residual` is what the fit has
 /// left in all rows; `surely` are the segments in which a memory of something else than rest is no surprise.
 ///
@@ -260,23 +349,25 @@ pub(crate) fn recalled(
         }
         let beginning = samples.beginning(i, window);
         // What does not move leaves the same.
-        let motion = |past: &Vec<f64>| {
-            let after = Samples { pasts: vec![past.clone()], ..beginning.clone() };
+        let motion = |past: &[f64]| {
+            let after = Samples { pasts: vec![past.to_vec()], ..beginning.clone() };
             problem.motion_in(fitted, &after)
         };
         let level = level(samples, &centred, &windows, i);
         let now = motion(&beginning.pasts[0])?;
-        let squares = |past: &Vec<f64>| {
+        let squares = |past: &[f64]| {
             let left = motion(past).ok()?;
             let left = now.iter().zip(left).zip(&centred[start..start + window]).zip(&beginning.blind);
             Some(left.filter(|(_, blind)| !**blind).map(|(((now, then), r), _)| (r + now - then).powi(2)).sum::<f64>())
         };
-        let mut pasts = pasts(samples.input[start], samples.input_range());
+        let mut candidates = Candidates::new(samples.input[start], samples.input_range());
         // Or it went on as it does afterwards.
-        pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
-        pasts.extend(continued(samples, i));
-        pasts.extend(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned());
-        Ok(best(pasts, level, surely[i], |past| squares(past).unwrap_or(f64::INFINITY)))
+        let others = cycles[i].map(|rows| samples.input[start..start + rows].to_vec()).into_iter();
+        let others = others.chain(continued(samples, i));
+        others
+            .chain(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned())
+            .for_each(|past| candidates.add(past));
+        Ok(candidates.best(level, surely[i], |past| squares(past).unwrap_or(f64::INFINITY)))
     };
     (0..asked.len()).map(of_segment).collect()
 }
@@ -284,29 +375,6 @@ pub(crate) fn recalled(
 /// The `new` past of each segment, or the old one where there is none.
 pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     new.into_iter().zip(old).map(|(new, old)| if new.is_empty() { old.clone() } else { new }).collect()
-}
-
-/// The past after which least is left of the first rows. None unless their error above the `level` of as many other rows falls by [`MIN_PAST_RATIO`] (`level`
-/// and `squares` are Σ residual²). Near 0 V, where a memory may be that of a rest and what stands out a transient of the sensor, it has to explain all but a
-/// [`NEGLIGIBLE_SHARE`] of that, or nothing may stand out any more: an actuator that was cycled before keeps a remanence at 0 V, and no transient of a
-/// sensor has the course of a loop.
-pub(crate) fn best(
-    pasts: Vec<Vec<f64>>,
-    level: f64,
-    away: bool,
-    squares: impl Fn(&Vec<f64>) -> f64 + Sync,
-) -> Vec<f64> {
-    let from_rest = squares(&Vec::new());
-    let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
-    if from_rest < stands_out {
-        return Vec::new();
-    }
-    let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
-    let least = all.iter().copied().fold(f64::INFINITY, f64::min);
-    let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
-    let explains_all = least - level <= NEGLIGIBLE_SHARE * (from_rest - level);
-    let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || explains_all || least < stands_out));
-    found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }
 
 /// Σ residual² of as many rows as a segment has at its beginning, at the level of those of the record in which no start-up can lie; `centred` is without
@@ -444,16 +512,27 @@ mod tests {
 
     #[test]
     fn a_past_near_rest_has_to_explain_all_that_stands_out() {
-        let pasts = || vec![vec![1.0], vec![2.0]];
-        let squares = |past: &Vec<f64>| match past.first() {
+        let near = Candidates { u0: 0.0, step: 0.0, turns: Vec::new(), others: vec![vec![1.0], vec![2.0]] };
+        let squares = |past: &[f64]| match past.first() {
             None => 100.0,
             Some(past) if *past == 1.0 => 9.0,
             Some(_) => 40.0,
         };
-        assert_eq!(best(pasts(), 1.0, true, squares), [1.0]);
-        assert!(best(pasts(), 1.0, false, squares).is_empty(), "nine times the level");
-        assert_eq!(best(pasts(), 8.0, false, squares), [1.0]);
-        assert!(best(pasts(), 60.0, true, squares).is_empty(), "nothing stands out");
+        assert_eq!(near.best(1.0, true, squares), [1.0]);
+        assert!(near.best(1.0, false, squares).is_empty(), "nine times the level");
+        assert_eq!(near.best(8.0, false, squares), [1.0]);
+        assert!(near.best(60.0, true, squares).is_empty(), "nothing stands out");
+    }
+
+    #[test]
+    fn a_turn_between_two_levels_is_found() {
+        let candidates = Candidates::new(10.0, (0.0, 120.0));
+        let squares = |past: &[f64]| {
+            let turns: Vec<f64> = past.iter().skip(ROWS).step_by(ROWS).copied().collect();
+            if let [first, second] = turns[..] { (first - 77.3).powi(2) + (second + 21.9).powi(2) } else { 1e4 }
+        };
+        let past = candidates.best(1e-3, false, squares);
+        assert!((past[ROWS] - 77.3).abs() < 0.1 && (past[2 * ROWS] + 21.9).abs() < 0.1, "{past:?}");
     }
 
     /// At 0 V, too, an actuator remembers that it was driven before; the amplitude fades, so that the first rise alone shows the lower half.

@@ -268,7 +268,7 @@ impl<'a> Own<'a> {
         (richest, noise, seed): (f64, f64, u64),
         zero: Zero,
     ) -> Result<Extension, FitError> {
-        let begun = self.start(found.0, richest)?;
+        let begun = self.start(found.0, noise)?;
         let mut extensions = Vec::new();
         for begun in std::iter::once(None).chain(begun.map(Some)) {
             let own = Own { samples: begun.as_ref().unwrap_or(self.samples), ..*self };

@@ -13,7 +13,7 @@ use crate::lsq::Blocks;
 use crate::memory;
 use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
-use crate::settle::{start_up_rows, without_beginnings};
+use crate::settle::{start_up_rows, started, without_beginnings};
 
 /// How often a start is looked for, each time with what is known of it.
 const RECALLS: usize = 2;
@@ -41,30 +41,25 @@ impl Own<'_> {
             _ => None,
         };
         let better = [behind, before].into_iter().flatten().min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
-        Ok(better.map(|start| start.samples).filter(|start| self.is_another(start)))
+        let is_another = |start: &Samples| start.settling != self.samples.settling || start.pasts != self.samples.pasts;
+        Ok(better.map(|start| start.samples).filter(is_another))
     }
 
     /// The same as the own base shows it with what was found.
-    pub(super) fn start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
-        let start = self.started(hypothesis, richest, None)?;
-        Ok(start.map(|start| start.samples).filter(|start| self.is_another(start)))
+    pub(super) fn start(&self, hypothesis: &Hypothesis, noise: f64) -> Result<Option<Samples>, FitError> {
+        // Not what the rich base misses: it does not know the start either. And what misses no more than noise of the other rows may miss a start-up.
+        let least = if started(self.samples, &self.samples.settling).contains(&true) { 0.0 } else { noise };
+        let start = self.started(hypothesis, least, None)?.map(|start| start.samples);
+        // Another than the extended model would take by itself.
+        Ok(start.filter(|start| start.settling != self.before.settling || start.pasts != self.samples.pasts))
     }
 
-    fn is_another(&self, start: &Samples) -> bool {
-        start.settling != self.samples.settling || start.pasts != self.samples.pasts
-    }
-
-    /// The start of each segment, beside a curve on one side; none where nothing is missing, or where no curve can be fitted.
-    fn started(
-        &self,
-        hypothesis: &Hypothesis,
-        richest: f64,
-        side: Option<CurveSide>,
-    ) -> Result<Option<Start>, FitError> {
+    /// The start of each segment, beside a curve on one side; none where no more than `least` is missed, or where no curve can be fitted.
+    fn started(&self, hypothesis: &Hypothesis, least: f64, side: Option<CurveSide>) -> Result<Option<Start>, FitError> {
         let stage = |e| self.stage(e);
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let plain = shape::plain(&self.on(self.basis, &blocks), hypothesis).map_err(stage)?;
-        if plain.is_none_or(|plain| shape::is_complete(&plain, richest)) {
+        if plain.is_none_or(|plain| shape::is_complete(&plain, least)) {
             return Ok(None);
         }
         // Near 0 V only where everything is known but the start.
