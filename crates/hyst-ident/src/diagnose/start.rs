@@ -91,7 +91,7 @@ impl Own<'_> {
         let late = without_beginnings(self.samples);
         let mut known = memory::with_histories(&late, &asked, &mut |samples| squares(samples))?;
         // Then the turns, as far as the first rows show them; what is left is a start-up.
-        let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
+        let all = |samples: &Samples| squares(&Samples { settling: samples.blind.clone(), ..samples.clone() });
         for _ in 0..RECALLS {
             let Some((.., pasts)) = fitted(&known, true).map_err(stage)? else { break };
             let next = Samples { pasts: memory::kept(&known.pasts, pasts), ..known.clone() };
@@ -100,9 +100,15 @@ impl Own<'_> {
             }
             known = next;
         }
+        // What was a start-up before is none after a past that explains it.
+        let mut settling = self.samples.settling.clone();
+        if known.pasts != self.samples.pasts {
+            settling.copy_from_slice(&known.blind);
+            known.settling.copy_from_slice(&known.blind);
+        }
         let Some((trial, residual, _)) = fitted(&known, false).map_err(stage)? else { return Ok(None) };
         let starting = start_up_rows(&known, &residual);
-        known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
+        known.settling = settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
         Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
     }
 }

@@ -5,10 +5,8 @@ use std::sync::OnceLock;
 
 use hyst_core::{
     Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
-    SaturationInverse, Stage, Temperature, TemperatureParams, Widening, WideningParams,
+    SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
 };
-
-use rayon::prelude::*;
 
 use super::Hypothesis;
 use crate::Samples;
@@ -16,6 +14,7 @@ use crate::base::BESIDE;
 use crate::model::InputSide;
 use crate::model::capacity::{CREEP, DELAY};
 use crate::samples::PerSegment;
+use crate::widened;
 
 /// What leads to the hysteresis and what follows it, for one set of causes.
 pub(crate) struct SignalPath<'a> {
@@ -26,9 +25,8 @@ pub(crate) struct SignalPath<'a> {
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
-    /// Each play of the widening by itself, of weight one.
-    widening: Vec<PerSegment<Widening<f64>>>,
-    /// What each of them adds, once somebody has asked.
+    widening: Option<PerSegment<Widening<f64>>>,
+    /// What each play of the widening adds, of weight one, once somebody has asked.
     wider: OnceLock<Vec<Vec<f64>>>,
     warmth: Option<Warmth>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
@@ -61,12 +59,7 @@ impl<'a> SignalPath<'a> {
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
             wider: OnceLock::new(),
-            widening: effects
-                .widening
-                .iter()
-                .flat_map(each_play)
-                .map(|p| for_each(samples, &p))
-                .collect::<Result<_, _>>()?,
+            widening: effects.widening.as_ref().map(|p| for_each(samples, p)).transpose()?,
             warmth: warmth.flatten(),
             creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
             resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
@@ -112,26 +105,14 @@ impl<'a> SignalPath<'a> {
     }
 
     fn widened(&self) -> Vec<Vec<f64>> {
-        if self.widening.is_empty() {
-            return Vec::new();
+        let Some(stages) = &self.widening else { return Vec::new() };
+        let (drive, segments) = (self.input_side(), &self.samples.segments);
+        let mut columns =
+            widened::columns(stages.of(0).plays(), |i| Some(stages.of(i)), &drive, segments, &self.pasts());
+        if self.samples.falls {
+            columns.iter_mut().flatten().for_each(|x| *x = -*x);
         }
-        let (drive, pasts, env) = (self.input_side(), self.pasts(), Env::default());
-        let sign = if self.samples.falls { -1.0 } else { 1.0 };
-        let column = |stages: &PerSegment<Widening<f64>>| {
-            let mut column = vec![0.0; drive.len()];
-            for (i, segment) in self.samples.segments.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
-                let stage = stages.of(i);
-                let mut state = stage.state();
-                pasts.get(i).into_iter().flatten().for_each(|u| stage.rest(&mut state, *u));
-                // The device has rested at its first input.
-                stage.rest(&mut state, drive[segment.start]);
-                for k in segment.clone().skip(1) {
-                    column[k] = sign * stage.step(&mut state, &env, drive[k]);
-                }
-            }
-            column
-        };
-        self.widening.par_iter().map(column).collect()
+        columns
     }
 
     /// Adds what the widening does with these weights.
@@ -232,13 +213,6 @@ impl<'a> SignalPath<'a> {
             }
         }
     }
-}
-
-/// A widening of one play, of weight one, for each of its plays.
-fn each_play(p: &WideningParams<Vec<f64>>) -> impl Iterator<Item = WideningParams<[f64; 1]>> + use<> {
-    let WideningParams { growth, exponent, reference_rate, seconds, .. } = *p;
-    let of = move |r| WideningParams { growth, exponent, reference_rate, seconds, thresholds: [r], weights: [1.0] };
-    p.thresholds.clone().into_iter().map(of)
 }
 
 /// What the temperature does in each row.
