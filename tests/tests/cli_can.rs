@@ -84,8 +84,7 @@ fn interfaces_are_listed_and_refused_with_advice() {
     assert!(
         found
             .iter()
-            .any(|port| port["daq"] == "can:cli-list"
-                && port["what"] == "CAN; can:cli-list,fd for CAN FD frames; up"),
+            .any(|port| port["daq"] == "can:cli-list" && port["what"] == "CAN; can:cli-list,fd for CAN FD frames; up"),
         "{found:?}"
     );
     lab.write("u.csv", "time_s,voltage_v\n0,0\n0.002,1\n0.004,0\n");

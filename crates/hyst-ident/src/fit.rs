@@ -402,7 +402,7 @@ pub(crate) fn fit_settled(
         all = run(samples, basis)?;
     }
     let (mut found, late) = start_up_found(samples, all, None, |samples| run(samples, basis))?;
-    if memory::standing_out(samples, &late.1).contains(&true) {
+    if memory::standing_out_where_followed(samples, &late.1).contains(&true) {
         // The drive history is estimated with play operators for every base: their few unknowns need few rows.
         samples.settling.copy_from_slice(&samples.blind);
         let plays = PiBasis::for_samples(samples);
@@ -428,7 +428,7 @@ fn recalled(
     recalls: &Recalls<'_>,
 ) -> Result<Vec<f64>, FitError> {
     let (mut found, mut late) = start_up_found(samples, run(samples)?, None, &run)?;
-    let asked = memory::standing_out(samples, &late.1);
+    let asked = memory::standing_out_where_followed(samples, &late.1);
     if !asked.contains(&true) {
         return Ok(found.1);
     }

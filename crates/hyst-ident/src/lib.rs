@@ -46,6 +46,7 @@ pub mod spikes;
 pub mod stop;
 mod tone_phase;
 pub mod tracking;
+mod widened;
 
 pub use drive::{BetweenSamples, UnknownBetweenSamples};
 pub use loop_gains::{LoopGains, loop_gains};

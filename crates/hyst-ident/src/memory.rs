@@ -11,7 +11,8 @@ use hyst_core::Error;
 use rayon::prelude::*;
 
 use crate::base::{Basis, Drag};
-use crate::criteria::{MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
+use crate::criteria::{LAW_ACCURACY, MIN_PAST_RATIO, MIN_RMSE_DROP, MIN_RMSE_RATIO, MINOR_SHARE, NEGLIGIBLE_SHARE};
+use crate::metrics::rms;
 use crate::nested::{Fitted, Problem};
 use crate::samples::Samples;
 use crate::settle::{centre, first_cycles, windows};
@@ -26,21 +27,89 @@ const DECAY_REVERSALS: usize = 16;
 const DECAY_AMPLITUDES: usize = 6;
 /// Rows from one reversal to the next.
 const ROWS_PER_REVERSAL: usize = 16;
+/// Number of times that the step of a reversal's level is halved: to 1/1500 of the range.
+const HALVINGS: usize = 7;
 
-/// Returns candidate drive histories of a segment that starts at `u0` \[V\]: drives from 0 V that end just before `u0`.
-pub(crate) fn pasts(u0: f64, (low, high): (f64, f64)) -> Vec<Vec<f64>> {
-    let (span, inside) = (high - low, LEVELS - 1);
-    let level = |i: usize| low + span * (i as f64 - LEVELS_BEYOND as f64) / inside as f64;
-    // Levels outside of the range too: a device driven to one side is poled there, and wide play operators come to rest
-    // at any voltage.
-    let levels = || (0..LEVELS + 2 * LEVELS_BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
-    let mut turns: Vec<Vec<f64>> = levels().map(|u| vec![u]).collect();
-    // Two reversals on the same side of `u0` wipe each other out.
-    for first in levels() {
-        turns.extend(levels().filter(|second| (second - u0) * (first - u0) < 0.0).map(|second| vec![first, second]));
+/// Candidate drive histories of a segment: drives from 0 V that end just before its first voltage.
+pub(crate) struct Candidates {
+    /// First voltage of the segment \[V\].
+    u0: f64,
+    /// Distance of two levels \[V\].
+    step: f64,
+    /// Drives with few reversals: the levels of these \[V\].
+    reversals: Vec<Vec<f64>>,
+    others: Vec<Vec<f64>>,
+}
+
+impl Candidates {
+    /// Histories with one or two reversals, and decaying drives.
+    pub(crate) fn new(u0: f64, (low, high): (f64, f64)) -> Self {
+        let (span, inside) = (high - low, LEVELS - 1);
+        let level = |i: usize| low + span * (i as f64 - LEVELS_BEYOND as f64) / inside as f64;
+        // Levels outside of the range too: a device driven to one side is poled there, and wide play operators come to
+        // rest at any voltage.
+        let levels = || (0..LEVELS + 2 * LEVELS_BEYOND).map(level).filter(|u| (u - u0).abs() > 1e-9 * span);
+        let mut reversals: Vec<Vec<f64>> = levels().map(|u| vec![u]).collect();
+        // Two reversals on the same side of `u0` wipe each other out.
+        for first in levels() {
+            let opposite = levels().filter(|second| (second - u0) * (first - u0) < 0.0);
+            reversals.extend(opposite.map(|second| vec![first, second]));
+        }
+        let amplitude = |i: usize| span * i as f64 / DECAY_AMPLITUDES as f64;
+        let others = (1..=DECAY_AMPLITUDES).map(|i| decay(u0, amplitude(i))).collect();
+        Self { u0, step: span / inside as f64, reversals, others }
     }
-    let decays = (1..=DECAY_AMPLITUDES).map(|i| decay(u0, span * i as f64 / DECAY_AMPLITUDES as f64));
-    turns.iter().map(|turns| path(turns, u0)).chain(decays).collect()
+
+    /// Adds another history.
+    pub(crate) fn add(&mut self, past: Vec<f64>) {
+        self.others.push(past);
+    }
+
+    /// Returns the history with the smallest Σ residual² of the first rows (`squares`); empty if none explains them.
+    /// The error above `level`, the Σ residual² of as many other rows, must fall by [`MIN_PAST_RATIO`]. Near 0 V a memory
+    /// of rest and a sensor transient are plausible too. There the history must explain all but a [`NEGLIGIBLE_SHARE`] of
+    /// the error, or the error must fall to that of other rows: a cycled actuator keeps a remanence at 0 V, and no sensor
+    /// transient has the shape of a loop.
+    pub(crate) fn best(&self, level: f64, away: bool, squares: impl Fn(&[f64]) -> f64 + Sync) -> Vec<f64> {
+        let from_rest = squares(&[]);
+        let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
+        if from_rest < stands_out {
+            return Vec::new();
+        }
+        let with_reversals: Vec<f64> =
+            self.reversals.par_iter().map(|levels| squares(&path(levels, self.u0))).collect();
+        let with_others: Vec<f64> = self.others.par_iter().map(|past| squares(past)).collect();
+        let least = |all: &[f64]| all.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let refined =
+            least(&with_reversals).map(|(at, error)| self.refined(self.reversals[at].clone(), error, &squares));
+        let other = least(&with_others).map(|(at, error)| (self.others[at].clone(), error));
+        let best = refined.into_iter().chain(other).min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((past, least)) = best.filter(|(_, least)| *least < f64::INFINITY) else { return Vec::new() };
+        let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
+        let explains_all = least - level <= NEGLIGIBLE_SHARE * (from_rest - level);
+        if helps && (away || explains_all || least < stands_out) { past } else { Vec::new() }
+    }
+
+    /// Moves each reversal to the level with the smallest error, in steps that are halved. Returns the history and its
+    /// error.
+    fn refined(&self, mut reversals: Vec<f64>, mut least: f64, squares: &impl Fn(&[f64]) -> f64) -> (Vec<f64>, f64) {
+        let mut step = self.step;
+        for _ in 0..HALVINGS {
+            step /= 2.0;
+            for at in 0..reversals.len() {
+                for by in [-step, step] {
+                    let mut moved = reversals.clone();
+                    moved[at] += by;
+                    let error = squares(&path(&moved, self.u0));
+                    if error < least {
+                        (reversals, least) = (moved, error);
+                        break;
+                    }
+                }
+            }
+        }
+        (path(&reversals, self.u0), least)
+    }
 }
 
 /// How a device may have reached the start of a segment.
@@ -163,15 +232,44 @@ pub(crate) fn away(samples: &Samples) -> Vec<bool> {
 /// Returns which segments have a larger error in their first rows than in other rows. `residual` is that of a fit
 /// without those rows.
 pub(crate) fn standing_out(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    first_rows(samples, residual).iter().map(|rows| rows.stand_out()).collect()
+}
+
+/// The same. Near 0 V a segment counts only if the fit follows the hysteresis in the other rows: they do not contain the
+/// first rise of a virgin actuator, and a fit without a missing effect may have a larger error there.
+pub(crate) fn standing_out_where_followed(samples: &Samples, residual: &[f64]) -> Vec<bool> {
+    let accuracy = LAW_ACCURACY * rms(&samples.hysteresis().1);
+    let rows = first_rows(samples, residual);
+    let counts = |(rows, away): (&FirstRows, bool)| {
+        let is_followed = away || rows.usual <= rows.count as f64 * accuracy * accuracy;
+        is_followed && rows.stand_out()
+    };
+    rows.iter().zip(away(samples)).map(counts).collect()
+}
+
+/// Errors of a fit in the first rows of a segment, and in as many other rows \[Σ residual²\].
+struct FirstRows {
+    count: usize,
+    squares: f64,
+    usual: f64,
+}
+
+impl FirstRows {
+    fn stand_out(&self) -> bool {
+        self.squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * self.usual
+    }
+}
+
+fn first_rows(samples: &Samples, residual: &[f64]) -> Vec<FirstRows> {
     let windows = windows(samples);
     let centred = centre(samples, residual, &windows, &samples.blind);
-    let stands_out = |i: usize| {
+    let of = |i: usize| {
         let start = samples.segments[i].start;
-        let rows = (start..start + windows[i]).filter(|k| !samples.blind[*k]);
-        let squares: f64 = rows.map(|k| centred[k] * centred[k]).sum();
-        squares >= MIN_RMSE_RATIO * MIN_RMSE_RATIO * level(samples, &centred, &windows, i)
+        let rows: Vec<usize> = (start..start + windows[i]).filter(|k| !samples.blind[*k]).collect();
+        let squares = rows.iter().map(|k| centred[*k] * centred[*k]).sum();
+        FirstRows { count: rows.len(), squares, usual: level(samples, &centred, &windows, i) }
     };
-    (0..samples.segments.len()).map(stands_out).collect()
+    (0..samples.segments.len()).map(of).collect()
 }
 
 /// A drive with the history of each segment before it.
@@ -235,9 +333,9 @@ pub(crate) fn combined(
     basis.combined(weights, &all.drive, &all.segments, drag).map(|v| all.own(&v))
 }
 
-/// Returns the drive history of each segment after which a fit follows its first rows [`best`]; empty for segments that
-/// are not in `asked`. About 340 combinations of reversals are tried over the start-up window, at most half of the
-/// segment.
+/// Returns the drive history of each segment after which a fit follows its first rows [`Candidates::best`]; empty for
+/// segments that are not in `asked`. About 340 combinations of reversals are tried over the start-up window, at most half
+/// of the segment.
 /// `residual` is that of the fit in all rows; `surely` marks the segments in which a memory other than rest is
 /// expected.
 ///
@@ -260,23 +358,24 @@ pub(crate) fn recalled(
         }
         let beginning = samples.beginning(i, window);
         // The residual changes only by the change of the motion.
-        let motion = |past: &Vec<f64>| {
-            let after = Samples { pasts: vec![past.clone()], ..beginning.clone() };
+        let motion = |past: &[f64]| {
+            let after = Samples { pasts: vec![past.to_vec()], ..beginning.clone() };
             problem.motion_in(fitted, &after)
         };
         let level = level(samples, &centred, &windows, i);
         let now = motion(&beginning.pasts[0])?;
-        let squares = |past: &Vec<f64>| {
+        let squares = |past: &[f64]| {
             let left = motion(past).ok()?;
             let left = now.iter().zip(left).zip(&centred[start..start + window]).zip(&beginning.blind);
             Some(left.filter(|(_, blind)| !**blind).map(|(((now, then), r), _)| (r + now - then).powi(2)).sum::<f64>())
         };
-        let mut pasts = pasts(samples.input[start], samples.input_range());
+        let mut candidates = Candidates::new(samples.input[start], samples.input_range());
         // Or the device was cycled before as in the segment itself.
-        pasts.extend(cycles[i].map(|rows| samples.input[start..start + rows].to_vec()));
-        pasts.extend(continued(samples, i));
-        pasts.extend(beginning.pasts.iter().filter(|past| !past.is_empty()).cloned());
-        Ok(best(pasts, level, surely[i], |past| squares(past).unwrap_or(f64::INFINITY)))
+        let others = cycles[i].map(|rows| samples.input[start..start + rows].to_vec()).into_iter();
+        let others = others.chain(continued(samples, i));
+        let known = beginning.pasts.iter().filter(|past| !past.is_empty()).cloned();
+        others.chain(known).for_each(|past| candidates.add(past));
+        Ok(candidates.best(level, surely[i], |past| squares(past).unwrap_or(f64::INFINITY)))
     };
     (0..asked.len()).map(of_segment).collect()
 }
@@ -284,30 +383,6 @@ pub(crate) fn recalled(
 /// Returns the `new` history of each segment, or the old one where that is empty.
 pub(crate) fn kept(old: &[Vec<f64>], new: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     new.into_iter().zip(old).map(|(new, old)| if new.is_empty() { old.clone() } else { new }).collect()
-}
-
-/// Returns the drive history with the smallest Σ residual² of the first rows (`squares`); empty if none explains them.
-/// The error above `level`, the Σ residual² of as many other rows, must fall by [`MIN_PAST_RATIO`]. Near 0 V a memory
-/// of rest and a sensor transient are plausible too. There the history must explain all but a [`NEGLIGIBLE_SHARE`] of
-/// the error, or the error must fall to that of other rows: a cycled actuator keeps a remanence at 0 V, and no sensor
-/// transient has the shape of a loop.
-pub(crate) fn best(
-    pasts: Vec<Vec<f64>>,
-    level: f64,
-    away: bool,
-    squares: impl Fn(&Vec<f64>) -> f64 + Sync,
-) -> Vec<f64> {
-    let from_rest = squares(&Vec::new());
-    let stands_out = MIN_RMSE_RATIO * MIN_RMSE_RATIO * level;
-    if from_rest < stands_out {
-        return Vec::new();
-    }
-    let all: Vec<f64> = pasts.par_iter().map(&squares).collect();
-    let least = all.iter().copied().fold(f64::INFINITY, f64::min);
-    let helps = MIN_PAST_RATIO * MIN_PAST_RATIO * (least - level).max(0.0) < from_rest - level;
-    let explains_all = least - level <= NEGLIGIBLE_SHARE * (from_rest - level);
-    let found = all.iter().position(|x| *x == least).filter(|_| helps && (away || explains_all || least < stands_out));
-    found.map(|at| pasts.into_iter().nth(at).unwrap_or_default()).unwrap_or_default()
 }
 
 /// Returns the Σ residual² that the start-up window of a segment would have with the mean square of the rows outside of
@@ -446,16 +521,28 @@ mod tests {
 
     #[test]
     fn a_drive_history_near_rest_has_to_explain_the_whole_error() {
-        let pasts = || vec![vec![1.0], vec![2.0]];
-        let squares = |past: &Vec<f64>| match past.first() {
+        let near = Candidates { u0: 0.0, step: 0.0, reversals: Vec::new(), others: vec![vec![1.0], vec![2.0]] };
+        let squares = |past: &[f64]| match past.first() {
             None => 100.0,
             Some(past) if *past == 1.0 => 9.0,
             Some(_) => 40.0,
         };
-        assert_eq!(best(pasts(), 1.0, true, squares), [1.0]);
-        assert!(best(pasts(), 1.0, false, squares).is_empty(), "nine times the level");
-        assert_eq!(best(pasts(), 8.0, false, squares), [1.0]);
-        assert!(best(pasts(), 60.0, true, squares).is_empty(), "the first rows have no larger error");
+        assert_eq!(near.best(1.0, true, squares), [1.0]);
+        assert!(near.best(1.0, false, squares).is_empty(), "nine times the level");
+        assert_eq!(near.best(8.0, false, squares), [1.0]);
+        assert!(near.best(60.0, true, squares).is_empty(), "the first rows have no larger error");
+    }
+
+    #[test]
+    fn a_reversal_between_two_levels_is_found() {
+        let candidates = Candidates::new(10.0, (0.0, 120.0));
+        let squares = |past: &[f64]| {
+            let levels: Vec<f64> = past.iter().skip(ROWS_PER_REVERSAL).step_by(ROWS_PER_REVERSAL).copied().collect();
+            if let [first, second] = levels[..] { (first - 77.3).powi(2) + (second + 21.9).powi(2) } else { 1e4 }
+        };
+        let past = candidates.best(1e-3, false, squares);
+        let (first, second) = (past[ROWS_PER_REVERSAL], past[2 * ROWS_PER_REVERSAL]);
+        assert!((first - 77.3).abs() < 0.1 && (second + 21.9).abs() < 0.1, "{past:?}");
     }
 
     /// An actuator at 0 V also remembers an earlier drive. The amplitude falls, so only the first rise shows the lower
@@ -475,8 +562,8 @@ mod tests {
         let (fitted, _) = fit_settled(&mut samples, &basis, &FitOptions::default(), &String::new).unwrap();
         assert!(!samples.pasts[0].is_empty());
         assert!(samples.settling.iter().all(|s| !s));
-        let hysteresis = crate::metrics::rms(&samples.hysteresis().1);
-        assert!(fitted.rmse() < crate::criteria::LAW_ACCURACY * hysteresis, "{} of {hysteresis}", fitted.rmse());
+        let hysteresis = rms(&samples.hysteresis().1);
+        assert!(fitted.rmse() < LAW_ACCURACY * hysteresis, "{} of {hysteresis}", fitted.rmse());
     }
 
     #[test]

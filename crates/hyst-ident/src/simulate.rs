@@ -256,7 +256,7 @@ fn recalled(
         // The initial creep is a further unknown of the same rows.
         let nothing = || vec![0.0; windows[i]];
         let unit = creep.map_or_else(nothing, |creep| creep_rest::column(creep, 0.0, samples.period_of(i), windows[i]));
-        let squares = |past: &Vec<f64>| -> f64 {
+        let squares = |past: &[f64]| -> f64 {
             let chain = chain.of(i);
             let output =
                 drive.beginning(i, windows[i], chain, |state, env, u0| chain.reset_after(state, env, u0, past));
@@ -267,9 +267,9 @@ fn recalled(
             all - creep_rest::fitted(left.into_iter(), samples.output_span()).map_or(0.0, |(_, taken)| taken)
         };
         let level = memory::level(samples, &centred, &windows, i);
-        let mut pasts = memory::pasts(samples.input[rows.start], samples.input_range());
-        pasts.extend(memory::continued(samples, i));
-        memory::best(pasts, level, away[i] && of.starts[i], squares)
+        let mut candidates = memory::Candidates::new(samples.input[rows.start], samples.input_range());
+        memory::continued(samples, i).into_iter().for_each(|past| candidates.add(past));
+        candidates.best(level, away[i] && of.starts[i], squares)
     };
     (0..of.asked.len()).map(past).collect()
 }

@@ -25,6 +25,8 @@ const MIN_STEPS: f64 = 5.0;
 const MIN_DRIVE_RATIO: f64 = 2.0;
 /// Smallest ratio of the deviation to the largest step of the drive, likewise. From row to row a misfit changes by less than the output.
 const MIN_MISFIT_RATIO: f64 = 1.0;
+/// Share of the rows at either end of the output's range that does not count for its span.
+const OUTER_SHARE: f64 = 0.005;
 /// Largest share of rows with spikes. With more, the deviations are a property of the output.
 const MAX_SHARE: f64 = 0.1;
 
@@ -75,8 +77,13 @@ fn spikes(input: &[f64], output: &[f64], signal: &[f64], usual: f64, segments: &
         let (low, high) = crate::samples::range(x.iter().copied());
         (high - low).max(f64::MIN_POSITIVE)
     };
-    // A spike itself widens the output's span.
-    let per_input = span(output) / span(input);
+    // Without its outermost rows: a spike itself widens the output's span.
+    let inner = {
+        let mut sorted = output.to_vec();
+        let mut at = |share: f64| quantile(&mut sorted, share);
+        at(1.0 - OUTER_SHARE) - at(OUTER_SHARE)
+    };
+    let per_input = if inner > 0.0 { inner } else { span(output) } / span(input);
     let (mut beside, mut steps) = (Vec::new(), Vec::new());
     let usual = usual.max(digit);
     for s in segments {

@@ -138,6 +138,16 @@ impl<T: Real> Widening<T> {
         plays.fold(T::ZERO, |y, ((grown, plain), (r, w))| y + *w * (play(*grown, u, *r * factor) - play(*plain, u, *r)))
     }
 
+    /// Number of plays.
+    pub fn plays(&self) -> usize {
+        self.len
+    }
+
+    /// What each play adds after the last sample, before it is weighed: P(u; rᵢ g) − P(u; rᵢ) \[input unit\].
+    pub fn parts<'a>(&self, s: &'a WideningState<T>) -> impl Iterator<Item = T> + 'a {
+        s.grown.iter().zip(&s.plain).take(self.len).map(|(grown, plain)| *grown - *plain)
+    }
+
     /// Moves the plays as a drive does that is slow enough to be felt as none.
     pub fn rest(&self, s: &mut WideningState<T>, u: T) {
         let u = finite_or(u, s.u);

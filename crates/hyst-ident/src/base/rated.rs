@@ -8,13 +8,14 @@
 
 use std::ops::Range;
 
-use hyst_core::{Build, Env, Sampling, Stage, Widening, WideningParams};
+use hyst_core::{Build, MAX_WIDENING, Sampling, Widening, WideningParams};
 use nalgebra::DMatrix;
 
 use super::pi::plays;
 use super::{Basis, Drag};
 use crate::Samples;
 use crate::lsq::Bounds;
+use crate::widened;
 
 /// Quantiles of the moving rows whose rates are the knots. The first knot has no hat function.
 const KNOTS: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
@@ -64,29 +65,26 @@ impl<'a> RatedBasis<'a> {
         ((self.knots.len() - 1) * self.thresholds.len(), EXPONENTS.len() * (self.thresholds.len() - 1))
     }
 
-    /// Returns the contribution of a play operator with a growing threshold; zero if the stage cannot be built.
-    fn grown(&self, at: usize, drive: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
-        let plays = self.thresholds.len() - 1;
-        let weight = if self.falls { -1.0 } else { 1.0 };
+    /// Returns the contribution of each play operator whose threshold grows with this exponent; zero where the stage
+    /// cannot be built.
+    fn grown(&self, exponent: f64, drive: &[f64], segments: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let thresholds = &self.thresholds[1..];
         let widening = WideningParams {
             growth: GROWTH,
-            exponent: EXPONENTS[at / plays],
+            exponent,
             reference_rate: self.median,
             seconds: self.felt_over,
-            thresholds: [self.thresholds[1 + at % plays]],
-            weights: [weight],
+            thresholds,
+            weights: &[1.0; MAX_WIDENING][..thresholds.len()],
         };
-        let mut column = vec![0.0; drive.len()];
-        for (rows, period) in segments.iter().zip(&self.periods) {
-            let stage: Result<Widening<f64>, _> = widening.build(&Sampling { period: *period });
-            let (Ok(stage), Some(first)) = (stage, drive.get(rows.start)) else { continue };
-            let (mut state, env) = (stage.state(), Env::default());
-            stage.reset(&mut state, &env, *first);
-            for k in rows.clone().skip(1) {
-                column[k] = stage.step(&mut state, &env, drive[k]);
-            }
+        let stages: Vec<Option<Widening<f64>>> =
+            self.periods.iter().map(|period| widening.build(&Sampling { period: *period }).ok()).collect();
+        let stage = |i: usize| stages.get(i).and_then(Option::as_ref);
+        let mut columns = widened::columns(thresholds.len(), stage, drive, segments, &[]);
+        if self.falls {
+            columns.iter_mut().flatten().for_each(|x| *x = -*x);
         }
-        column
+        columns
     }
 
     /// Returns the hat function of a knot over the rows.
@@ -130,7 +128,16 @@ impl Basis for RatedBasis<'_> {
             let hat = self.hat(knot + 1, &rates);
             columns.push(plays[threshold].iter().zip(hat).map(|(p, hat)| p * hat).collect());
         }
-        columns.extend((of.start.max(hats)..of.end.max(hats)).map(|column| self.grown(column - hats, drive, segments)));
+        let wanted = of.start.max(hats)..of.end.max(hats);
+        let plays = self.thresholds.len() - 1;
+        for (i, exponent) in EXPONENTS.into_iter().enumerate() {
+            let here = hats + i * plays..hats + (i + 1) * plays;
+            let (from, to) = (wanted.start.max(here.start), wanted.end.min(here.end));
+            if from < to {
+                let grown = self.grown(exponent, drive, segments);
+                columns.extend(grown.into_iter().take(to - here.start).skip(from - here.start));
+            }
+        }
         columns
     }
 

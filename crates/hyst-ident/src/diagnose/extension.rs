@@ -108,9 +108,9 @@ impl<'a> OwnModel<'a> {
         let (mut bent, mut bases): (Vec<CurveFits>, Vec<Option<BasisOf>>) = (Vec::new(), Vec::new());
         let complete = |curved: &shape::CurveFit| shape::is_complete(&curved.trial, richest);
         for side in [CurveSide::Output, CurveSide::Input] {
-            // A curve behind the operator is linear in its weights. One before the operator has to be searched, so it
-            // is tried only if needed.
-            if bent.iter().flat_map(CurveFits::curves).any(complete) {
+            // A curve behind the operator is linear in its weights. One before the operator has to be searched. It is tried
+            // unless the first one leaves only noise: the right curve may predict better than the rich base.
+            if bent.iter().flat_map(CurveFits::curves).any(|curved| shape::is_complete(&curved.trial, noise)) {
                 break;
             }
             let own = shape::bent(&problem, hypothesis, &plain.fit, side).map_err(stage)?;
@@ -274,7 +274,7 @@ impl<'a> OwnModel<'a> {
         (richest, noise, seed): (f64, f64, u64),
         zero: Zero,
     ) -> Result<Extension, FitError> {
-        let restarted = self.start(found.0, richest)?;
+        let restarted = self.start(found.0, noise)?;
         let mut extensions = Vec::new();
         for restarted in std::iter::once(None).chain(restarted.map(Some)) {
             let own = OwnModel { samples: restarted.as_ref().unwrap_or(self.samples), ..*self };

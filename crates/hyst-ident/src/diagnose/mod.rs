@@ -17,13 +17,13 @@ mod changed;
 mod colour;
 mod evidence;
 mod extension;
-mod few_unknowns;
 mod findings;
 mod finer;
 mod follow;
 mod history;
 mod limits;
 mod named;
+mod own_base;
 mod probability;
 mod race;
 mod remainder;
@@ -176,19 +176,18 @@ fn found_in(
     let start = hypothesis_of(model);
     // A linearised operator is not searched: far from its parameters its linearisation error looks like effects.
     let is_searched = !matches!(own, BasisOf::Linearised(_));
-    // The model's own base is also searched if it has fewer unknowns than the screening base.
-    let few = (is_searched && own.as_ref().len() < screening.len()).then(|| own.as_ref());
-    let base_of = |on_own: bool| few.filter(|_| on_own).unwrap_or(&screening);
+    let searched_too = is_searched.then(|| own.as_ref());
+    let base_of = |on_own: bool| searched_too.filter(|_| on_own).unwrap_or(&screening);
     // A search over other rows starts from the result of the previous search.
     let searched = |samples: &Samples, from: &Hypothesis| {
         let problem = Problem::new(samples, &screening, &blocks, per_record);
         let base = problem.fit(from).map_err(stage)?.ok_or_else(unsolvable)?;
         let found = search::search(&problem, base, &start.causes(), options.seed, progress).map_err(stage)?;
         let (mut problem, mut found, mut on_own) = (problem, found, false);
-        if let Some(few) = few {
-            let own = Problem::new(samples, few, &blocks, per_record);
+        if let Some(basis) = searched_too {
+            let own = Problem::new(samples, basis, &blocks, per_record);
             let start = (from, start.causes());
-            let anew = few_unknowns::search(&own, &found, start, options.seed, progress).map_err(stage)?;
+            let anew = own_base::search(&own, screening.len(), &found, start, options.seed, progress).map_err(stage)?;
             if let Some(anew) = anew {
                 (problem, found, on_own) = (own, anew, true);
             }
@@ -225,8 +224,7 @@ fn found_in(
     let problem = Problem::new(&samples, base_of(on_own), &blocks, per_record);
     let finer::Finer { mut hypothesis, mut errors, cv_rmse: mut richest } =
         finer::refine(&problem, &mut found, &start.causes(), &samples, options.seed, progress).map_err(stage)?;
-    // The search used a basis with few unknowns. With the same effects, the screening basis may follow the record even
-    // better.
+    // If the model's own base was searched, the screening basis may follow the record even better with the same effects.
     if on_own {
         let rich = Problem::new(&samples, &screening, &blocks, per_record);
         let fit = rich.fit_linear(&hypothesis).map_err(stage)?;

@@ -50,7 +50,7 @@ impl<'a> Scan<'a> {
 
     /// Returns Σ squares of the part of a column that the fit cannot imitate.
     pub(super) fn left(&self, column: &[f64]) -> f64 {
-        self.prober.projector.left(column)
+        self.prober.projector.unexplained(column)
     }
 
     /// Returns the change of the motion with another hypothesis.

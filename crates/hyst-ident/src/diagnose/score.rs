@@ -3,15 +3,15 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use hyst_core::{ResonanceParams, SaturationParams};
+use hyst_core::{RateLaw, RateParams, ResonanceParams, SaturationParams};
 
 use super::tone::is_sensor_tone;
 use super::trial::Trial;
 use crate::Samples;
 use crate::criteria::{
-    HALF, MAX_KNEE, MAX_MODE_DAMPING, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_BETTER_DRAWS, MIN_CONFIDENCE,
-    MIN_DRIFT_TIME, MIN_MODE_HZ, MIN_NOISE_FLOORS, MIN_RMSE_DROP, MIN_RMSE_RATIO, MIN_STOP_ROWS, MIN_TONE_HZ,
-    MIN_VARIANCE_SHARE, MINOR_SHARE,
+    HALF, LAW_ACCURACY, MAX_KNEE, MAX_MODE_DAMPING, MAX_SHARP_KNEE, MAX_STOP_DISTANCE, MIN_BETTER_DRAWS,
+    MIN_CONFIDENCE, MIN_DRIFT_TIME, MIN_MODE_HZ, MIN_NOISE_FLOORS, MIN_RMSE_DROP, MIN_RMSE_RATIO, MIN_STOP_ROWS,
+    MIN_TONE_HZ, MIN_VARIANCE_SHARE, MINOR_SHARE,
 };
 use crate::nested::{Fitted, Problem, ends_at_a_bound, shown_motion};
 use crate::samples::range;
@@ -162,7 +162,7 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
     !ends_at_a_bound(&trial.fit.hypothesis, samples)
         && e.delay.is_none_or(|p| time(p.seconds))
         && e.lag.is_none_or(|p| time(p.seconds))
-        && e.rate.is_none_or(|p| p.volts > 0.0)
+        && e.rate.is_none_or(|p| p.volts > 0.0 && !is_lag(&p))
         && trial.fit.hypothesis.drag.is_none_or(|p| p.volt_seconds > 0.0 || p.seconds > 0.02 * samples.period)
         && e.drift.is_none_or(|p| {
             p.seconds == 0.0
@@ -178,6 +178,11 @@ pub(super) fn sensible(problem: &Problem<'_>, trial: &Trial) -> bool {
                 && p.hz < 0.9 * nyquist
         })
         && e.interference.is_none_or(|p| p.hz > f64::max(2.5 / longest, MIN_TONE_HZ) && !is_harmonic(problem, p.hz))
+}
+
+/// Returns whether a rate law is that of a first-order lag, u − v = τ v̇, or its expansion, v = u − τ u̇.
+fn is_lag(p: &RateParams) -> bool {
+    p.law != RateLaw::Holds && (1.0 - p.exponent).abs() < LAW_ACCURACY
 }
 
 /// Returns whether a settling process with this time constant \[s\] outlasts the unknown memory from before the record.

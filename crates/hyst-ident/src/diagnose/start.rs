@@ -14,7 +14,7 @@ use crate::lsq::Blocks;
 use crate::memory;
 use crate::nested::{Hypothesis, Problem};
 use crate::samples::Samples;
-use crate::settle::{start_up_rows, without_beginnings};
+use crate::settle::{start_up_rows, started, without_beginnings};
 
 /// Maximum number of estimates of the last reversals, each from the previous one.
 const RECALLS: usize = 2;
@@ -42,32 +42,27 @@ impl OwnModel<'_> {
             _ => None,
         };
         let better = [behind, before].into_iter().flatten().min_by(|a, b| a.cv_rmse.total_cmp(&b.cv_rmse));
-        Ok(better.map(|start| start.samples).filter(|start| self.is_another(start)))
+        let is_another = |start: &Samples| start.settling != self.samples.settling || start.pasts != self.samples.pasts;
+        Ok(better.map(|start| start.samples).filter(is_another))
     }
 
-    /// Returns the record with the starts that the model's base shows with the effects found; `None` if they are
-    /// unchanged.
-    pub(super) fn start(&self, hypothesis: &Hypothesis, richest: f64) -> Result<Option<Samples>, FitError> {
-        let start = self.started(hypothesis, richest, None)?;
-        Ok(start.map(|start| start.samples).filter(|start| self.is_another(start)))
+    /// Returns the record with the starts that the model's base shows with the effects found; `None` if the extended model
+    /// would take these by itself.
+    pub(super) fn start(&self, hypothesis: &Hypothesis, noise: f64) -> Result<Option<Samples>, FitError> {
+        // The error of the rich base is no measure: it does not know the start either. If rows are left out as start-up,
+        // even a model that leaves only noise in the other rows may be improved.
+        let least = if started(self.samples, &self.samples.settling).contains(&true) { 0.0 } else { noise };
+        let start = self.started(hypothesis, least, None)?.map(|start| start.samples);
+        Ok(start.filter(|start| start.settling != self.before.settling || start.pasts != self.samples.pasts))
     }
 
-    fn is_another(&self, start: &Samples) -> bool {
-        start.settling != self.samples.settling || start.pasts != self.samples.pasts
-    }
-
-    /// Estimates the start of each segment, with a curve on one side if given. Returns `None` if nothing is missing or
-    /// no curve can be fitted.
-    fn started(
-        &self,
-        hypothesis: &Hypothesis,
-        richest: f64,
-        side: Option<CurveSide>,
-    ) -> Result<Option<Start>, FitError> {
+    /// Estimates the start of each segment, with a curve on one side if given. Returns `None` if the error is not above
+    /// `least`, or if no curve can be fitted.
+    fn started(&self, hypothesis: &Hypothesis, least: f64, side: Option<CurveSide>) -> Result<Option<Start>, FitError> {
         let stage = |e| self.stage(e);
         let blocks = Blocks::new(self.samples, BLOCKS, SHAPE_ROWS);
         let plain = shape::plain(&self.on(self.basis, &blocks), hypothesis).map_err(stage)?;
-        if plain.is_none_or(|plain| shape::is_complete(&plain, richest)) {
+        if plain.is_none_or(|plain| shape::is_complete(&plain, least)) {
             return Ok(None);
         }
         // Near 0 V only if nothing but the start is unknown.
@@ -100,7 +95,7 @@ impl OwnModel<'_> {
         let late = without_beginnings(self.samples);
         let mut known = memory::with_histories(&late, &asked, &mut |samples| squares(samples))?;
         // Then the last reversals, as far as the first rows show them. The remaining rows are start-up.
-        let all = |samples: &Samples| squares(&Samples { settling: self.samples.settling.clone(), ..samples.clone() });
+        let all = |samples: &Samples| squares(&Samples { settling: samples.blind.clone(), ..samples.clone() });
         for _ in 0..RECALLS {
             let Some((.., pasts)) = fitted(&known, true).map_err(stage)? else { break };
             let next = Samples { pasts: memory::kept(&known.pasts, pasts), ..known.clone() };
@@ -109,9 +104,15 @@ impl OwnModel<'_> {
             }
             known = next;
         }
+        // A new history may explain rows that were start-up before.
+        let mut settling = self.samples.settling.clone();
+        if known.pasts != self.samples.pasts {
+            settling.copy_from_slice(&known.blind);
+            known.settling.copy_from_slice(&known.blind);
+        }
         let Some((trial, residual, _)) = fitted(&known, false).map_err(stage)? else { return Ok(None) };
         let starting = start_up_rows(&known, &residual);
-        known.settling = self.samples.settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
+        known.settling = settling.iter().zip(starting).map(|(known, starts)| *known || starts).collect();
         Ok(Some(Start { samples: known, cv_rmse: trial.cv_rmse() }))
     }
 }

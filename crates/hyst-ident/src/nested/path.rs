@@ -5,10 +5,8 @@ use std::sync::OnceLock;
 
 use hyst_core::{
     Asymmetry, Build, Creep, Delay, Env, Error, Invert, Lag, MAX_DEAD_ZONES, Rate, Resonance, Sampling, Saturation,
-    SaturationInverse, Stage, Temperature, TemperatureParams, Widening, WideningParams,
+    SaturationInverse, Stage, Temperature, TemperatureParams, Widening,
 };
-
-use rayon::prelude::*;
 
 use super::Hypothesis;
 use crate::Samples;
@@ -16,6 +14,7 @@ use crate::base::SIDE_BY_SIDE;
 use crate::model::InputSide;
 use crate::model::capacity::{CREEP, DELAY};
 use crate::samples::PerSegment;
+use crate::widened;
 
 /// The stages before and behind the hysteresis, for one hypothesis.
 pub(crate) struct SignalPath<'a> {
@@ -26,9 +25,8 @@ pub(crate) struct SignalPath<'a> {
     lag: Option<PerSegment<Lag<f64>>>,
     rate: Option<PerSegment<Rate<f64>>>,
     curve: Option<Asymmetry<f64, MAX_DEAD_ZONES>>,
-    /// Each play operator of the widening, with weight one.
-    widening: Vec<PerSegment<Widening<f64>>>,
-    /// Their columns; computed on first use.
+    widening: Option<PerSegment<Widening<f64>>>,
+    /// Columns of the play operators of the widening, with weight one; computed on first use.
     widening_columns: OnceLock<Vec<Vec<f64>>>,
     thermal_state: Option<ThermalState>,
     creep: Option<PerSegment<Creep<f64, CREEP>>>,
@@ -61,12 +59,7 @@ impl<'a> SignalPath<'a> {
             rate: rate.map(|p| for_each(samples, &p)).transpose()?,
             curve: curve.map(|p| p.build(&())).transpose()?,
             widening_columns: OnceLock::new(),
-            widening: effects
-                .widening
-                .iter()
-                .flat_map(each_play)
-                .map(|p| for_each(samples, &p))
-                .collect::<Result<_, _>>()?,
+            widening: effects.widening.as_ref().map(|p| for_each(samples, p)).transpose()?,
             thermal_state: thermal_state.flatten(),
             creep: effects.creep.as_ref().map(|p| for_each(samples, p)).transpose()?,
             resonances: effects.resonances.iter().map(|p| for_each(samples, p)).collect::<Result<_, _>>()?,
@@ -114,26 +107,14 @@ impl<'a> SignalPath<'a> {
     }
 
     fn computed_widening(&self) -> Vec<Vec<f64>> {
-        if self.widening.is_empty() {
-            return Vec::new();
+        let Some(stages) = &self.widening else { return Vec::new() };
+        let (drive, segments) = (self.input_side(), &self.samples.segments);
+        let mut columns =
+            widened::columns(stages.of(0).plays(), |i| Some(stages.of(i)), &drive, segments, &self.pasts());
+        if self.samples.falls {
+            columns.iter_mut().flatten().for_each(|x| *x = -*x);
         }
-        let (drive, pasts, env) = (self.input_side(), self.pasts(), Env::default());
-        let sign = if self.samples.falls { -1.0 } else { 1.0 };
-        let column = |stages: &PerSegment<Widening<f64>>| {
-            let mut column = vec![0.0; drive.len()];
-            for (i, segment) in self.samples.segments.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
-                let stage = stages.of(i);
-                let mut state = stage.state();
-                pasts.get(i).into_iter().flatten().for_each(|u| stage.rest(&mut state, *u));
-                // The device has rested at its first input.
-                stage.rest(&mut state, drive[segment.start]);
-                for k in segment.clone().skip(1) {
-                    column[k] = sign * stage.step(&mut state, &env, drive[k]);
-                }
-            }
-            column
-        };
-        self.widening.par_iter().map(column).collect()
+        columns
     }
 
     /// Adds the widening with these weights.
@@ -236,13 +217,6 @@ impl<'a> SignalPath<'a> {
     }
 }
 
-/// Returns one widening per play operator, with weight one.
-fn each_play(p: &WideningParams<Vec<f64>>) -> impl Iterator<Item = WideningParams<[f64; 1]>> + use<> {
-    let WideningParams { growth, exponent, reference_rate, seconds, .. } = *p;
-    let of = move |r| WideningParams { growth, exponent, reference_rate, seconds, thresholds: [r], weights: [1.0] };
-    p.thresholds.clone().into_iter().map(of)
-}
-
 /// Effect of the temperature in each row.
 pub(crate) struct ThermalState {
     /// Gain factor.
@@ -291,7 +265,7 @@ pub(crate) fn limit_slope(drive: &mut [f64], samples: &Samples, v_per_s: f64) {
 mod tests {
     use super::*;
     use crate::model::Effects;
-    use hyst_core::{CreepParams, ResonanceParams};
+    use hyst_core::{CreepParams, ResonanceParams, WideningParams};
 
     /// The weighted play operators add up to the chain's stage, also after a drive history.
     #[test]
